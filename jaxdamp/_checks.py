@@ -1,0 +1,49 @@
+"""Checks of arguments. Every message names the argument, shows its value and says what to do instead."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any, NoReturn
+
+import jax
+import numpy as np
+
+
+def refuse(argument: str, must: str, value: Any, remedy: str = "") -> NoReturn:
+    """Raise the `ValueError` that all checks share."""
+    remedy = f" {remedy}" if remedy else ""
+    raise ValueError(f"Argument `{argument}` must {must}, but is {value}.{remedy}")
+
+
+def concrete(value: Any) -> np.ndarray | None:
+    """The value as a NumPy array, or `None` while JAX traces it (traced values cannot be checked)."""
+    return None if isinstance(value, jax.core.Tracer) else np.asarray(value)
+
+
+def finite(argument: str, value: Any, remedy: str = "Look for NaN or a division by zero where it was made.") -> None:
+    """Refuse NaN and infinity."""
+    array = concrete(value)
+    if array is not None and not np.all(np.isfinite(array)):
+        refuse(argument, "be finite", array, remedy)
+
+
+def positive(argument: str, value: Any, remedy: str = "") -> None:
+    """Refuse anything that is not finite and greater than zero."""
+    array = concrete(value)
+    if array is not None and not (np.all(np.isfinite(array)) and np.all(array > 0)):
+        refuse(argument, "be positive and finite", array, remedy)
+
+
+def nonnegative(argument: str, value: Any, remedy: str = "") -> None:
+    """Refuse anything that is not finite and at least zero."""
+    array = concrete(value)
+    if array is not None and not (np.all(np.isfinite(array)) and np.all(array >= 0)):
+        refuse(argument, "be finite and not negative", array, remedy)
+
+
+def one_of(argument: str, value: str, choices: Iterable[str]) -> None:
+    """Refuse a word that is not among the choices; suggest the nearest one."""
+    choices = list(choices)
+    if value not in choices:
+        near = get_close_matches(value, choices, 1)
+        hint = f"Did you mean {near[0]!r}?" if near else ""
+        refuse(argument, f"be one of {', '.join(map(repr, choices))}", repr(value), hint)
