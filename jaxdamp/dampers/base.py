@@ -1,0 +1,165 @@
+"""The damper contract: what every law offers, and the sum and the scaling of laws.
+
+Stroke x [m] and velocity v [m/s] are positive in extension (rebound), the force [N] is positive when it resists
+extension: a passive law takes in energy, ∮ F v dt ≥ 0. One instance is one damper; batches are made with `jax.vmap`.
+"""
+
+from abc import abstractmethod
+from typing import Any, ClassVar, final
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.parameters import check_parameters, parameter
+
+
+class AbstractDamper(eqx.Module):
+    """A force law between two points, with a flat array of states (empty for memoryless laws).
+
+    A law whose states are fast compared with a step of about a millisecond derives from this class and brings its own
+    `advance`, exact or implicit. Other laws derive from `AbstractStateful` or `AbstractMemoryless`, which bring it.
+    """
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
+
+    @abstractmethod
+    def initial_state(self) -> State:
+        """The states of a damper at rest that carries no dynamic force."""
+
+    @abstractmethod
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Force [N] at stroke x [m], velocity v [m/s] and these states."""
+
+    @abstractmethod
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """Time derivative of the states [1/s], for solvers of ordinary differential equations."""
+
+    @abstractmethod
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """The states after a step dt [s] over which stroke and velocity go from (x0, v0) to (x1, v1)."""
+
+    def __add__(self, other: "AbstractDamper") -> "AbstractDamper":
+        """Two laws side by side: forces add."""
+        if not isinstance(other, AbstractDamper):
+            return NotImplemented
+        mine = self.terms if isinstance(self, Sum) else (self,)
+        theirs = other.terms if isinstance(other, Sum) else (other,)
+        return Sum(mine + theirs)
+
+    def __mul__(self, factor: Any) -> "AbstractDamper":
+        """The force times a factor."""
+        if isinstance(factor, AbstractDamper):
+            return NotImplemented
+        return Scaled(self, factor)
+
+    __rmul__ = __mul__
+
+
+class AbstractMemoryless(AbstractDamper):
+    """A law whose force depends on the velocity alone: it has one method, `force_velocity`."""
+
+    @abstractmethod
+    def force_velocity(self, v: ScalarLike) -> Scalar:
+        """Force [N] at velocity v [m/s]."""
+
+    def initial_state(self) -> State:
+        """No states."""
+        return jnp.zeros(0)
+
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Force [N] at velocity v [m/s]."""
+        del x, state
+        return self.force_velocity(v)
+
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """No states."""
+        del x, v
+        return state
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """No states."""
+        del x0, v0, x1, v1, dt
+        return state
+
+
+class AbstractStateful(AbstractDamper):
+    """A law with states that change slowly over a step: the step is Heun's, second order and explicit."""
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """Heun's second-order step."""
+        rate = self.state_rate(x0, v0, state)
+        return state + 0.5 * dt * (rate + self.state_rate(x1, v1, state + dt * rate))
+
+
+def _states_of(terms: tuple[AbstractDamper, ...], state: Float[Array, " states"]) -> list[State]:
+    """Cut the concatenated states of several laws into theirs."""
+    sizes = [eqx.filter_eval_shape(term.initial_state).size for term in terms]
+    ends = [sum(sizes[: i + 1]) for i in range(len(sizes))]
+    return [state[end - size : end] for size, end in zip(sizes, ends, strict=True)]
+
+
+@final
+class Sum(AbstractDamper):
+    """Laws side by side, F = Σ Fᵢ; made by `law + law`. States are concatenated in order."""
+
+    terms: tuple[AbstractDamper, ...]
+
+    preserves_linearity: ClassVar[bool] = True
+
+    def initial_state(self) -> State:
+        """The states of all terms."""
+        return jnp.concatenate([term.initial_state() for term in self.terms])
+
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Sum of the forces [N]."""
+        pairs = zip(self.terms, _states_of(self.terms, state), strict=True)
+        return jnp.sum(jnp.stack([term.force(x, v, s) for term, s in pairs]))
+
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """Rates of all terms."""
+        pairs = zip(self.terms, _states_of(self.terms, state), strict=True)
+        return jnp.concatenate([term.state_rate(x, v, s) for term, s in pairs])
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """Every term takes its own step."""
+        pairs = zip(self.terms, _states_of(self.terms, state), strict=True)
+        return jnp.concatenate([term.advance(x0, v0, x1, v1, s, dt) for term, s in pairs])
+
+
+@final
+class Scaled(AbstractDamper):
+    """A law whose force is multiplied by a factor, F = factor · F_law; made by `2.0 * law`."""
+
+    law: AbstractDamper
+    factor: Number = parameter("", "factor on the force")
+
+    preserves_linearity: ClassVar[bool] = True
+
+    def initial_state(self) -> State:
+        """The states of the law."""
+        return self.law.initial_state()
+
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Force [N]."""
+        return self.factor * self.law.force(x, v, state)
+
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """Rates of the law."""
+        return self.law.state_rate(x, v, state)
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """The step of the law."""
+        return self.law.advance(x0, v0, x1, v1, state, dt)

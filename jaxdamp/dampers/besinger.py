@@ -1,0 +1,112 @@
+"""The seven-parameter law of Besinger, Cebon and Cole, as paper 001 uses it for a heavy vehicle."""
+
+import warnings
+from typing import final
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp._types import Number, Scalar, ScalarLike
+from jaxdamp.dampers._guesses import secant_rate
+from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.parameters import parameter, positive
+
+
+def transition_rate(
+    v: ScalarLike, compression_rate: ScalarLike, rebound_rate: ScalarLike, transition_velocity: ScalarLike
+) -> Scalar:
+    """C(v) = c₁ u/√(1+u²) + c₂ [N s/m], u = (v − α)/α, c₁ = (C_e − C_c)/2, c₂ = (C_e + C_c)/2.
+
+    C goes from C_c far in compression to C_e far in rebound. Paper 001 prints c₁ twice; the second is c₂.
+    """
+    u = v / transition_velocity - 1.0
+    c1 = 0.5 * (rebound_rate - compression_rate)
+    c2 = 0.5 * (rebound_rate + compression_rate)
+    return c1 * u / jnp.sqrt(1.0 + u * u) + c2
+
+
+@final
+class Besinger(AbstractMemoryless):
+    """Paper 001: F = C(v) v below the limit velocity, F = C_e v_open + C_b (v − v_open) above, when the valve is open.
+
+    C(v) passes smoothly from C_c to C_e (`transition_rate`). The opening velocity is not a parameter of its own:
+    continuity at v_lim gives v_open = v_lim (C(v_lim) − C_b)/(C_e − C_b). With v_open = v_lim, as the paper's text
+    suggests, the force jumps. The slope changes at v_lim. F grows with v everywhere if C_c > 0.0067 C_e and C_b > 0.
+    C_e must differ from C_b only for `opening_velocity` to exist, not for the force.
+
+    Valid below 10 Hz and 1 m/s (paper 001); above 10 Hz put a `SeriesSpring` or a `Lag` around it. Needs data on both
+    sides of v_lim and of α: a test that stays below leaves C_b, C_e and α undetermined.
+
+    >>> law = Besinger(14_400.0, 15_600.0, 3_600.0, limit_velocity=0.125, transition_velocity=0.7)
+    >>> round(float(law.opening_velocity()), 6), round(float(law.force_velocity(0.3)), 4)
+    (0.114783, 2457.3945)
+    """
+
+    compression_rate: Number = parameter("N s/m", "C_c, damping coefficient far in compression", positive)
+    rebound_rate: Number = parameter("N s/m", "C_e, damping coefficient in rebound, valve closed", positive)
+    blow_off_rate: Number = parameter("N s/m", "C_b, slope in rebound, valve open", positive)
+    limit_velocity: Number = parameter("m/s", "v_lim, rebound velocity where the valve opens", positive)
+    transition_velocity: Number = parameter("m/s", "α, centre and width of the change from C_c to C_e", positive)
+
+    def force_velocity(self, v: ScalarLike) -> Scalar:
+        """Force [N] at velocity v [m/s]."""
+        closed = jnp.minimum(v, self.limit_velocity)
+        rate = transition_rate(closed, self.compression_rate, self.rebound_rate, self.transition_velocity)
+        return rate * closed + self.blow_off_rate * jnp.maximum(v - self.limit_velocity, 0.0)
+
+    def opening_velocity(self) -> Scalar:
+        """v_open [m/s], where the blow-off line meets the line C_e v."""
+        at_limit = transition_rate(
+            self.limit_velocity, self.compression_rate, self.rebound_rate, self.transition_velocity
+        )
+        return self.limit_velocity * (at_limit - self.blow_off_rate) / (self.rebound_rate - self.blow_off_rate)
+
+    @classmethod
+    def from_printed(
+        cls, c_c: float, c_e: float, c_b: float, v_lim: float, alpha: float, v_open: float | None = None
+    ) -> "Besinger":
+        """Read a parameter set made for the formula as paper 001 prints it, coefficients in N s/m, velocities in m/s.
+
+        The printed formula has v_open as a free number (v_lim if it is left out) and then jumps at v_lim. The law made
+        here derives v_open, is continuous, and equals the printed formula below v_lim; above it the force is lower or
+        higher by the jump. A warning states the jump.
+        """
+        law = cls(c_c, c_e, c_b, v_lim, alpha)
+        v_open = v_lim if v_open is None else v_open
+        above = c_e * v_open + c_b * (v_lim - v_open)
+        below = float(law.force_velocity(v_lim))
+        jump = above - below
+        if abs(jump) > 1e-6 * abs(below):
+            warnings.warn(
+                f"The printed formula with v_open = {v_open:g} m/s jumps by {jump:+.4g} N ({100 * jump / below:+.2g} %)"
+                f" at v_lim = {v_lim:g} m/s; continuity needs v_open = {float(law.opening_velocity()):.6g} m/s, which"
+                " is used instead. A jump breaks solvers and gradients.",
+                stacklevel=2,
+            )
+        return law
+
+    @classmethod
+    def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "Besinger":
+        """Start values from measured data: secant slopes; the rebound knee where the mean curve leaves them."""
+        velocity, force = np.asarray(velocity), np.asarray(force)
+        top = max(float(velocity.max()), 1e-6)
+        low = secant_rate(velocity, force, 1, 0.0, 0.1)
+        knees = top * np.linspace(0.05, 0.9, 35)
+        use = velocity > 0
+        v, f = (velocity[use], force[use]) if use.any() else (np.array([top]), np.array([low * top]))
+        best = (np.inf, low, 0.3 * low, 0.5 * top)
+        for knee in knees:
+            columns = np.stack([np.minimum(v, knee), np.maximum(v - knee, 0.0)], axis=1)
+            slopes = np.linalg.lstsq(columns, f, rcond=None)[0]
+            error = float(np.sum((columns @ slopes - f) ** 2))
+            if error < best[0]:
+                best = (error, float(slopes[0]), float(slopes[1]), float(knee))
+        _, rebound, blow_off, knee = best
+        rebound = max(rebound, 1.0)
+        return cls(
+            compression_rate=max(secant_rate(velocity, force, -1), 0.02 * rebound),
+            rebound_rate=rebound,
+            blow_off_rate=float(np.clip(blow_off, 0.05 * rebound, None)),
+            limit_velocity=knee,
+            transition_velocity=0.3 * knee,
+        )

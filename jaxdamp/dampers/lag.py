@@ -1,0 +1,55 @@
+"""A law whose force follows with a first-order lag."""
+
+from typing import ClassVar, final
+
+import jax.numpy as jnp
+
+from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.parameters import parameter, positive
+
+
+@final
+class Lag(AbstractDamper):
+    """τ Ḟ + F = F_law: the force of any law behind a first-order lag. One state, the force.
+
+    Oil and hose compressibility make the force trail the velocity. For a linear law the loop of a sine is that of a
+    spring c/τ in series; |F(v = 0)|/F_peak = ωτ/√(1 + (ωτ)²). The step is exact for a law force that is linear over
+    the step, so any τ is stable and τ ≪ dt gives the law itself.
+
+    >>> from jaxdamp.dampers import Linear
+    >>> Lag(Linear(2000.0), lag_time=0.004).initial_state().shape
+    (1,)
+    """
+
+    law: AbstractDamper
+    lag_time: Number = parameter("s", "time constant of the lag", positive)
+
+    preserves_linearity: ClassVar[bool] = True
+
+    def initial_state(self) -> State:
+        """No force; then the states of the law."""
+        return jnp.concatenate([jnp.zeros(1), self.law.initial_state()])
+
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Force [N]."""
+        del x, v
+        return state[0]
+
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """Rates of the force [N/s] and of the law's states."""
+        rate = (self.law.force(x, v, state[1:]) - state[0]) / self.lag_time
+        return jnp.concatenate([rate[None], self.law.state_rate(x, v, state[1:])])
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """Exact for a law force linear over the step."""
+        inner = self.law.advance(x0, v0, x1, v1, state[1:], dt)
+        before = self.law.force(x0, v0, state[1:])
+        after = self.law.force(x1, v1, inner)
+        z = dt / self.lag_time
+        kept = jnp.exp(-z)
+        mean = -jnp.expm1(-z) / z
+        force = kept * state[0] + (mean - kept) * before + (1.0 - mean) * after
+        return jnp.concatenate([force[None], inner])

@@ -1,0 +1,33 @@
+"""Viscous damper."""
+
+from typing import final
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxdamp._types import Number, Scalar, ScalarLike
+from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.parameters import parameter, positive
+
+
+@final
+class Linear(AbstractMemoryless):
+    """F = c v, the law of the textbooks (paper 000, eq. 3).
+
+    Valid where the flow through the valves is laminar; real dampers are stiffer at low velocity and softer in
+    compression.
+
+    >>> round(float(Linear(2500.0).force_velocity(0.2)), 6)
+    500.0
+    """
+
+    rate: Number = parameter("N s/m", "damping coefficient", positive, linear=True)
+
+    def force_velocity(self, v: ScalarLike) -> Scalar:
+        """Force [N] at velocity v [m/s]."""
+        return self.rate * v
+
+    @classmethod
+    def guess(cls, velocity: Float[Array, " samples"], force: Float[Array, " samples"]) -> "Linear":
+        """Start value from measured data: least squares through the origin."""
+        return cls(jnp.maximum(jnp.vdot(velocity, force) / jnp.vdot(velocity, velocity), 1.0))

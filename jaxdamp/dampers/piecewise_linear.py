@@ -1,0 +1,61 @@
+"""Several slopes between knots."""
+
+from typing import final
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import Number, Scalar, ScalarLike, Vector
+from jaxdamp.dampers._guesses import velocity_grid
+from jaxdamp.dampers._hinges import hinges
+from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.parameters import check_parameters, increasing, nonnegative, parameter, positive, real, setting
+
+
+@final
+class PiecewiseLinear(AbstractMemoryless):
+    """F(v) continuous with slope sₖ between the knots vₖ, and F(0) = 0.
+
+    F = s₀ v + Σ (sₖ − sₖ₋₁) max(v − vₖ, 0) − const. With `monotone` (the default) all slopes are positive, so the law
+    is passive and can be inverted. A knee width w rounds the knots: max(u, 0) becomes w ln(1 + exp(u/w)).
+
+    Arguments:
+        knots: velocities [m/s] where the slope changes, strictly increasing, shape (k,).
+        slopes: slopes [N s/m], shape (k+1,): below the first knot, between the knots, above the last.
+        knee_width: width [m/s] of the rounding, 0 for sharp knees.
+        monotone: allow positive slopes only.
+
+    >>> law = PiecewiseLinear(knots=[-0.1, 0.1], slopes=[500.0, 2000.0, 800.0])
+    >>> [round(float(law.force_velocity(v)), 6) for v in (0.0, 0.1, 0.2, -0.2)]
+    [0.0, 200.0, 280.0, -250.0]
+    """
+
+    knots: Vector = parameter("m/s", "velocities where the slope changes", increasing)
+    slopes: Vector = parameter(
+        "N s/m", "slopes between the knots", lambda law: positive if law.monotone else real, linear=True
+    )
+    knee_width: Number = setting("m/s", "width over which the knees are rounded", nonnegative, default=0.0)
+    monotone: bool = eqx.field(static=True, default=True)
+
+    def __check_init__(self) -> None:
+        if self.knots.ndim != 1 or self.slopes.shape != (self.knots.size + 1,):
+            must = "hold one slope more than there are knots"
+            _checks.refuse("slopes", must, f"of shape {self.slopes.shape} beside knots of shape {self.knots.shape}")
+        check_parameters(self)
+
+    def force_velocity(self, v: ScalarLike) -> Scalar:
+        """Force [N] at velocity v [m/s]."""
+        return hinges(v, self.knots, self.slopes, self.knee_width)
+
+    @classmethod
+    def guess(cls, velocity: np.ndarray, force: np.ndarray, knots_a_side: int = 3) -> "PiecewiseLinear":
+        """Start values from measured data: knots closer together towards zero, slopes by least squares."""
+        velocity, force = np.asarray(velocity), np.asarray(force)
+        knots = velocity_grid(velocity, knots_a_side + 1)[1:-1]
+        knots = np.delete(knots, knots_a_side)  # the kink at zero is left to the two innermost knots
+        columns = [velocity] + [np.maximum(velocity - k, 0.0) - max(-k, 0.0) for k in knots]
+        jumps = np.linalg.lstsq(np.stack(columns, axis=1), force, rcond=None)[0]
+        slopes = np.cumsum(jumps)
+        return cls(knots, np.maximum(slopes, 0.02 * max(slopes.max(), 1.0)))

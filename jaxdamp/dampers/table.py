@@ -1,0 +1,55 @@
+"""Force-velocity points, as vehicle simulators exchange them."""
+
+from typing import final
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, Vector
+from jaxdamp.dampers._guesses import velocity_grid
+from jaxdamp.dampers._hinges import hinges
+from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.parameters import check_parameters, increasing, parameter, setting
+
+
+@final
+class Table(AbstractMemoryless):
+    """Straight lines between the points (vₖ, Fₖ); beyond the first and last point the end slopes go on.
+
+    Arguments:
+        velocity: strictly increasing velocities [m/s], shape (k,), k ≥ 2. Fixed: a fit changes the forces.
+        force: forces [N] at these velocities, shape (k,).
+
+    >>> law = Table(velocity=[-1.0, 0.0, 0.2, 1.0], force=[-900.0, 0.0, 700.0, 1900.0])
+    >>> [round(float(law.force_velocity(v)), 6) for v in (0.1, 0.6, 1.2)]
+    [350.0, 1300.0, 2200.0]
+    """
+
+    velocity: Vector = setting("m/s", "velocities of the points", increasing)
+    force_points: Vector = parameter("N", "forces at the points", linear=True)
+
+    def __init__(self, velocity: Float[Array, " points"] | list, force: Float[Array, " points"] | list) -> None:
+        self.velocity = jnp.asarray(velocity, dtype=float)
+        self.force_points = jnp.asarray(force, dtype=float)
+
+    def __check_init__(self) -> None:
+        if self.velocity.ndim != 1 or self.velocity.size < 2 or self.force_points.shape != self.velocity.shape:
+            must = "hold two or more points, one force for each velocity"
+            _checks.refuse("force", must, f"of shape {self.force_points.shape} beside {self.velocity.shape} velocities")
+        check_parameters(self)
+
+    def force_velocity(self, v: ScalarLike) -> Scalar:
+        """Force [N] at velocity v [m/s]."""
+        slopes = jnp.diff(self.force_points) / jnp.diff(self.velocity)
+        knots = self.velocity[1:-1]
+        shift = self.velocity[0]
+        return self.force_points[0] + hinges(v - shift, knots - shift, slopes, 0.0)
+
+    @classmethod
+    def guess(cls, velocity: np.ndarray, force: np.ndarray, points_a_side: int = 6) -> "Table":
+        """Points from measured data by least squares, closer together towards zero velocity."""
+        grid = velocity_grid(np.asarray(velocity), points_a_side)
+        hats = np.stack([np.interp(velocity, grid, unit) for unit in np.eye(grid.size)], axis=1)
+        return cls(grid, np.linalg.lstsq(hats, np.asarray(force), rcond=None)[0])
