@@ -1,0 +1,64 @@
+"""What a damper takes out of the motion."""
+
+import jax.numpy as jnp
+
+from .. import _checks
+from .._types import Scalar, ScalarLike, Signal, SignalLike
+from ._signals import as_signal, same_length
+
+
+def _trapezoid(signal: Signal) -> Scalar:
+    """Integral over time, in units of the sampling interval, ends counted half."""
+    return signal.sum() - 0.5 * (signal[0] + signal[-1])
+
+
+def dissipated_energy(force: SignalLike, velocity: SignalLike, dt: ScalarLike | int) -> Scalar:
+    """The work done on the damper over the record, E = int F v dt [J], by the trapezoidal rule.
+
+    Positive when the damper takes energy out of the motion, with the signs of this library: force resisting extension
+    and velocity in extension are positive. For one or more whole cycles of a steady motion it is the area of the
+    force-stroke loops; elastic parts of the force then cancel. Differentiable.
+
+    >>> import jax.numpy as jnp
+    >>> time = jnp.linspace(0.0, 1.0, 1001)
+    >>> v = 0.5 * jnp.cos(2.0 * jnp.pi * time)
+    >>> round(float(dissipated_energy(2000.0 * v, v, 0.001)), 6)  # c V^2 T/2
+    250.0
+
+    Args:
+        force: Damper force [N], shape [time].
+        velocity: Damper velocity [m/s], shape [time].
+        dt: The sampling interval [s].
+
+    Raises:
+        ValueError: If the lengths differ, if there are fewer than two samples, or if `dt` is not positive.
+    """
+    force, velocity = as_signal("force", force, least=2), as_signal("velocity", velocity, least=2)
+    same_length("force", force, "velocity", velocity)
+    _checks.positive("dt", dt, "It is the sampling interval in s.")
+    return _trapezoid(force * velocity) * jnp.asarray(dt, force.dtype)
+
+
+def equivalent_damping(force: SignalLike, velocity: SignalLike) -> Scalar:
+    """The rate of the linear damper that dissipates as much in the same motion, c = int F v dt / int v^2 dt [N s/m].
+
+    For whole cycles of a sine with amplitude X and angular frequency w it is the usual E/(pi w X^2), with E the
+    energy of one cycle; it holds for any other motion as well. The record should span whole cycles, or be long, so
+    that elastic and gas forces cancel. Differentiable; NaN if the damper does not move.
+
+    >>> import jax.numpy as jnp
+    >>> time = jnp.linspace(0.0, 1.0, 1001)
+    >>> v = 0.5 * jnp.cos(2.0 * jnp.pi * time)
+    >>> round(float(equivalent_damping(1000.0 * v**3, v)), 4)  # 3/4 of 1000 V^2
+    187.5
+
+    Args:
+        force: Damper force [N], shape [time]; positive resists extension.
+        velocity: Damper velocity [m/s], shape [time]; positive in extension.
+
+    Raises:
+        ValueError: If the lengths differ, or if there are fewer than two samples.
+    """
+    force, velocity = as_signal("force", force, least=2), as_signal("velocity", velocity, least=2)
+    same_length("force", force, "velocity", velocity)
+    return _trapezoid(force * velocity) / _trapezoid(velocity * velocity)

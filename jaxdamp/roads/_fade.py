@@ -1,0 +1,16 @@
+"""A smooth rise from nothing to one, shared by the step and by roads that must start on level ground."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .._types import Scalar, Signal
+
+
+def raised_cosine(fraction: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
+    """S(s) = (1 - cos(pi s))/2 for 0 <= s <= 1, 0 before and 1 after; continuous with its slope."""
+    return 0.5 * (1.0 - jnp.cos(jnp.pi * jnp.clip(fraction, 0.0, 1.0)))
+
+
+def fade_in(time: Signal, ramp: float) -> Signal | Scalar:
+    """The factor that lets a road begin at height and slope zero: S(t/ramp), or 1 throughout if `ramp` [s] is zero."""
+    return raised_cosine(time / ramp) if ramp else jnp.ones((), time.dtype)

@@ -1,0 +1,85 @@
+"""Roads made of uniformly spaced samples."""
+
+from typing import final
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .. import _checks
+from .._types import Scalar, Signal, SignalLike
+from ._fade import fade_in
+from .base import AbstractRoad
+
+
+# How far outside the record a time may lie before it is refused, in samples: rounding must not count.
+_TOLERANCE = 1e-3
+
+
+def interpolate(
+    samples: Float[Array, "samples wheels"], index: Signal, *, periodic: bool
+) -> Float[Array, "time wheels"]:
+    """Straight lines between uniform samples at a fractional `index`; NaN beyond the record unless `periodic`."""
+    size = samples.shape[0]
+    if periodic:
+        index = index - size * jnp.floor(index / size)
+        inside = None
+        left = jnp.clip(jnp.floor(index).astype(int), 0, size - 1)
+    else:
+        inside = (index >= -_TOLERANCE) & (index <= size - 1 + _TOLERANCE)
+        left = jnp.clip(jnp.floor(index).astype(int), 0, size - 2)
+    fraction = (index - left.astype(index.dtype))[:, None]
+    height = (1.0 - fraction) * samples[left] + fraction * samples[(left + 1) % size]
+    return height if inside is None else jnp.where(inside[:, None], height, jnp.nan)
+
+
+@final
+class SampledRoad(AbstractRoad):
+    """Samples at equal spacing in time, or in distance when there is a `speed`."""
+
+    samples: Float[Array, "samples wheels"]
+    speed: Scalar | None
+    spacing: float = eqx.field(static=True)  # [s], or [m] with a speed
+    periodic: bool = eqx.field(static=True)
+    ramp: float = eqx.field(static=True)
+
+    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
+        """The height [m] at each `time` [s], by linear interpolation between the samples.
+
+        Times outside the record of a road that is not periodic raise a `ValueError`, or give NaN where they are
+        traced.
+        """
+        self._refuse_outside(time)
+        return self._interpolated(jnp.asarray(time, self.samples.dtype))
+
+    @eqx.filter_jit
+    def _interpolated(self, time: Signal) -> Float[Array, "time wheels"]:
+        rate = 1.0 / self.spacing if self.speed is None else self.speed / self.spacing
+        height = interpolate(self.samples, time * rate, periodic=self.periodic)
+        return height * jnp.reshape(fade_in(time, self.ramp), (-1, 1))
+
+    @property
+    def grid(self) -> float | None:
+        """The spacing of the samples [s]."""
+        if self.speed is None:
+            return self.spacing
+        speed = _checks.concrete(self.speed)
+        return None if speed is None else self.spacing / float(speed)
+
+    @property
+    def duration(self) -> float | None:
+        """The time [s] from the first sample to the last, or to the first repeated one if the road is periodic."""
+        intervals = self.samples.shape[0] - (0 if self.periodic else 1)
+        return None if self.grid is None else intervals * self.grid
+
+    def _refuse_outside(self, time: SignalLike) -> None:
+        times, grid, duration = _checks.concrete(time), self.grid, self.duration
+        if self.periodic or times is None or grid is None or duration is None or times.size == 0:
+            return
+        if times.min() < -_TOLERANCE * grid or times.max() > duration + _TOLERANCE * grid:
+            _checks.refuse(
+                "time",
+                f"stay within this road, which lasts from 0 to {duration:.6g} s",
+                f"from {times.min():.6g} to {times.max():.6g} s",
+                "Ask for a shorter time, give a longer profile, or make the road with periodic=True.",
+            )

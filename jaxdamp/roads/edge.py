@@ -1,0 +1,62 @@
+"""A kerb: the ground rises once and stays up."""
+
+from typing import final
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .. import _checks
+from .._types import Scalar, ScalarLike, SignalLike
+from ._fade import raised_cosine
+from .base import AbstractRoad
+
+
+@final
+class Step(AbstractRoad):
+    """A rounded step in time; made by `step`."""
+
+    rise: Scalar
+    start: Scalar
+    ramp: Scalar
+
+    @eqx.filter_jit
+    def height(self, time: SignalLike) -> Float[Array, "time 1"]:
+        """The height [m] at each `time` [s]; see `step`."""
+        time = jnp.asarray(time, self.rise.dtype)
+        return (self.rise * raised_cosine((time - self.start) / self.ramp))[:, None]
+
+    @property
+    def grid(self) -> None:
+        """A formula has no samples."""
+        return None
+
+    @property
+    def duration(self) -> None:
+        """The ground stays up for ever."""
+        return None
+
+
+def step(height: ScalarLike | int, *, start: ScalarLike | int = 1.0, ramp: ScalarLike | int = 0.01) -> Step:
+    """A step of the ground with a rounded flank, z(t) = H/2 (1 - cos(pi (t - t0)/T)) for t0 <= t <= t0 + T, then H.
+
+    Differentiable in every argument; that is why the ramp cannot be zero. Choose it several time steps long: a ramp
+    shorter than a step of the simulation is seen as a jump.
+
+    >>> import jax.numpy as jnp
+    >>> kerb = step(0.05, start=1.0, ramp=0.02)
+    >>> kerb.height(jnp.array([1.0, 1.01, 1.02, 9.0]))[:, 0].round(6)
+    Array([0.   , 0.025, 0.05 , 0.05 ], dtype=float64)
+
+    Args:
+        height: H, the height of the ground behind the step [m]; negative for a drop.
+        start: t0, the time [s] at which the ground begins to rise.
+        ramp: T, the time [s] of the rise.
+
+    Raises:
+        ValueError: If `height` or `start` is not finite, or `ramp` is not positive.
+    """
+    _checks.finite("height", height)
+    _checks.finite("start", start)
+    _checks.positive("ramp", ramp, "A sudden jump has no derivative: give the rise a few milliseconds.")
+    return Step(rise=jnp.asarray(height, float), start=jnp.asarray(start, float), ramp=jnp.asarray(ramp, float))

@@ -1,0 +1,211 @@
+"""Random roads of the ISO 8608 roughness classes."""
+
+import math
+from typing import final
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .. import _checks
+from .._types import Scalar, ScalarLike, SignalLike
+from ._cosine_sum import cosine_sum
+from ._fade import fade_in
+from ._seed import random_key
+from .base import AbstractRoad
+
+
+REFERENCE_SPATIAL_FREQUENCY = 0.1  # n0 [cycle/m]
+
+ROUGHNESS_PSD = {road_class: 16e-6 * 4.0**k for k, road_class in enumerate("ABCDEFGH")}
+"""Geometric mean of G_d(n0) [m^3] of each class; the limit between two classes is twice the lower mean."""
+
+
+def displacement_psd(
+    spatial_frequency: Float[Array, " lines"], roughness_psd: Scalar, waviness: Scalar
+) -> Float[Array, " lines"]:
+    """G_d(n) = G_d(n0) (n/n0)^-w [m^3], one-sided, n in cycle/m (not rad/m), n0 = 0.1 cycle/m. Source: ISO 8608."""
+    return roughness_psd * (spatial_frequency / REFERENCE_SPATIAL_FREQUENCY) ** -waviness
+
+
+@final
+class Iso8608(AbstractRoad):
+    """A sum of cosines with the spectrum of ISO 8608; made by `iso8608`."""
+
+    roughness_psd: Scalar
+    waviness: Scalar
+    speed: Scalar
+    phase: Float[Array, " lines"]
+    length: float = eqx.field(static=True)
+    band: tuple[float, float] = eqx.field(static=True)
+    ramp: float = eqx.field(static=True)
+
+    @eqx.filter_jit
+    def height(self, time: SignalLike) -> Float[Array, "time 1"]:
+        """The height [m] at each `time` [s]; see `iso8608`."""
+        time = jnp.asarray(time, self.phase.dtype)
+        cycles = self.speed * time / self.length
+        wave = cosine_sum(cycles, self.amplitude, self.phase, first=_first_and_last(self.band, self.length)[0])
+        return (fade_in(time, self.ramp) * wave)[:, None]
+
+    @property
+    def spatial_frequency(self) -> Float[Array, " lines"]:
+        """The spatial frequencies of the cosines [cycle/m]: all multiples of 1/length within the band."""
+        first, last = _first_and_last(self.band, self.length)
+        return jnp.arange(first, last + 1, dtype=self.phase.dtype) / self.length
+
+    @property
+    def amplitude(self) -> Float[Array, " lines"]:
+        """The amplitudes of the cosines [m], sqrt(2 int G_d dn) over the band nearest to each (by Simpson's rule)."""
+        centre, half = self.spatial_frequency, 0.5 / self.length
+        lower, upper = jnp.clip(centre - half, *self.band), jnp.clip(centre + half, *self.band)
+        ends = [displacement_psd(n, self.roughness_psd, self.waviness) for n in (lower, 0.5 * (lower + upper), upper)]
+        return jnp.sqrt((upper - lower) / 3.0 * (ends[0] + 4.0 * ends[1] + ends[2]))
+
+    @property
+    def grid(self) -> None:
+        """A formula has no samples."""
+        return None
+
+    @property
+    def duration(self) -> float | None:
+        """The time [s] after which the road repeats."""
+        speed = _checks.concrete(self.speed)
+        return None if speed is None else self.length / float(speed)
+
+
+def iso8608(
+    road_class: str | ScalarLike,
+    speed: ScalarLike | int,
+    duration: float | int | None = None,
+    *,
+    seed: int | Array,
+    waviness: ScalarLike | int = 2.0,
+    minimum_spatial_frequency: float = 0.011,
+    maximum_spatial_frequency: float = 2.83,
+    length: float | int | None = None,
+    ramp: float | int = 0.5,
+) -> Iso8608:
+    """A random road of an ISO 8608 roughness class, driven at constant speed.
+
+    Its displacement PSD over spatial frequency is G_d(n) = G_d(n0) (n/n0)^-w; over frequency it is
+    G_d(f/speed)/speed. The road is z(t) = sum_i a_i cos(2 pi n_i V t + phi_i) with n_i = i/length and random phases
+    phi_i. The amplitudes are not random: a_i^2/2 is the integral of G_d over the band 1/length wide around n_i, so
+    each realisation has exactly the variance of the class. It has as many cosines as there are multiples of 1/length
+    in the band (2820 for 1 km), and repeats after `length`.
+
+    Heights are close to Gaussian, with a kurtosis of 3 - 1.5 sum p_i^2, where p_i is the share of a cosine in the
+    variance: 2.96 for the defaults, whose variance lies mostly in the dozens of longest waves. Slopes and vertical
+    velocities are Gaussian for every practical purpose. Because one realisation holds few long waves, judge body
+    motion on several seeds.
+
+    Differentiable in `speed`, `waviness` and a numeric `road_class`; the same ground is then driven faster or is
+    rougher.
+
+    >>> import jax.numpy as jnp
+    >>> road = iso8608("C", speed=20.0, seed=1, ramp=0.0)
+    >>> z = road.height(jnp.linspace(0.0, 50.0, 10_000, endpoint=False))[:, 0]
+    >>> round(float(jnp.sqrt(jnp.mean(z**2))), 6)  # sqrt(256e-6 * 0.1**2 * (1/0.011 - 1/2.83))
+    0.015226
+    >>> road.duration
+    50.0
+
+    Args:
+        road_class: A letter from "A" (very good) to "H" (very poor), standing for the geometric mean of the class, or
+            the roughness G_d(n0) itself [m^3] at n0 = 0.1 cycle/m ("A" is 16e-6, each class four times the one
+            before).
+        speed: V, the speed of the vehicle [m/s].
+        duration: The time [s] the road must last before it repeats; lengthens the road where 1 km is not enough.
+        seed: A whole number, or a JAX random key.
+        waviness: w; 2 in the standard.
+        minimum_spatial_frequency: The lower end of the spectrum [cycle/m]; 0.011 in the standard.
+        maximum_spatial_frequency: The upper end of the spectrum [cycle/m]; 2.83 in the standard. It reaches the
+            frequency 2.83 V: sample the road at more than twice that.
+        length: The distance [m] after which the road repeats; by default the longest of 1000 m, ten of the longest
+            waves, and `speed` times `duration`. The time to compute the road grows with it.
+        ramp: The time [s] over which the road fades in as a raised cosine at the start, so that a vehicle at rest on
+            level ground meets no jump; 0 turns it off.
+
+    Raises:
+        ValueError: If the class is unknown, if `speed`, the roughness or a spatial frequency is not positive, if
+            `waviness` or `ramp` is negative, if the band is empty, if `length` is shorter than the longest wave or
+            than `speed` times `duration`, or if `duration` is given while `speed` is traced (give `length` instead).
+
+    Source: ISO 8608. Not to be confused with the table over rad/m, whose reference is 1 rad/m (1e-6 m^3 for class A).
+    """
+    band = (float(minimum_spatial_frequency), float(maximum_spatial_frequency))
+    _checks.positive("minimum_spatial_frequency", band[0])
+    _checks.finite("maximum_spatial_frequency", band[1])
+    if band[0] >= band[1]:
+        _checks.refuse(
+            "minimum_spatial_frequency",
+            f"be below `maximum_spatial_frequency` ({band[1]} cycle/m)",
+            f"{band[0]} cycle/m",
+            "Exchange them, or widen the band.",
+        )
+    _checks.positive("speed", speed, "Roads are driven forwards; it is in m/s.")
+    _checks.nonnegative("waviness", waviness, "The standard uses 2.")
+    _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
+    roughness = _roughness(road_class)
+    length = _repeat_length(band, speed, duration, length)
+    first, last = _first_and_last(band, length)
+    return Iso8608(
+        roughness_psd=jnp.asarray(roughness, float),
+        waviness=jnp.asarray(waviness, float),
+        speed=jnp.asarray(speed, float),
+        phase=jax.random.uniform(random_key(seed), (last - first + 1,), float, maxval=2.0 * math.pi),
+        length=length,
+        band=band,
+        ramp=float(ramp),
+    )
+
+
+def _first_and_last(band: tuple[float, float], length: float) -> tuple[int, int]:
+    """The multiples of 1/length whose own bands of that width cover the whole band."""
+    return math.floor(band[0] * length + 0.5 + 1e-9), math.ceil(band[1] * length - 0.5 - 1e-9)
+
+
+def _roughness(road_class: str | ScalarLike) -> ScalarLike:
+    if not isinstance(road_class, str):
+        _checks.positive("road_class", road_class, "As a number it is G_d(n0) in m^3, for example 64e-6.")
+        value = _checks.concrete(road_class)
+        if value is not None and np.any(value >= 1.0):
+            _checks.refuse(
+                "road_class", "be below 1 m^3", value, "Tables give G_d(n0) in 1e-6 m^3: write 256e-6, not 256."
+            )
+        return road_class
+    if road_class not in ROUGHNESS_PSD:
+        letters = [letter for letter in road_class.upper() if letter in ROUGHNESS_PSD]
+        near = letters[-1] if letters else "H" if road_class.upper() > "H" else "A"
+        choices = ", ".join(map(repr, ROUGHNESS_PSD))
+        _checks.refuse("road_class", f"be one of {choices}, or a number", repr(road_class), f"Did you mean {near!r}?")
+    return ROUGHNESS_PSD[road_class]
+
+
+def _repeat_length(
+    band: tuple[float, float], speed: ScalarLike | int, duration: float | int | None, length: float | int | None
+) -> float:
+    needed = 0.0
+    if duration is not None:
+        _checks.positive("duration", duration)
+        velocity = _checks.concrete(speed)
+        if velocity is None:
+            remedy = (
+                "The number of cosines must be known: give `length`, the distance in m after which the road may repeat."
+            )
+            _checks.refuse("duration", "be left out where `speed` is traced by JAX", f"{duration} s", remedy)
+        needed = float(velocity) * float(duration)
+    if length is None:
+        return max(1000.0, needed, 10.0 / band[0])
+    _checks.positive("length", length)
+    shortest = max(needed, 1.0 / band[0])
+    if length < shortest * (1.0 - 1e-9):
+        _checks.refuse(
+            "length",
+            f"be at least {shortest:.6g} m, the longest wave or the distance driven",
+            f"{length} m",
+            "Make it longer, or leave it out.",
+        )
+    return float(length)

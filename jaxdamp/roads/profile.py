@@ -1,0 +1,112 @@
+"""Measured roads."""
+
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike, Float
+
+from .. import _checks
+from .._types import ScalarLike
+from ._sampled import SampledRoad
+
+
+# Largest departure from a uniform grid that is taken for rounding in the file, as part of one step.
+_UNEVENNESS = 0.01
+
+
+def from_profile(
+    position: Float[ArrayLike, " samples"],
+    height: Float[ArrayLike, " samples"] | Float[ArrayLike, "samples wheels"],
+    speed: ScalarLike | int | None = None,
+    *,
+    periodic: bool = False,
+    ramp: float | int = 0.0,
+) -> SampledRoad:
+    """A road from measured or computed heights at equal spacing, with straight lines between the samples.
+
+    The vehicle is at the first sample at time 0, whatever its position is called. Differentiable in `height` and
+    `speed`
+    (the slope jumps at each sample, so the gradient in speed is that of the piecewise linear road).
+
+    A road that is not periodic ends with its last sample: asking for later times raises a `ValueError`, and gives NaN
+    inside compiled code, where times cannot be inspected.
+
+    >>> import jax.numpy as jnp
+    >>> ramp_up = from_profile(jnp.arange(4.0), jnp.array([0.0, 0.0, 0.1, 0.1]), speed=10.0)
+    >>> ramp_up.height(jnp.array([0.1, 0.15, 0.2]))[:, 0].round(6)
+    Array([0.  , 0.05, 0.1 ], dtype=float64)
+    >>> round(ramp_up.grid, 6), round(ramp_up.duration, 6)
+    (0.1, 0.3)
+
+    Args:
+        position: The place of each sample: distance along the road [m] if `speed` is given, otherwise time [s]. It
+            must increase in equal steps.
+        height: The height of each sample [m], up positive: shape [samples], or [samples, wheels] with one column per
+            track.
+        speed: The speed of the vehicle [m/s], for a profile over distance.
+        periodic: Repeat the profile for ever. The sample after the last one is then the first one again, so a closed
+            lap must not hold its starting point twice.
+        ramp: The time [s] over which the road fades in as a raised cosine, for profiles that do not start at height
+            zero; 0 turns it off.
+
+    Raises:
+        ValueError: If lengths differ, if there are fewer than two samples, if anything is NaN or infinite, if
+            `position` does not increase or its steps are not equal, if `speed` is not positive, or if `ramp` is
+            negative.
+    """
+    spacing = _uniform_spacing(np.asarray(position, float))
+    heights = jnp.asarray(height, float)
+    if heights.shape[0] != np.size(position):
+        _checks.refuse(
+            "height",
+            f"hold one value per position ({np.size(position)})",
+            f"of shape {heights.shape}",
+            "Give an array of shape [samples] or [samples, wheels].",
+        )
+    _refuse_gaps("height", _checks.concrete(heights))
+    if speed is not None:
+        _checks.positive("speed", speed, "Roads are driven forwards: reverse the arrays instead.")
+    _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
+    return SampledRoad(
+        samples=heights[:, None] if heights.ndim == 1 else heights,
+        speed=None if speed is None else jnp.asarray(speed, float),
+        spacing=spacing,
+        periodic=periodic,
+        ramp=float(ramp),
+    )
+
+
+def _uniform_spacing(position: np.ndarray) -> float:
+    if position.size < 2:
+        _checks.refuse("position", "hold at least two samples", f"of length {position.size}")
+    _refuse_gaps("position", position)
+    steps = np.diff(position)
+    if np.any(steps <= 0.0):
+        first = int(np.argmax(steps <= 0.0))
+        _checks.refuse(
+            "position",
+            "increase from sample to sample",
+            f"{position[first]:.6g} followed by {position[first + 1]:.6g} at sample {first + 1}",
+            "Sort the record, remove repeated samples, or cut it where it turns back.",
+        )
+    spacing = float((position[-1] - position[0]) / steps.size)
+    if np.max(np.abs(position - np.linspace(position[0], position[-1], position.size))) > _UNEVENNESS * spacing:
+        _checks.refuse(
+            "position",
+            "increase in equal steps",
+            f"stepped by {steps.min():.6g} to {steps.max():.6g}",
+            "Resample the profile first, for example with numpy.interp on numpy.linspace.",
+        )
+    return spacing
+
+
+def _refuse_gaps(argument: str, values: Any) -> None:
+    if values is not None and not np.all(np.isfinite(values)):
+        bad = ~np.isfinite(values).reshape(values.shape[0], -1).all(axis=1)
+        _checks.refuse(
+            argument,
+            "be finite",
+            f"NaN or infinite at {int(bad.sum())} samples, first at sample {int(np.argmax(bad))}",
+            "Cut or fill the gaps first, for example with numpy.interp over the good samples.",
+        )

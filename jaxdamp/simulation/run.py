@@ -1,0 +1,87 @@
+"""`simulate`: a vehicle on a road."""
+
+from typing import TYPE_CHECKING
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.roads import AbstractRoad
+from jaxdamp.simulation.exponential import exponential_steps
+from jaxdamp.simulation.response import Response
+from jaxdamp.vehicles import AbstractVehicle
+
+
+if TYPE_CHECKING:
+    import diffrax
+
+
+def simulate(
+    vehicle: AbstractVehicle,
+    road: AbstractRoad,
+    *,
+    duration: float | None = None,
+    dt: float = 1e-3,
+    method: "str | diffrax.AbstractSolver" = "exponential",
+    rtol: float = 1e-8,
+    atol: float = 1e-10,
+) -> Response:
+    """Drive a vehicle over a road.
+
+    The vehicle starts settled and at rest on the road's first height. The road is taken as linear between instants.
+
+    Arguments:
+        vehicle: any vehicle, with its laws.
+        road: heights under its wheels over time.
+        duration: length of the run [s]; the road's own if it has one and this is left out.
+        dt: spacing of the instants [s], for the exponential engine also its step (second order; 1 ms is right for
+            cars with memoryless laws).
+        method: `"exponential"`, the fixed-step engine; `"diffrax"`, adaptive Tsit5; or any diffrax solver, such as
+            `diffrax.Kvaerno5()` for a stiff law.
+        rtol, atol: tolerances of the adaptive methods.
+
+    Returns:
+        The response at `round(duration/dt) + 1` instants.
+
+    Raises:
+        ValueError: a step longer than the spacing of a sampled road, no duration, a run that diverged.
+
+    >>> from jaxdamp import roads, vehicles
+    >>> car = vehicles.presets.quarter_car_000()
+    >>> response = simulate(car, roads.cosine_bump(0.05, start=0.5, duration=0.25), duration=3.0)
+    >>> round(float(response.metrics()["working_space_peak"]), 3)
+    0.057
+    """
+    duration = road.duration if duration is None else duration
+    if duration is None:
+        _checks.refuse("duration", "be given for a road without an end of its own", None, "Pass `duration=10.0`.")
+    _checks.positive("duration", duration)
+    _checks.positive("dt", dt)
+    if dt > duration:
+        _checks.refuse("dt", f"be shorter than the run of {duration:g} s", dt)
+    if road.grid is not None and dt > road.grid * (1 + 1e-9):
+        remedy = f"Pass `dt={road.grid:g}` or less, or make the road with a coarser grid."
+        _checks.refuse("dt", f"not be longer than the road's grid of {road.grid:g} s", dt, remedy)
+    count = round(duration / dt)
+    time = jnp.arange(count + 1) * dt
+    heights = road.height(time)
+    wheels = vehicle.port_form().road_stiffness.shape[1]
+    if heights.shape[1] != wheels:
+        _checks.refuse("road", f"have a track for each of {wheels} wheels", f"a road of {heights.shape[1]} track(s)")
+    if method == "exponential":
+        motion, forces, states = exponential_steps(vehicle, heights, jnp.asarray(dt, dtype=float))
+        remedy = f"Take a shorter step than {dt:g} s, or an implicit solver, `method=diffrax.Kvaerno5()`."
+    else:
+        import diffrax
+
+        from jaxdamp.simulation.adaptive import adaptive_steps
+
+        if isinstance(method, str):
+            _checks.one_of("method", method, ["exponential", "diffrax"])
+            method = diffrax.Tsit5()
+        motion, forces, states, result = adaptive_steps(vehicle, time, heights, method, rtol, atol)
+        remedy = f"The solver says: {diffrax.RESULTS[result] or 'finished'}."
+    last = _checks.concrete(motion[-1])
+    if last is not None and not np.all(np.isfinite(last)):
+        _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
+    return Response(vehicle, time, motion, forces, heights, states)
