@@ -1,0 +1,24 @@
+"""Dyno records: read from files or made by a virtual dyno, in SI and one sign convention.
+
+Stroke and velocity are positive in extension (rebound), force is positive when it resists extension.
+"""
+
+from jaxdamp.bench import programmes
+from jaxdamp.bench.programmes import RandomTest, SineTest
+from jaxdamp.bench.read import read
+from jaxdamp.bench.runs import BenchRun
+from jaxdamp.bench.sets import BenchSet
+from jaxdamp.bench.velocity import estimate_velocity
+from jaxdamp.bench.virtual_dyno import VirtualDyno
+
+
+__all__ = [
+    "BenchRun",
+    "BenchSet",
+    "RandomTest",
+    "SineTest",
+    "VirtualDyno",
+    "estimate_velocity",
+    "programmes",
+    "read",
+]

@@ -1,0 +1,74 @@
+"""Which files are meant: one file, several, a glob pattern or a folder."""
+
+import glob
+import os
+import re
+from collections.abc import Iterable, Iterator
+from difflib import get_close_matches
+from pathlib import Path
+
+
+TEXT_ENDINGS = (".csv", ".txt", ".dat", ".tsv", ".asc")
+
+
+def find_files(paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> tuple[Path, ...]:
+    """The files that the paths name, in natural order within a folder or pattern ("2mm" before "10mm").
+
+    Arguments:
+        paths: a file, a folder (all its `*.csv`), a glob pattern, or several of these.
+
+    Raises:
+        FileNotFoundError: a file does not exist, or a pattern or folder holds nothing.
+        ValueError: no path at all, or the same file twice.
+    """
+    asked = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
+    if not asked:
+        raise ValueError("Argument `paths` must name at least one file, but is empty.")
+    files = [file for path in asked for file in _expand(path)]
+    for file in files:
+        if files.count(file) > 1:
+            raise ValueError(
+                f"Argument `paths` must name every file once, but {file} is there {files.count(file)} times."
+            )
+    return tuple(files)
+
+
+def natural_key(text: str) -> list[tuple[int, float, str]]:
+    """Sort key that puts "2mm" before "10mm" and "0A" before "0.5A"."""
+    parts = re.split(r"(\d+(?:\.\d+)?)", text)
+    return [(0, float(part), "") if i % 2 else (1, 0.0, part.lower()) for i, part in enumerate(parts)]
+
+
+def _expand(path: str | os.PathLike[str]) -> Iterator[Path]:
+    text, file = os.fspath(path), Path(path).expanduser()
+    if file.is_dir():
+        inside = [f for f in file.iterdir() if f.suffix.lower() == ".csv" and f.is_file()]
+        if not inside:
+            others = sorted(f.name for f in file.iterdir() if f.suffix.lower() in TEXT_ENDINGS)
+            hint = (
+                f" It holds {', '.join(others[:5])}: name these files, or a pattern such as '*.txt'." if others else ""
+            )
+            raise FileNotFoundError(f"Folder {file} holds no *.csv file.{hint}")
+        yield from sorted(inside, key=lambda f: natural_key(f.name))
+    elif file.exists():
+        yield file
+    elif glob.has_magic(text):
+        found = [Path(name) for name in glob.glob(str(file), recursive=True) if Path(name).is_file()]
+        if not found:
+            raise FileNotFoundError(f"No file matches the pattern {text!r}.{_near(file)}")
+        yield from sorted(found, key=lambda f: natural_key(str(f)))
+    else:
+        raise FileNotFoundError(f"There is no file {text!r}.{_near(file)}")
+
+
+def _near(file: Path) -> str:
+    """A sentence with the names in the same folder that look alike."""
+    folder = file.parent
+    if not folder.is_dir():
+        return f" The folder {str(folder)!r} does not exist either."
+    names = sorted(f.name for f in folder.iterdir() if f.is_file() and not f.name.startswith("."))
+    near = get_close_matches(file.name, names, 3, cutoff=0.5)
+    if near:
+        return f" Did you mean {' or '.join(repr(str(folder / name)) for name in near)}?"
+    text = [name for name in names if Path(name).suffix.lower() in TEXT_ENDINGS]
+    return f" The folder {str(folder)!r} holds {', '.join(text[:5]) if text else 'no text files'}."

@@ -1,0 +1,88 @@
+"""What kind of motion a stroke is: its frequency, its cycles, its amplitude."""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import savgol_filter
+
+
+Samples = Float[np.ndarray, " time"]
+
+
+def crossings(time: Samples, stroke: Samples) -> tuple[Float[np.ndarray, " rising"], Float[np.ndarray, " falling"]]:
+    """Instants [s] at which the stroke passes the middle of its range upwards, and downwards.
+
+    Hysteresis of 15 % of the range to both sides keeps noise and rest from being counted. The instant is where the
+    straight line through the samples of the passage is zero.
+    """
+    low, high = float(np.min(stroke)), float(np.max(stroke))
+    x, band = stroke - (low + high) / 2, 0.15 * (high - low)
+    side = np.where(x > band, 1, np.where(x < -band, -1, 0))
+    outside = np.flatnonzero(side)
+    before, after = outside[:-1], outside[1:]
+    turns = [np.flatnonzero((side[after] == way) & (side[before] == -way)) for way in (1, -1)]
+    passages = [zip(before[turn].tolist(), after[turn].tolist(), strict=True) for turn in turns]
+    rising, falling = (np.array([_crossing(time, x, *passage) for passage in way], dtype=float) for way in passages)
+    return rising, falling
+
+
+def _crossing(time: Samples, x: Samples, start: int, stop: int) -> float:
+    """Where x passes zero between two samples of different sign."""
+    t, y = time[start : stop + 1], x[start : stop + 1]
+    centred = t - t.mean()
+    slope = np.dot(centred, y) / np.dot(centred, centred)
+    instant = t.mean() - y.mean() / slope if slope * y[-1] > 0 else t.mean()
+    return float(np.clip(instant, t[0], t[-1]))
+
+
+def dominant_frequency(time: Samples, stroke: Samples) -> float:
+    """Frequency of the stroke [Hz]: one over the median time between passages of its middle in the same direction.
+
+    Rest before and after the motion does not count. Where no direction is passed twice it is the highest line of the
+    spectrum.
+    """
+    periods = np.concatenate([np.diff(instants) for instants in crossings(time, stroke)])
+    if len(periods):
+        return float(1 / np.median(periods))
+    x, step = stroke - np.mean(stroke), (time[-1] - time[0]) / (len(time) - 1)
+    size = 8 * len(x)
+    return float((1 + np.argmax(np.abs(np.fft.rfft(x, size))[1:])) / (size * step))
+
+
+def cycle_instants(time: Samples, stroke: Samples) -> Float[np.ndarray, " instants"]:
+    """Instants [s] at which full cycles begin and, last, at which the last one ends.
+
+    Cycles begin where the stroke passes its middle upwards, or downwards if that gives more of them. A record that
+    begins or ends in the middle of the stroke has a full cycle before the first or behind the last passage too.
+    """
+    period = 1 / dominant_frequency(time, stroke)
+    return max((_extended(time, stroke, instants, period) for instants in crossings(time, stroke)), key=len)
+
+
+def _extended(
+    time: Samples, stroke: Samples, instants: Float[np.ndarray, " instants"], period: float
+) -> Float[np.ndarray, " more"]:
+    """The passages with one more at either end if the record holds another cycle of motion there."""
+    if not len(instants):
+        return instants
+    step, reach = (time[-1] - time[0]) / (len(time) - 1), 0.6 * float(np.ptp(stroke))
+    first, last = float(instants[0]), float(instants[-1])
+    head, tail = stroke[(time >= first - period) & (time < first)], stroke[(time > last) & (time <= last + period)]
+    before = [first - period] if first - period > time[0] - step and len(head) and np.ptp(head) > reach else []
+    behind = [last + period] if last + period < time[-1] + 2 * step and len(tail) and np.ptp(tail) > reach else []
+    return np.concatenate([before, instants, behind])
+
+
+def motion_amplitude(time: Samples, stroke: Samples) -> float:
+    """Half the range of the stroke [m], zero to peak; noise faster than a twentieth of a period is smoothed."""
+    window = round((len(time) - 1) / (time[-1] - time[0]) / dominant_frequency(time, stroke) / 20)
+    window = min(window, len(stroke) - 1) // 2 * 2 + 1
+    smooth = np.asarray(savgol_filter(stroke, window, 4)) if window > 5 else stroke
+    return float(np.max(smooth) - np.min(smooth)) / 2
+
+
+def cycle_works(time: Samples, stroke: Samples, power: Samples) -> Float[np.ndarray, " cycles"]:
+    """Work [J] of every full cycle, from the power F v [W]."""
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    work = np.concatenate([[0.0], np.cumsum((power[1:] + power[:-1]) / 2) * step])
+    work = np.concatenate([work, [work[-1] + 2 * step * power[-1]]])  # the last cycle may end behind the last sample
+    return np.diff(np.interp(cycle_instants(time, stroke), np.append(time, time[-1] + 2 * step), work))

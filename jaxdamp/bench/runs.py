@@ -1,0 +1,225 @@
+"""One record of a test bench."""
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+from jaxtyping import ArrayLike, Float
+
+from jaxdamp import _checks
+from jaxdamp.bench import sampling
+from jaxdamp.bench.motion import cycle_instants, cycle_works, dominant_frequency, motion_amplitude
+from jaxdamp.bench.velocity import estimate_velocity
+
+
+FILE_MARK = "# jaxdamp bench record: stroke and velocity positive in extension, force positive resisting it"
+NOTE_MARK = "# note: "
+_HEADERS = {"time": "time [s]", "stroke": "stroke [m]", "velocity": "velocity [m/s]", "force": "force [N]"}
+
+
+def _column(channel: str, values: ArrayLike, count: int) -> Float[np.ndarray, " time"]:
+    """A copy of a channel, of the length of the time."""
+    column = np.array(values, dtype=np.float64)
+    if column.ndim != 1 or len(column) != count:
+        _checks.refuse(channel, f"be a column of as many samples as the time, {count}", f"of shape {column.shape}")
+    return column
+
+
+@final
+@dataclass(frozen=True, repr=False, eq=False)
+class BenchRun:
+    """One record of a bench: one excitation of one damper at one setting.
+
+    Stroke and velocity are positive in extension (rebound), the force is positive when it resists extension. The
+    arrays are copies and cannot be written to; whatever was done to the measured data stands in the notes.
+
+    Arguments:
+        name: of the record, by which a set finds it.
+        time: instants [s], uniform and increasing, shape (time,).
+        stroke: as measured [m], shape (time,).
+        velocity: [m/s], shape (time,).
+        force: [N], shape (time,).
+        temperature: [K], shape (time,), if it was measured.
+        source: the file, or what else the record comes from.
+        notes: sentences on what was done to the data.
+
+    Raises:
+        ValueError: channels of different lengths, fewer than 20 samples, NaN, time not uniform, constant stroke.
+
+    >>> time = np.arange(1000) / 1000
+    >>> run = BenchRun.from_arrays("3 Hz", time, 0.01 * np.sin(6 * np.pi * time), 300 * np.cos(6 * np.pi * time))
+    >>> run
+    BenchRun('3 Hz': 1 s at 1000 Hz, 3 Hz, 10 mm, up to 0.188 m/s, -300 … 300 N)
+    >>> round(run.work_per_cycle, 2)  # π · 300 N · 0.01 m
+    9.42
+    """
+
+    name: str
+    time: Float[np.ndarray, " time"]
+    stroke: Float[np.ndarray, " time"]
+    velocity: Float[np.ndarray, " time"]
+    force: Float[np.ndarray, " time"]
+    temperature: Float[np.ndarray, " time"] | None = None
+    source: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        where = f"record {self.name!r}"
+        for channel in (*_HEADERS, "temperature"):
+            if channel == "temperature" and self.temperature is None:
+                continue
+            values = _column(channel, getattr(self, channel), len(self.time))
+            sampling.check_numbers(values, channel, where)
+            values.setflags(write=False)
+            object.__setattr__(self, channel, values)
+        object.__setattr__(self, "notes", tuple(self.notes))
+        sampling.check_count(len(self.time), where)
+        sampling.check_time(self.time, where)
+        sampling.check_stroke(self.stroke, where)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        name: str,
+        time: ArrayLike,
+        stroke: ArrayLike,
+        force: ArrayLike,
+        velocity: ArrayLike | None = None,
+        *,
+        temperature: ArrayLike | None = None,
+        source: str = "",
+        notes: Iterable[str] = (),
+    ) -> "BenchRun":
+        """A record from arrays in SI and the library's sign; without a velocity it is derived from the stroke."""
+        notes, count = tuple(notes), np.size(time)
+        stroke, force = _column("stroke", stroke, count), _column("force", force, count)
+        if velocity is None:
+            velocity, how = estimate_velocity(time, stroke)
+            notes = (*notes, how)
+        velocity, time = _column("velocity", velocity, count), _column("time", time, count)
+        warm = None if temperature is None else _column("temperature", temperature, count)
+        return cls(name, time, stroke, velocity, force, temperature=warm, source=source, notes=notes)
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.time)
+
+    @property
+    def sampling_rate(self) -> float:
+        """Samples per second [Hz]."""
+        return float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
+
+    @property
+    def duration(self) -> float:
+        """Number of samples over sampling rate [s]."""
+        return len(self.time) / self.sampling_rate
+
+    @cached_property
+    def frequency(self) -> float:
+        """Frequency of the motion [Hz]: one over the median time between passages of mid-stroke in one direction."""
+        return dominant_frequency(self.time, self.stroke)
+
+    @cached_property
+    def amplitude(self) -> float:
+        """Half the range of the stroke [m], zero to peak, smoothed over a twentieth of a period."""
+        return motion_amplitude(self.time, self.stroke)
+
+    @property
+    def cycles(self) -> int:
+        """Number of full cycles, from one passage of mid-stroke to the next in the same direction."""
+        return max(len(cycle_instants(self.time, self.stroke)) - 1, 0)
+
+    @property
+    def peak_velocity(self) -> float:
+        """Largest magnitude of the velocity [m/s]."""
+        return float(np.max(np.abs(self.velocity)))
+
+    @property
+    def dissipated_energy(self) -> float:
+        """Work ∫ F v dt of the whole record [J]."""
+        return float(np.trapezoid(self.force * self.velocity, self.time))
+
+    @cached_property
+    def work_per_cycle(self) -> float:
+        """Median over the full cycles of the work ∮ F v dt [J]; the whole record's if it has no full cycle.
+
+        The median leaves the first and last cycles, in which a machine runs up and down, without influence.
+        """
+        works = cycle_works(self.time, self.stroke, self.force * self.velocity)
+        return float(np.median(works)) if len(works) else self.dissipated_energy
+
+    def between(self, start: float | int, stop: float | int) -> "BenchRun":
+        """The part of the record with start ≤ time < stop [s]; the velocity is not computed anew."""
+        part = (self.time >= start) & (self.time < stop)
+        if not np.any(part):
+            first, last = f"{self.time[0]:.6g}", f"{self.time[-1]:.6g}"
+            _checks.refuse(
+                "start", "leave some of the record", f"{start} with stop {stop}", f"It runs from {first} to {last} s."
+            )
+        return replace(
+            self,
+            **{channel: getattr(self, channel)[part] for channel in _HEADERS},
+            temperature=None if self.temperature is None else self.temperature[part],
+            notes=(*self.notes, f"cut to {self.time[part][0]:g} … {self.time[part][-1]:g} s"),
+        )
+
+    def last_cycles(self, count: int = 1) -> "BenchRun":
+        """The last full cycles of the record, from one passage of mid-stroke to another."""
+        if not 1 <= count <= self.cycles:
+            _checks.refuse("count", f"be between 1 and the number of full cycles, {self.cycles}", count)
+        instants, half = cycle_instants(self.time, self.stroke), 0.5 / self.sampling_rate
+        return self.between(float(instants[-1 - count]) - half, float(instants[-1]) - half)
+
+    def summary(self) -> dict[str, Any]:
+        """The figures of the record in SI, one row of the set's table."""
+        return {
+            "name": self.name,
+            "samples": len(self),
+            "sampling_rate": self.sampling_rate,
+            "cycles": self.cycles,
+            "frequency": self.frequency,
+            "amplitude": self.amplitude,
+            "peak_velocity": self.peak_velocity,
+            "largest_force": float(self.force.max()),
+            "smallest_force": float(self.force.min()),
+            "work_per_cycle": self.work_per_cycle,
+        }
+
+    def describe(self) -> str:
+        """What the record is and what was done to its data, in words."""
+        lines = [
+            f"{self.name}",
+            f"  source       {self.source or 'arrays'}",
+            f"  samples      {len(self)} at {self.sampling_rate:.6g} Hz, {self.duration:.4g} s, {self.cycles} cycles",
+            f"  motion       {self.frequency:.4g} Hz, {1e3 * self.amplitude:.4g} mm zero to peak, "
+            f"up to {self.peak_velocity:.4g} m/s",
+            f"  force        {self.force.min():.4g} … {self.force.max():.4g} N",
+            f"  work         {self.work_per_cycle:.4g} J per cycle",
+        ]
+        if self.temperature is not None:
+            warm = self.temperature - 273.15
+            lines.append(f"  temperature  {warm.min():.1f} … {warm.max():.1f} °C")
+        return "\n".join(lines + [f"  - {note}" for note in self.notes])
+
+    def __repr__(self) -> str:
+        return (
+            f"BenchRun({self.name!r}: {self.duration:.4g} s at {self.sampling_rate:.6g} Hz, {self.frequency:.4g} Hz, "
+            f"{1e3 * self.amplitude:.4g} mm, up to {self.peak_velocity:.3g} m/s, "
+            f"{self.force.min():.4g} … {self.force.max():.4g} N)"
+        )
+
+    def to_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write the record with units in its header; `read` gives back the same numbers to the last bit."""
+        channels = [getattr(self, channel) for channel in _HEADERS]
+        header = list(_HEADERS.values())
+        if self.temperature is not None:
+            channels, header = [*channels, self.temperature], [*header, "temperature [K]"]
+        lines = [FILE_MARK, *(NOTE_MARK + " ".join(note.split()) for note in self.notes), ",".join(header)]
+        lines += [",".join(map(repr, row)) for row in np.stack(channels, axis=1).tolist()]
+        path = Path(path)
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return path

@@ -1,0 +1,117 @@
+"""Which direction of a file is rebound, and whether its force resists or pushes.
+
+The work of a passive damper over a cycle is positive, ∮ F dx > 0, so a record shows whether force and stroke agree in
+sign. Which of the two directions is rebound no work can show: turning both leaves it as it is. That is either given,
+or taken as rebound positive and said so.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.bench.motion import Samples, cycle_instants, cycle_works
+
+
+SIGNS = ("rebound-positive", "compression-positive")
+FORCE_SIGNS = ("same", "opposite")
+_LEAST_LOSS = 0.05
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Factors that bring the motion and the force of a file to the library's sign, and the sentences that say why."""
+
+    motion: float
+    force: float
+    notes: tuple[str, ...]
+
+
+def check_words(sign: str | None, force_sign: str | None) -> None:
+    """Refuse words that are no sign."""
+    if sign is not None:
+        _checks.one_of("sign", sign, SIGNS)
+    if force_sign is not None:
+        _checks.one_of("force_sign", force_sign, FORCE_SIGNS)
+
+
+def loss_fraction(time: Samples, stroke: Samples, force: Samples) -> tuple[float, float]:
+    """Median work per cycle [J] and its ratio to that of a viscous damper with the same RMS force and stroke.
+
+    The ratio W / (2 π σ_F σ_x), over full cycles, is 1 for a viscous damper on a sine, 0 for a spring, -1 if force or
+    stroke has the wrong sign.
+    """
+    instants, power = cycle_instants(time, stroke), force * np.gradient(stroke, time)
+    part = np.ones(len(time), dtype=bool)
+    if len(instants) > 1:
+        work, part = float(np.median(cycle_works(time, stroke, power))), (time >= instants[0]) & (time < instants[-1])
+    else:
+        work = float(np.trapezoid(power, time))
+    scale = 2 * np.pi * float(np.std(force[part]) * np.std(stroke[part]))
+    return work, work / scale if scale > 0 else 0.0
+
+
+def decide(
+    time: Samples, stroke: Samples, force: Samples, sign: str | None, force_sign: str | None, where: str
+) -> Decision:
+    """How the channels of a file have to be turned.
+
+    Arguments:
+        time: instants [s].
+        stroke: as the file counts it [m].
+        force: as the file counts it [N].
+        sign: the direction in which the file counts stroke and velocity positive, or None.
+        force_sign: "same" if the file's force is positive when it resists motion in its positive direction,
+            "opposite" if it is negative then; None: with `sign` the same, without from the work.
+        where: the file, for messages.
+
+    Raises:
+        ValueError: what is given contradicts the work, or nothing is given and the work is too small to decide.
+    """
+    check_words(sign, force_sign)
+    work, loss = loss_fraction(time, stroke, force)
+    clear = abs(loss) >= _LEAST_LOSS
+    done = f"work per cycle {work:+.4g} J"
+    if sign is None and force_sign is None and not clear:
+        raise ValueError(
+            f"{where}: the sign convention cannot be established from the data, because the {done} is only "
+            f'{abs(loss):.1%} of that of a damper with this force and stroke. Pass sign="rebound-positive" or '
+            'sign="compression-positive".'
+        )
+    if force_sign is None:
+        force_sign = "opposite" if sign is None and loss < 0 else "same"
+        if sign is not None and clear and loss < 0:
+            raise ValueError(
+                f"{where}: sign={sign!r} contradicts the data: with force and stroke of the same sign the {done}, and "
+                "a damper cannot give energy. If the force of this bench counts the other way, pass also "
+                'force_sign="opposite".'
+            )
+    elif clear and (loss < 0) == (force_sign == "same"):
+        other = "opposite" if force_sign == "same" else "same"
+        raise ValueError(
+            f"{where}: force_sign={force_sign!r} contradicts the data ({done} as the file counts): a damper cannot "
+            f'give energy. Pass force_sign="{other}", or leave it out.'
+        )
+    motion = -1.0 if sign == "compression-positive" else 1.0
+    turned = -1.0 if force_sign == "opposite" else 1.0
+    return Decision(motion, motion * turned, _explain(sign, force_sign, done, clear))
+
+
+def _explain(sign: str | None, force_sign: str, work: str, clear: bool) -> tuple[str, ...]:
+    notes = []
+    if force_sign == "opposite":
+        notes.append(f"force and stroke of the file have opposite signs ({work}): force turned")
+    elif clear:
+        notes.append(f"force and stroke of the file agree in sign ({work})")
+    else:
+        notes.append(f"force and stroke of the file taken to agree in sign: the {work} is too small to tell")
+    if sign is None:
+        notes.append(
+            "positive stroke taken as rebound: if the bench counts compression positive, pass "
+            'sign="compression-positive"'
+        )
+    elif sign == "rebound-positive":
+        notes.append("positive stroke is rebound, as given")
+    else:
+        notes.append("positive stroke is compression, as given: stroke, velocity and force turned")
+    return tuple(notes)

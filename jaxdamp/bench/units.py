@@ -1,0 +1,116 @@
+"""Units at the file boundary: what a header or a user names becomes SI."""
+
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+
+if TYPE_CHECKING:
+    import pint
+
+
+SI = {"time": "s", "stroke": "m", "velocity": "m/s", "force": "N", "temperature": "K"}
+USUAL = {
+    "time": ("s", "ms", "us", "min"),
+    "stroke": ("mm", "m", "cm", "in", "um"),
+    "velocity": ("m/s", "mm/s", "cm/s", "in/s", "ft/s"),
+    "force": ("N", "kN", "daN", "lbf", "kgf"),
+    "temperature": ("degC", "K", "degF"),
+}
+# How bench software writes units that pint reads as something else or not at all, in lower case, per quantity.
+_WRITTEN = {
+    "time": {"sec": "s", "secs": "s", "sek": "s", "msec": "ms", "µs": "us", "μs": "us"},
+    "stroke": {"inch": "in", "inches": "in", '"': "in", "µm": "um", "μm": "um"},
+    "velocity": {
+        "m_s": "m/s",
+        "mm_s": "mm/s",
+        "cm_s": "cm/s",
+        "in_s": "in/s",
+        "ips": "in/s",
+        "mps": "m/s",
+        "mmps": "mm/s",
+    }
+    | {f"{unit}/{second}": f"{unit}/s" for unit in ("m", "mm", "cm", "in") for second in ("sec", "second")}
+    | {"inch/s": "in/s", "inches/s": "in/s", "inch/sec": "in/s"},
+    "force": {"lb": "lbf", "lbs": "lbf", "pounds": "lbf", "newtons": "N", "kp": "kgf", "kg-f": "kgf"},
+    "temperature": {
+        "°c": "degC",
+        "c": "degC",
+        "deg_c": "degC",
+        "deg c": "degC",
+        "°f": "degF",
+        "f": "degF",
+        "deg f": "degF",
+    },
+}
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """SI value = factor · value + offset, from the unit named."""
+
+    unit: str
+    factor: float
+    offset: float = 0.0
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """The values in SI."""
+        return values if self.factor == 1.0 and self.offset == 0.0 else values * self.factor + self.offset
+
+
+@lru_cache(maxsize=1)
+def _registry() -> "pint.UnitRegistry":
+    import pint
+
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+
+
+@lru_cache(maxsize=256)
+def conversion(role: str, written: str) -> Conversion | None:
+    """How to bring a column with this unit to SI, or None if this is no unit of that quantity.
+
+    >>> conversion("stroke", "in").factor
+    0.0254
+    >>> conversion("force", "lbs").unit
+    'lbf'
+    >>> conversion("force", "mm") is None
+    True
+    """
+    text = written.strip()
+    if not text:
+        return None
+    exact = {unit.lower(): unit for unit in USUAL[role]}
+    if text not in USUAL[role]:
+        text = _WRITTEN[role].get(text.lower()) or exact.get(text.lower()) or text
+    try:
+        unit = _registry().Unit(text)
+        zero, one, two = (_registry().Quantity(x, unit).to(SI[role]).magnitude for x in (0.0, 1.0, 2.0))
+    except Exception:  # pint answers unknown text with errors of many classes, its tokeniser's among them
+        return None
+    if zero == 0.0:
+        return Conversion(text, float(one))
+    return Conversion(text, float(two - zero) / 2, float(zero))
+
+
+def is_unit(written: str) -> bool:
+    """Whether this text is a unit of any quantity that a record has."""
+    return any(conversion(role, written) is not None for role in SI)
+
+
+def named_conversion(role: str, written: str, where: str) -> Conversion:
+    """As `conversion`, but a clear error that begins with `where` and suggests a unit."""
+    found = conversion(role, written)
+    if found is not None:
+        return found
+    near = get_close_matches(written, [*USUAL[role], *_WRITTEN[role]], 1, cutoff=0.4)
+    hint = f"Did you mean {near[0]!r}? " if near else ""
+    other = next((r for r in SI if conversion(r, written) is not None), None)
+    what = f"is a unit of {other}, not of {role}" if other else f"is no known unit of {role}"
+    example = near[0] if near else USUAL[role][0]
+    raise ValueError(
+        f"{where}: {written!r} {what}. {hint}Usual ones are {', '.join(USUAL[role])}: "
+        f'pass units={{"{role}": "{example}"}}.'
+    )

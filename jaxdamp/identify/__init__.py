@@ -1,0 +1,9 @@
+"""From bench records to a damper law: `fit` one law, `compare` many, and say how well the records determine them."""
+
+from jaxdamp.identify.comparing import Comparison, Rung, compare
+from jaxdamp.identify.fitting import fit
+from jaxdamp.identify.ladder import LAWS, default_ladder
+from jaxdamp.identify.result import Estimate, FitResult, Score, fit_percent
+
+
+__all__ = ["LAWS", "Comparison", "Estimate", "FitResult", "Rung", "Score", "compare", "default_ladder", "fit", "fit_percent"]

@@ -1,0 +1,78 @@
+"""`compare`: several laws on the same records, scored on records they were not fitted to."""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from jaxdamp.bench import BenchRun
+from jaxdamp.identify.fitting import Start, fit
+from jaxdamp.identify.result import FitResult
+
+
+class Rung(NamedTuple):
+    """One law of a comparison."""
+
+    name: str
+    parameters: int
+    fit_percent: float
+    rmse: float  # N
+    held_out_fit_percent: float | None
+    held_out_rmse: float | None  # N
+    result: FitResult
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class Comparison:
+    """Laws fitted to the same records, in the order given."""
+
+    rungs: tuple[Rung, ...]
+    held_out: tuple[BenchRun, ...]
+
+    @property
+    def best(self) -> Rung:
+        """The law with the smallest error on the held-out records, or on the fitted ones if there are none."""
+        return min(self.rungs, key=lambda r: r.rmse if r.held_out_rmse is None else r.held_out_rmse)
+
+    def __getitem__(self, name: str) -> FitResult:
+        """The fit of the law of that name."""
+        for rung in self.rungs:
+            if rung.name == name:
+                return rung.result
+        raise KeyError(f"No law is named {name!r}; there are {', '.join(r.name for r in self.rungs)}.")
+
+    def __repr__(self) -> str:
+        head = f"{'law':<24}{'free':>5}{'fit %':>8}{'RMSE N':>9}" + f"{'held-out %':>12}{'RMSE N':>9}" * bool(self.held_out)
+        lines = [head]
+        for r in self.rungs:
+            line = f"{r.name:<24}{r.parameters:>5}{r.fit_percent:>8.1f}{r.rmse:>9.1f}"
+            if r.held_out_rmse is not None:
+                line += f"{r.held_out_fit_percent:>12.1f}{r.held_out_rmse:>9.1f}"
+            lines.append(line)
+        return "\n".join([*lines, f"best: {self.best.name}"])
+
+
+def compare(
+    laws: Mapping[str, Start],
+    runs: Sequence[BenchRun],
+    *,
+    held_out: Sequence[BenchRun] = (),
+    progress: Callable[[str], None] | None = None,
+    **options: Any,
+) -> Comparison:
+    """Fit several laws to the same records and score them on others.
+
+    Arguments:
+        laws: starts by name, such as `default_ladder(runs)`.
+        runs: records to fit.
+        held_out: records to score on, not fitted.
+        progress: called with each name before its fit, for a progress display.
+        options: passed on to `fit`.
+    """
+    rungs = []
+    for name, start in laws.items():
+        if progress is not None:
+            progress(name)
+        result = fit(start, runs, **options)
+        percent, rmse = result.score(held_out)[:2] if held_out else (None, None)
+        rungs.append(Rung(name, len(result.parameters), result.fit_percent, result.rmse, percent, rmse, result))
+    return Comparison(tuple(rungs), tuple(held_out))

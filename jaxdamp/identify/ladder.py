@@ -1,0 +1,95 @@
+"""The ladder: laws from plain to rich, each with a start taken from the records."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import (
+    AbstractDamper,
+    AbstractMemoryless,
+    Besinger,
+    Bilinear,
+    CoulombFriction,
+    Lag,
+    Linear,
+    PiecewiseLinear,
+    Polynomial,
+    PowerLaw,
+    SegmentedPolynomial,
+    SeriesSpring,
+    Table,
+)
+
+
+def lag_time(runs: Sequence[BenchRun]) -> float:
+    """Time [s] by which the force trails the velocity, from the phase of their fundamentals: tan(φ)/ω, the median."""
+    times = []
+    for run in runs:
+        omega = 2 * np.pi * run.frequency
+        turning = np.exp(-1j * omega * run.time) * np.hanning(len(run))
+        lead = np.angle((run.velocity - run.velocity.mean()) @ turning / ((run.force - run.force.mean()) @ turning))
+        if 0.0 < lead < 1.4:
+            times.append(np.tan(lead) / omega)
+    return float(np.clip(np.median(times) if times else 1e-3, 1e-4, 0.1))
+
+
+def _friction(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
+    friction = CoulombFriction.guess(velocity, force)
+    rest = force - float(friction.friction_force) * np.tanh(velocity / float(friction.friction_velocity))
+    return Linear.guess(velocity, rest) + friction
+
+
+def _rate(law: AbstractMemoryless, velocity: np.ndarray) -> float:
+    """Secant slope [N s/m] at the RMS velocity."""
+    v = float(np.sqrt(np.mean(velocity**2)))
+    return float(law.force_velocity(v) - law.force_velocity(-v)) / (2 * v)
+
+
+_MEMORYLESS = {
+    "linear": Linear.guess,
+    "bilinear": Bilinear.guess,
+    "power_law": PowerLaw.guess,
+    "polynomial": Polynomial.guess,
+    "segmented_polynomial": SegmentedPolynomial.guess,
+    "piecewise_linear": PiecewiseLinear.guess,
+    "table": Table.guess,
+    "besinger": Besinger.guess,
+    "linear_friction": _friction,
+}
+LAWS = (*_MEMORYLESS, "besinger_lag", "besinger_series_spring", "linear_friction_lag")
+
+
+def default_ladder(
+    runs: Sequence[BenchRun], names: Sequence[str] = LAWS
+) -> dict[str, AbstractDamper]:
+    """Laws from plain to rich by name, each started from the records, ready for `compare` or `fit`.
+
+    Memoryless: `linear`, `bilinear`, `power_law`, `polynomial` (degree 5), `segmented_polynomial` (paper 000),
+    `piecewise_linear`, `table`, `besinger` (paper 001), `linear_friction` (with smooth Coulomb friction). With
+    hysteresis: `besinger_lag`, `besinger_series_spring` (paper 001), `linear_friction_lag`.
+
+    Raises:
+        ValueError: an unknown name.
+    """
+    runs = list(runs)
+    velocity = np.concatenate([run.velocity for run in runs])
+    force = np.concatenate([run.force for run in runs])
+    lag = lag_time(runs)
+    ladder: dict[str, AbstractDamper] = {}
+    for name in names:
+        _checks.one_of("law", name, LAWS)
+        if name in _MEMORYLESS:
+            ladder[name] = _MEMORYLESS[name](velocity, force)
+        elif name == "linear_friction_lag":
+            ladder[name] = Lag(_friction(velocity, force), lag)
+        else:
+            law = Besinger.guess(velocity, force)
+            stiffness = max(_rate(law, velocity), 1.0) / lag
+            deflection = float(np.sqrt(np.mean(force**2))) / stiffness
+            series = SeriesSpring(law, stiffness, 0.1 * stiffness / deflection**2)
+            ladder[name] = Lag(law, lag) if name == "besinger_lag" else series
+    return ladder
+
+

@@ -1,0 +1,119 @@
+"""What a fit found, how well it is determined and how good it is."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.traces import predict_runs, used_samples
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Estimate(NamedTuple):
+    """One fitted number."""
+
+    name: str
+    value: float
+    unit: str
+    standard_error: float
+    interval: tuple[float, float]  # 95 %
+    meaning: str
+    note: str  # "", "not identifiable" or "at a bound"
+
+
+class Score(NamedTuple):
+    """How far a law's force is from a record's, after settling."""
+
+    name: str
+    rmse: float  # N
+    fit_percent: float
+    largest_error: float  # N
+
+
+def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray]) -> float:
+    """100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all samples: 100 is perfect, 0 no better than a constant."""
+    y, p = np.concatenate(list(measured)), np.concatenate(list(predicted))
+    return float(100.0 * (1.0 - np.linalg.norm(y - p) / np.linalg.norm(y - y.mean())))
+
+
+def score(law: AbstractDamper, runs: Sequence[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
+    """Fit percent and RMSE [N] of a law over records together, and for each of them."""
+    forces = predict_runs(law, runs)
+    kept = [used_samples(law, run) for run in runs]
+    measured = [run.force[k] for run, k in zip(runs, kept, strict=True)]
+    predicted = [force[k] for force, k in zip(forces, kept, strict=True)]
+    rows = []
+    for run, y, p in zip(runs, measured, predicted, strict=True):
+        error = p - y
+        rows.append(
+            Score(run.name, float(np.sqrt(np.mean(error**2))), fit_percent([y], [p]), float(np.abs(error).max()))
+        )
+    everything = np.concatenate(predicted) - np.concatenate(measured)
+    return fit_percent(measured, predicted), float(np.sqrt(np.mean(everything**2))), tuple(rows)
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class FitResult:
+    """A fitted law with its parameters, their uncertainty and its errors.
+
+    Attributes:
+        law: the fitted law.
+        runs: the records it was fitted to.
+        parameters: an estimate for each free number, with unit, standard error and 95 % interval.
+        covariance: of the free numbers, in their units, in the order of `parameters`.
+        fit_percent: 100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all records.
+        rmse: root of the mean squared error over all records [N].
+        scores: the same for each record.
+        warnings: what a user should know before trusting the numbers, in words.
+        converged: whether the search ended by its tolerance.
+        steps: steps of the search, 0 for a closed form.
+    """
+
+    law: AbstractDamper
+    runs: tuple[BenchRun, ...]
+    parameters: tuple[Estimate, ...]
+    covariance: Float[np.ndarray, "free free"]
+    fit_percent: float
+    rmse: float
+    scores: tuple[Score, ...]
+    warnings: tuple[str, ...]
+    converged: bool
+    steps: int
+
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of that name."""
+        for estimate in self.parameters:
+            if estimate.name == name:
+                return estimate
+        raise KeyError(f"No parameter is named {name!r}; there are {', '.join(e.name for e in self.parameters)}.")
+
+    def predict(self, runs: BenchRun | Sequence[BenchRun]) -> list[np.ndarray]:
+        """Force [N] of the fitted law at every sample of records, old or new."""
+        return predict_runs(self.law, [runs] if isinstance(runs, BenchRun) else list(runs))
+
+    def score(self, runs: Sequence[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
+        """Fit percent, RMSE [N] and the scores by record, on other records."""
+        return score(self.law, list(runs))
+
+    def plot(self, runs: Sequence[BenchRun] | None = None, **options: Any) -> "Figure":
+        """Loops of force over velocity and over stroke, measured and fitted, with residuals."""
+        from jaxdamp.plots import fit_loops
+
+        return fit_loops(self, runs, **options)
+
+    def __repr__(self) -> str:
+        width = max(len(e.name) for e in self.parameters)
+        lines = [
+            f"{type(self.law).__name__} on {len(self.runs)} records: {self.fit_percent:.1f} %, RMSE {self.rmse:.4g} N"
+        ]
+        for e in self.parameters:
+            note = f"  ({e.note})" if e.note else ""
+            lines.append(f"  {e.name:<{width}}  {e.value:>11.5g} ± {e.standard_error:<9.2g} {e.unit}{note}")
+        return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])

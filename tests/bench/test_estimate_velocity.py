@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+
+from jaxdamp.bench import RandomTest, estimate_velocity
+
+
+def _error(estimate: np.ndarray, truth: np.ndarray) -> float:
+    return float(np.sqrt(np.mean((estimate - truth) ** 2) / np.mean(truth**2)))
+
+
+def _sine(rate: float, frequency: float, amplitude: float, cycles: float = 5):
+    time = np.arange(int(rate * cycles / frequency)) / rate
+    omega = 2 * np.pi * frequency
+    return time, amplitude * np.sin(omega * time + 0.4), amplitude * omega * np.cos(omega * time + 0.4)
+
+
+@pytest.mark.parametrize(("rate", "frequency"), [(2000, 60), (2000, 0.5), (300, 1.5), (200, 17.3)])
+def test_clean_sine_is_exact(rate, frequency):
+    time, stroke, truth = _sine(rate, frequency, 0.01)
+    velocity, how = estimate_velocity(time, stroke)
+    assert _error(velocity, truth) < 1e-10
+    assert "harmonic regression" in how
+    assert f"{frequency:g} Hz" in how
+
+
+def test_noise_averages_out_at_its_theoretical_rate(rng):
+    time, stroke, truth = _sine(2000, 5, 0.01)
+    errors = []
+    for _ in range(20):
+        velocity, _ = estimate_velocity(time, stroke + 1e-4 * rng.standard_normal(len(time)))
+        errors.append(_error(velocity, truth) ** 2)
+    # amplitude, phase and frequency: three numbers, efficiently estimated
+    expected = 1e-4 / 0.01 * np.sqrt(2) * np.sqrt(3 / len(time))
+    assert 0.4 * expected < np.sqrt(np.mean(errors)) < 2 * expected
+    assert _error(np.gradient(stroke + 1e-4 * rng.standard_normal(len(time)), time), truth) > 0.4
+
+
+def test_mains_ripple_of_a_public_dyno_record(rng):
+    """300 Hz, ripple of 0.14 mm peak to peak at about 50 Hz: differenced, it is 20 mm/s of false velocity."""
+    time, stroke, truth = _sine(300, 1.5, 0.02)
+    rippled = stroke + 7e-5 * np.sin(2 * np.pi * 50.3 * time)
+    assert np.max(np.abs(np.gradient(rippled, time) - truth)) > 0.015
+    for method, bound in ((None, 1e-4), ("savitzky-golay", 5e-3)):
+        velocity, _ = estimate_velocity(time, rippled, method=method)
+        assert _error(velocity, truth) < bound
+
+
+def test_harmonics_of_a_distorted_sine(rng):
+    time, stroke, truth = _sine(1000, 3, 0.02)
+    omega = 2 * np.pi * 3
+    stroke = stroke + 4e-4 * np.sin(2 * omega * time) + 2e-4 * np.cos(3 * omega * time)
+    truth = truth + 8e-4 * omega * np.cos(2 * omega * time) - 6e-4 * omega * np.sin(3 * omega * time)
+    velocity, how = estimate_velocity(time, stroke + 1e-5 * rng.standard_normal(len(time)))
+    assert "3 harmonics" in how
+    assert _error(velocity, truth) < 1e-3
+
+
+def _with_rest():
+    _, stroke, truth = _sine(1000, 2, 0.02, 6)
+    rest = np.zeros(800)
+    parts = [np.concatenate([rest, part, rest]) for part in (stroke - stroke[0], truth)]
+    return np.arange(len(parts[0])) / 1000, *parts
+
+
+def _growing():
+    time, stroke, truth = _sine(1000, 2, 0.02, 6)
+    grown = 1 + 0.05 * time / time[-1]
+    return time, grown * stroke, grown * truth + 0.05 / time[-1] * stroke
+
+
+def _triangle():
+    time = _sine(1000, 2, 0.02, 6)[0]
+    phase = (2 * time) % 1
+    return time, 0.02 * (4 * np.abs(phase - 0.5) - 1), np.where(phase < 0.5, -0.16, 0.16)
+
+
+def _random():
+    test = RandomTest(duration=10.0)
+    time = np.arange(5000) / 500
+    return time, test.stroke(time), test.velocity(time)
+
+
+def _short():
+    return _sine(1000, 2, 0.02, 1.2)
+
+
+@pytest.mark.parametrize(
+    ("motion", "bound"), [(_with_rest, 0.07), (_growing, 0.01), (_triangle, 0.25), (_random, 0.01), (_short, 0.02)]
+)
+def test_what_is_not_steady_and_periodic_goes_to_savitzky_golay(motion, bound, rng):
+    time, stroke, truth = motion()
+    noisy = stroke + 1e-5 * rng.standard_normal(len(time))
+    velocity, how = estimate_velocity(time, noisy)
+    assert "Savitzky-Golay" in how
+    assert _error(velocity, truth) < bound
+    with pytest.raises(ValueError, match="no steady periodic motion"):
+        estimate_velocity(time, noisy, method="harmonic")
+
+
+@pytest.mark.parametrize(("noise", "bound"), [(0.0, 1e-4), (1e-5, 0.005), (1e-4, 0.025)])
+@pytest.mark.parametrize(("rate", "frequency"), [(2000, 1.5), (2000, 10), (2000, 30)])
+def test_savitzky_golay_window_follows_the_noise(rate, frequency, noise, bound, rng):
+    time, stroke, truth = _sine(rate, frequency, 0.01)
+    for _ in range(20 if noise else 1):
+        noisy = stroke + noise * rng.standard_normal(len(time))
+        velocity, _ = estimate_velocity(time, noisy, method="savitzky-golay")
+        assert _error(velocity, truth) < bound
+        assert _error(velocity, truth) < 0.5 * _error(np.gradient(noisy, time), truth)
+
+
+def test_stroke_is_left_as_it_is(rng):
+    time, stroke, _ = _sine(1000, 2, 0.02)
+    before = stroke.copy()
+    estimate_velocity(time, stroke)
+    np.testing.assert_array_equal(stroke, before)
+
+
+def test_bad_arguments():
+    time, stroke, _ = _sine(1000, 2, 0.02)
+    with pytest.raises(ValueError, match="`method`"):
+        estimate_velocity(time, stroke, method="spline")
+    with pytest.raises(ValueError, match="shape of the time"):
+        estimate_velocity(time, stroke[1:])
+    with pytest.raises(ValueError, match="only 10 samples"):
+        estimate_velocity(time[:10], stroke[:10])
+    with pytest.raises(ValueError, match="stroke is constant"):
+        estimate_velocity(time, np.full_like(time, 0.1))
+    with pytest.raises(ValueError, match="stroke is nan"):
+        estimate_velocity(time, np.where(time == time[7], np.nan, stroke))

@@ -1,0 +1,127 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jaxdamp.bench.columns import find_columns, role_of
+from jaxdamp.bench.tables import Table
+from jaxdamp.bench.units import conversion
+
+
+def _table(*names: str, units: tuple[str, ...] = (), count: int = 0) -> Table:
+    return Table(Path("run.csv"), names, units, np.zeros((30, len(names) or count)), tuple(range(30)), ())
+
+
+@pytest.mark.parametrize(
+    ("header", "role"),
+    [
+        ("t_s", "time"),
+        ("T_degC", "temperature"),
+        ("x_mm", "stroke"),
+        ("Displacement, in", "stroke"),
+        ("v/(m/s)", "velocity"),
+        ("v_mm_s", "velocity"),
+        ("F/N", "force"),
+        ("Load cell temperature [°C]", "temperature"),
+        ("Damper force (kN)", "force"),
+        ("StrokeVelocity [mm/s]", "velocity"),
+        ("Load, lbs", "force"),
+        ("Zeit [s]", "time"),
+        ("s [mm]", "stroke"),
+        ("Displacement setpoint [mm]", None),
+        ("Acceleration [m/s^2]", None),
+        ("cycle", None),
+    ],
+)
+def test_role_of_a_header(header, role):
+    assert role_of(header) == role
+
+
+def test_units_from_headers_rows_and_arguments():
+    found = find_columns(_table("t_s", "Displacement, in", "Velocity (in/s)", "force lbf", "temp [degC]"))
+    assert {role: column.conversion.unit for role, column in found.items()} == {
+        "time": "s",
+        "stroke": "in",
+        "velocity": "in/s",
+        "force": "lbf",
+        "temperature": "degC",
+    }
+    found = find_columns(_table("time", "stroke", "force", units=("ms", "mm", "kN")))
+    assert found["force"].conversion.factor == 1000.0
+    found = find_columns(_table("time [s]", "stroke", "force [N]"), units={"stroke": "mm", "force": "kN"})
+    assert (found["stroke"].conversion.unit, found["force"].conversion.unit) == ("mm", "kN")
+
+
+def test_columns_by_name_number_and_none():
+    table = _table("t_s", "LVDT_mm", "string pot_mm", "x_mm", "F_N", "v_m_s")
+    found = find_columns(table, {"stroke": "LVDT_mm", "velocity": None, "force": 4})
+    assert (found["stroke"].index, found["force"].index, "velocity" in found) == (1, 4, False)
+    units = {"time": "s", "stroke": "mm", "force": "N"}
+    assert len(find_columns(_table(count=3), {"time": 0, "stroke": 1, "force": 2}, units)) == 3
+
+
+def test_two_columns_for_one_role():
+    with pytest.raises(ValueError, match=r"'LVDT_mm' and 'x_mm' could all be the stroke\. Choose one: columns="):
+        find_columns(_table("t_s", "LVDT_mm", "x_mm", "F_N"))
+
+
+def test_no_unit_is_an_error_with_the_remedy():
+    with pytest.raises(ValueError, match=r"column 'stroke' \(stroke\) names no unit.*units=\{\"stroke\": \"mm\"\}"):
+        find_columns(_table("time [s]", "stroke", "force [N]"))
+
+
+def test_unknown_unit_suggests():
+    with pytest.raises(
+        ValueError, match=r"column 'stroke \[mmm\]': 'mmm' is no known unit of stroke\. Did you mean 'mm'"
+    ):
+        find_columns(_table("time [s]", "stroke [mmm]", "force [N]"))
+    with pytest.raises(ValueError, match="'mm' is a unit of stroke, not of force"):
+        find_columns(_table("time [s]", "stroke [mm]", "force [N]"), units={"force": "mm"})
+
+
+def test_missing_column_and_header():
+    with pytest.raises(ValueError, match=r"no column for the force: its columns are 't_s', 'x_mm'"):
+        find_columns(_table("t_s", "x_mm"))
+    with pytest.raises(ValueError, match=r"no header row.*columns=\{\"time\": 0"):
+        find_columns(_table(count=3))
+
+
+def test_wrong_names():
+    with pytest.raises(ValueError, match="Did you mean 'x_mm'"):
+        find_columns(_table("t_s", "x_mm", "F_N"), {"stroke": "x_m"})
+    with pytest.raises(ValueError, match=r"has columns 0 to 2"):
+        find_columns(_table("t_s", "x_mm", "F_N"), {"stroke": 3})
+    with pytest.raises(ValueError, match="Did you mean 'stroke'"):
+        find_columns(_table("t_s", "x_mm", "F_N"), {"strok": 1})
+    with pytest.raises(ValueError, match="`units` must be one of"):
+        find_columns(_table("t_s", "x_mm", "F_N"), units={"displacement": "mm"})
+
+
+@pytest.mark.parametrize(
+    ("role", "unit", "value", "si"),
+    [
+        ("stroke", "in", 1.0, 0.0254),
+        ("stroke", "cm", 1.0, 0.01),
+        ("stroke", "µm", 1.0, 1e-6),
+        ("velocity", "in/s", 10.0, 0.254),
+        ("velocity", "mm/sec", 1.0, 1e-3),
+        ("force", "lbf", 1.0, 4.4482216152605),
+        ("force", "kgf", 1.0, 9.80665),
+        ("force", "kN", 2.0, 2000.0),
+        ("time", "ms", 5.0, 0.005),
+        ("time", "Sec", 5.0, 5.0),
+        ("temperature", "degC", 20.0, 293.15),
+        ("temperature", "°F", 212.0, 373.15),
+    ],
+)
+def test_conversion_to_si(role, unit, value, si):
+    found = conversion(role, unit)
+    assert found is not None
+    assert found(np.array([value]))[0] == pytest.approx(si, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("role", "unit"), [("stroke", "N"), ("force", "kg"), ("time", ""), ("force", "-"), ("time", "3 s")]
+)
+def test_what_is_no_unit(role, unit):
+    assert conversion(role, unit) is None
