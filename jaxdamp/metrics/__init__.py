@@ -22,11 +22,11 @@ differentiated; where a derivative is zero or undefined, the docstring says so. 
 Array([0.707107, 1.414214, 2.828427], dtype=float64)
 """
 
-from .amplitude import crest_factor, peak, rms
-from .dissipation import dissipated_energy, equivalent_damping
-from .spectrum import power_spectral_density
-from .tyre_load import dynamic_load_coefficient, lift_off_fraction, road_stress_factor
-from .working_space import working_space_peak, working_space_rms
+from jaxdamp.metrics.amplitude import crest_factor, peak, rms
+from jaxdamp.metrics.dissipation import dissipated_energy, equivalent_damping
+from jaxdamp.metrics.spectrum import power_spectral_density
+from jaxdamp.metrics.tyre_load import dynamic_load_coefficient, lift_off_fraction, road_stress_factor
+from jaxdamp.metrics.working_space import working_space_peak, working_space_rms
 
 
 __all__ = [

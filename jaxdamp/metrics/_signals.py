@@ -2,8 +2,8 @@
 
 import jax.numpy as jnp
 
-from .. import _checks
-from .._types import Signal, SignalLike
+from jaxdamp import _checks
+from jaxdamp._types import Signal, SignalLike
 
 
 def as_signal(argument: str, signal: SignalLike, *, least: int = 1) -> Signal:

@@ -2,8 +2,8 @@
 
 import jax.numpy as jnp
 
-from .._types import Scalar, SignalLike
-from ._signals import as_signal
+from jaxdamp._types import Scalar, SignalLike
+from jaxdamp.metrics._signals import as_signal
 
 
 def rms(signal: SignalLike) -> Scalar:

@@ -2,9 +2,9 @@
 
 import jax.numpy as jnp
 
-from .. import _checks
-from .._types import Scalar, ScalarLike, Signal, SignalLike
-from ._signals import as_signal, same_length
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
+from jaxdamp.metrics._signals import as_signal, same_length
 
 
 def _trapezoid(signal: Signal) -> Scalar:

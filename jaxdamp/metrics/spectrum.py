@@ -5,9 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .. import _checks
-from .._types import Scalar, ScalarLike, Signal, SignalLike
-from ._signals import as_signal
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
+from jaxdamp.metrics._signals import as_signal
 
 
 # Coefficients a_k of the periodic windows w_j = sum_k (-1)^k a_k cos(2 pi k j/n).

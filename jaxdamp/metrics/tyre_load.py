@@ -2,10 +2,10 @@
 
 import jax.numpy as jnp
 
-from .. import _checks
-from .._types import Scalar, ScalarLike, SignalLike
-from ._signals import as_signal
-from .amplitude import rms
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, SignalLike
+from jaxdamp.metrics._signals import as_signal
+from jaxdamp.metrics.amplitude import rms
 
 
 def dynamic_load_coefficient(tyre_load_variation: SignalLike, static_tyre_load: ScalarLike | int) -> Scalar:

@@ -2,9 +2,9 @@
 
 import jax.numpy as jnp
 
-from .._types import Scalar, SignalLike
-from ._signals import as_signal
-from .amplitude import rms
+from jaxdamp._types import Scalar, SignalLike
+from jaxdamp.metrics._signals import as_signal
+from jaxdamp.metrics.amplitude import rms
 
 
 def working_space_rms(deflection: SignalLike) -> Scalar:

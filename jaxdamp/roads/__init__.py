@@ -8,6 +8,7 @@ an array of shape [time, wheels]. A road with a single track has one column; a v
 - Random roads: `iso8608` (a roughness class at a vehicle speed) and `band_limited` (a flat spectrum between two
   frequencies).
 - Measured roads: `from_profile`.
+- For stationary responses: `white`, a road known by its spectrum alone.
 
 Roads are pure functions of their parameters, so that they can be compiled, batched and differentiated in height,
 speed or roughness. Simulations start at rest on level ground: random roads therefore fade in over the first half
@@ -26,13 +27,24 @@ Two roads through the same corner of a village, first a speed hump and then a po
 (10001, 1)
 """
 
-from .base import AbstractRoad
-from .bump import cosine_bump
-from .edge import step
-from .harmonic import sine
-from .iso_roughness import iso8608
-from .profile import from_profile
-from .random_band import band_limited
+from jaxdamp.roads.base import AbstractRoad
+from jaxdamp.roads.bump import cosine_bump
+from jaxdamp.roads.edge import step
+from jaxdamp.roads.harmonic import sine
+from jaxdamp.roads.iso_roughness import iso8608
+from jaxdamp.roads.profile import from_profile
+from jaxdamp.roads.random_band import band_limited
+from jaxdamp.roads.white import WhiteRoad, white
 
 
-__all__ = ["AbstractRoad", "band_limited", "cosine_bump", "from_profile", "iso8608", "sine", "step"]
+__all__ = [
+    "AbstractRoad",
+    "WhiteRoad",
+    "band_limited",
+    "cosine_bump",
+    "from_profile",
+    "iso8608",
+    "sine",
+    "step",
+    "white",
+]

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._types import Signal
+from jaxdamp._types import Signal
 
 
 # Samples handled at a time: bounds the memory whatever the length of the record.

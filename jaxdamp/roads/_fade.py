@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .._types import Scalar, Signal
+from jaxdamp._types import Scalar, Signal
 
 
 def raised_cosine(fraction: Float[Array, "*shape"]) -> Float[Array, "*shape"]:

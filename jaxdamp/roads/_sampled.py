@@ -6,10 +6,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .. import _checks
-from .._types import Scalar, Signal, SignalLike
-from ._fade import fade_in
-from .base import AbstractRoad
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, Signal, SignalLike
+from jaxdamp.roads._fade import fade_in
+from jaxdamp.roads.base import AbstractRoad
 
 
 # How far outside the record a time may lie before it is refused, in samples: rounding must not count.

@@ -5,7 +5,7 @@ from abc import abstractmethod
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from .._types import SignalLike
+from jaxdamp._types import SignalLike
 
 
 class AbstractRoad(eqx.Module):

@@ -6,9 +6,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .. import _checks
-from .._types import Scalar, ScalarLike, Signal, SignalLike
-from .base import AbstractRoad
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
+from jaxdamp.roads.base import AbstractRoad
 
 
 def haversine(fraction: Signal, height: Scalar) -> Signal:

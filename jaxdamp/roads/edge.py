@@ -6,10 +6,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .. import _checks
-from .._types import Scalar, ScalarLike, SignalLike
-from ._fade import raised_cosine
-from .base import AbstractRoad
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, SignalLike
+from jaxdamp.roads._fade import raised_cosine
+from jaxdamp.roads.base import AbstractRoad
 
 
 @final

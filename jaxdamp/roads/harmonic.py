@@ -6,10 +6,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .. import _checks
-from .._types import Scalar, ScalarLike, SignalLike
-from ._fade import fade_in
-from .base import AbstractRoad
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, SignalLike
+from jaxdamp.roads._fade import fade_in
+from jaxdamp.roads.base import AbstractRoad
 
 
 @final
@@ -33,10 +33,9 @@ class Sine(AbstractRoad):
         return None
 
     @property
-    def duration(self) -> float | None:
-        """The period of the sine [s]."""
-        frequency = _checks.concrete(self.frequency)
-        return None if frequency is None else 1.0 / float(frequency)
+    def duration(self) -> None:
+        """A sine does not end."""
+        return None
 
 
 def sine(

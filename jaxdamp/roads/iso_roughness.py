@@ -9,12 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .. import _checks
-from .._types import Scalar, ScalarLike, SignalLike
-from ._cosine_sum import cosine_sum
-from ._fade import fade_in
-from ._seed import random_key
-from .base import AbstractRoad
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, SignalLike
+from jaxdamp.roads._cosine_sum import cosine_sum
+from jaxdamp.roads._fade import fade_in
+from jaxdamp.roads._seed import random_key
+from jaxdamp.roads.base import AbstractRoad
 
 
 REFERENCE_SPATIAL_FREQUENCY = 0.1  # n0 [cycle/m]
@@ -148,11 +148,11 @@ def iso8608(
     _checks.positive("speed", speed, "Roads are driven forwards; it is in m/s.")
     _checks.nonnegative("waviness", waviness, "The standard uses 2.")
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
-    roughness = _roughness(road_class)
+    density = roughness(road_class)
     length = _repeat_length(band, speed, duration, length)
     first, last = _first_and_last(band, length)
     return Iso8608(
-        roughness_psd=jnp.asarray(roughness, float),
+        roughness_psd=jnp.asarray(density, float),
         waviness=jnp.asarray(waviness, float),
         speed=jnp.asarray(speed, float),
         phase=jax.random.uniform(random_key(seed), (last - first + 1,), float, maxval=2.0 * math.pi),
@@ -167,7 +167,8 @@ def _first_and_last(band: tuple[float, float], length: float) -> tuple[int, int]
     return math.floor(band[0] * length + 0.5 + 1e-9), math.ceil(band[1] * length - 0.5 - 1e-9)
 
 
-def _roughness(road_class: str | ScalarLike) -> ScalarLike:
+def roughness(road_class: str | ScalarLike) -> ScalarLike:
+    """G_d(n0) [m^3] of a class, or the number itself."""
     if not isinstance(road_class, str):
         _checks.positive("road_class", road_class, "As a number it is G_d(n0) in m^3, for example 64e-6.")
         value = _checks.concrete(road_class)

@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from .. import _checks
-from .._types import ScalarLike
-from ._sampled import SampledRoad
+from jaxdamp import _checks
+from jaxdamp._types import ScalarLike
+from jaxdamp.roads._sampled import SampledRoad
 
 
 # Largest departure from a uniform grid that is taken for rounding in the file, as part of one step.

@@ -6,10 +6,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .. import _checks
-from .._types import Scalar, ScalarLike
-from ._sampled import SampledRoad
-from ._seed import random_key
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike
+from jaxdamp.roads._sampled import SampledRoad
+from jaxdamp.roads._seed import random_key
 
 
 @jax.jit(static_argnames=("first", "size"))

@@ -48,19 +48,16 @@ class Response(eqx.Module):
         steps = jnp.diff(self.road, axis=0) / jnp.diff(self.time)[:, None]
         return jnp.concatenate([steps[:1], 0.5 * (steps[1:] + steps[:-1]), steps[-1:]])
 
-    def _instants(self) -> Instant:
+    @property
+    def channels(self) -> dict[str, Signal]:
+        """All channels by name; with tyre damping the road's rate is the mean of the slopes on both sides."""
         form = self.vehicle.port_form()
         n = form.mass.shape[0]
         rate = self._road_rate()
         forces = self.port_force @ form.port_input().T + self.road @ form.road_input().T
         change = self.motion @ form.state_matrix().T + forces + rate @ form.road_rate_input().T
-        position, velocity = self.motion[:, :n], self.motion[:, n:]
-        return Instant(position, velocity, change[:, n:], self.road, rate, self.port_force)
-
-    @property
-    def channels(self) -> dict[str, Signal]:
-        """All channels by name; with tyre damping the road's rate is the mean of the slopes on both sides."""
-        return jax.vmap(self.vehicle.channels)(self._instants())
+        parts = (self.motion[:, :n], self.motion[:, n:], change[:, n:], self.road, rate, self.port_force)
+        return jax.vmap(lambda *instant: self.vehicle.channels(Instant(*instant)))(*parts)
 
     def __getitem__(self, channel: str) -> Signal:
         _checks.one_of("channel", channel, self.units)

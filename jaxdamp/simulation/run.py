@@ -63,7 +63,7 @@ def simulate(
         remedy = f"Pass `dt={road.grid:g}` or less, or make the road with a coarser grid."
         _checks.refuse("dt", f"not be longer than the road's grid of {road.grid:g} s", dt, remedy)
     count = round(duration / dt)
-    time = jnp.arange(count + 1) * dt
+    time = jnp.arange(count + 1, dtype=float) * dt
     heights = road.height(time)
     wheels = vehicle.port_form().road_stiffness.shape[1]
     if heights.shape[1] != wheels:

@@ -45,26 +45,26 @@ class PortForm(eqx.Module):
     ground_damping: Float[Array, "wheels wheels"]
     ports: Float[Array, "ports q"]
 
-    def state_matrix(self) -> Float[Array, "2*q 2*q"]:
+    def state_matrix(self) -> Float[Array, "n n"]:
         """A of ẋ = A x + …, x = (q, q̇)."""
         n = self.mass.shape[0]
         lower = -jnp.linalg.solve(self.mass, jnp.concatenate([self.stiffness, self.damping], axis=1))
         upper = jnp.concatenate([jnp.zeros((n, n), lower.dtype), jnp.eye(n, dtype=lower.dtype)], axis=1)
         return jnp.concatenate([upper, lower])
 
-    def _driven(self, forces: Float[Array, "q inputs"]) -> Float[Array, "2*q inputs"]:
+    def _driven(self, forces: Float[Array, "q inputs"]) -> Float[Array, "n inputs"]:
         rates = jnp.linalg.solve(self.mass, forces)
         return jnp.concatenate([jnp.zeros_like(rates), rates])
 
-    def port_input(self) -> Float[Array, "2*q ports"]:
+    def port_input(self) -> Float[Array, "n ports"]:
         """B_f: how the element forces act on ẋ."""
         return self._driven(-self.ports.T)
 
-    def road_input(self) -> Float[Array, "2*q wheels"]:
+    def road_input(self) -> Float[Array, "n wheels"]:
         """B_r: how the road heights act on ẋ."""
         return self._driven(self.road_stiffness)
 
-    def road_rate_input(self) -> Float[Array, "2*q wheels"]:
+    def road_rate_input(self) -> Float[Array, "n wheels"]:
         """How the rates of the road heights act on ẋ."""
         return self._driven(self.road_damping)
 

@@ -32,18 +32,9 @@ def test_gradient_in_speed_equals_closed_form():
     np.testing.assert_allclose(slope, 0.01 * np.cos(2 * np.pi * 2.0 * TIME) * 2 * np.pi * TIME / 8.0, atol=1e-13)
 
 
-def test_duration_is_the_period_where_it_is_known():
-    assert sine(0.01, frequency=2.0).duration == 0.5
+def test_has_neither_an_end_nor_samples():
+    assert sine(0.01, frequency=2.0).duration is None
     assert sine(0.01, frequency=2.0).grid is None
-    seen = []
-
-    @jax.jit
-    def traced(frequency):
-        seen.append(sine(0.01, frequency=frequency).duration)
-        return frequency
-
-    traced(jnp.asarray(2.0))
-    assert seen == [None]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,42 @@
+"""A road whose rate of height is white noise: the ISO 8608 road of waviness 2 without ends to its spectrum."""
+
+from typing import final
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike
+from jaxdamp.roads.iso_roughness import REFERENCE_SPATIAL_FREQUENCY, roughness
+
+
+@final
+class WhiteRoad(eqx.Module):
+    """A road known by its spectrum alone, for the stationary response of linear vehicles; made by `white`.
+
+    Attributes:
+        velocity_psd: two-sided power spectral density of the rate of height [(m/s)²/Hz].
+    """
+
+    velocity_psd: Scalar
+
+
+def white(road_class: str | ScalarLike, speed: ScalarLike) -> WhiteRoad:
+    """The road of an ISO 8608 class at a speed as white noise in the rate of height, S = 2π² G_d(n₀) n₀² V.
+
+    It cannot be driven over in time: it goes to stationary calculations, in which heights stay relative.
+
+    Arguments:
+        road_class: a letter A to H, or G_d(n₀) [m³].
+        speed: vehicle speed V [m/s].
+
+    Raises:
+        ValueError: an unknown class, a speed or roughness that is not positive.
+
+    >>> round(float(white("C", speed=20.0).velocity_psd), 9)
+    0.001010647
+    """
+    _checks.positive("speed", speed)
+    density = 2.0 * np.pi**2 * roughness(road_class) * REFERENCE_SPATIAL_FREQUENCY**2 * speed
+    return WhiteRoad(jnp.asarray(density, float))

@@ -1,0 +1,149 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxdamp import dampers, parameters, roads, simulate, tune, vehicles
+from jaxdamp.tune.minimising import driven_ride
+
+
+CAR = vehicles.presets.quarter_car_000()
+MS, MU, K, KT = 1200.0, 125.0, 60e3, 220e3
+M = MS + MU
+BEST_ACCELERATION = K * np.sqrt(M / KT)
+BEST_TYRE = np.sqrt(M * K**2 / KT - 2 * MU * MS * K / M + MU * MS**2 * KT / M**2)
+
+
+@pytest.mark.parametrize("start", [600.0, 2500.0, 15_000.0])
+@pytest.mark.parametrize(
+    ("metric", "best"),
+    [
+        ("rms_sprung_acceleration", BEST_ACCELERATION),
+        ("rms_dynamic_tyre_load", BEST_TYRE),
+        ("dynamic_load_coefficient", BEST_TYRE),
+    ],
+)
+def test_finds_the_closed_form_optimum_on_a_white_road(metric, best, start):
+    car = vehicles.presets.quarter_car_000(dampers.Linear(start))
+    result = tune.minimise(metric, car, roads.white("C", speed=20.0))
+    assert float(result.vehicle.damper.rate) == pytest.approx(best, rel=1e-6)
+    assert result.converged and not result.warnings
+    assert result.after[metric] < result.before[metric]
+
+
+def test_closed_form_optima_are_those_of_paper_000():
+    assert pytest.approx(4656.4, abs=0.05) == BEST_ACCELERATION
+    assert pytest.approx(5536.5, abs=0.05) == BEST_TYRE
+
+
+def test_simulated_roads_find_the_optimum_within_their_sampling_error():
+    """Roads that repeat after the run hold every wave whole times; their optima scatter little about the closed form."""
+    found = []
+    for seed in range(4):
+        road = roads.iso8608("C", speed=20.0, seed=seed, length=1000.0)
+        result = tune.minimise("rms_sprung_acceleration", CAR, road, duration=50.0, dt=2e-3)
+        assert result.converged
+        found.append(float(result.vehicle.damper.rate))
+    spread = np.std(found, ddof=1)
+    assert 0 < spread < 0.05 * BEST_ACCELERATION
+    assert abs(np.mean(found) - BEST_ACCELERATION) < 3.0 * spread / np.sqrt(len(found))
+
+
+def test_gradient_through_the_simulation_agrees_with_differences():
+    law = dampers.Bilinear(2600.0, 1400.0, knee_width=0.02)
+    car = vehicles.presets.quarter_car_000(law)
+    ride = driven_ride(car, roads.iso8608("C", speed=20.0, seed=1), 3.0, 1e-3)
+
+    def metric(rates):
+        changed = parameters.replace(
+            car, {"damper.rebound_rate": rates[0], "damper.compression_rate": rates[1], "sprung_mass": rates[2]}
+        )
+        return ride(changed)["rms_sprung_acceleration"]
+
+    at = np.array([2600.0, 1400.0, 1200.0])
+    slope = np.asarray(jax.jacfwd(metric)(jnp.asarray(at)))
+    for i, h in enumerate(1e-3 * at):
+        step = np.eye(3)[i] * h
+        far = (metric(jnp.asarray(at + 2 * step)) - metric(jnp.asarray(at - 2 * step))) / (4 * h)
+        near = (metric(jnp.asarray(at + step)) - metric(jnp.asarray(at - step))) / (2 * h)
+        assert slope[i] == pytest.approx(float((4 * near - far) / 3), rel=1e-7)
+
+
+def test_hard_limit_is_met_and_active():
+    road = roads.cosine_bump(0.06, start=0.2, duration=0.25)
+    car = vehicles.presets.quarter_car_000(dampers.Bilinear(2500.0, 2500.0))
+    free = tune.minimise("rms_sprung_acceleration", car, road, duration=2.0)
+    top = 0.93 * free.after["working_space_peak"]
+    result = tune.minimise("rms_sprung_acceleration", car, road, limits={"working_space_peak": top}, duration=2.0)
+    assert result.converged, result
+    assert result.after["working_space_peak"] == pytest.approx(top, rel=1e-5)
+    assert result.after["rms_sprung_acceleration"] > free.after["rms_sprung_acceleration"]
+    again = simulate(result.vehicle, road, duration=2.0).metrics()
+    assert {k: float(v) for k, v in again.items()} == pytest.approx(result.after, rel=1e-9)
+    assert "limit" in repr(result) and "working_space_peak" in repr(result)
+
+
+def test_limit_that_cannot_be_met_is_said():
+    road = roads.cosine_bump(0.06, start=0.2, duration=0.25)
+    result = tune.minimise("rms_sprung_acceleration", CAR, road, limits={"working_space_peak": 1e-3}, duration=1.0)
+    assert not result.converged
+    assert any("working_space_peak <= 0.001 is not met" in w for w in result.warnings)
+
+
+def test_bounds_hold_and_are_said():
+    result = tune.minimise(
+        "rms_sprung_acceleration", CAR, roads.white("C", 20.0), bounds={"damper.rate": (1000.0, 4000.0)}
+    )
+    assert float(result.vehicle.damper.rate) == pytest.approx(4000.0, rel=1e-5)
+    assert result.parameters[0].note == "at a bound"
+    assert any("ended at a bound" in w for w in result.warnings)
+    assert result.converged
+
+
+def test_several_parameters_of_any_kind_can_be_free():
+    result = tune.minimise(
+        "rms_sprung_acceleration",
+        CAR,
+        roads.white("C", 20.0),
+        over=["rate", "spring_rate"],
+        bounds={"spring_rate": (30e3, 90e3)},
+    )
+    # without a limit on travel the softest spring is best, and then c* = k sqrt(M/k_t)
+    assert float(result.vehicle.spring_rate) == pytest.approx(30e3, rel=1e-4)
+    assert float(result.vehicle.damper.rate) == pytest.approx(30e3 * np.sqrt(M / KT), rel=1e-3)
+
+
+def test_knots_stay_in_order():
+    law = dampers.PiecewiseLinear(jnp.array([-0.2, 0.05, 0.3]), jnp.array([900.0, 2500.0, 2600.0, 1500.0]))
+    car = vehicles.presets.quarter_car_000(law)
+    road = roads.cosine_bump(0.05, start=0.1, duration=0.2)
+    result = tune.minimise("rms_sprung_acceleration", car, road, duration=1.0, max_steps=15)
+    assert np.all(np.diff(np.asarray(result.vehicle.damper.knots)) > 0)
+    assert np.all(np.asarray(result.vehicle.damper.slopes) > 0)
+    assert result.after["rms_sprung_acceleration"] < result.before["rms_sprung_acceleration"]
+
+
+def test_progress_and_history_follow_the_search():
+    seen = []
+    result = tune.minimise(
+        "rms_sprung_acceleration", CAR, roads.white("C", 20.0), progress=lambda step, value: seen.append((step, value))
+    )
+    assert [value for _, value in seen] == list(result.history)
+    assert [step for step, _ in seen] == list(range(1, len(seen) + 1))
+    assert result.history[-1] == pytest.approx(result.after["rms_sprung_acceleration"])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"metric": "rms_acceleration"}, "Did you mean 'rms_sprung_acceleration'"),
+        ({"metric": "working_space_peak"}, "must be one of 'rms_sprung_acceleration'"),
+        ({"limits": {"travel": 0.1}}, "`metric` must be one of .* but is 'travel'"),
+        ({"over": ["damper.rat"]}, "did you mean 'damper.rate'"),
+        ({"bounds": {"damper.rate": (3000.0, 9000.0)}}, "Start inside the bounds or widen them"),
+    ],
+)
+def test_refuses_names_and_starts_that_do_not_fit(change, message):
+    arguments = {"metric": "rms_sprung_acceleration", "vehicle": CAR, "road": roads.white("C", 20.0)} | change
+    with pytest.raises(ValueError, match=message):
+        tune.minimise(**arguments)
