@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any, NoReturn
 
-import jax
 import numpy as np
+from jax.core import Tracer
 
 
 def refuse(argument: str, must: str, value: Any, remedy: str = "") -> NoReturn:
@@ -16,7 +16,7 @@ def refuse(argument: str, must: str, value: Any, remedy: str = "") -> NoReturn:
 
 def concrete(value: Any) -> np.ndarray | None:
     """The value as a NumPy array, or `None` while JAX traces it (traced values cannot be checked)."""
-    return None if isinstance(value, jax.core.Tracer) else np.asarray(value)
+    return None if isinstance(value, Tracer) else np.asarray(value)
 
 
 def finite(argument: str, value: Any, remedy: str = "Look for NaN or a division by zero where it was made.") -> None:

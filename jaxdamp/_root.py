@@ -1,6 +1,7 @@
 """Root of a scalar function that increases, with the derivative of the implicit function theorem."""
 
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -28,14 +29,17 @@ def increasing_root(
     """
 
     def solve(f: Callable[[Scalar], Scalar], w: Scalar) -> Scalar:
-        def narrow(_: int, now: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+        def narrow(_: Any, now: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
             w, low, high, last, before_last = now
             value, slope = jax.jvp(f, (w,), (jnp.ones_like(w),))
             low = jnp.where(value <= 0, w, low)
             high = jnp.where(value >= 0, w, high)
             newton = w - value / jnp.where(slope > 0, slope, 1.0)
-            stalled = (jnp.abs(value) > 0.5 * before_last) & (jnp.abs(newton - w) > 1e-6 * (high - low))
-            good = (slope > 0) & (newton >= low) & (newton <= high) & ~stalled
+            stalled = jnp.abs(value) > 0.5 * before_last
+            inside = (newton >= low) & (newton <= high)
+            # At the root rounding may point out of the bracket; its other end can be far away, and so its middle.
+            small = jnp.abs(newton - w) <= 1e-6 * (high - low)
+            good = (slope > 0) & (small | (inside & ~stalled))
             return jnp.where(good, newton, 0.5 * (low + high)), low, high, jnp.abs(value), last
 
         low, high = jax.lax.stop_gradient((lower, upper))

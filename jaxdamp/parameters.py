@@ -8,7 +8,6 @@ parameter inside a composition. Freezing and extra bounds are arguments of a fit
 """
 
 import dataclasses
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
@@ -21,96 +20,42 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-
-
-@dataclasses.dataclass(frozen=True)
-class Domain:
-    """The values a parameter may take, and a smooth one-to-one map to them from the whole real line.
-
-    `from_raw(raw, scale)` and `to_raw(value, scale)` are inverse to each other; `scale` is a typical magnitude, so
-    that a raw step of one is a step of about the size of the parameter.
-    """
-
-    name: str
-    contains: Callable[[np.ndarray], bool]
-    from_raw: Callable[[Array, Array], Array]
-    to_raw: Callable[[Array, Array], Array]
-    lower: float = -np.inf
-    upper: float = np.inf
-
-
-def _inverse_softplus(y: Array) -> Array:
-    return jnp.where(y > 30.0, y, jnp.log(jnp.expm1(jnp.minimum(y, 30.0))))
-
-
-def _positive_to_raw(value: Array, scale: Array) -> Array:
-    return _inverse_softplus(jnp.maximum(value / scale, 1e-12))
-
-
-def _increasing_from_raw(raw: Array, scale: Array) -> Array:
-    steps = jnp.concatenate([scale[:1] * raw[:1], scale[1:] * jax.nn.softplus(raw[1:])])
-    return jnp.cumsum(steps)
-
-
-def _increasing_to_raw(value: Array, scale: Array) -> Array:
-    return jnp.concatenate([value[:1] / scale[:1], _inverse_softplus(jnp.diff(value) / scale[1:])])
-
-
-def _increasing_from_raw_positive(raw: Array, scale: Array) -> Array:
-    return jnp.cumsum(scale * jax.nn.softplus(raw))
-
-
-def _increasing_to_raw_positive(value: Array, scale: Array) -> Array:
-    return _inverse_softplus(jnp.diff(value, prepend=jnp.zeros(1, value.dtype)) / scale)
-
-
-real = Domain("real", lambda a: True, lambda raw, scale: scale * raw, lambda value, scale: value / scale)
-positive = Domain(
-    "positive",
-    lambda a: bool(np.all(a > 0)),
-    lambda raw, scale: scale * jax.nn.softplus(raw),
-    _positive_to_raw,
-    lower=0.0,
-)
-# A value of exactly zero has no raw counterpart: a search from there starts at a hundredth of the scale.
-nonnegative = dataclasses.replace(
+from jaxdamp._domains import (
+    Domain,
+    around_zero,
+    increasing,
+    increasing_negative,
+    interval,
+    nonnegative,
+    ordered_interval,
     positive,
-    name="not negative",
-    contains=lambda a: bool(np.all(a >= 0)),
-    to_raw=lambda value, scale: _inverse_softplus(jnp.maximum(value / scale, 1e-2)),
-)
-increasing = Domain(
-    "strictly increasing", lambda a: bool(np.all(np.diff(a) > 0)), _increasing_from_raw, _increasing_to_raw
-)
-increasing_negative = Domain(
-    "strictly increasing and negative",
-    lambda a: bool(np.all(np.diff(a) > 0) and np.all(a < 0)),
-    lambda raw, scale: -_increasing_from_raw_positive(raw, scale)[::-1],
-    lambda value, scale: _increasing_to_raw_positive(-value[::-1], scale),
-    upper=0.0,
+    real,
 )
 
 
-@functools.lru_cache
-def interval(lower: float, upper: float) -> Domain:
-    """The open interval between two finite numbers (scaled logistic map)."""
-    if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
-        raise ValueError(f"Bounds must be two finite numbers in increasing order, but are ({lower}, {upper}).")
-    width = upper - lower
-
-    def to_raw(value: Array, scale: Array) -> Array:
-        del scale
-        share = jnp.clip((value - lower) / width, 1e-9, 1 - 1e-9)
-        return jnp.log(share / (1 - share))
-
-    return Domain(
-        f"between {lower:g} and {upper:g}",
-        lambda a: bool(np.all((a >= lower) & (a <= upper))),
-        lambda raw, scale: lower + width * jax.nn.sigmoid(raw),
-        to_raw,
-        lower,
-        upper,
-    )
+__all__ = [
+    "Domain",
+    "FreeParameters",
+    "Parameter",
+    "around_zero",
+    "as_float",
+    "check_parameters",
+    "free_parameters",
+    "get",
+    "increasing",
+    "increasing_negative",
+    "interval",
+    "match_paths",
+    "nonnegative",
+    "ordered_interval",
+    "parameter",
+    "parameters",
+    "positive",
+    "readable",
+    "real",
+    "replace",
+    "setting",
+]
 
 
 def as_float(value: Any) -> Array:
@@ -197,31 +142,49 @@ def check_parameters(module: eqx.Module) -> None:
             _checks.refuse(argument, f"be {domain.name}{unit}", value, f"It is the {declared['meaning']}.")
 
 
+def readable(module: eqx.Module) -> str:
+    """The module as a line with its numbers: `Lag(law=Linear(rate=1500.0), lag_time=0.004)`."""
+
+    def text(value: Any) -> str:
+        if isinstance(value, tuple | list):
+            return f"({', '.join(map(text, value))}{',' if len(value) == 1 else ''})"
+        if isinstance(value, jax.Array | np.ndarray):
+            numbers = _checks.concrete(value)
+            return eqx.tree_pformat(value) if numbers is None or numbers.size > 50 else repr(numbers.tolist())
+        return repr(value)
+
+    fields = [f"{field.name}={text(getattr(module, field.name))}" for field in dataclasses.fields(module)]
+    return f"{type(module).__name__}({', '.join(fields)})"
+
+
 def get(tree: Any, path: str) -> Any:
     """The value at a path such as `"damper.terms.0.rate"`."""
-    for part in path.split("."):
+    for part in path.split(".") if path else []:
         tree = tree[int(part)] if isinstance(tree, tuple | list) else getattr(tree, part)
     return tree
 
 
 def replace(tree: Any, values: Mapping[str, Any]) -> Any:
-    """The same tree with other values at the given paths.
+    """The same tree with other values at the given paths (last parts and patterns as in `free_parameters`).
+
+    Values outside their domain are refused.
 
     >>> from jaxdamp.dampers import Linear
     >>> float(replace(Linear(1500.0), {"rate": 2000.0}).rate)
     2000.0
     """
     known = [p.path for p in parameters(tree)]
-    for path in values:
-        match_paths(known, [path])
-    paths = list(values)
-    return eqx.tree_at(lambda t: [get(t, p) for p in paths], tree, [as_float(values[p]) for p in paths])
+    chosen = {path: as_float(value) for name, value in values.items() for path in match_paths(known, [name])}
+    changed = eqx.tree_at(lambda t: [get(t, path) for path in chosen], tree, list(chosen.values()))
+    for path in chosen:
+        check_parameters(get(changed, path.rpartition(".")[0]))
+    return changed
 
 
 def match_paths(known: Sequence[str], patterns: Sequence[str]) -> list[str]:
     """The known paths that patterns name: exactly, by their last part, or with `*`."""
     chosen = []
-    for pattern in patterns:
+    for pattern in [patterns] if isinstance(patterns, str) else patterns:
         hits = [p for p in known if fnmatchcase(p, pattern)] or [p for p in known if fnmatchcase(p, f"*.{pattern}")]
         if not hits:
             near = get_close_matches(pattern, list(known) + [p.rsplit(".", 1)[-1] for p in known], 1)
@@ -245,9 +208,7 @@ class FreeParameters(eqx.Module):
     @property
     def names(self) -> list[str]:
         """One name for each number."""
-        return [
-            p.path if p.value.ndim == 0 else f"{p.path}[{i}]" for p in self.chosen for i in range(max(p.value.size, 1))
-        ]
+        return [p.path if p.value.ndim == 0 else f"{p.path}[{i}]" for p in self.chosen for i in range(p.value.size)]
 
     @property
     def values(self) -> Float[Array, " free"]:
@@ -285,11 +246,12 @@ class FreeParameters(eqx.Module):
 
 def _scale(p: Parameter) -> Array:
     value = jax.lax.stop_gradient(p.value)
-    if p.domain.name.startswith("strictly increasing"):
-        value = jnp.diff(value, prepend=jnp.zeros(1, value.dtype))
+    if p.domain.steps is not None:
+        value = p.domain.steps(value)
     magnitude = jnp.abs(value)
-    floor = jnp.maximum(1e-3 * jnp.max(magnitude, initial=0.0), jnp.finfo(value.dtype).tiny)
-    return jnp.where(magnitude > floor, magnitude, jnp.where(jnp.all(magnitude == 0), 1.0, jnp.max(magnitude)))
+    largest = jnp.max(magnitude, initial=0.0)
+    floor = jnp.maximum(1e-3 * largest, jnp.finfo(value.dtype).tiny)
+    return jnp.where(magnitude > floor, magnitude, jnp.where(largest == 0, 1.0, largest))
 
 
 def free_parameters(
@@ -316,6 +278,9 @@ def free_parameters(
     frozen = match_paths(known, freeze)
     limits: dict[str, tuple[float, float]] = {}
     for name, pair in (bounds or {}).items():
+        if len(pair) != 2 or not np.all(np.isfinite(pair)) or not pair[0] < pair[1]:
+            remedy = "A side that should stay open gets a number that is never reached."
+            _checks.refuse(f"bounds[{name!r}]", "be two finite numbers in increasing order", pair, remedy)
         for path in match_paths(known, [name]):
             limits[path] = pair
     chosen = []
@@ -324,7 +289,8 @@ def free_parameters(
             continue
         if p.path in limits:
             lower, upper = limits[p.path]
-            domain = interval(max(lower, p.domain.lower), min(upper, p.domain.upper))
+            limited = interval if p.domain.steps is None else ordered_interval
+            domain = limited(max(lower, p.domain.lower), min(upper, p.domain.upper))
             value = np.asarray(p.value)
             if not np.all((value > domain.lower) & (value < domain.upper)):
                 remedy = "Start inside the bounds or widen them."

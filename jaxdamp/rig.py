@@ -1,14 +1,15 @@
-"""The bench: the force of a law under a prescribed stroke."""
+"""The bench: the force of a law under a prescribed stroke, and at constant velocity."""
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp._types import Signal, SignalLike
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import as_float
 
 
 def respond(
@@ -40,23 +41,70 @@ def respond(
     >>> round(float(force[0]), 6)
     120.0
     """
-    time, stroke = jnp.asarray(time), jnp.asarray(stroke)
+    instants = _checks.concrete(time)
+    time, stroke = as_float(time), as_float(stroke)
     if time.ndim != 1 or time.size < 2 or stroke.shape != time.shape:
         _checks.refuse("stroke", "be as long as `time`, two or more", f"of shape {stroke.shape} for time {time.shape}")
     if velocity is not None and jnp.shape(velocity) != time.shape:
         _checks.refuse("velocity", "be as long as `time`", f"of shape {jnp.shape(velocity)} for time {time.shape}")
     if substeps < 1:
         _checks.refuse("substeps", "be 1 or more", substeps)
-    _checks.finite("stroke", stroke, "Remove or interpolate the missing samples first.")
-    instants = _checks.concrete(time)
+    for name, values in (("stroke", stroke), ("velocity", velocity)):
+        if values is not None:
+            _checks.finite(name, values, "Remove or interpolate the missing samples first.")
     if instants is not None:
         steps = np.diff(instants)
-        if not (np.all(steps > 0) and np.ptp(steps) <= 1e-3 * steps.mean()):
+        rounding = 4.0 * float(jnp.finfo(time.dtype).eps) * np.abs(instants).max()
+        if not (np.all(steps > 0) and np.ptp(steps) <= 1e-3 * steps.mean() + rounding):
             value = f"stepping from {steps.min():g} to {steps.max():g} s"
             _checks.refuse("time", "increase in equal steps", value, "Resample the record to a uniform rate.")
     dt = (time[-1] - time[0]) / (time.size - 1)
-    velocity = jnp.gradient(stroke, dt) if velocity is None else jnp.asarray(velocity)
-    return march(law, dt, stroke, velocity, substeps)
+    rate = jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else as_float(velocity)
+    return march(law, dt, stroke, rate, substeps)
+
+
+def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.ndarray) -> Float[Array, " points"]:
+    """Force [N] of a law at constant velocity, its states settled: the curve without hysteresis.
+
+    The velocity is held at stroke zero until the force stands still; a memoryless law answers at once.
+
+    Arguments:
+        law: the damper law.
+        velocities: velocities [m/s], shape (points,).
+
+    Raises:
+        ValueError: velocities that are not finite numbers in one dimension; a force that does not settle in 64 s.
+
+    >>> from jaxdamp.dampers import Linear, SeriesSpring
+    >>> quasi_static(SeriesSpring(Linear(2000.0), stiffness=1e6), np.array([-0.5, 0.0, 0.5]))
+    Array([-1000.,     0.,  1000.], dtype=float64)
+    """
+    velocities = as_float(velocities)
+    if velocities.ndim != 1 or velocities.size == 0:
+        _checks.refuse("velocities", "be one or more in one dimension", f"of shape {velocities.shape}")
+    _checks.finite("velocities", velocities)
+    force = _hold(law, velocities, jnp.asarray(0))
+    if law.initial_state().size == 0:
+        return force
+    tolerance = 1e-3 if force.dtype == jnp.float32 else 1e-9
+    for seconds in (1, 2, 4, 8, 16, 32, 64):
+        before, force = force, _hold(law, velocities, jnp.asarray(1000 * seconds))
+        if np.max(np.abs(force - before)) <= tolerance * np.max(np.abs(force)):
+            return force
+    remedy = "Its force depends on how long it has moved: take `respond` with the motion that you mean."
+    _checks.refuse("law", "settle at constant velocity", f"{law} with forces {before} N, then {force} N", remedy)
+
+
+@eqx.filter_jit
+def _hold(law: AbstractDamper, velocities: Array, count: Int[Array, ""]) -> Array:
+    zero, dt = jnp.zeros((), velocities.dtype), jnp.asarray(1e-3, velocities.dtype)
+
+    def one(v: Array) -> Array:
+        start = law.initial_state()
+        state = jax.lax.fori_loop(0, count, lambda _, state: law.advance(zero, v, zero, v, state, dt), start)
+        return law.force(zero, v, state)
+
+    return jax.vmap(one)(velocities)
 
 
 @eqx.filter_jit
@@ -75,12 +123,15 @@ def march(law: AbstractDamper, dt: Array, stroke: Signal, velocity: Signal, subs
 
     def sample(state: Array, ends: tuple[Array, Array, Array, Array]) -> tuple[Array, Array]:
         if substeps == 1:
-            state = step(state, tuple(e[0] for e in ends))[0]
+            state = step(state, (ends[0][0], ends[1][0], ends[2][0], ends[3][0]))[0]
         else:
             state = jax.lax.scan(step, state, ends)[0]
         return state, state
 
-    grid = tuple(a.reshape(-1, substeps) for a in (fine_x[:-1], fine_v[:-1], fine_x[1:], fine_v[1:]))
+    def grouped(values: Array) -> Array:
+        return values.reshape(-1, substeps)
+
+    grid = (grouped(fine_x[:-1]), grouped(fine_v[:-1]), grouped(fine_x[1:]), grouped(fine_v[1:]))
     _, states = jax.lax.scan(sample, state, grid)
     states = jnp.concatenate([state[None], states])
     return jax.vmap(law.force)(stroke, velocity, states)
@@ -89,7 +140,7 @@ def march(law: AbstractDamper, dt: Array, stroke: Signal, velocity: Signal, subs
 def _slopes(values: Signal, dt: Array) -> Signal:
     """Derivative by five-point differences, exact for quartics up to the ends."""
     if values.size < 5:
-        return jnp.gradient(values, dt)
+        return jnp.asarray(jnp.gradient(values, dt))
     inner = (values[:-4] - 8.0 * values[1:-3] + 8.0 * values[3:-1] - values[4:]) / 12.0
     edge = jnp.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0, 1.0]]) / 12.0
     return jnp.concatenate([edge @ values[:5], inner, -(edge @ values[:-6:-1])[::-1]]) / dt

@@ -11,8 +11,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.parameters import check_parameters, parameter
+from jaxdamp.parameters import check_parameters, parameter, readable
 
 
 class AbstractDamper(eqx.Module):
@@ -24,6 +25,9 @@ class AbstractDamper(eqx.Module):
 
     def __check_init__(self) -> None:
         check_parameters(self)
+
+    def __repr__(self) -> str:
+        return readable(self)
 
     @abstractmethod
     def initial_state(self) -> State:
@@ -73,12 +77,14 @@ class AbstractMemoryless(AbstractDamper):
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N] at velocity v [m/s]."""
-        del x, state
+        del x
+        _check_stateless(self, state)
         return self.force_velocity(v)
 
     def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
         """No states."""
         del x, v
+        _check_stateless(self, state)
         return state
 
     def advance(
@@ -86,6 +92,7 @@ class AbstractMemoryless(AbstractDamper):
     ) -> State:
         """No states."""
         del x0, v0, x1, v1, dt
+        _check_stateless(self, state)
         return state
 
 
@@ -100,10 +107,27 @@ class AbstractStateful(AbstractDamper):
         return state + 0.5 * dt * (rate + self.state_rate(x1, v1, state + dt * rate))
 
 
-def _states_of(terms: tuple[AbstractDamper, ...], state: Float[Array, " states"]) -> list[State]:
+_START = "Start from `law.initial_state()`."
+
+
+def _check_stateless(law: AbstractDamper, state: State) -> None:
+    if state.size:
+        _checks.refuse("state", f"be empty for {type(law).__name__}", f"of shape {state.shape}", _START)
+
+
+def own_and_inner(law: AbstractDamper, state: State) -> tuple[Scalar, Float[Array, " inner"]]:
+    """The first state, that of a wrapper, and the rest, those of the law inside."""
+    if not state.size:
+        _checks.refuse("state", f"hold the state of {type(law).__name__} first", "empty", _START)
+    return state[0], state[1:]
+
+
+def _states_of(terms: tuple[AbstractDamper, ...], state: State) -> list[Array]:
     """Cut the concatenated states of several laws into theirs."""
-    sizes = [eqx.filter_eval_shape(term.initial_state).size for term in terms]
+    sizes = [term.initial_state().size for term in terms]
     ends = [sum(sizes[: i + 1]) for i in range(len(sizes))]
+    if state.size != ends[-1]:
+        _checks.refuse("state", f"hold {ends[-1]} numbers for the terms of the sum", f"of shape {state.shape}", _START)
     return [state[end - size : end] for size, end in zip(sizes, ends, strict=True)]
 
 
@@ -115,6 +139,10 @@ class Sum(AbstractDamper):
 
     preserves_linearity: ClassVar[bool] = True
 
+    def __check_init__(self) -> None:
+        if not self.terms:
+            _checks.refuse("terms", "hold at least one law", self.terms)
+
     def initial_state(self) -> State:
         """The states of all terms."""
         return jnp.concatenate([term.initial_state() for term in self.terms])
@@ -122,7 +150,7 @@ class Sum(AbstractDamper):
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Sum of the forces [N]."""
         pairs = zip(self.terms, _states_of(self.terms, state), strict=True)
-        return jnp.sum(jnp.stack([term.force(x, v, s) for term, s in pairs]))
+        return jnp.sum(jnp.stack([term.force(x, v, s) for term, s in pairs]), axis=0)
 
     def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
         """Rates of all terms."""

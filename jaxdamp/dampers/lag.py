@@ -5,7 +5,7 @@ from typing import ClassVar, final
 import jax.numpy as jnp
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.base import AbstractDamper, own_and_inner
 from jaxdamp.parameters import parameter, positive
 
 
@@ -34,22 +34,24 @@ class Lag(AbstractDamper):
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N]."""
         del x, v
-        return state[0]
+        return own_and_inner(self, state)[0]
 
     def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
         """Rates of the force [N/s] and of the law's states."""
-        rate = (self.law.force(x, v, state[1:]) - state[0]) / self.lag_time
-        return jnp.concatenate([rate[None], self.law.state_rate(x, v, state[1:])])
+        force, inner = own_and_inner(self, state)
+        rate = (self.law.force(x, v, inner) - force) / self.lag_time
+        return jnp.concatenate([rate[None], self.law.state_rate(x, v, inner)])
 
     def advance(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
     ) -> State:
         """Exact for a law force linear over the step."""
-        inner = self.law.advance(x0, v0, x1, v1, state[1:], dt)
-        before = self.law.force(x0, v0, state[1:])
+        force, inner = own_and_inner(self, state)
+        before = self.law.force(x0, v0, inner)
+        inner = self.law.advance(x0, v0, x1, v1, inner, dt)
         after = self.law.force(x1, v1, inner)
         z = dt / self.lag_time
         kept = jnp.exp(-z)
         mean = -jnp.expm1(-z) / z
-        force = kept * state[0] + (mean - kept) * before + (1.0 - mean) * after
+        force = kept * force + (mean - kept) * before + (1.0 - mean) * after
         return jnp.concatenate([force[None], inner])

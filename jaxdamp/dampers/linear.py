@@ -2,8 +2,7 @@
 
 from typing import final
 
-import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractMemoryless
@@ -28,6 +27,7 @@ class Linear(AbstractMemoryless):
         return self.rate * v
 
     @classmethod
-    def guess(cls, velocity: Float[Array, " samples"], force: Float[Array, " samples"]) -> "Linear":
+    def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "Linear":
         """Start value from measured data: least squares through the origin."""
-        return cls(jnp.maximum(jnp.vdot(velocity, force) / jnp.vdot(velocity, velocity), 1.0))
+        velocity, force = np.asarray(velocity), np.asarray(force)
+        return cls(max(float(np.vdot(velocity, force) / max(np.vdot(velocity, velocity), 1e-12)), 1.0))

@@ -4,14 +4,13 @@ from typing import final
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers._guesses import velocity_grid
 from jaxdamp.dampers._hinges import hinges
 from jaxdamp.dampers.base import AbstractMemoryless
-from jaxdamp.parameters import check_parameters, increasing, nonnegative, parameter, positive, real, setting
+from jaxdamp.parameters import increasing, nonnegative, parameter, positive, real, setting
 
 
 @final
@@ -43,7 +42,6 @@ class PiecewiseLinear(AbstractMemoryless):
         if self.knots.ndim != 1 or self.slopes.shape != (self.knots.size + 1,):
             must = "hold one slope more than there are knots"
             _checks.refuse("slopes", must, f"of shape {self.slopes.shape} beside knots of shape {self.knots.shape}")
-        check_parameters(self)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

@@ -1,16 +1,14 @@
 """One polynomial over the whole range of velocities."""
 
-from collections.abc import Sequence
 from typing import final
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._types import Scalar, ScalarLike, Vector
+from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers.base import AbstractMemoryless
-from jaxdamp.parameters import as_float, check_parameters, increasing, parameter, setting
+from jaxdamp.parameters import around_zero, as_float, parameter, setting
 
 
 @final
@@ -30,12 +28,12 @@ class Polynomial(AbstractMemoryless):
     """
 
     coefficients: Vector = parameter("N", "shares of the force at 1 m/s, by power", linear=True)
-    velocity_range: Vector = setting("m/s", "range where the polynomial holds", increasing)
+    velocity_range: Vector = setting("m/s", "range where the polynomial holds", around_zero)
 
     def __init__(
         self,
-        coefficients: Float[Array, " degree"] | Sequence[float],
-        velocity_range: Float[Array, "2"] | tuple[float, float] = (-2.0, 2.0),
+        coefficients: VectorLike,
+        velocity_range: VectorLike = (-2.0, 2.0),
     ) -> None:
         self.coefficients = as_float(coefficients)
         self.velocity_range = as_float(velocity_range)
@@ -43,7 +41,6 @@ class Polynomial(AbstractMemoryless):
     def __check_init__(self) -> None:
         if self.coefficients.ndim != 1 or self.coefficients.size == 0:
             _checks.refuse("coefficients", "be a₁ … aₙ in one dimension", f"of shape {self.coefficients.shape}")
-        check_parameters(self)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
@@ -60,4 +57,5 @@ class Polynomial(AbstractMemoryless):
         scale = np.abs(velocity).max()
         powers = np.stack([(velocity / scale) ** j for j in range(1, degree + 1)], axis=1)
         scaled = np.linalg.lstsq(powers, force, rcond=None)[0]
-        return cls(scaled / scale ** np.arange(1, degree + 1), (float(velocity.min()), float(velocity.max())))
+        reach = (min(float(velocity.min()), 0.0), max(float(velocity.max()), 0.0))
+        return cls(scaled / scale ** np.arange(1, degree + 1), reach)

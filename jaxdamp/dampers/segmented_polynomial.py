@@ -2,6 +2,7 @@
 
 from typing import final
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -9,7 +10,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers.base import AbstractMemoryless
-from jaxdamp.parameters import as_float, check_parameters, increasing, increasing_negative, parameter, positive, setting
+from jaxdamp.parameters import around_zero, as_float, increasing_negative, parameter, positive, setting
 
 
 def _poly(shares: Float[Array, " degree"], u: ScalarLike) -> Scalar:
@@ -48,7 +49,7 @@ class SegmentedPolynomial(AbstractMemoryless):
     shares_high_compression: Vector = parameter("N", "shares by power on v ≤ v₁", linear=True)
     shares_low_rebound: Vector = parameter("N", "shares by power on 0 < v ≤ v₄", linear=True)
     shares_high_rebound: Vector = parameter("N", "shares by power on v > v₄", linear=True)
-    velocity_range: Vector = setting("m/s", "range where the law holds", increasing, default=(-2.0, 2.0))
+    velocity_range: Vector = setting("m/s", "range where the law holds", around_zero, default=(-2.0, 2.0))
 
     def __check_init__(self) -> None:
         sizes = {"compression_knots": 2, "shares_low_compression": 4, "shares_mid_compression": 2}
@@ -57,7 +58,10 @@ class SegmentedPolynomial(AbstractMemoryless):
             shape = getattr(self, name).shape
             if shape != (size,):
                 _checks.refuse(name, f"hold {size} numbers", f"of shape {shape}")
-        check_parameters(self)
+        arrays = (self.compression_knots, self.rebound_knot, self.velocity_range)
+        v1, v4, reach = (_checks.concrete(a) for a in arrays)
+        if v1 is not None and v4 is not None and reach is not None and not (reach[0] <= v1[0] and v4 <= reach[1]):
+            _checks.refuse("velocity_range", f"hold the knots {v1} and {v4} m/s", reach, "Widen it to the data's.")
 
     def _segments(self, v: ScalarLike) -> Scalar:
         v1, v2, v4 = self.compression_knots[0], self.compression_knots[1], self.rebound_knot
@@ -71,13 +75,11 @@ class SegmentedPolynomial(AbstractMemoryless):
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
         low, high = self.velocity_range[0], self.velocity_range[1]
-        v1, v4 = self.compression_knots[0], self.rebound_knot
-        below = jnp.arange(1.0, 5.0) * self.shares_high_compression / -v1
-        above = jnp.arange(1.0, 5.0) * self.shares_high_rebound / v4
-        slope_low = jnp.polyval(below[::-1], jnp.minimum(low - v1, 0.0) / -v1)
-        slope_high = jnp.polyval(above[::-1], jnp.maximum(high - v4, 0.0) / v4)
-        beyond = slope_low * jnp.minimum(v - low, 0.0) + slope_high * jnp.maximum(v - high, 0.0)
-        return self._segments(jnp.clip(v, low, high)) + beyond
+        inside = jnp.clip(v, low, high)
+        _, tangent_low = jax.jvp(self._segments, (low,), (jnp.ones_like(low),))
+        _, tangent_high = jax.jvp(self._segments, (high,), (jnp.ones_like(high),))
+        beyond = tangent_low * jnp.minimum(v - low, 0.0) + tangent_high * jnp.maximum(v - high, 0.0)
+        return self._segments(inside) + beyond
 
     def coefficients(self) -> dict[str, np.ndarray]:
         """The paper's 21 coefficients a_kj, ascending powers of v [m/s], by segment name."""
@@ -96,14 +98,15 @@ class SegmentedPolynomial(AbstractMemoryless):
             line = np.polynomial.Polynomial([-start / length, 1 / length])
             constant = float(self._segments(jnp.asarray(starts[name]))) if name in starts else 0.0
             whole = np.polynomial.Polynomial([constant, *np.asarray(shares)])(line)
-            result[name] = np.resize(whole.coef, shares.size + 1)
+            result[name] = np.pad(whole.coef, (0, shares.size + 1 - whole.coef.size))
         return result
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "SegmentedPolynomial":
         """Knots at a third and a tenth of the peak velocities, coefficients by least squares on the data."""
         velocity, force = np.asarray(velocity), np.asarray(force)
-        low, high = float(velocity.min()), float(velocity.max())
+        least = 1e-3 * float(np.abs(velocity).max())  # a side without data still has its segments
+        low, high = min(float(velocity.min()), -least), max(float(velocity.max()), least)
         v1, v2, v4 = 0.4 * low, 0.1 * low, 0.15 * high
 
         def powers(u: np.ndarray, degree: int) -> np.ndarray:

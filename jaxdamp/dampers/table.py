@@ -4,14 +4,13 @@ from typing import final
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._types import Scalar, ScalarLike, Vector
+from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers._guesses import velocity_grid
 from jaxdamp.dampers._hinges import hinges
 from jaxdamp.dampers.base import AbstractMemoryless
-from jaxdamp.parameters import check_parameters, increasing, parameter, setting
+from jaxdamp.parameters import as_float, increasing, parameter, setting
 
 
 @final
@@ -30,15 +29,14 @@ class Table(AbstractMemoryless):
     velocity: Vector = setting("m/s", "velocities of the points", increasing)
     force_points: Vector = parameter("N", "forces at the points", linear=True)
 
-    def __init__(self, velocity: Float[Array, " points"] | list, force: Float[Array, " points"] | list) -> None:
-        self.velocity = jnp.asarray(velocity, dtype=float)
-        self.force_points = jnp.asarray(force, dtype=float)
+    def __init__(self, velocity: VectorLike, force: VectorLike) -> None:
+        self.velocity = as_float(velocity)
+        self.force_points = as_float(force)
 
     def __check_init__(self) -> None:
         if self.velocity.ndim != 1 or self.velocity.size < 2 or self.force_points.shape != self.velocity.shape:
             must = "hold two or more points, one force for each velocity"
             _checks.refuse("force", must, f"of shape {self.force_points.shape} beside {self.velocity.shape} velocities")
-        check_parameters(self)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

@@ -50,7 +50,7 @@ def simulate(
     >>> car = vehicles.presets.quarter_car_000()
     >>> response = simulate(car, roads.cosine_bump(0.05, start=0.5, duration=0.25), duration=3.0)
     >>> round(float(response.metrics()["working_space_peak"]), 3)
-    0.057
+    0.072
     """
     duration = road.duration if duration is None else duration
     if duration is None:

@@ -1,0 +1,147 @@
+"""The values that parameters may take, each set with a smooth one-to-one map to it from the whole real line."""
+
+import dataclasses
+import functools
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Domain:
+    """The values a parameter may take, and a smooth one-to-one map to them from the whole real line.
+
+    `from_raw(raw, scale)` and `to_raw(value, scale)` are inverse to each other; `scale` is a typical magnitude, so
+    that a raw step of one is a step of about the size of the parameter. `steps` is for ordered vectors: the steps from
+    one number to the next, which are scaled in place of the numbers.
+    """
+
+    name: str
+    contains: Callable[[np.ndarray], bool]
+    from_raw: Callable[[Array, Array], Array]
+    to_raw: Callable[[Array, Array], Array]
+    lower: float = -np.inf
+    upper: float = np.inf
+    steps: Callable[[Array], Array] | None = None
+
+
+def _inverse_softplus(y: Array) -> Array:
+    return jnp.where(y > 30.0, y, jnp.log(jnp.expm1(jnp.minimum(y, 30.0))))
+
+
+def _positive_to_raw(value: Array, scale: Array) -> Array:
+    return _inverse_softplus(jnp.maximum(value / scale, 1e-12))
+
+
+def _increasing_from_raw(raw: Array, scale: Array) -> Array:
+    steps = jnp.concatenate([scale[:1] * raw[:1], scale[1:] * jax.nn.softplus(raw[1:])])
+    return jnp.cumsum(steps)
+
+
+def _increasing_to_raw(value: Array, scale: Array) -> Array:
+    return jnp.concatenate([value[:1] / scale[:1], _inverse_softplus(jnp.diff(value) / scale[1:])])
+
+
+def _increasing_from_raw_positive(raw: Array, scale: Array) -> Array:
+    return jnp.cumsum(scale * jax.nn.softplus(raw))
+
+
+def _increasing_to_raw_positive(value: Array, scale: Array) -> Array:
+    return _inverse_softplus(jnp.diff(value, prepend=jnp.zeros(1, value.dtype)) / scale)
+
+
+real = Domain("real", lambda a: True, lambda raw, scale: scale * raw, lambda value, scale: value / scale)
+positive = Domain(
+    "positive",
+    lambda a: bool(np.all(a > 0)),
+    lambda raw, scale: scale * jax.nn.softplus(raw),
+    _positive_to_raw,
+    lower=0.0,
+)
+# Its edge belongs to it, so the map is a square: zero is reached at a finite raw value, where softplus would crawl
+# towards it for ever. At exactly zero the square is flat and a search would never leave: it starts a little beside.
+nonnegative = Domain(
+    "not negative",
+    lambda a: bool(np.all(a >= 0)),
+    lambda raw, scale: scale * raw * raw,
+    lambda value, scale: jnp.sqrt(jnp.maximum(value / scale, 1e-2)),
+    lower=0.0,
+)
+increasing = Domain(
+    "strictly increasing",
+    lambda a: bool(np.all(np.diff(a) > 0)),
+    _increasing_from_raw,
+    _increasing_to_raw,
+    steps=lambda value: jnp.diff(value, prepend=jnp.zeros(1, value.dtype)),
+)
+increasing_negative = Domain(
+    "strictly increasing and negative",
+    lambda a: bool(np.all(np.diff(a) > 0) and np.all(a < 0)),
+    lambda raw, scale: -_increasing_from_raw_positive(raw[::-1], scale[::-1])[::-1],
+    lambda value, scale: _increasing_to_raw_positive(-value[::-1], scale[::-1])[::-1],
+    upper=0.0,
+    steps=lambda value: jnp.diff(value, append=jnp.zeros(1, value.dtype)),
+)
+# For settings that hold the two ends of a range.
+around_zero = dataclasses.replace(
+    increasing,
+    name="a low and a high end with zero between them",
+    contains=lambda a: a.shape == (2,) and bool(a[0] < a[1] and a[0] <= 0 <= a[1]),
+)
+
+
+def _check_bounds(lower: float, upper: float) -> None:
+    if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
+        raise ValueError(f"Bounds must be two finite numbers in increasing order, but are ({lower}, {upper}).")
+
+
+@functools.lru_cache
+def interval(lower: float, upper: float) -> Domain:
+    """The open interval between two finite numbers (scaled logistic map)."""
+    _check_bounds(lower, upper)
+    width = upper - lower
+
+    def to_raw(value: Array, scale: Array) -> Array:
+        del scale
+        share = jnp.clip((value - lower) / width, 1e-9, 1 - 1e-9)
+        return jnp.log(share / (1 - share))
+
+    return Domain(
+        f"between {lower:g} and {upper:g}",
+        lambda a: bool(np.all((a >= lower) & (a <= upper))),
+        lambda raw, scale: lower + width * jax.nn.sigmoid(raw),
+        to_raw,
+        lower,
+        upper,
+    )
+
+
+@functools.lru_cache
+def ordered_interval(lower: float, upper: float) -> Domain:
+    """Increasing numbers between two finite ones: their gaps are the shares of a softmax."""
+    _check_bounds(lower, upper)
+    width = upper - lower
+
+    def from_raw(raw: Array, scale: Array) -> Array:
+        del scale
+        gaps = jax.nn.softmax(jnp.concatenate([raw, jnp.zeros(1, raw.dtype)]))
+        return lower + width * jnp.cumsum(gaps)[:-1]
+
+    def to_raw(value: Array, scale: Array) -> Array:
+        del scale
+        ends = jnp.array([lower], value.dtype), jnp.array([upper], value.dtype)
+        gaps = jnp.maximum(jnp.diff(jnp.concatenate([ends[0], value, ends[1]])) / width, 1e-12)
+        return jnp.log(gaps[:-1] / gaps[-1])
+
+    return Domain(
+        f"strictly increasing between {lower:g} and {upper:g}",
+        lambda a: bool(np.all(np.diff(a) > 0) and np.all((a >= lower) & (a <= upper))),
+        from_raw,
+        to_raw,
+        lower,
+        upper,
+        steps=increasing.steps,
+    )

@@ -1,0 +1,20 @@
+"""Files are written whole or not at all."""
+
+import os
+from pathlib import Path
+
+from jaxdamp import _checks
+
+
+def write_whole(path: str | os.PathLike[str], text: str) -> Path:
+    """Write a text file beside its place, then move it there: a reader never meets half a file."""
+    target = Path(path).expanduser()
+    if not target.parent.is_dir():
+        _checks.refuse("path", "lie in a folder that exists", target, "Make the folder first.")
+    draft = target.with_name(f".{target.name}.{os.getpid()}.draft")
+    try:
+        draft.write_text(text, encoding="utf-8")
+        os.replace(draft, target)
+    finally:
+        draft.unlink(missing_ok=True)
+    return target

@@ -1,0 +1,198 @@
+import json
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxdamp.dampers
+from jaxdamp.dampers import AbstractMemoryless, CoulombFriction, Lag, Linear, MotionRatio, PiecewiseLinear, SeriesSpring
+from jaxdamp.export import from_json, to_json
+from jaxdamp.parameters import get, parameter, positive, setting
+
+
+def law():
+    inner = PiecewiseLinear([-0.1, 0.1 + 0.2], [500.0, 2000.0 / 3.0, 800.0], knee_width=0.01)
+    return Lag(SeriesSpring(inner + 2.0 * CoulombFriction(40.0, 1e-300), 1.5e6), 0.004)
+
+
+class Orifice(AbstractMemoryless):
+    """A law of one's own, with settings of several kinds."""
+
+    size: Any = parameter("N s²/m²", "force over v²", positive)
+    width: Any = setting("m/s", "rounding", positive, default=1e-3)
+    name: str = "orifice"
+    weights: Any = None
+    pair: tuple = (1, None, True)
+
+    def force_velocity(self, v):
+        return self.size * v * jnp.sqrt(v * v + self.width**2)
+
+
+def same(a, b):
+    return jax.tree.structure(a) == jax.tree.structure(b) and all(
+        np.asarray(x).tobytes() == np.asarray(y).tobytes()
+        for x, y in zip(jax.tree.leaves(a), jax.tree.leaves(b), strict=True)
+    )
+
+
+def test_text_names_classes_units_and_settings():
+    document = json.loads(to_json(law()))
+    assert document["format"] == "jaxdamp law" and document["version"] == 1
+    outer = document["law"]
+    assert outer["class"] == "Lag" and outer["lag_time"] == {"value": 0.004, "unit": "s"}
+    terms = outer["law"]["law"]["terms"]
+    assert [t["class"] for t in terms] == ["PiecewiseLinear", "Scaled"]
+    assert terms[0]["knots"] == {"value": [-0.1, 0.1 + 0.2], "unit": "m/s"}
+    assert terms[0]["knee_width"] == {"value": 0.01, "unit": "m/s"} and terms[0]["monotone"] is True
+
+
+def test_text_and_file(tmp_path):
+    path = tmp_path / "front.json"
+    text = to_json(law(), path)
+    assert path.read_text(encoding="utf-8") == text + "\n"
+    for source in (text, "\n  " + text, path, str(path)):
+        assert same(from_json(source), law())
+
+
+def test_an_existing_file_is_replaced_whole_or_not_at_all(tmp_path, monkeypatch):
+    path = tmp_path / "front.json"
+    to_json(Linear(1.0), path)
+    before = path.read_text(encoding="utf-8")
+
+    def fail(*arguments):
+        raise OSError("no space left")
+
+    monkeypatch.setattr("os.replace", fail)
+    with pytest.raises(OSError, match="no space left"):
+        to_json(law(), path)
+    assert path.read_text(encoding="utf-8") == before
+    assert [f.name for f in tmp_path.iterdir()] == ["front.json"]
+
+
+def test_a_law_of_ones_own(tmp_path):
+    for own in (Orifice(2000.0), Orifice(1.0, 0.1, "b", jnp.array([[0.1, 0.2]]), (2.5, "c", Linear(3.0)))):
+        assert same(from_json(to_json(MotionRatio(own, 0.7))), MotionRatio(own, 0.7))
+        again = from_json(to_json(own))
+        assert isinstance(again, Orifice) and again.name == own.name
+
+
+def test_single_precision_keeps_its_value():
+    single = jax.tree.map(lambda a: a.astype(jnp.float32), Linear(0.1))
+    assert get(from_json(to_json(single)), "rate") == np.float64(np.float32(0.1))
+
+
+# ---- what cannot be written
+
+
+def test_not_a_law():
+    with pytest.raises((ValueError, TypeError), match="law"):
+        to_json(3.0)  # type: ignore[arg-type]
+
+
+def test_not_a_number(tmp_path):
+    broken = jax.tree.map(lambda a: a * jnp.nan, Linear(1.0))
+    with pytest.raises(ValueError, match=r"`Linear\.rate` must be finite, but is nan"):
+        to_json(broken, tmp_path / "law.json")
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(ValueError, match=r"`Orifice\.pair\[0\]` must be finite"):
+        to_json(Orifice(1.0, pair=(np.inf,)))
+
+
+def test_a_traced_law():
+    with pytest.raises(ValueError, match=r"`Linear\.rate` must have a known value.*outside `jax.jit`"):
+        jax.jit(lambda rate: to_json(Linear(rate)) and rate)(1.0)
+
+
+def test_a_field_that_is_no_plain_value():
+    with pytest.raises(ValueError, match=r"`Orifice\.weights` must be a law, a number, .*, but is a builtin_function"):
+        to_json(Orifice(1.0, weights=len))
+    with pytest.raises(ValueError, match=r"`Orifice\.weights` must hold floating-point numbers, but is of type int"):
+        to_json(Orifice(1.0, weights=np.arange(3)))
+
+
+def test_two_laws_of_one_name():
+    own = type("Linear", (AbstractMemoryless,), {"force_velocity": lambda self, v: v})
+    with pytest.raises(ValueError, match="must be of a class that can be found by its name, but is a Linear unlike"):
+        to_json(own())
+    assert type(from_json(to_json(Linear(1.0)))) is Linear
+
+
+def test_no_folder(tmp_path):
+    with pytest.raises(ValueError, match=r"`path` must lie in a folder that exists.*Make the folder first"):
+        to_json(Linear(1.0), tmp_path / "no" / "law.json")
+
+
+# ---- what cannot be read
+
+
+def test_no_file(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"There is no law file .*front\.json"):
+        from_json(tmp_path / "front.json")
+    with pytest.raises(FileNotFoundError, match="There is no law file"):
+        from_json("front.json")
+
+
+def changed(change):
+    document = json.loads(to_json(Lag(Linear(1500.0), 0.004)))
+    change(document)
+    return json.dumps(document)
+
+
+READ_ERRORS = {
+    "not JSON": ("{oops", "A law must be written in JSON, but the text is not: Expecting property name"),
+    "another file": ('{"format": "PDF"}', '`path_or_text` must begin with "format": "jaxdamp law"'),
+    "version": (changed(lambda d: d.update(version=2)), "`version` must be 1, but is 2"),
+    "no law": (changed(lambda d: d.pop("law")), "`the law file` must hold format, version, law, but is lacks law"),
+    "unknown law": (
+        changed(lambda d: d["law"]["law"].update({"class": "Linaer"})),
+        "must be a law that is known, but is 'Linaer'. Did you mean 'Linear'. Import the module of your own laws first",
+    ),
+    "abstract law": (changed(lambda d: d["law"].update({"class": "AbstractDamper"})), "must be a law that is known"),
+    "missing": (
+        changed(lambda d: d["law"].pop("lag_time")),
+        "`Lag` must hold class, law, lag_time, but is lacks lag_time",
+    ),
+    "too many": (changed(lambda d: d["law"].update(gain=1.0)), "`Lag` must hold .* but is has gain too many"),
+    "no class": (changed(lambda d: d["law"]["law"].pop("class")), 'must be written as {"class"'),
+    "NaN": (changed(lambda d: d["law"]["lag_time"].update(value=np.nan)), "finite numbers only, but the text has NaN"),
+    "too large": (
+        changed(lambda d: d["law"]["lag_time"].update(value=1)).replace('"value": 1,', '"value": 1e999,'),
+        r"`Lag\.lag_time` must be finite",
+    ),
+    "negative": (changed(lambda d: d["law"]["lag_time"].update(value=-1.0)), r"`Lag\.lag_time` must be positive \[s\]"),
+    "unit": (
+        changed(lambda d: d["law"]["lag_time"].update(unit="ms")),
+        r"`Lag\.lag_time` must be in 's', but is in 'ms'",
+    ),
+    "no unit": (
+        changed(lambda d: d["law"]["lag_time"].pop("unit")),
+        'must be written as {"value": "...", "unit": "s"}',
+    ),
+    "a bare number": (changed(lambda d: d["law"].update(lag_time=0.004)), "must be written as"),
+    "a word": (changed(lambda d: d["law"]["lag_time"].update(value="x")), "must be a number or a list of numbers"),
+    "ragged": (changed(lambda d: d["law"]["lag_time"].update(value=[1, [2]])), "must be a number or a list"),
+    "a list": (changed(lambda d: d["law"]["lag_time"].update(value=[1.0, 2.0])), r"`Lag\.lag_time` must be one number"),
+}
+
+
+@pytest.mark.parametrize("name", READ_ERRORS)
+def test_read_errors(name):
+    text, message = READ_ERRORS[name]
+    with pytest.raises(ValueError, match=message):
+        from_json(text)
+
+
+def test_a_file_of_several_faults_is_named(tmp_path):
+    path = tmp_path / "law.json"
+    path.write_text("[1, 2", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"law\.json is not"):
+        from_json(path)
+
+
+def test_every_law_of_the_package_is_found_by_its_name():
+    from jaxdamp.export.law_file import _classes
+
+    names = [n for n in jaxdamp.dampers.__all__ if not n.startswith("Abstract")]
+    assert all(_classes()[n] is getattr(jaxdamp.dampers, n) for n in names)

@@ -1,0 +1,246 @@
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import scipy.integrate
+
+from jaxdamp import dampers, roads, simulate
+from jaxdamp.parameters import replace
+from jaxdamp.simulation.exponential import exponential_steps
+from jaxdamp.vehicles.presets import quarter_car_000
+
+
+BESINGER = dampers.Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05)
+LAWS = {
+    "linear": dampers.Linear(2500.0),
+    "bilinear": dampers.Bilinear(3000.0, 1500.0),
+    "power": dampers.PowerLaw(1800.0, 0.6, 900.0, 0.6, knee_width=0.01),
+    "besinger": BESINGER,
+    "lag": dampers.Lag(dampers.Linear(2500.0) + dampers.CoulombFriction(80.0, 0.02), 0.004),
+    "series spring": dampers.SeriesSpring(BESINGER, 1e6, 1e9),
+    "stiff series spring": dampers.SeriesSpring(dampers.Linear(15_000.0), 1.5e7),
+    "motion ratio": dampers.MotionRatio(BESINGER, 1.3),
+}
+BUMP = roads.cosine_bump(0.06, start=0.1, duration=0.25)
+MS, MU, K, KT = 1200.0, 125.0, 60e3, 220e3
+
+
+@pytest.fixture(scope="module", params=LAWS)
+def run(request):
+    return simulate(quarter_car_000(LAWS[request.param]), BUMP, duration=1.0)
+
+
+def test_momentum_comes_from_the_tyre_alone(run):
+    """m_s z_s'' + m_u z_u'' = -k_t (z_u - z_r) for any law, at every instant."""
+    force = MS * run["sprung_acceleration"] + MU * run["unsprung_acceleration"]
+    np.testing.assert_allclose(force, -KT * (run["z_unsprung"] - run["z_road"]), atol=1e-9 * KT * 0.06)
+
+
+def test_channels_are_consistent_and_have_units(run):
+    channels = run.channels
+    assert set(channels) == set(run.units)
+    np.testing.assert_allclose(channels["stroke"], channels["z_sprung"] - channels["z_unsprung"], atol=1e-15)
+    held = 0.5 * (channels["damper_velocity"][1:] + channels["damper_velocity"][:-1])
+    assert np.abs(np.diff(channels["stroke"]) / 1e-3 - held).max() < 2e-3 * np.abs(held).max()
+    mean = 0.5 * (channels["sprung_acceleration"][1:] + channels["sprung_acceleration"][:-1])
+    np.testing.assert_allclose(np.diff(run.motion[:, 2]) / 1e-3, mean, atol=5e-3 * np.abs(mean).max())
+
+
+def test_energy_balance_closes(run):
+    parts = run.energy_balance()
+    total = float(parts["stored"] + parts["absorbed"] + parts["dashpots"])
+    assert float(parts["road_work"]) == pytest.approx(total, rel=4e-4)
+    assert float(parts["road_work"]) > 0 and float(parts["absorbed"]) > 0
+
+
+def test_energy_error_falls_with_the_square_of_the_step():
+    car = replace(quarter_car_000(LAWS["series spring"]), {"tyre_damping": 300.0})
+    errors = []
+    for dt in (2e-3, 1e-3, 5e-4):
+        parts = simulate(car, BUMP, duration=1.0, dt=dt).energy_balance()
+        assert float(parts["dashpots"]) > 0
+        errors.append(abs(float(parts["error"] / parts["road_work"])))
+    assert errors[0] > 3.3 * errors[1] > 3.3 * 3.3 * errors[2]
+
+
+def test_the_two_engines_agree(run):
+    reference = simulate(run.vehicle, BUMP, duration=1.0, method="diffrax")
+    for channel, share in (("sprung_acceleration", 6e-3), ("stroke", 1e-3), ("dynamic_tyre_load", 1e-3)):
+        difference = np.abs(run[channel] - reference[channel]).max()
+        assert difference < share * np.abs(reference[channel]).max(), channel
+
+
+@pytest.mark.parametrize("name", ["linear", "power", "lag", "series spring"])
+def test_the_error_falls_with_the_step(name):
+    car = quarter_car_000(LAWS[name])
+    reference = simulate(car, BUMP, duration=0.5, dt=1.25e-4)["stroke"]
+    errors = []
+    for dt in (4e-3, 2e-3, 1e-3):
+        skip = round(dt / 1.25e-4)
+        errors.append(float(np.abs(simulate(car, BUMP, duration=0.5, dt=dt)["stroke"] - reference[::skip]).max()))
+    assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2]
+
+
+def test_agrees_with_equations_written_by_hand():
+    """SciPy at tight tolerance on the textbook equations, with random cars, laws and bumps."""
+    rng = np.random.default_rng(3)
+    car, worst = quarter_car_000(LAWS["bilinear"]), []
+    for _ in range(12):
+        ms, mu, k, kt = rng.uniform([200, 25, 1e4, 1e5], [900, 90, 6e4, 3e5])
+        ct, cr, cc, height = rng.uniform([0, 800, 400, 0.02], [400, 4000, 3000, 0.08])
+        width = rng.uniform(0.15, 0.5)
+
+        def road(t, height=height, width=width):
+            s = np.clip((t - 0.1) / width, 0, 1)
+            return 0.5 * height * (1 - np.cos(2 * np.pi * s)), np.pi * height / width * np.sin(2 * np.pi * s)
+
+        def field(t, y, p=(ms, mu, k, kt, ct, cr, cc), road=road):
+            ms, mu, k, kt, ct, cr, cc = p
+            z, slope = road(t)
+            v = y[2] - y[3]
+            force = k * (y[0] - y[1]) + (cr * max(v, 0.0) + cc * min(v, 0.0))
+            tyre = kt * (y[1] - z) + ct * (y[3] - slope)
+            return [y[2], y[3], -force / ms, (force - tyre) / mu]
+
+        time = np.linspace(0, 1, 1001)
+        exact = scipy.integrate.solve_ivp(field, (0, 1), np.zeros(4), "DOP853", time, rtol=1e-10, atol=1e-12).y
+        drawn = replace(
+            car,
+            {
+                "sprung_mass": ms,
+                "unsprung_mass": mu,
+                "spring_rate": k,
+                "tyre_stiffness": kt,
+                "tyre_damping": ct,
+                "damper.rebound_rate": cr,
+                "damper.compression_rate": cc,
+            },
+        )
+        bump = roads.cosine_bump(height, start=0.1, duration=width)
+        found = np.asarray(simulate(drawn, bump, duration=1.0).motion).T
+        worst.append(np.abs(found - exact).max(axis=1) / np.abs(exact).max(axis=1))
+    assert np.max(worst) < 3e-3
+    assert np.median(worst) < 1e-3
+
+
+@pytest.mark.parametrize("frequency", [0.6, 1.0, 3.0, 7.5, 15.0])
+def test_steady_sine_is_the_transfer_function(frequency):
+    """H(s) = s² k_t (c s + k)/D(s), D = (m_s s² + c s + k)(m_u s² + c s + k + k_t) − (c s + k)²."""
+    c, s = 2500.0, 2j * np.pi * frequency
+    d = (MS * s**2 + c * s + K) * (MU * s**2 + c * s + K + KT) - (c * s + K) ** 2
+    response = simulate(quarter_car_000(), roads.sine(0.01, frequency=frequency), duration=40.0 / frequency + 15.0)
+    last = np.asarray(response.time) > 20.0 / frequency + 15.0
+    turning = np.exp(-s * np.asarray(response.time[last]))
+    found = 2 * np.mean(np.asarray(response["sprung_acceleration"])[last] * turning) / 0.01
+    assert abs(found) == pytest.approx(abs(s**2 * KT * (c * s + K) / d), rel=3e-3)
+
+
+def test_stands_still_on_a_raised_flat_road():
+    road = roads.from_profile(np.linspace(0, 2, 2001), np.full(2001, 0.3))
+    response = simulate(quarter_car_000(BESINGER), road, duration=1.0)
+    np.testing.assert_allclose(response["z_sprung"], 0.3, atol=1e-12)
+    np.testing.assert_allclose(response["sprung_acceleration"], 0.0, atol=1e-10)
+
+
+def test_motion_is_unchanged_when_all_masses_and_forces_are_scaled():
+    car = quarter_car_000(dampers.Scaled(BESINGER, 1.0))
+    names = ["sprung_mass", "unsprung_mass", "spring_rate", "tyre_stiffness"]
+    scaled = replace(car, {n: 3.0 * getattr(car, n) for n in names} | {"damper.factor": 3.0})
+    one, three = (simulate(c, BUMP, duration=0.6) for c in (car, scaled))
+    np.testing.assert_allclose(one.motion, three.motion, atol=1e-11)
+    np.testing.assert_allclose(3 * one["damper_force"], three["damper_force"], atol=1e-6)
+
+
+def test_batches_equal_loops_and_both_modes_of_differentiation_agree():
+    car = quarter_car_000(BESINGER)
+    heights = BUMP.height(jnp.arange(401.0) * 1e-3)
+    rates = jnp.array([1200.0, 1600.0, 2400.0])
+
+    def peak(rate):
+        motion, _, _ = exponential_steps(replace(car, {"damper.compression_rate": rate}), heights, jnp.asarray(1e-3))
+        return jnp.mean(motion[:, 2] ** 2)
+
+    np.testing.assert_allclose(jax.vmap(peak)(rates), [peak(r) for r in rates], rtol=1e-12)
+    forward, reverse = jax.jacfwd(peak)(rates[1]), jax.grad(peak)(rates[1])
+    assert float(forward) == pytest.approx(float(reverse), rel=1e-10)
+    near, far = ((float(peak(1600.0 + h)) - float(peak(1600.0 - h))) / (2 * h) for h in (2.0, 4.0))
+    assert float(forward) == pytest.approx((4 * near - far) / 3, rel=1e-7)
+
+
+def test_metrics_are_those_of_the_channels():
+    response = simulate(quarter_car_000(BESINGER), roads.iso8608("C", 20.0, seed=2), duration=5.0)
+    found, acceleration = response.metrics(), np.asarray(response["sprung_acceleration"])
+    stroke, load = np.asarray(response["stroke"]), np.asarray(response["dynamic_tyre_load"])
+    expected = {
+        "rms_sprung_acceleration": np.sqrt(np.mean(acceleration**2)),
+        "peak_sprung_acceleration": np.abs(acceleration).max(),
+        "working_space_rms": np.sqrt(np.mean(stroke**2)),
+        "working_space_peak": np.ptp(stroke),
+        "rms_dynamic_tyre_load": np.sqrt(np.mean(load**2)),
+        "dynamic_load_coefficient": np.std(load) / (1325.0 * 9.80665),
+        "peak_damper_velocity": np.abs(response["damper_velocity"]).max(),
+    }
+    assert {k: float(v) for k, v in found.items()} == pytest.approx(expected, rel=1e-9)
+    assert set(response.metric_units()) == set(expected)
+
+
+def test_to_xarray_carries_units_and_time():
+    response = simulate(quarter_car_000(), BUMP, duration=0.5)
+    dataset = response.to_xarray()
+    assert dataset["sprung_acceleration"].attrs["units"] == "m/s^2"
+    assert dataset["time"].attrs["units"] == "s"
+    np.testing.assert_array_equal(dataset["damper_force"], response["damper_force"])
+
+
+def test_duration_of_the_road_is_used():
+    road = roads.from_profile(np.linspace(0, 0.5, 501), np.zeros(501))
+    assert float(simulate(quarter_car_000(), road).time[-1]) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"dt": 0.01}, r"`dt` must not be longer than the road's grid of 0.005 s, but is 0.01. Pass `dt=0.005` or less"),
+        ({"duration": -1.0}, r"`duration` must be positive and finite, but is -1"),
+        ({"dt": 0.0}, r"`dt` must be positive"),
+        ({"dt": 2.0}, r"`dt` must be shorter than the run"),
+        ({"method": "exponental"}, r"`method` must be one of.*Did you mean 'exponential'"),
+        ({"road": roads.sine(0.01, frequency=1.0), "duration": None}, r"`duration` must be given.*Pass `duration=10.0`"),
+        ({"road": roads.from_profile(np.arange(400) * 5e-3, np.zeros((400, 2)))}, r"`road` must have a track for each of 1"),
+    ],
+)
+def test_refuses_runs_that_make_no_sense(change, message):
+    sampled = roads.from_profile(np.arange(400) * 5e-3, np.zeros(400))
+    arguments = {"road": sampled, "duration": 1.0, "dt": 5e-3} | change
+    with pytest.raises(ValueError, match=message):
+        simulate(quarter_car_000(), **arguments)
+
+
+def test_a_run_that_diverges_says_so():
+    car = quarter_car_000(dampers.Linear(1e9))
+    with pytest.raises(ValueError, match=r"must have a finite response.*shorter step than 0.001 s"):
+        simulate(car, BUMP, duration=2.0)
+
+
+def test_unknown_channel_suggests_the_nearest():
+    with pytest.raises(ValueError, match="Did you mean 'sprung_acceleration'"):
+        simulate(quarter_car_000(), BUMP, duration=0.2)["sprung_aceleration"]
+
+
+def test_implicit_solver_can_be_asked_for():
+    car = quarter_car_000(dampers.Lag(dampers.Linear(2500.0), 1e-3))
+    implicit = simulate(car, BUMP, duration=0.2, method=diffrax.Kvaerno3(), rtol=1e-6, atol=1e-8)
+    explicit = simulate(car, BUMP, duration=0.2, method="diffrax")
+    np.testing.assert_allclose(implicit["stroke"], explicit["stroke"], atol=1e-6)
+
+
+def test_compiled_and_plain_runs_are_the_same():
+    car = quarter_car_000(LAWS["lag"])
+    heights = BUMP.height(jnp.arange(51.0) * 4e-3)
+    plain = exponential_steps.__wrapped__ if hasattr(exponential_steps, "__wrapped__") else exponential_steps
+    with jax.disable_jit():
+        slow = plain(car, heights, jnp.asarray(4e-3))[0]
+    fast = eqx.filter_jit(exponential_steps)(car, heights, jnp.asarray(4e-3))[0]
+    np.testing.assert_allclose(fast, slow, atol=1e-12)

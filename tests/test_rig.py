@@ -1,0 +1,141 @@
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from jaxdamp import respond
+from jaxdamp.dampers import Bilinear, Lag, Linear, PiecewiseLinear, SeriesSpring
+from jaxdamp.rig import quasi_static
+
+
+W = 2 * np.pi * 8.0
+
+
+def sine(dt, duration=0.25):
+    t = np.arange(round(duration / dt) + 1) * dt
+    return t, 0.01 * (1 - np.cos(W * t)), 0.01 * W * np.sin(W * t)
+
+
+def test_memoryless_law():
+    t, x, v = sine(1e-3)
+    force = respond(Bilinear(2600.0, 1200.0), t, x, v)
+    np.testing.assert_allclose(force, np.where(v > 0, 2600.0, 1200.0) * v, rtol=1e-13)
+
+
+def test_velocity_from_the_stroke():
+    t, x, v = sine(1e-4)
+    force = respond(Linear(2000.0), t, x)
+    np.testing.assert_allclose(force[1:-1], 2000.0 * v[1:-1], atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        Lag(Bilinear(2600.0, 1200.0, 0.02), 0.004),
+        SeriesSpring(Bilinear(2600.0, 1200.0, 0.02), 4e5, 1e9),
+        Lag(Linear(1500.0), 0.01) + SeriesSpring(Linear(800.0), 1e5),
+    ],
+)
+def test_against_an_independent_solver(law):
+    t, x, v = sine(1e-3)
+    rate = eqx.filter_jit(law.state_rate)
+    exact = solve_ivp(
+        lambda t, y: np.asarray(
+            rate(jnp.asarray(0.01 * (1 - np.cos(W * t))), jnp.asarray(0.01 * W * np.sin(W * t)), jnp.asarray(y))
+        ),
+        (0.0, t[-1]),
+        np.asarray(law.initial_state()),
+        "LSODA",
+        t,
+        rtol=1e-10,
+        atol=1e-13,
+    )
+    expected = jax.vmap(law.force)(jnp.asarray(x), jnp.asarray(v), jnp.asarray(exact.y.T))
+    size = np.max(np.abs(expected))
+    errors = [np.max(np.abs(respond(law, t, x, v, substeps=n) - expected)) / size for n in (1, 2, 4)]
+    assert errors[0] < 2e-3
+    np.testing.assert_allclose([errors[0] / errors[1], errors[1] / errors[2]], 4.0, rtol=0.3)
+
+
+def test_substeps_change_nothing_without_states():
+    t, x, v = sine(1e-3)
+    law = PiecewiseLinear([-0.1, 0.1], [500.0, 2000.0, 800.0])
+    np.testing.assert_array_equal(respond(law, t, x, v, substeps=4), respond(law, t, x, v))
+
+
+@pytest.mark.parametrize("length", [2, 3, 4, 5, 6])
+def test_short_records(length):
+    t, x, v = (a[:length] for a in sine(1e-3))
+    assert respond(Lag(Linear(2000.0), 0.004), t, x, v, substeps=3).shape == (length,)
+
+
+def test_inside_compiled_and_batched_functions():
+    t, x, v = sine(1e-3)
+
+    def peak(rate):
+        return jnp.max(respond(Lag(Linear(rate), 0.004), t, x, v))
+
+    rates = jnp.array([1000.0, 2000.0])
+    np.testing.assert_allclose(jax.jit(jax.vmap(peak))(rates), [peak(r) for r in rates], rtol=1e-12)
+
+
+def test_time_in_single_precision():
+    t = np.arange(20_000, dtype=np.float32) * np.float32(1e-3)
+    x = np.zeros_like(t)
+    law = jax.tree.map(lambda a: a.astype(jnp.float32), Linear(2.0))
+    assert respond(law, jnp.asarray(t), jnp.asarray(x), jnp.asarray(x)).dtype == jnp.float32
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"stroke": np.zeros(5)}, r"`stroke` must be as long as `time`, two or more, but is of shape \(5,\) for time"),
+        ({"time": np.zeros(1), "stroke": np.zeros(1)}, "`stroke` must be as long as `time`, two or more"),
+        ({"velocity": np.zeros(3)}, r"`velocity` must be as long as `time`, but is of shape \(3,\)"),
+        ({"stroke": np.array([0.0, np.nan, 0.0, 0.0])}, "`stroke` must be finite.*Remove or interpolate the missing"),
+        ({"velocity": np.array([0.0, np.inf, 0.0, 0.0])}, "`velocity` must be finite"),
+        (
+            {"time": np.array([0.0, 0.1, 0.3, 0.4])},
+            r"`time` must increase in equal steps, but is stepping from 0\.1 to",
+        ),
+        ({"time": np.array([0.3, 0.2, 0.1, 0.0])}, "Resample the record to a uniform rate"),
+        ({"time": np.zeros(4)}, "`time` must increase"),
+        ({"substeps": 0}, "`substeps` must be 1 or more, but is 0"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_refusals(change, message):
+    arguments = {"time": np.linspace(0.0, 0.3, 4), "stroke": np.zeros(4), "velocity": np.zeros(4)} | change
+    lengths = {np.shape(arguments[name]) for name in ("time", "stroke", "velocity")}
+    with pytest.raises((ValueError, TypeError), match=message if len(lengths) == 1 else None):
+        respond(Linear(1.0), **arguments)
+
+
+# ---- constant velocity
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        Bilinear(2600.0, 1200.0),
+        Lag(Bilinear(2600.0, 1200.0), 0.5),
+        SeriesSpring(Bilinear(2600.0, 1200.0), 1e4),
+        Lag(SeriesSpring(Bilinear(1300.0, 600.0), 1e6), 0.004) + Bilinear(1300.0, 600.0),
+    ],
+)
+def test_settled_force_is_the_curve_without_hysteresis(law):
+    v = np.array([-0.6, -0.1, 0.0, 0.2, 1.0])
+    np.testing.assert_allclose(quasi_static(law, v), np.where(v > 0, 2600.0, 1200.0) * v, rtol=1e-6, atol=1e-9)
+
+
+def test_a_law_that_does_not_settle_is_refused():
+    with pytest.raises(ValueError, match=r"`law` must settle at constant velocity.*Lag\(law=Linear.*take `respond`"):
+        quasi_static(Lag(Linear(1000.0), lag_time=1e3), np.array([0.5]))
+
+
+@pytest.mark.parametrize(("v", "message"), [(np.zeros(0), "one or more"), (np.array([0.0, np.nan]), "be finite")])
+def test_quasi_static_refuses(v, message):
+    with pytest.raises(ValueError, match=message):
+        quasi_static(Linear(1000.0), v)

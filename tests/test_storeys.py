@@ -1,0 +1,172 @@
+"""The storeys of the package: imports only go down, packages of one storey do not know one another."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+
+ROOT = Path(__file__).parents[1] / "jaxdamp"
+
+STOREYS = [
+    {"parameters"},  # and every private module `_*.py` at the top
+    {"dampers", "roads", "metrics"},
+    {"vehicles", "rig"},
+    {"simulation", "bench"},
+    {"identify", "tune", "sweep"},
+    {"plots", "export"},
+    {"cli", "report"},
+]
+TOP = len(STOREYS) - 1
+# A result draws itself: `.plot()` loads the plots when it is called.
+DRAWS_ITSELF = {("identify", "plots"), ("tune", "plots"), ("sweep", "plots")}
+# Known only to someone who asks for them: importing the package loads none.
+LATE = ["matplotlib", "xarray", "pint", "typer", "rich", "pandas", "scipy.optimize", "scipy.signal", "scipy.io"]
+
+
+def storey(part: str) -> int:
+    """The storey of a module or package at the top of jaxdamp."""
+    if part.startswith("_"):
+        return 0
+    found = [i for i, parts in enumerate(STOREYS) if part in parts]
+    assert found, f"jaxdamp.{part} has no storey: put it into the table of tests/test_storeys.py"
+    return found[0]
+
+
+def imported_modules(source: str, package: list[str]) -> Iterator[tuple[list[str], bool]]:
+    """Every import of a source text inside jaxdamp: the parts of its dotted name, and whether a function does it."""
+    tree = ast.parse(source)
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    inside = {id(node) for function in functions for node in ast.walk(function)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = [alias.name.split(".") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else []
+            base = above + (node.module.split(".") if node.module else [])
+            names = [[*base, alias.name] for alias in node.names]
+        else:
+            continue
+        yield from ((name, id(node) in inside) for name in names if name[0] == "jaxdamp")
+
+
+def faults(source: str, package: list[str], own: str) -> list[str]:
+    """What is wrong with the imports of a source text in the part `own` of jaxdamp."""
+    level, found = storey(own), []
+    for name, late in imported_modules(source, package):
+        other = name[1] if len(name) > 1 else ""
+        if not other.startswith("_") and not any(other in parts for parts in STOREYS):
+            if level < TOP:
+                found.append(f"{own} imports {'.'.join(name)}, the front of the package, which stands above it")
+            continue
+        if late and (own, other) in DRAWS_ITSELF:
+            continue
+        if other != own and 0 < level < TOP and storey(other) >= level:
+            found.append(f"{own} (storey {level}) imports {other} (storey {storey(other)})")
+        if level == 0 and storey(other) > 0:
+            found.append(f"{own} (storey 0) imports {other} (storey {storey(other)})")
+    return found
+
+
+FILES = sorted(path for path in ROOT.rglob("*.py") if path != ROOT / "__init__.py")
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_go_down(path):
+    own = path.relative_to(ROOT).parts[0].removesuffix(".py")
+    package = ["jaxdamp", *path.relative_to(ROOT).parts[:-1]]
+    assert not faults(path.read_text(encoding="utf-8"), package, own)
+
+
+@pytest.mark.parametrize(
+    ("own", "source"),
+    [
+        ("dampers", "from jaxdamp.rig import respond"),
+        ("dampers", "import jaxdamp.vehicles.base"),
+        ("dampers", "from jaxdamp import metrics"),
+        ("dampers", "from .. import roads"),
+        ("dampers", "from ..simulation import run"),
+        ("dampers", "from jaxdamp import simulate"),
+        ("dampers", "import jaxdamp"),
+        ("dampers", "def f():\n    from jaxdamp.export import to_json"),
+        ("identify", "from jaxdamp.tune import minimise"),
+        ("identify", "from jaxdamp import plots"),
+        ("rig", "from jaxdamp.vehicles import QuarterCar"),
+        ("parameters", "from jaxdamp.dampers import Linear"),
+        ("_checks", "import jaxdamp.parameters, jaxdamp.roads"),
+    ],
+)
+def test_imports_that_go_up_or_sideways_are_found(own, source):
+    assert faults(source, ["jaxdamp", own], own)
+
+
+@pytest.mark.parametrize(
+    ("own", "source"),
+    [
+        ("dampers", "import jax\nfrom jaxdamp import _checks\nfrom jaxdamp.parameters import positive"),
+        ("dampers", "from jaxdamp.dampers.base import Sum\nfrom .lag import Lag"),
+        ("simulation", "from jaxdamp import metrics\nfrom jaxdamp.vehicles import QuarterCar"),
+        ("identify", "def plot():\n    from jaxdamp import plots"),
+        ("cli", "import jaxdamp\nfrom jaxdamp.report import write"),
+        ("_domains", "from jaxdamp import _checks\nfrom jaxdamp.parameters import real"),
+    ],
+)
+def test_imports_that_go_down_are_allowed(own, source):
+    assert not faults(source, ["jaxdamp", own], own)
+
+
+def test_a_module_without_a_storey_is_found():
+    with pytest.raises(AssertionError, match=r"jaxdamp\.attic has no storey"):
+        storey("attic")
+
+
+# ---- importing
+
+
+def run(code: str) -> str:
+    """What a fresh interpreter prints, errors and warnings included."""
+    command = [sys.executable, "-W", "error::SyntaxWarning", "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT.parent, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
+
+
+def test_importing_prints_nothing_changes_nothing_and_is_light():
+    code = f"""
+import os, jax
+before, environment = dict(jax.config.values), dict(os.environ)
+import jaxdamp
+import sys, warnings
+assert dict(jax.config.values) == before, "a setting of jax changed"
+assert not jax.config.jax_enable_x64
+assert dict(os.environ) == environment, "the environment changed"
+assert not warnings.filters or all("jaxdamp" not in str(f) for f in warnings.filters)
+heavy = [name for name in {LATE!r} if name in sys.modules]
+assert not heavy, f"loaded with the package: {{heavy}}"
+from jax._src import xla_bridge
+assert not xla_bridge._backends, "the backend has started"
+"""
+    assert run(code) == ""
+
+
+PACKAGES = sorted(
+    path.parent.name for path in ROOT.glob("*/__init__.py") if path.read_text(encoding="utf-8").strip()
+) + sorted(path.stem for path in ROOT.glob("*.py") if path.stem != "__init__")
+
+
+def test_each_part_can_be_imported_first():
+    """Each in its own process; importing `jaxdamp.x` runs the front of the package, so that is replaced by a shell."""
+    code = """
+import sys, types
+shell = types.ModuleType("jaxdamp")
+shell.__path__ = [{root!r}]
+sys.modules["jaxdamp"] = shell
+import jaxdamp.{part}
+"""
+    with ThreadPoolExecutor(4) as pool:
+        printed = list(pool.map(lambda part: run(code.format(root=str(ROOT), part=part)), PACKAGES))
+    assert printed == [""] * len(PACKAGES)
