@@ -1,1 +1,6 @@
-"""The command line."""
+"""The command line: `jaxdamp fit` and `jaxdamp demo`, the two jobs that need no code, and `jaxdamp laws`."""
+
+from jaxdamp.cli.commands import app
+
+
+__all__ = ["app"]

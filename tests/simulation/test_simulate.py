@@ -1,5 +1,4 @@
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -154,18 +153,19 @@ def test_motion_is_unchanged_when_all_masses_and_forces_are_scaled():
 
 
 def test_batches_equal_loops_and_both_modes_of_differentiation_agree():
-    car = quarter_car_000(BESINGER)
+    car = quarter_car_000(LAWS["power"])
     heights = BUMP.height(jnp.arange(401.0) * 1e-3)
-    rates = jnp.array([1200.0, 1600.0, 2400.0])
+    forces = jnp.array([700.0, 900.0, 1500.0])
 
-    def peak(rate):
-        motion, _, _ = exponential_steps(replace(car, {"damper.compression_rate": rate}), heights, jnp.asarray(1e-3))
+    @jax.jit
+    def square(force):
+        motion, _, _ = exponential_steps(replace(car, {"damper.compression_force": force}), heights, jnp.asarray(1e-3))
         return jnp.mean(motion[:, 2] ** 2)
 
-    np.testing.assert_allclose(jax.vmap(peak)(rates), [peak(r) for r in rates], rtol=1e-12)
-    forward, reverse = jax.jacfwd(peak)(rates[1]), jax.grad(peak)(rates[1])
+    np.testing.assert_allclose(jax.vmap(square)(forces), [square(f) for f in forces], rtol=1e-12)
+    forward, reverse = jax.jacfwd(square)(forces[1]), jax.grad(square)(forces[1])
     assert float(forward) == pytest.approx(float(reverse), rel=1e-10)
-    near, far = ((float(peak(1600.0 + h)) - float(peak(1600.0 - h))) / (2 * h) for h in (2.0, 4.0))
+    near, far = ((float(square(900.0 + h)) - float(square(900.0 - h))) / (2 * h) for h in (4.0, 8.0))
     assert float(forward) == pytest.approx((4 * near - far) / 3, rel=1e-7)
 
 
@@ -234,13 +234,3 @@ def test_implicit_solver_can_be_asked_for():
     implicit = simulate(car, BUMP, duration=0.2, method=diffrax.Kvaerno3(), rtol=1e-6, atol=1e-8)
     explicit = simulate(car, BUMP, duration=0.2, method="diffrax")
     np.testing.assert_allclose(implicit["stroke"], explicit["stroke"], atol=1e-6)
-
-
-def test_compiled_and_plain_runs_are_the_same():
-    car = quarter_car_000(LAWS["lag"])
-    heights = BUMP.height(jnp.arange(51.0) * 4e-3)
-    plain = exponential_steps.__wrapped__ if hasattr(exponential_steps, "__wrapped__") else exponential_steps
-    with jax.disable_jit():
-        slow = plain(car, heights, jnp.asarray(4e-3))[0]
-    fast = eqx.filter_jit(exponential_steps)(car, heights, jnp.asarray(4e-3))[0]
-    np.testing.assert_allclose(fast, slow, atol=1e-12)

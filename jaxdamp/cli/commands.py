@@ -1,0 +1,104 @@
+"""The commands and their options."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="""From a dyno file to a damper law, a ride and a better damper.
+
+Units: SI everywhere (m, m/s, N, s, N s/m). Files may use other units, but must name them: in their headers
+("stroke [mm]", "F_N"), or with --units.
+
+Signs: stroke and velocity are positive in rebound (extension), force is positive when it resists extension. A file
+whose bench counts compression positive is read with --sign compression-positive. Nothing is guessed silently: what was
+decided is printed.""",
+)
+
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+Force = Annotated[bool, typer.Option("--force", help="Write into a folder that jaxdamp did not write.")]
+
+
+@app.command()
+def fit(
+    files: Annotated[list[Path], typer.Argument(help="Text files with records, patterns, or folders of *.csv.")],
+    law: Annotated[
+        list[str], typer.Option(help='Name of a law, see "jaxdamp laws"; may be given several times; or "all".')
+    ] = ["all"],  # noqa: B006 (typer copies it)
+    held_out: Annotated[
+        list[str], typer.Option(help='Records to score on, not to fit: a name or a pattern, such as "30mm_*".')
+    ] = [],  # noqa: B006
+    sign: Annotated[
+        str | None,
+        typer.Option(help="Direction that the files count positive: rebound-positive or compression-positive."),
+    ] = None,
+    force_sign: Annotated[
+        str | None,
+        typer.Option(
+            help='"same" if the files\' force is positive when it resists motion in their positive direction, '
+            'otherwise "opposite".'
+        ),
+    ] = None,
+    columns: Annotated[
+        list[str],
+        typer.Option(help="Headers or numbers (from 0) of columns: time=t_s,stroke=1,velocity=none."),
+    ] = [],  # noqa: B006
+    units: Annotated[list[str], typer.Option(help="Units that the headers do not give: stroke=mm,force=kN.")] = [],  # noqa: B006
+    sampling_rate: Annotated[
+        float | None, typer.Option(help="Samples per second [Hz], for files without a time column.")
+    ] = None,
+    delimiter: Annotated[str | None, typer.Option(help="Character between columns, if it is not found.")] = None,
+    weighting: Annotated[
+        str, typer.Option(help='"samples": every sample counts the same; "runs": every record, by its RMS force.')
+    ] = "samples",
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-fit"),
+    force: Force = False,
+    debug: Debug = False,
+) -> None:
+    """Fit damper laws to bench records, and say how good they are.
+
+    Writes a report, pictures, tables, and each law as JSON, which jaxdamp.export.from_json reads.
+    """
+    from jaxdamp.cli import console, fitting
+
+    with console.plain_errors(debug):
+        console.prepare()
+        options = fitting.ReadOptions(sign, force_sign, tuple(columns), tuple(units), sampling_rate, delimiter)
+        fitting.run_fit(
+            console.Screen(), files, options, laws=law, held_out=held_out, weighting=weighting, out=out, force=force
+        )
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-demo"),
+    seed: Annotated[int, typer.Option(help="Of the noise of the virtual bench and of the roads.")] = 0,
+    force: Force = False,
+    debug: Debug = False,
+) -> None:
+    """Run the whole chain on a damper whose truth is known. Needs no input.
+
+    A virtual bench records a known damper; laws are fitted to the files and compared on records that were held out; a
+    quarter car rides on each law; the damper is tuned for comfort; all is written to a folder.
+    """
+    from jaxdamp.cli import console
+    from jaxdamp.cli import demo as demonstration
+
+    with console.plain_errors(debug):
+        console.prepare()
+        demonstration.run_demo(console.Screen(), demonstration.Scenario(seed=seed), out=out, force=force)
+
+
+@app.command()
+def laws() -> None:
+    """List the laws that can be fitted by name."""
+    from jaxdamp.cli.console import Screen
+    from jaxdamp.cli.findings import laws_table
+
+    Screen().table(laws_table())

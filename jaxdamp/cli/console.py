@@ -1,0 +1,111 @@
+"""What the commands share at the terminal: tables, stages with their progress, errors in one sentence."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.padding import Padding
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from jaxdamp.report import Column, Table
+
+
+Advance = Callable[[str, int], None]
+_WIDTH_OF_FILES = 130  # characters a line where the output is no terminal
+
+
+class Screen:
+    """Where a command writes what it does, and the times that its stages took."""
+
+    def __init__(self) -> None:
+        self.console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_FILES, highlight=False)
+        self.times: dict[str, float] = {}
+
+    def say(self, text: str = "", style: str = "") -> None:
+        """A paragraph, taken literally."""
+        self.console.print(Text(text, style=style), soft_wrap=False)
+
+    def heading(self, text: str) -> None:
+        """A section begins."""
+        self.console.print()
+        self.console.print(Text(text, style="bold"))
+
+    def points(self, items: Sequence[str], style: str = "") -> None:
+        """A list of remarks."""
+        for item in items:
+            self.console.print(Text.assemble(("  - ", style), (item, style)))
+
+    def table(self, table: Table, mark: str | None = None) -> None:
+        """A table without its meanings, which are for the files; rows whose first cell is `mark` in bold."""
+        shown = RichTable(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+        kept = [index for index, column in enumerate(table.columns) if column.name != "meaning"]
+        for index in kept:
+            side = "right" if table.is_number(index) else "left"
+            shown.add_column(Text(table.columns[index].heading), justify=side, overflow="fold", no_wrap=index == 0)
+        for row in table.texts():
+            shown.add_row(*(Text(row[index]) for index in kept), style="bold" if row[0] == mark else "")
+        self.heading(table.title)
+        self.console.print(Padding(shown, (0, 0, 0, 2), expand=False))
+
+    def files(self, folder: Path, names: Sequence[str]) -> None:
+        """The files written, those of one folder and ending on one line."""
+        groups: dict[tuple[str, str], list[str]] = {}
+        for name in names:
+            groups.setdefault((str(Path(name).parent), Path(name).suffix), []).append(name)
+        self.heading(f"Written to {folder}")
+        for members in groups.values():
+            more = f" and {len(members) - 3} more" if len(members) > 3 else ""
+            self.points([", ".join(members[:3]) + more])
+
+    def times_table(self) -> Table:
+        """How long each stage took."""
+        rows = (*self.times.items(), ("all", sum(self.times.values())))
+        return Table("Times", (Column("stage"), Column("time", "s", ".1f")), rows)
+
+    @contextmanager
+    def stage(self, title: str, total: int | None = None) -> Iterator[Advance]:
+        """A stage of the work: shows that it runs and how far it is, and notes how long it took.
+
+        Gives a function to be called with a word on what is being done now and the number of parts done so far.
+        """
+        started = time.perf_counter()
+        if self.console.is_terminal:
+            columns = [SpinnerColumn(), TextColumn("{task.description}", markup=False)]
+            columns += [BarColumn(), MofNCompleteColumn()] if total else []
+            columns += [TimeElapsedColumn(), TextColumn("{task.fields[detail]}", markup=False)]
+            with Progress(*columns, console=self.console, transient=True) as progress:
+                task = progress.add_task(title, total=total, detail="")
+                yield lambda detail, done: progress.update(task, completed=done, detail=detail)
+        else:
+            self.say(f"{title} ...")
+            yield lambda detail, done: None
+        seconds = time.perf_counter() - started
+        self.times[title] = seconds
+        self.say(f"{title}: done in {seconds:.1f} s", "green")
+
+
+def prepare() -> None:
+    """Compute in float64, as a command may decide for its own process."""
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+
+
+@contextmanager
+def plain_errors(debug: bool) -> Iterator[None]:
+    """Show what the library refuses as one message without traceback, and end with exit code 2."""
+    try:
+        yield
+    except (ValueError, OSError) as error:
+        if debug:
+            raise
+        screen = Console(stderr=True, highlight=False, soft_wrap=True)
+        screen.print(Text.assemble(("Error: ", "bold red"), (str(error), "red")))
+        raise typer.Exit(2) from error

@@ -1,0 +1,106 @@
+"""What the words on the command line mean: columns, units, laws, records to hold out."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from jaxdamp import _checks, bench, identify
+from jaxdamp.bench import BenchRun, BenchSet
+
+
+ROLES = ("time", "stroke", "velocity", "force", "temperature")
+
+
+def law_names(asked: Sequence[str]) -> list[str]:
+    """The laws to fit: all, or those named, each once."""
+    for name in asked:
+        _checks.one_of("law", name, ("all", *identify.LAWS))
+    return list(identify.LAWS) if "all" in asked else list(dict.fromkeys(asked))
+
+
+def assignments(option: str, texts: Sequence[str]) -> dict[str, str]:
+    """What "stroke=x_mm,force=Load, N" assigns to the quantities of a record.
+
+    >>> assignments("columns", ["time=t,stroke=Displacement, in", "force=2"])
+    {'time': 't', 'stroke': 'Displacement, in', 'force': '2'}
+    """
+    found = {}
+    for text in texts:
+        for part in re.split(rf",(?=\s*(?:{'|'.join(ROLES)})\s*=)", text):
+            role, equals, value = (piece.strip() for piece in part.partition("="))
+            if not equals or not value:
+                raise ValueError(f"Option --{option} must read like stroke=..., but is {part!r}.")
+            _checks.one_of(option, role, ROLES)
+            found[role] = value
+    return found
+
+
+def column_numbers(columns: Mapping[str, str]) -> dict[str, str | int | None]:
+    """Headers stay, digits are numbers of columns, "none" leaves a quantity out."""
+    special: dict[str, None] = {"none": None}
+    return {
+        role: int(value) if value.isdigit() else special.get(value.lower(), value) for role, value in columns.items()
+    }
+
+
+def split(runs: BenchSet, patterns: Sequence[str]) -> tuple[BenchSet, BenchSet]:
+    """The records to fit and those to hold out, which are named by name, file or pattern."""
+    if not patterns:
+        return runs, BenchSet()
+    names = [name for pattern in patterns for name in _names_of(runs, pattern)]
+    try:
+        held, fitted = runs.select(names), runs.without(names)
+    except KeyError as error:
+        raise ValueError(f"Option --held-out: {error.args[0]}") from error
+    if not len(fitted):
+        raise ValueError("Option --held-out leaves no record to fit: hold out fewer.")
+    return fitted, held
+
+
+def _names_of(runs: BenchSet, pattern: str) -> list[str]:
+    """The records of a file, or the pattern without the ending of a file."""
+    path = Path(pattern).expanduser()
+    if path.is_file():
+        here = [run.name for run in runs if Path(run.source).resolve() == path.resolve()]
+        if here:
+            return here
+    return [pattern.removesuffix(".csv").removesuffix(".txt")]
+
+
+def decisions(runs: Sequence[BenchRun]) -> list[str]:
+    """What the reader decided; notes that differ only in their numbers are said once, with those of the first."""
+    kinds: dict[str, list[str]] = {}
+    for run in runs:
+        for note in run.notes:
+            kinds.setdefault(re.sub(r"[+-]?\d[\d.]*(?:e[+-]?\d+)?", "#", note), []).append(note)
+    sentences = []
+    for notes in kinds.values():
+        who = "all records" if len(notes) == len(runs) else f"{len(notes)} records"
+        alike = "" if len(set(notes)) == 1 else ", numbers of the first"
+        sentences.append(notes[0] if len(runs) == 1 else f"{notes[0]} ({who}{alike})")
+    return sentences
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How the files are to be read, as the command line says it."""
+
+    sign: str | None = None
+    force_sign: str | None = None
+    columns: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    sampling_rate: float | None = None
+    delimiter: str | None = None
+
+    def read(self, files: Sequence[Path]) -> BenchSet:
+        """Read the records."""
+        return bench.read(
+            list(files),
+            sign=self.sign,
+            force_sign=self.force_sign,
+            columns=column_numbers(assignments("columns", self.columns)),
+            units=assignments("units", self.units),
+            sampling_rate=self.sampling_rate,
+            delimiter=self.delimiter,
+        )

@@ -1,0 +1,14 @@
+"""Pictures of fits, laws, rides and tunings. Each function returns its matplotlib `Figure` and shows nothing.
+
+Save one with `figure.savefig("fit.png", dpi=150)`; in a notebook it is shown as the value of a cell. No function
+touches pyplot or its global state, and matplotlib is loaded by the first call only.
+"""
+
+from jaxdamp.plots.changes import tuning
+from jaxdamp.plots.curves import force_velocity
+from jaxdamp.plots.errors import ladder
+from jaxdamp.plots.loops import fit_loops
+from jaxdamp.plots.rides import ride
+
+
+__all__ = ["fit_loops", "force_velocity", "ladder", "ride", "tuning"]

@@ -1,0 +1,88 @@
+"""What all pictures share: figure, colours, labels with unit and sign, legends beside the axes."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from jaxdamp.dampers import AbstractDamper, Sum
+
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+
+
+# Okabe and Ito: told apart with every kind of colour vision. The pale yellow is left out, black serves baselines.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+DASHES = ("-", "--", ":", "-.")
+BLACK = "#222222"
+GREY = "#7F7F7F"
+
+VELOCITY = "velocity [m/s]   (+ rebound, − compression)"
+STROKE = "stroke [mm]   (+ rebound, − compression)"
+FORCE = "force [N]   (+ resists extension)"
+
+
+def new_figure(width: float, height: float) -> "matplotlib.figure.Figure":
+    """An empty figure [inch] that finds its own margins."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=100, layout="constrained")
+
+
+def line_style(index: int) -> dict[str, Any]:
+    """Colour and dash of the curve of that number; the dash changes once the colours are used up."""
+    return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index // len(COLOURS) % len(DASHES)]}
+
+
+def graded(index: int, count: int) -> tuple[float, float, float, float]:
+    """One of so many colours in order, dark to light, for curves that have an order themselves."""
+    from matplotlib import colormaps
+
+    return colormaps["viridis"](0.88 * index / max(count - 1, 1))
+
+
+def short(value: float) -> str:
+    """Three figures, but no power of ten for thousands."""
+    return (f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}").replace("-", "−")
+
+
+def dress(axes: "matplotlib.axes.Axes", x: str, y: str, title: str = "") -> None:
+    """Labels, a light grid, and no frame above and to the right."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    if title:
+        axes.set_title(title, loc="left", fontsize="medium")
+    axes.grid(True, color="0.9", linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def cross(axes: "matplotlib.axes.Axes", horizontal: bool = True, vertical: bool = True) -> None:
+    """Lines through zero."""
+    if horizontal:
+        axes.axhline(0.0, color="0.6", linewidth=0.8, zorder=1)
+    if vertical:
+        axes.axvline(0.0, color="0.6", linewidth=0.8, zorder=1)
+
+
+def legend_beside(figure: "matplotlib.figure.Figure", handles: Sequence[Any], title: str = "") -> None:
+    """A legend to the right of all axes, never over data."""
+    figure.legend(
+        handles=list(handles), loc="outside right upper", frameon=False, title=title or None, alignment="left"
+    )
+
+
+def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[Any], columns: int = 3) -> None:
+    """A legend above all axes, for pictures that need their width."""
+    figure.legend(
+        handles=list(handles), loc="outside upper center", frameon=False, ncols=min(columns, max(len(handles), 1))
+    )
+
+
+def law_name(law: AbstractDamper) -> str:
+    """The classes of a law in words: "SeriesSpring of Besinger", "Linear + CoulombFriction"."""
+    if isinstance(law, Sum):
+        return " + ".join(law_name(term) for term in law.terms)
+    inner = getattr(law, "law", None)
+    own = type(law).__name__
+    return f"{own} of {law_name(inner)}" if isinstance(inner, AbstractDamper) else own

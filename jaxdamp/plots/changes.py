@@ -1,0 +1,95 @@
+"""A tuning: the law before and after, what it did to every ride metric, and how the search went."""
+
+from typing import TYPE_CHECKING
+
+import equinox as eqx
+import numpy as np
+
+from jaxdamp._types import VectorLike
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.plots import _style
+from jaxdamp.rig import quasi_static
+from jaxdamp.tune import TuneResult
+
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+
+
+def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplotlib.figure.Figure":
+    """Force over velocity before and after, the change of each ride metric, and the metric over the search.
+
+    Arguments:
+        result: a tuning.
+        velocities: where to draw the laws [m/s]; a little beyond the fastest damper motion of the ride, if the vehicle
+            reports it as `peak_damper_velocity`, or −1 to 1 m/s, if left out.
+    """
+    if velocities is None:
+        peaks = [table.get("peak_damper_velocity", 0.0) for table in (result.before, result.after)]
+        reach = 1.1 * max(peaks) or 1.0
+        velocities = np.linspace(-reach, reach, 401)
+    pairs = _changed(result)
+    figure = _style.new_figure(12.0, 6.0)
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.0), height_ratios=(1.8, 1.0))
+    curves, bars, search = (figure.add_subplot(at) for at in (grid[:, 0], grid[0, 1], grid[1, 1]))
+    points = np.asarray(velocities, dtype=float)
+    for number, (name, pair) in enumerate(pairs.items()):
+        colour = _style.COLOURS[number % len(_style.COLOURS)]
+        old, new = (np.asarray(quasi_static(law, points)) for law in pair)
+        curves.plot(points, old, "--", color=colour if len(pairs) > 1 else _style.BLACK, label=f"{name}before")
+        curves.plot(points, new, "-", color=colour, linewidth=1.8, label=f"{name}after")
+    _style.dress(curves, _style.VELOCITY, _style.FORCE, "Damper law")
+    _style.cross(curves)
+    curves.legend(loc="upper left", frameon=False)
+    _bars(bars, result)
+    _search(search, result)
+    return figure
+
+
+def _changed(result: TuneResult) -> dict[str, tuple[AbstractDamper, AbstractDamper]]:
+    """The laws of both vehicles by a name to put before "before" and "after": those that differ, or the first."""
+    pairs = list(zip(result.start.elements(), result.vehicle.elements(), strict=True))
+    differing = [i for i, (old, new) in enumerate(pairs) if not eqx.tree_equal(old, new)] or [0]
+    return {f"damper {i + 1} " if len(differing) > 1 else "": pairs[i] for i in differing}
+
+
+def _bars(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
+    """Relative change of each metric, with its values."""
+    names = list(result.before)
+    rows = np.arange(len(names), dtype=float)
+    change = [100.0 * (result.after[n] / result.before[n] - 1.0) if result.before[n] else 0.0 for n in names]
+    colours = [_style.COLOURS[1] if c > 0 else _style.COLOURS[2] for c in change]
+    axes.barh(rows, change, 0.65, color=colours)
+    for row, name, value in zip(rows, names, change, strict=True):
+        unit = result.units[name].replace("^2", "²")
+        values = f"{_style.short(result.before[name])} → {_style.short(result.after[name])} {unit}".rstrip()
+        text = f"{values}  ({value:+.1f} %)".replace("-", "−")
+        axes.annotate(
+            text,
+            (max(value, 0.0), row),
+            xytext=(4, 0),
+            textcoords="offset points",
+            verticalalignment="center",
+            fontsize="small",
+        )
+    marks = [" (minimised)" * (n == result.metric) + " (limited)" * (n in result.limits) for n in names]
+    axes.set_yticks(rows, [n.replace("_", " ") + mark for n, mark in zip(names, marks, strict=True)])
+    axes.invert_yaxis()
+    lower, upper = min(*change, 0.0), max(*change, 0.0)
+    spread = max(upper - lower, 1.0)
+    axes.set_xlim(lower - 0.05 * spread, upper + 0.95 * spread)
+    _style.dress(axes, "change [%]   (less is better)", "", "Ride metrics")
+    axes.grid(False, axis="y")
+    _style.cross(axes, horizontal=False)
+
+
+def _search(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    history = np.array([result.before[result.metric], *result.history])
+    axes.plot(np.arange(len(history)), history, "o-", color=_style.COLOURS[0], markersize=3.5, linewidth=1.3)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    unit = result.units[result.metric].replace("^2", "²") or "–"
+    title = f"Search of {result.metric.replace('_', ' ')}"
+    _style.dress(axes, "step of the search", f"metric [{unit}]", title)

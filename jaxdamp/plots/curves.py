@@ -1,0 +1,121 @@
+"""Laws as curves of force over velocity."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp import _checks
+from jaxdamp._types import VectorLike
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.plots import _style
+from jaxdamp.plots.loops import last_cycle
+from jaxdamp.rig import quasi_static
+
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+
+
+def force_velocity(
+    laws: AbstractDamper | Mapping[str, AbstractDamper],
+    velocities: VectorLike | None = None,
+    runs: BenchRun | Sequence[BenchRun] | None = None,
+    *,
+    baseline: str | None = None,
+) -> "matplotlib.figure.Figure":
+    """Force over velocity of one law or several, over the samples and the peak-velocity points of records.
+
+    A law with states is drawn at constant velocity, its states settled: the curve in the middle of its loops.
+
+    Arguments:
+        laws: a law, or laws by name.
+        velocities: where to draw the curves [m/s]; the range of the records, or −1 to 1 m/s, if left out.
+        runs: measured records to draw under the curves.
+        baseline: name of the law to draw as a dashed black line, the one that the others are compared with.
+
+    Raises:
+        ValueError: no law, or a baseline that is not among the laws.
+    """
+    laws = {_style.law_name(laws): laws} if isinstance(laws, AbstractDamper) else dict(laws)
+    runs = () if runs is None else (runs,) if isinstance(runs, BenchRun) else tuple(runs)
+    if not laws:
+        _checks.refuse("laws", "hold at least one law", "empty")
+    if baseline is not None:
+        _checks.one_of("baseline", baseline, laws)
+    if velocities is None:
+        lower, upper = _range(runs)
+        velocities = np.linspace(lower, upper, 401)
+    points = np.asarray(velocities, dtype=float)
+    figure = _style.new_figure(9.5, 5.5)
+    axes = figure.subplots()
+    handles = _measured(axes, runs)
+    handles += draw_laws(axes, laws, points, baseline)
+    _style.dress(axes, _style.VELOCITY, _style.FORCE)
+    _style.cross(axes)
+    axes.set_xlim(float(points.min()), float(points.max()))
+    _style.legend_beside(figure, handles)
+    return figure
+
+
+def draw_laws(
+    axes: "matplotlib.axes.Axes",
+    laws: Mapping[str, AbstractDamper],
+    velocities: Float[np.ndarray, " points"],
+    baseline: str | None,
+) -> list:
+    """One curve a law; the handles for the legend."""
+    handles, number = [], 0
+    for name, law in laws.items():
+        force = np.asarray(quasi_static(law, velocities))
+        label = f"{name} (settled)" if law.initial_state().size else name
+        if name == baseline:
+            style = {"color": _style.BLACK, "linestyle": "--", "zorder": 2.5}
+        else:
+            style, number = _style.line_style(number), number + 1
+        handles += axes.plot(velocities, force, linewidth=1.8, label=label, **style)
+    return handles
+
+
+def _range(runs: Sequence[BenchRun]) -> tuple[float, float]:
+    if not runs:
+        return -1.0, 1.0
+    lower, upper = min(run.velocity.min() for run in runs), max(run.velocity.max() for run in runs)
+    return 1.05 * float(min(lower, 0.0)), 1.05 * float(max(upper, 0.0))
+
+
+def peak_points(run: BenchRun) -> Float[np.ndarray, "2 2"]:
+    """Velocity [m/s] and force [N] at the compression and the rebound peak of the velocity in the last cycle.
+
+    Means over the samples within 2 % of the peak, so that one noisy sample decides nothing.
+    """
+    part = last_cycle(run)
+    velocity, force = run.velocity[part], run.force[part]
+    near = [velocity <= 0.98 * velocity.min(), velocity >= 0.98 * velocity.max()]
+    return np.array([[velocity[at].mean(), force[at].mean()] for at in near])
+
+
+def _measured(axes: "matplotlib.axes.Axes", runs: Sequence[BenchRun]) -> list:
+    """Samples as a cloud and peak-velocity points as rings; the handles for the legend."""
+    if not runs:
+        return []
+    parts = [(run.velocity[last_cycle(run)], run.force[last_cycle(run)]) for run in runs]
+    thin = [slice(None, None, max(len(velocity) // 400, 1)) for velocity, _ in parts]
+    velocity = np.concatenate([v[every] for (v, _), every in zip(parts, thin, strict=True)])
+    force = np.concatenate([f[every] for (_, f), every in zip(parts, thin, strict=True)])
+    cloud = axes.plot(velocity, force, ".", color="0.78", markersize=2.0, label="measured, last cycles", zorder=0)
+    peaks = np.concatenate([peak_points(run) for run in runs])
+    rings = axes.plot(
+        peaks[:, 0],
+        peaks[:, 1],
+        "o",
+        color=_style.BLACK,
+        markerfacecolor="white",
+        markersize=4.5,
+        label="measured at peak velocity",
+        zorder=3,
+    )
+    return [*cloud, *rings]

@@ -1,0 +1,123 @@
+"""Rides over a road: time histories and the spectrum of the body's acceleration."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp import _checks, metrics
+from jaxdamp.plots import _style
+from jaxdamp.simulation import Response
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+
+CHANNELS = ("sprung_acceleration", "stroke", "dynamic_tyre_load")
+_WORDS = {
+    "sprung_acceleration": "body acceleration [m/s²]   (+ up)",
+    "stroke": "stroke [mm]   (+ rebound)",
+    "dynamic_tyre_load": "dynamic tyre load [N]   (+ more load)",
+}
+
+
+def ride(
+    responses: Response | Mapping[str, Response],
+    *,
+    channels: Sequence[str] = CHANNELS,
+    window: tuple[float | int, float | int] | None = None,
+    frequencies: tuple[float | int, float | int] = (0.3, 30.0),
+) -> "matplotlib.figure.Figure":
+    """Channels over time and the power spectral density of the first of them, overlaid for several responses.
+
+    The legend gives the RMS of the first channel over the whole run.
+
+    Arguments:
+        responses: a response, or responses by name, all of one kind of vehicle.
+        channels: what to draw over time; the first one also as a spectrum.
+        window: part of the run to draw over time [s]; if left out, the whole run, or of a long one the 5 s around its
+            largest first channel. The spectrum and the RMS are of the whole run.
+        frequencies: range of the spectrum [Hz].
+
+    Raises:
+        ValueError: no response, no channel or an unknown one, a window without samples.
+    """
+    responses = {"": responses} if isinstance(responses, Response) else dict(responses)
+    if not responses or not channels:
+        _checks.refuse("responses", "hold at least one, with one channel to draw", f"{len(responses)}")
+    first = next(iter(responses.values()))
+    for channel in channels:
+        _checks.one_of("channels", channel, first.units)
+    start, stop = _window(first, channels[0]) if window is None else window
+    figure = _style.new_figure(12.0, 2.2 * len(channels) + 0.6)
+    grid = figure.add_gridspec(len(channels), 2, width_ratios=(1.4, 1.0))
+    rows = [figure.add_subplot(grid[0, 0])]
+    rows += [figure.add_subplot(grid[i, 0], sharex=rows[0]) for i in range(1, len(channels))]
+    spectrum = figure.add_subplot(grid[:, 1])
+    handles = []
+    for number, (name, response) in enumerate(responses.items()):
+        style = _style.line_style(number)
+        time, found = np.asarray(response.time), response.channels
+        values = {channel: np.asarray(found[channel]) for channel in channels}
+        seen = (time >= start) & (time <= stop)
+        if not seen.any():
+            _checks.refuse("window", f"hold instants of the run, 0 to {time[-1]:g} s", (start, stop))
+        for axes, channel in zip(rows, channels, strict=True):
+            axes.plot(time[seen], _factor(first, channel) * values[channel][seen], linewidth=1.1, **style)
+        rms = float(metrics.rms(values[channels[0]]))
+        label = f"{name + ': ' if name else ''}RMS {_style.short(rms)} {_unit(first, channels[0])}"
+        frequency, density = _spectrum(values[channels[0]], time, frequencies)
+        handles += spectrum.loglog(frequency, density, linewidth=1.3, label=label, **style)
+    for axes, channel in zip(rows, channels, strict=True):
+        _style.dress(axes, "", _label(first, channel).replace("   ", "\n"))
+        _style.cross(axes, vertical=False)
+        axes.label_outer()
+    figure.align_ylabels(rows)
+    rows[-1].set_xlabel("time [s]")
+    rows[0].set_xlim(start, stop)
+    title = _label(first, channels[0]).split(" [")[0]
+    unit = _unit(first, channels[0])
+    _style.dress(spectrum, "frequency [Hz]", f"power spectral density [({unit})²/Hz]", f"Spectrum of the {title}")
+    spectrum.grid(True, which="minor", color="0.95", linewidth=0.5)
+    spectrum.set_xlim(*frequencies)
+    _style.legend_above(figure, handles)
+    return figure
+
+
+def _window(response: Response, channel: str) -> tuple[float, float]:
+    """The whole run, or the 5 s around its largest value."""
+    time = np.asarray(response.time)
+    end, length = float(time[-1]), 5.0
+    if end <= 2 * length:
+        return 0.0, end
+    centre = float(time[np.argmax(np.abs(np.asarray(response[channel])))])
+    start = min(max(centre - 0.5 * length, 0.0), end - length)
+    return start, start + length
+
+
+def _spectrum(
+    values: Float[np.ndarray, " time"], time: Float[np.ndarray, " time"], band: tuple[float | int, float | int]
+) -> tuple[Float[np.ndarray, " lines"], Float[np.ndarray, " lines"]]:
+    """Welch's estimate with segments longer than a period of the lowest frequency, where the run is."""
+    dt = float(time[-1] - time[0]) / (len(time) - 1)
+    size = min(max(len(values) // 8, round(1.2 / (band[0] * dt))), len(values))
+    frequency, density = (np.asarray(a) for a in metrics.power_spectral_density(values, dt, size))
+    inside = (frequency > 0) & (frequency >= band[0]) & (frequency <= band[1])
+    return frequency[inside], density[inside]
+
+
+def _unit(response: Response, channel: str) -> str:
+    return response.units[channel].replace("^2", "²") or "–"
+
+
+def _factor(response: Response, channel: str) -> float:
+    """Metres of stroke are drawn in millimetres."""
+    return 1e3 if response.units[channel] == "m" else 1.0
+
+
+def _label(response: Response, channel: str) -> str:
+    known = _WORDS.get(channel)
+    unit = "mm" if response.units[channel] == "m" else _unit(response, channel)
+    return known or f"{channel.replace('_', ' ')} [{unit}]"

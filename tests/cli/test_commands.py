@@ -1,0 +1,195 @@
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from jaxdamp import identify
+from jaxdamp.bench import BenchSet
+from jaxdamp.cli import app
+from jaxdamp.cli.findings import LAWS
+from jaxdamp.dampers import Bilinear
+from jaxdamp.export import from_json
+
+
+def jaxdamp(*words: str | Path, code: int = 0) -> Result:
+    result = CliRunner().invoke(app, [str(word) for word in words])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def _refused(folder: Path, *words: str | Path) -> str:
+    """The message of a command that must fail and leave nothing behind."""
+    before = sorted(folder.rglob("*"))
+    output = " ".join(jaxdamp(*words, code=2).output.split())
+    assert "Traceback" not in output
+    assert sorted(folder.rglob("*")) == before
+    return output
+
+
+# ---- help
+
+
+def test_help_states_units_and_signs() -> None:
+    text = " ".join(jaxdamp("--help").output.split())
+    assert "SI everywhere" in text and '"stroke [mm]"' in text
+    assert "positive in rebound" in text and "positive when it resists extension" in text
+    assert all(command in text for command in ("fit", "demo", "laws"))
+
+
+@pytest.mark.parametrize(
+    ("command", "options"),
+    [
+        ("fit", "--law --held-out --sign --force-sign --columns --units --sampling-rate --weighting --out --force"),
+        ("demo", "--out --seed --force --debug"),
+    ],
+)
+def test_help_of_a_command_names_its_options(command: str, options: str) -> None:
+    text = jaxdamp(command, "--help").output
+    assert [option for option in options.split() if option not in text] == []
+
+
+def test_laws_lists_every_law_with_a_line() -> None:
+    text = jaxdamp("laws").output
+    lines = {line.split()[0]: line for line in text.splitlines() if line.strip()}
+    assert all(len(lines[name].split()) > 3 for name in identify.LAWS)
+    assert set(LAWS) == set(identify.LAWS)
+
+
+# ---- fit
+
+
+def test_fit_writes_laws_that_load_again(records: Path, tmp_path: Path) -> None:
+    out = tmp_path / "fit"
+    text = jaxdamp("fit", records, "--law", "linear", "--law", "bilinear", "--out", out).output
+    law = from_json(out / "best_law.json")
+    assert isinstance(law, Bilinear)
+    assert (float(law.rebound_rate), float(law.compression_rate)) == pytest.approx((2600.0, 1200.0), rel=2e-3)
+    assert from_json(out / "laws" / "bilinear.json") == law
+    for said in ("Records", "stroke from 'stroke [m]'", "RMSE [N]", "linear", "Smallest error", "Written to"):
+        assert said in text
+
+
+def test_fit_writes_tables_pictures_and_a_report(records: Path, tmp_path: Path) -> None:
+    out = tmp_path / "fit"
+    jaxdamp("fit", records, "--law", "linear", "--law", "bilinear", "--held-out", "10mm_4Hz", "--out", out)
+    files = sorted(file.relative_to(out).as_posix() for file in out.rglob("*") if file.is_file())
+    assert json.loads((out / "manifest.json").read_text())["files"] == [f for f in files if f != "manifest.json"] + [
+        "manifest.json"
+    ]
+    pictures = ["best_law_held_out.png", "best_law_loops.png", "force_velocity.png", "ladder.png"]
+    assert [file for file in files if file.endswith(".png")] == pictures
+    assert all((out / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
+    ladder = _rows(out / "tables" / "ladder.csv")
+    assert [row["law"] for row in ladder] == ["linear", "bilinear"]
+    assert float(ladder[1]["held-out RMSE [N]"]) == pytest.approx(2.0, rel=0.1)
+    assert [row["use"] for row in _rows(out / "tables" / "records.csv")] == ["fitted", "fitted", "held out"]
+    assert float(_rows(out / "tables" / "parameters_bilinear.csv")[0]["value"]) == pytest.approx(2600.0, rel=2e-3)
+    report = (out / "report.html").read_text(encoding="utf-8")
+    assert report.count("data:image/png;base64,") == 4 and "held-out RMSE [N]" in report
+
+
+def test_one_law_is_fitted_without_a_ladder(records: Path, tmp_path: Path) -> None:
+    text = " ".join(jaxdamp("fit", records, "--law", "linear", "--out", tmp_path / "fit").output.split())
+    assert "Fitting 1 law to 3 records" in text
+    assert "linear, RMSE" in text and "law of velocity alone" in text
+    assert not (tmp_path / "fit" / "ladder.png").exists()
+
+
+def test_what_the_reader_decided_is_printed(lab_file: Path, tmp_path: Path) -> None:
+    text = jaxdamp("fit", lab_file, "--law", "bilinear", "--out", tmp_path / "fit").output
+    flat = " ".join(text.split())
+    assert "force from 'load [kN]' in kN" in flat
+    assert "positive stroke taken as rebound" in flat
+    law = from_json(tmp_path / "fit" / "best_law.json")
+    assert isinstance(law, Bilinear) and float(law.rebound_rate) == pytest.approx(1200.0, rel=2e-3)  # taken wrongly
+
+
+def test_sign_turns_the_records_of_a_bench_that_counts_compression_positive(lab_file: Path, tmp_path: Path) -> None:
+    words = ("--law", "bilinear", "--sign", "compression-positive", "--out", tmp_path / "fit")
+    text = jaxdamp("fit", lab_file, *words).output
+    assert "positive stroke is compression, as given" in " ".join(text.split())
+    law = from_json(tmp_path / "fit" / "best_law.json")
+    assert isinstance(law, Bilinear)
+    assert (float(law.rebound_rate), float(law.compression_rate)) == pytest.approx((2600.0, 1200.0), rel=2e-3)
+
+
+def test_columns_units_and_sampling_rate_read_a_file_without_header(tmp_path: Path, runs: BenchSet) -> None:
+    run = runs[2]
+    rows = [f"{1e3 * x};{0.0};{f}" for x, f in zip(run.stroke, run.force, strict=True)]
+    path = tmp_path / "bare.txt"
+    path.write_text("\n".join(rows) + "\n")
+    words = ("--columns", "stroke=0,force=2", "--units", "stroke=mm,force=N", "--sampling-rate", "500")
+    jaxdamp("fit", path, "--law", "bilinear", *words, "--delimiter", ";", "--out", tmp_path / "fit")
+    law = from_json(tmp_path / "fit" / "best_law.json")
+    assert isinstance(law, Bilinear) and float(law.rebound_rate) == pytest.approx(2600.0, rel=5e-3)
+
+
+def test_records_are_held_out_by_pattern_or_by_file(records: Path, tmp_path: Path) -> None:
+    for number, word in enumerate(("*_4Hz", str(records / "10mm_4Hz.csv"), "10mm_4Hz.csv")):
+        out = tmp_path / str(number)
+        jaxdamp("fit", records, "--law", "linear", "--held-out", word, "--out", out)
+        assert [row["use"] for row in _rows(out / "tables" / "records.csv")] == ["fitted", "fitted", "held out"]
+
+
+# ---- fit: what is refused
+
+
+def test_a_missing_file_is_named_with_its_neighbours(records: Path, tmp_path: Path) -> None:
+    message = _refused(tmp_path, "fit", records / "10mm_5Hz.csv", "--law", "linear", "--out", tmp_path / "fit")
+    assert "Error: There is no file" in message and "Did you mean" in message
+
+
+def test_an_unknown_law_gets_a_suggestion(records: Path, tmp_path: Path) -> None:
+    message = _refused(tmp_path, "fit", records, "--law", "besingr", "--out", tmp_path / "fit")
+    assert "Did you mean 'besinger'?" in message
+
+
+def test_a_missing_unit_is_asked_for(tmp_path: Path, runs: BenchSet) -> None:
+    run = runs[0]
+    rows = [f"{t},{x},{f}" for t, x, f in zip(run.time, run.stroke, run.force, strict=True)]
+    (tmp_path / "run.csv").write_text("\n".join(["time [s],stroke,force [N]", *rows]))
+    message = _refused(tmp_path, "fit", tmp_path / "run.csv", "--law", "linear", "--out", tmp_path / "fit")
+    assert "stroke" in message and "unit" in message
+
+
+def test_a_sign_that_contradicts_the_work_is_refused(lab_file: Path, tmp_path: Path) -> None:
+    words = ("--law", "linear", "--force-sign", "opposite", "--out", tmp_path / "fit")
+    assert "contradicts the data" in _refused(tmp_path, "fit", lab_file, *words)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--sign", "rebound"), "Did you mean 'rebound-positive'?"),
+        (("--columns", "strok=x"), "Did you mean 'stroke'?"),
+        (("--columns", "stroke"), "--columns must read like stroke=..."),
+        (("--units", "stroke=furlong_s"), "furlong_s"),
+        (("--weighting", "records"), "`weighting`"),
+        (("--held-out", "20mm_*"), "Option --held-out: No record is called '20mm_*'"),
+        (("--held-out", "10mm_*"), "leaves no record to fit"),
+    ],
+)
+def test_wrong_options_are_refused(records: Path, tmp_path: Path, words: tuple[str, str], message: str) -> None:
+    said = _refused(tmp_path, "fit", records, "--law", "linear", *words, "--out", tmp_path / "fit")
+    assert message in said
+
+
+def test_a_folder_of_others_is_refused(records: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("keep")
+    message = _refused(tmp_path, "fit", records, "--law", "linear", "--out", tmp_path / "mine")
+    assert "not written by jaxdamp" in message and "--force" in message
+    jaxdamp("fit", records, "--law", "linear", "--out", tmp_path / "mine", "--force")
+    assert (tmp_path / "mine" / "notes.txt").read_text() == "keep"
+    assert (tmp_path / "mine" / "best_law.json").exists()
+
+
+def test_debug_shows_where_an_error_comes_from(records: Path, tmp_path: Path) -> None:
+    words = ["fit", str(records), "--law", "besingr", "--out", str(tmp_path / "fit"), "--debug"]
+    assert isinstance(CliRunner().invoke(app, words).exception, ValueError)

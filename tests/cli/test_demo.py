@@ -1,0 +1,43 @@
+import csv
+from pathlib import Path
+
+import pytest
+
+from jaxdamp import bench
+from jaxdamp.bench import SineTest
+from jaxdamp.cli.console import Screen
+from jaxdamp.cli.demo import PAPER_LINEAR, Scenario, run_demo
+from jaxdamp.dampers import Besinger
+from jaxdamp.export import from_json
+
+
+def test_the_demo_goes_through_the_whole_chain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scenario = Scenario(
+        law=Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05),
+        true_name="besinger",
+        laws=("linear", "besinger"),
+        tests=tuple(SineTest(0.015, f, cycles=2, name=f"30mm_{f:g}Hz") for f in (1.0, 3.0, 5.0)),
+        held_out="30mm_3Hz",
+        duration=10.0,
+    )
+    out = tmp_path / "demo"
+    run_demo(Screen(), scenario, out=out)
+    text = capsys.readouterr().out
+    assert bench.read(out / "records").names == ("30mm_1Hz", "30mm_3Hz", "30mm_5Hz")
+    assert isinstance(from_json(out / "best_law.json"), Besinger)
+    assert from_json(out / "true_law.json") == scenario.law
+    (truth,) = [p for p in (out / "tables").glob("parameters_and_truth.csv")]
+    rows = list(csv.DictReader(truth.read_text(encoding="utf-8").splitlines()))
+    sound = [row for row in rows if not row["note"]]
+    assert len(sound) >= 4 and all(abs(float(row["(value − true)/se"])) < 4.5 for row in sound)
+    rides = list(csv.DictReader((out / "tables" / "ride_1.csv").read_text(encoding="utf-8").splitlines()))
+    assert [row["law"] for row in rides] == [PAPER_LINEAR, "linear", "besinger"]
+    tuned = list(csv.DictReader((out / "tables" / "tuned_metrics.csv").read_text(encoding="utf-8").splitlines()))
+    comfort = next(row for row in tuned if row["note"] == "minimised")
+    travel = next(row for row in tuned if row["note"].startswith("limit"))
+    assert float(comfort["after"]) < float(comfort["before"])
+    assert float(travel["after"]) <= float(travel["before"]) * (1 + 1e-6)
+    assert len(list(out.glob("*.png"))) == 8
+    assert (out / "report.html").read_text(encoding="utf-8").count("data:image/png") == 8
+    for said in ("standard errors off", "Paper 000", "Tuning for comfort: done", "Times", "report.html"):
+        assert said in text

@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from jaxdamp import plots
+from jaxdamp.bench import BenchRun, BenchSet
+from jaxdamp.identify import Comparison
+from jaxdamp.plots.loops import last_cycle, spread
+
+
+def test_axes_say_what_they_show_with_unit_and_sign(comparison: Comparison) -> None:
+    figure = plots.fit_loops(comparison["bilinear"])
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
+    velocity, force = "velocity [m/s]   (+ rebound, − compression)", "force [N]   (+ resists extension)"
+    assert labels == [
+        (velocity, force),
+        ("stroke [mm]   (+ rebound, − compression)", force),
+        (velocity, "fitted − measured [N]"),
+        ("time in the cycle, over its period [–]", "fitted − measured [N]"),
+    ]
+
+
+def test_lines_are_the_measured_and_the_fitted_last_cycle(runs: BenchSet, comparison: Comparison) -> None:
+    result, run = comparison["bilinear"], runs[3]
+    figure = plots.fit_loops(result, run)
+    loops, football, over_velocity, over_time = figure.axes
+    part = last_cycle(run)
+    fitted = result.predict(run)[0]
+    measured_line, fitted_line = loops.get_lines()[:2]
+    np.testing.assert_array_equal(measured_line.get_xydata(), np.stack([run.velocity[part], run.force[part]], axis=1))
+    np.testing.assert_array_equal(fitted_line.get_xydata(), np.stack([run.velocity[part], fitted[part]], axis=1))
+    np.testing.assert_allclose(np.asarray(football.get_lines()[0].get_xdata()), 1e3 * run.stroke[part])
+    np.testing.assert_array_equal(football.get_lines()[1].get_ydata(), fitted[part])
+    residual = fitted[part] - run.force[part]
+    np.testing.assert_array_equal(over_velocity.get_lines()[0].get_ydata(), residual)
+    np.testing.assert_array_equal(over_time.get_lines()[0].get_ydata(), residual)
+    phase = np.asarray(over_time.get_lines()[0].get_xdata())
+    assert phase[0] == 0.0 and phase[-1] == pytest.approx(1.0, abs=0.02)
+
+
+def test_the_residual_of_a_slow_record_is_drawn_in_means_over_the_cycle(comparison: Comparison) -> None:
+    result = comparison["bilinear"]
+    slow = BenchRun.from_arrays(
+        "slow",
+        np.arange(8000) / 500,
+        0.01 * np.sin(2 * np.pi * np.arange(8000) / 2000),
+        np.random.default_rng(0).normal(size=8000),
+    )
+    part, every = last_cycle(slow), 6
+    residual = result.predict(slow)[0][part] - slow.force[part]
+    over_time = np.asarray(plots.fit_loops(result, slow).axes[3].get_lines()[0].get_ydata())
+    assert len(over_time) == len(residual) // every
+    assert over_time[5] == pytest.approx(residual[30:36].mean())
+
+
+def test_the_last_cycle_is_one_period_at_the_end(runs: BenchSet) -> None:
+    run = runs[1]  # 2 Hz for 2 s, sampled at 500 Hz
+    part = last_cycle(run)
+    assert len(run.time[part]) == pytest.approx(250, abs=2)
+    assert run.time[part][0] > 0.9
+
+
+def test_a_cycle_in_which_the_machine_runs_down_is_passed_over() -> None:
+    time = np.arange(5000) / 1000
+    size = np.where(time < 4.0, 0.01, 0.006)
+    run = BenchRun.from_arrays("stop", time, size * np.sin(2 * np.pi * time), np.cos(2 * np.pi * time))
+    part = last_cycle(run)
+    assert run.time[part][-1] == pytest.approx(4.0, abs=0.01) and np.ptp(run.stroke[part]) > 0.0199
+
+
+def test_a_record_without_a_full_cycle_is_drawn_whole() -> None:
+    time = np.arange(50) / 100
+    run = BenchRun.from_arrays("half", time, 0.01 * np.sin(2 * time), np.cos(2 * time))
+    assert run.cycles == 0
+    assert len(run.time[last_cycle(run)]) == 50
+
+
+def test_of_many_records_some_are_shown_and_the_title_says_so(runs: BenchSet, comparison: Comparison) -> None:
+    result = comparison["linear"]
+    title = plots.fit_loops(result, most=3).get_suptitle()
+    assert "on 7 records" in title and "3 of them shown" in title and "RMSE" in title
+    assert "shown" not in plots.fit_loops(result, most=7).get_suptitle()
+    assert "on 1 record not fitted" in plots.fit_loops(result, runs[7]).get_suptitle()
+
+
+def test_the_records_shown_are_spread_over_the_peak_velocities(runs: BenchSet) -> None:
+    shown = [run.name for run in spread(list(runs), 3)]
+    assert shown[0] == runs[0].name and shown[-1] == runs[-1].name and len(set(shown)) == 3
+    assert spread(list(runs), 20) == sorted(runs, key=lambda run: run.peak_velocity)
+
+
+def test_every_record_shown_stands_in_the_legend(comparison: Comparison) -> None:
+    figure = plots.fit_loops(comparison["linear"], most=4)
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts[:2] == ["measured", "fitted"] and len(texts) == 6
+    assert texts[2].endswith("m/s)")
+
+
+def test_the_result_plots_itself(comparison: Comparison) -> None:
+    assert isinstance(comparison["linear"].plot(), Figure)
+
+
+def test_no_record_is_refused(comparison: Comparison) -> None:
+    with pytest.raises(ValueError, match="`runs` must hold at least one record"):
+        plots.fit_loops(comparison["linear"], [])

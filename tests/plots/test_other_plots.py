@@ -1,0 +1,193 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from jaxdamp import metrics, plots
+from jaxdamp.bench import BenchSet
+from jaxdamp.dampers import Bilinear, Lag, Linear
+from jaxdamp.identify import Comparison
+from jaxdamp.plots.curves import peak_points
+from jaxdamp.simulation import Response
+from jaxdamp.tune import TuneResult
+
+
+def _line(axes: Axes, label: str) -> np.ndarray:
+    (found,) = [line for line in axes.get_lines() if line.get_label() == label]
+    return np.asarray(found.get_xydata())
+
+
+def _legend(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+# ---- force_velocity
+
+
+def test_force_velocity_draws_each_law_where_asked() -> None:
+    velocity = np.linspace(-0.5, 0.5, 11)
+    laws = {"a": Linear(2000.0), "b": Bilinear(2000.0, 1000.0)}
+    figure = plots.force_velocity(laws, velocity)
+    (axes,) = figure.axes
+    np.testing.assert_allclose(_line(axes, "a"), np.stack([velocity, 2000.0 * velocity], axis=1))
+    np.testing.assert_allclose(_line(axes, "b")[:, 1], np.where(velocity > 0, 2000.0, 1000.0) * velocity)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (
+        "velocity [m/s]   (+ rebound, − compression)",
+        "force [N]   (+ resists extension)",
+    )
+    assert _legend(figure) == ["a", "b"]
+
+
+def test_a_law_with_states_is_drawn_settled() -> None:
+    figure = plots.force_velocity(Lag(Linear(1000.0), 0.01), np.array([-0.2, 0.0, 0.2]))
+    np.testing.assert_allclose(_line(figure.axes[0], "Lag of Linear (settled)")[:, 1], [-200.0, 0.0, 200.0], atol=1e-6)
+
+
+def test_the_baseline_is_a_dashed_black_line() -> None:
+    (axes,) = plots.force_velocity({"old": Linear(1000.0), "new": Linear(2000.0)}, baseline="old").axes
+    (old,) = [line for line in axes.get_lines() if line.get_label() == "old"]
+    (new,) = [line for line in axes.get_lines() if line.get_label() == "new"]
+    assert (old.get_linestyle(), old.get_color()) == ("--", "#222222")
+    assert new.get_linestyle() == "-" and new.get_color() != old.get_color()
+    with pytest.raises(ValueError, match="Did you mean 'old'"):
+        plots.force_velocity({"old": Linear(1000.0)}, baseline="odl")
+
+
+def test_measured_points_lie_under_the_curves(runs: BenchSet) -> None:
+    figure = plots.force_velocity(Bilinear(2600.0, 1200.0), runs=tuple(runs))
+    (axes,) = figure.axes
+    points = _line(axes, "measured at peak velocity")
+    assert points.shape == (16, 2)
+    np.testing.assert_array_equal(points[:2], peak_points(runs[0]))
+    assert len(_line(axes, "measured, last cycles")) > 1000
+    low, high = axes.get_xlim()
+    assert low < min(run.velocity.min() for run in runs) and high > max(run.velocity.max() for run in runs)
+
+
+def test_peak_points_are_the_force_at_the_largest_velocities(runs: BenchSet) -> None:
+    (v_compression, f_compression), (v_rebound, f_rebound) = peak_points(runs[0])  # 10 mm at 1 Hz, hardly any lag
+    assert (v_compression, v_rebound) == pytest.approx((-0.0628, 0.0628), rel=0.02)
+    assert (f_compression, f_rebound) == pytest.approx((-1200 * 0.0628, 2600 * 0.0628), rel=0.05)
+
+
+def test_no_law_is_refused() -> None:
+    with pytest.raises(ValueError, match="`laws` must hold at least one law"):
+        plots.force_velocity({})
+
+
+# ---- ladder
+
+
+def test_ladder_has_a_bar_for_each_error(comparison: Comparison) -> None:
+    figure = plots.ladder(comparison)
+    (axes,) = figure.axes
+    widths = [bar.get_width() for bar in axes.patches if isinstance(bar, Rectangle)]
+    fitted = [rung.rmse for rung in comparison.rungs]
+    held_out = [rung.held_out_rmse for rung in comparison.rungs]
+    assert widths == pytest.approx([*fitted, *held_out])
+    assert axes.get_xlabel() == "root of the mean squared force error [N]"
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["linear (1)", "bilinear (2)"]
+    bold = [label.get_text() for label in axes.get_yticklabels() if label.get_fontweight() == "bold"]
+    assert bold == [f"{comparison.best.name} ({comparison.best.parameters})"]
+    assert _legend(figure) == ["fitted records", "held-out records"]
+
+
+# ---- ride
+
+
+def test_ride_draws_channels_over_time_and_the_spectrum(responses: dict[str, Response]) -> None:
+    figure = plots.ride(responses, window=(2.0, 4.0))
+    acceleration, stroke, load, spectrum = figure.axes
+    response = responses["firm"]
+    time = np.asarray(response.time)
+    seen = (time >= 2.0) & (time <= 4.0)
+    for axes, channel, factor in (
+        (acceleration, "sprung_acceleration", 1.0),
+        (stroke, "stroke", 1e3),
+        (load, "dynamic_tyre_load", 1.0),
+    ):
+        line = np.asarray(axes.get_lines()[1].get_xydata())
+        np.testing.assert_allclose(line, np.stack([time[seen], factor * np.asarray(response[channel])[seen]], axis=1))
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert labels == [
+        "body acceleration [m/s²]\n(+ up)",
+        "stroke [mm]\n(+ rebound)",
+        "dynamic tyre load [N]\n(+ more load)",
+        "power spectral density [(m/s²)²/Hz]",
+    ]
+    assert (load.get_xlabel(), spectrum.get_xlabel()) == ("time [s]", "frequency [Hz]")
+    assert (spectrum.get_xscale(), spectrum.get_yscale()) == ("log", "log")
+    rms = float(metrics.rms(response["sprung_acceleration"]))
+    assert _legend(figure)[1] == f"firm: RMS {rms:.3g} m/s²"
+
+
+def test_the_area_under_the_spectrum_is_the_mean_square(responses: dict[str, Response]) -> None:
+    figure = plots.ride(responses["soft"], frequencies=(0.3, 50.0))
+    frequency, density = np.asarray(figure.axes[-1].get_lines()[0].get_xydata()).T
+    area = float(np.sum(density) * (frequency[1] - frequency[0]))
+    assert area == pytest.approx(float(metrics.rms(responses["soft"]["sprung_acceleration"])) ** 2, rel=0.15)
+
+
+def test_of_a_long_run_the_five_seconds_about_its_peak_are_drawn(responses: dict[str, Response]) -> None:
+    response = responses["soft"]
+    low, high = plots.ride(response).axes[0].get_xlim()
+    peak = float(response.time[int(np.argmax(np.abs(np.asarray(response["sprung_acceleration"]))))])
+    assert high - low == pytest.approx(5.0) and low <= peak <= high
+
+
+def test_ride_refuses_what_is_not_there(responses: dict[str, Response]) -> None:
+    with pytest.raises(ValueError, match="Did you mean 'stroke'"):
+        plots.ride(responses, channels=["strok"])
+    with pytest.raises(ValueError, match="`window` must hold instants"):
+        plots.ride(responses, window=(50.0, 60.0))
+    with pytest.raises(ValueError, match="`responses`"):
+        plots.ride({})
+
+
+def test_other_channels_get_a_label_with_their_unit(responses: dict[str, Response]) -> None:
+    figure = plots.ride(responses, channels=["damper_force", "relative_tyre_load"])
+    assert figure.axes[0].get_ylabel() == "damper force [N]"
+    assert figure.axes[1].get_ylabel() == "relative tyre load [–]"
+
+
+# ---- tuning
+
+
+def test_tuning_draws_laws_metrics_and_search(tuned: TuneResult) -> None:
+    velocity = np.linspace(-0.3, 0.3, 7)
+    figure = plots.tuning(tuned, velocity)
+    curves, bars, search = figure.axes
+    after = tuned.parameters[0].after
+    np.testing.assert_allclose(_line(curves, "before")[:, 1], 2500.0 * velocity, atol=1e-9)
+    np.testing.assert_allclose(_line(curves, "after")[:, 1], after * velocity, atol=1e-9)
+    change = [100 * (tuned.after[name] / tuned.before[name] - 1) for name in tuned.before]
+    widths = [bar.get_width() for bar in bars.patches if isinstance(bar, Rectangle)]
+    assert widths == pytest.approx(change)
+    names = [label.get_text() for label in bars.get_yticklabels()]
+    assert "rms sprung acceleration (minimised)" in names and "working space peak (limited)" in names
+    assert bars.get_xlabel() == "change [%]   (less is better)"
+    history = np.asarray(search.get_lines()[0].get_ydata())
+    np.testing.assert_allclose(history, [tuned.before[tuned.metric], *tuned.history])
+    assert search.get_ylabel() == "metric [m/s²]"
+
+
+def test_the_result_plots_itself(tuned: TuneResult) -> None:
+    assert isinstance(tuned.plot(), Figure)
+
+
+# ---- all
+
+
+def test_nothing_of_matplotlib_is_loaded_before_a_plot_is_drawn() -> None:
+    code = (
+        "import sys, jaxdamp.plots, jaxdamp.report\n"
+        "assert 'matplotlib' not in sys.modules\n"
+        "from jaxdamp.dampers import Linear\n"
+        "jaxdamp.plots.force_velocity(Linear(1.0))\n"
+        "assert 'matplotlib.figure' in sys.modules and 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
