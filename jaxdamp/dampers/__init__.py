@@ -4,37 +4,67 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 `law + law`, `2.0 * law`, `SeriesSpring(law, ...)`, `Lag(law, ...)`, `MotionRatio(law, ...)`.
 """
 
+from jaxdamp.dampers._stateless import AbstractStateless
 from jaxdamp.dampers.base import AbstractDamper, AbstractMemoryless, AbstractStateful, Scaled, Sum
 from jaxdamp.dampers.besinger import Besinger
 from jaxdamp.dampers.bilinear import Bilinear
+from jaxdamp.dampers.bouc_wen import BoucWen
+from jaxdamp.dampers.bump_stop import BumpStop
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
+from jaxdamp.dampers.dahl import Dahl
+from jaxdamp.dampers.degressive import Degressive
+from jaxdamp.dampers.digressive_progressive import DigressiveProgressive
+from jaxdamp.dampers.gas_spring import GasSpring
+from jaxdamp.dampers.hyperbolic_tangent import HyperbolicTangent
+from jaxdamp.dampers.karadayi_masada import KaradayiMasada
 from jaxdamp.dampers.lag import Lag
 from jaxdamp.dampers.linear import Linear
+from jaxdamp.dampers.lugre import LuGre
+from jaxdamp.dampers.modified_bouc_wen import ModifiedBoucWen
 from jaxdamp.dampers.motion_ratio import MotionRatio
 from jaxdamp.dampers.piecewise_linear import PiecewiseLinear
 from jaxdamp.dampers.polynomial import Polynomial
 from jaxdamp.dampers.power_law import PowerLaw
+from jaxdamp.dampers.saturating import Saturating
 from jaxdamp.dampers.segmented_polynomial import SegmentedPolynomial
 from jaxdamp.dampers.series_spring import SeriesSpring
+from jaxdamp.dampers.stribeck_friction import StribeckFriction
+from jaxdamp.dampers.stroke_dependent import StrokeDependent
 from jaxdamp.dampers.table import Table
+from jaxdamp.dampers.temperature_scaled import TemperatureScaled
 
 
 __all__ = [
     "AbstractDamper",
     "AbstractMemoryless",
     "AbstractStateful",
+    "AbstractStateless",
     "Besinger",
     "Bilinear",
+    "BoucWen",
+    "BumpStop",
     "CoulombFriction",
+    "Dahl",
+    "Degressive",
+    "DigressiveProgressive",
+    "GasSpring",
+    "HyperbolicTangent",
+    "KaradayiMasada",
     "Lag",
     "Linear",
+    "LuGre",
+    "ModifiedBoucWen",
     "MotionRatio",
     "PiecewiseLinear",
     "Polynomial",
     "PowerLaw",
+    "Saturating",
     "Scaled",
     "SegmentedPolynomial",
     "SeriesSpring",
+    "StribeckFriction",
+    "StrokeDependent",
     "Sum",
     "Table",
+    "TemperatureScaled",
 ]

@@ -1,0 +1,31 @@
+"""What the laws with hysteresis share: the count of their states, travel with reversals."""
+
+import jax.numpy as jnp
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, State
+from jaxdamp.dampers.base import AbstractDamper
+
+
+def own_states(law: AbstractDamper, state: State, count: int) -> list[Scalar]:
+    """The states as numbers; another count than that of the law is refused."""
+    if state.size != count:
+        must = f"hold {count} number{'s' * (count != 1)} for {type(law).__name__}"
+        _checks.refuse("state", must, f"of shape {state.shape}", "Start from `law.initial_state()`.")
+    return list(state)
+
+
+def travels(v0: ScalarLike, v1: ScalarLike, dt: ScalarLike) -> tuple[Scalar, Scalar]:
+    """Signed travel [m] before and after the reversal, for a velocity linear over the step; all after if there is none.
+
+    Both are continuous in v₀ and v₁; their sum is the net travel dt (v₀ + v₁)/2.
+    """
+    reverses = v0 * v1 < 0
+    change = jnp.where(reverses, v0 - v1, 1.0)
+    before = jnp.where(reverses, 0.5 * dt * v0 * v0 / change, 0.0)
+    return before, 0.5 * dt * (v0 + v1) - before
+
+
+def direction(travel: ScalarLike) -> Scalar:
+    """+1 or −1; +1 at zero, where |travel| = direction · travel then has the slope of one side, not none."""
+    return jnp.where(travel >= 0, 1.0, -1.0)

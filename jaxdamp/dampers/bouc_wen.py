@@ -1,0 +1,140 @@
+"""Smooth hysteresis that saturates: the law of Bouc and Wen."""
+
+from typing import final
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers._hysteresis import direction, own_states
+from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.parameters import interval, nonnegative, parameter, positive, real
+
+
+def _power(size: ScalarLike, exponent: ScalarLike) -> Scalar:
+    """size^exponent for size ≥ 0, with finite derivatives at zero."""
+    return jnp.exp(exponent * jnp.log(jnp.maximum(size, 1e-30)))
+
+
+def hysteresis_rate(travel_rate: ScalarLike, z: ScalarLike, shape: ScalarLike, exponent: ScalarLike) -> Scalar:
+    """ż [1/s] = u̇ − γ̂ |u̇| z|z|ⁿ⁻¹ − (1 − γ̂) u̇ |z|ⁿ, with the travel u counted in yield displacements."""
+    size = jnp.abs(z)
+    flat = _power(size, exponent - 1.0)
+    return travel_rate * (1.0 - (1.0 - shape) * size * flat) - shape * jnp.abs(travel_rate) * z * flat
+
+
+def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, exponent: ScalarLike) -> Scalar:
+    """The state after a travel in one direction, in yield displacements: second order, bounded for any travel.
+
+    With w = z sgn(u̇) the law reads dw/du = 1 + (2γ̂ − 1)|w|ⁿ for w < 0, unloading, and 1 − wⁿ for w > 0, loading. The
+    first is never stiff and takes a midpoint step. The second is carried on by w ← (w + t)/(1 + w t), t = tanh(r u),
+    r = (1 − wⁿ)/(1 − w²) at midway: exact for n = 2, and w tends to 1 without passing it however long the travel.
+    """
+    way = direction(travel)
+    u, w = way * travel, way * z
+
+    def rate_factor(w: Scalar) -> Scalar:
+        logarithm = jnp.minimum(jnp.log(jnp.maximum(w, 1e-30)), -1e-9)
+        return jnp.expm1(exponent * logarithm) / jnp.expm1(2.0 * logarithm)
+
+    def loaded(w: Scalar, stretch: Scalar) -> Scalar:
+        t = jnp.tanh(stretch)
+        return (w + t) / (1.0 + w * t)
+
+    held = jnp.maximum(-w, 0.0)  # still to be unloaded
+    steep = 1.0 + (2.0 * shape - 1.0) * _power(held, exponent)
+    midway = jnp.maximum(held - 0.5 * u * steep, 0.5 * held)
+    steep = 1.0 + (2.0 * shape - 1.0) * _power(midway, exponent)
+    left = jnp.maximum(u - held / steep, 0.0)
+    w = jnp.maximum(w, 0.0)
+    middle = loaded(w, 0.5 * left * rate_factor(w))
+    return way * (loaded(w, left * rate_factor(middle)) - jnp.maximum(held - u * steep, 0.0))
+
+
+@final
+class BoucWen(AbstractDamper):
+    """F = c₀ v + k₀ x + f₀ + F_y z (Wen 1976), z from −1 to 1: hysteresis with a yield force, independent of the rate.
+
+    x_y ż = v − γ̂ |v| z|z|ⁿ⁻¹ − (1 − γ̂) v |z|ⁿ. From rest the hysteretic force grows with slope F_y/x_y and saturates at
+    ±F_y; a larger n makes the knee sharper; γ̂ shapes the unloading (½: with slope F_y/x_y until z = 0; 1: steeper at
+    first). The usual A, β, γ, α hold one redundant number and leave the scale of z open; here z is dimensionless, so
+    A = 1/x_y, γ = γ̂/x_y, β = (1 − γ̂)/x_y, α = F_y (`classical`, `from_classical`), and γ ≥ |β| holds by construction:
+    the law always dissipates. A spring relaxed at x₀ is f₀ = −k₀ x₀.
+
+    State: z. The step is second order, bounded and stable for any x_y and any step. In a `SeriesSpring` it needs c₀
+    above zero.
+
+    >>> law = BoucWen(viscous_rate=800.0, stiffness=0.0, yield_force=300.0, yield_displacement=1e-3)
+    >>> state = law.advance(0.0, 0.1, 0.01, 0.1, law.initial_state(), 0.1)
+    >>> round(float(law.force(0.01, 0.1, state)), 3)
+    380.0
+    """
+
+    viscous_rate: Number = parameter("N s/m", "c₀, viscous damping coefficient", nonnegative)
+    stiffness: Number = parameter("N/m", "k₀, stiffness beside the hysteresis", nonnegative)
+    yield_force: Number = parameter("N", "F_y, hysteretic force when saturated", positive)
+    yield_displacement: Number = parameter("m", "x_y, travel from rest to F_y at the first slope", positive)
+    shape: Number = parameter("", "γ̂ = γ/(β + γ), shape of the unloading", interval(0.5, 1.0), default=0.75)
+    exponent: Number = parameter("", "n, sharpness of the knee", interval(1.0, 20.0), default=2.0)
+    static_force: Number = parameter("N", "f₀, force at rest at stroke zero", real, default=0.0)
+
+    def initial_state(self) -> State:
+        """No hysteretic force."""
+        return jnp.zeros(1)
+
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Force [N]."""
+        (z,) = own_states(self, state, 1)
+        return self.viscous_rate * v + self.stiffness * x + self.static_force + self.yield_force * z
+
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """ż [1/s]."""
+        del x
+        (z,) = own_states(self, state, 1)
+        return hysteresis_rate(v / self.yield_displacement, z, self.shape, self.exponent)[None]
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """One step along the net travel, see `hysteresis_step`; the velocity is taken as linear over the step."""
+        del x0, x1
+        (z,) = own_states(self, state, 1)
+        travel = 0.5 * dt * (v0 + v1) / self.yield_displacement
+        return hysteresis_step(travel, z, self.shape, self.exponent)[None]
+
+    def classical(self) -> dict[str, float]:
+        """A, β, γ [1/m], n and α [N] of ż = A v − γ|v|z|z|ⁿ⁻¹ − β v|z|ⁿ, F = … + α z, for the z in use here."""
+        first = 1.0 / float(self.yield_displacement)
+        shape = float(self.shape)
+        parts = {"A": first, "beta": (1.0 - shape) * first, "gamma": shape * first}
+        return parts | {"n": float(self.exponent), "alpha": float(self.yield_force)}
+
+    @classmethod
+    def from_classical(
+        cls,
+        c0: float,
+        k0: float,
+        alpha: float,
+        A: float,  # the letter of the literature
+        beta: float,
+        gamma: float,
+        n: float,
+        x0: float = 0.0,
+    ) -> "BoucWen":
+        """Read a set made for F = c₀ v + k₀ (x − x₀) + α z, whatever the scale of its z (in SI units).
+
+        Only sets with γ ≥ β ≥ 0 can be read.
+        """
+        largest = (A / (beta + gamma)) ** (1.0 / n)
+        return cls(c0, k0, alpha * largest, largest / A, gamma / (beta + gamma), n, -k0 * x0)
+
+    @classmethod
+    def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "BoucWen":
+        """Start values from measured data: F ≈ c₀ v + F_y sgn v + f₀ at the higher velocities; x_y starts at 1 mm."""
+        velocity, force = np.asarray(velocity), np.asarray(force)
+        fast = np.abs(velocity) >= 0.5 * np.max(np.abs(velocity))  # there the hysteresis has saturated
+        velocity, force = velocity[fast], force[fast]
+        columns = np.stack([velocity, np.sign(velocity), np.ones_like(velocity)], axis=1)
+        rate, level, offset = (float(a) for a in np.linalg.lstsq(columns, force, rcond=None)[0])
+        least = 0.02 * max(float(np.max(np.abs(force - offset))), 1e-3)
+        return cls(max(rate, 1.0), 0.0, max(level, least), 1e-3, static_force=offset)

@@ -1,0 +1,66 @@
+"""Friction that begins as a spring: the law of Dahl."""
+
+from typing import ClassVar, final
+
+import jax.numpy as jnp
+
+from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers._hysteresis import direction, own_states, travels
+from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.parameters import parameter, positive
+
+
+def dahl_step(travel: ScalarLike, force: ScalarLike, stiffness: ScalarLike, friction: ScalarLike) -> Scalar:
+    """F [N] after a travel [m] in one direction, exact: ±F_c is approached with exp(−σ₀ |travel|/F_c)."""
+    way = direction(travel)
+    settled = way * friction
+    return settled + (force - settled) * jnp.exp(-stiffness * way * travel / friction)
+
+
+@final
+class Dahl(AbstractDamper):
+    """Ḟ = σ₀ (v − |v| F/F_c) (Dahl 1968, exponent 1): dry friction of seals and guides whose contact gives a little.
+
+    For small travel it is a spring of stiffness σ₀, for large it saturates at ±F_c; the force depends on the travel and
+    its reversals, not on the rate. Over a full cycle it dissipates. Unlike `CoulombFriction` it holds at rest. It
+    stands beside a viscous law, `Linear(...) + Dahl(...)`.
+
+    State: the force [N]. The step is exact for a velocity linear over the step, a reversal included, so that
+    F_c/σ₀ may be far below the travel of a step. Inside a `SeriesSpring` a law with viscous damping must stand beside
+    it.
+
+    >>> law = Dahl(stiffness=4e5, friction_force=40.0)
+    >>> state = law.advance(0.0, 0.1, 1e-4, 0.1, law.initial_state(), 1e-3)
+    >>> round(float(law.force(1e-4, 0.1, state)), 6)
+    25.284822
+    """
+
+    stiffness: Number = parameter("N/m", "σ₀, stiffness of the contact at rest", positive)
+    friction_force: Number = parameter("N", "F_c, sliding friction", positive)
+
+    answers_at_once: ClassVar[bool] = False
+
+    def initial_state(self) -> State:
+        """No force."""
+        return jnp.zeros(1)
+
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Force [N]."""
+        del x, v
+        return own_states(self, state, 1)[0]
+
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """Ḟ [N/s]."""
+        del x
+        (force,) = own_states(self, state, 1)
+        return (self.stiffness * (v - jnp.abs(v) * force / self.friction_force))[None]
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """Exact for a velocity linear over the step."""
+        del x0, x1
+        (force,) = own_states(self, state, 1)
+        for travel in travels(v0, v1, dt):
+            force = dahl_step(travel, force, self.stiffness, self.friction_force)
+        return force[None]

@@ -1,0 +1,83 @@
+"""Friction with breakaway: the law of Lund and Grenoble."""
+
+from typing import final
+
+import jax.numpy as jnp
+
+from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers._hysteresis import direction, own_states, travels
+from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.parameters import nonnegative, parameter, positive
+
+
+def stribeck_force(v: ScalarLike, friction: ScalarLike, breakaway: ScalarLike, velocity: ScalarLike) -> Scalar:
+    """g(v) = F_c + (F_s − F_c) exp(−(v/v_s)²) [N], the friction of steady sliding."""
+    return friction + (breakaway - friction) * jnp.exp(-((v / velocity) ** 2))
+
+
+@final
+class LuGre(AbstractDamper):
+    """F = σ₀ z + σ₁(v) ż + σ₂ v, ż = v − σ₀ |v| z/g(v) (Canudas de Wit et al. 1995): stick, breakaway and sliding.
+
+    z [m] is the mean deflection of bristles of stiffness σ₀; in steady sliding F = g(v) sgn v + σ₂ v with the Stribeck
+    curve g(v) = F_c + (F_s − F_c) exp(−(v/v_s)²). A constant σ₁ can give energy out; the law takes none if σ₁(v) ≤
+    4 g/|v|, so here σ₁(v) = σ₁/√(1 + (σ₁ v/4g)²): the damping σ₁ at rest, fading as the contact slides, and a
+    passive law whatever the parameters. With σ₁ = 0 and F_s = F_c it is `Dahl` beside a viscous law.
+
+    State: z. The step is exact at constant velocity, second order, and stable however stiff the contact; a reversal
+    inside the step is followed. Below about σ₀ = 1e7 N/m a car may take steps of 1 ms. Inside a `SeriesSpring` it needs
+    σ₁ or σ₂ above zero.
+
+    >>> law = LuGre(4e5, 300.0, 0.0, friction_force=40.0, breakaway_force=60.0, stribeck_velocity=0.01)
+    >>> state = law.advance(0.0, 0.1, 0.01, 0.1, law.initial_state(), 0.1)
+    >>> round(float(law.force(0.01, 0.1, state)), 6)
+    40.0
+    """
+
+    stiffness: Number = parameter("N/m", "σ₀, stiffness of the bristles", positive)
+    contact_damping: Number = parameter("N s/m", "σ₁, damping of the bristles at rest", nonnegative)
+    viscous_rate: Number = parameter("N s/m", "σ₂, viscous damping coefficient", nonnegative)
+    friction_force: Number = parameter("N", "F_c, friction of fast sliding", positive)
+    breakaway_force: Number = parameter("N", "F_s, friction of slow sliding", positive)
+    stribeck_velocity: Number = parameter("m/s", "v_s, velocity over which F_s falls to F_c", positive)
+
+    def sliding_force(self, v: ScalarLike) -> Scalar:
+        """g(v) [N], positive."""
+        return stribeck_force(v, self.friction_force, self.breakaway_force, self.stribeck_velocity)
+
+    def initial_state(self) -> State:
+        """Bristles unbent."""
+        return jnp.zeros(1)
+
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Force [N]."""
+        (z,) = own_states(self, state, 1)
+        (rate,) = self.state_rate(x, v, state)
+        fading = jnp.sqrt(1.0 + (0.25 * self.contact_damping * v / self.sliding_force(v)) ** 2)
+        return self.stiffness * z + self.contact_damping / fading * rate + self.viscous_rate * v
+
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """ż [m/s]."""
+        del x
+        (z,) = own_states(self, state, 1)
+        return (v - self.stiffness * jnp.abs(v) * z / self.sliding_force(v))[None]
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """Exact for a friction of sliding that is linear in the travel, before and after a reversal."""
+        del x0, x1
+        (z,) = own_states(self, state, 1)
+        before, after = travels(v0, v1, dt)
+        zero = 0.0 * after
+        turn = jnp.where(before != 0.0, zero, v0)
+        for travel, start, end in ((before, v0, zero), (after, turn, v1)):
+            way = direction(travel)
+            middle = self.sliding_force(0.5 * (start + end))
+            lengths = self.stiffness * way * travel / middle
+            safe = jnp.where(lengths > 1e-6, lengths, 1.0)
+            kept = jnp.exp(-lengths)
+            mean = jnp.where(lengths > 1e-6, -jnp.expm1(-safe) / safe, 1.0 - 0.5 * lengths)
+            settled = (mean - kept) * self.sliding_force(start) + (1.0 - mean) * self.sliding_force(end)
+            z = kept * z + way * settled / self.stiffness
+        return z[None]

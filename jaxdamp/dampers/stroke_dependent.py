@@ -1,0 +1,86 @@
+"""A damper that changes along its stroke: hydraulic stops, grooves in the tube, tables over stroke and velocity."""
+
+from collections.abc import Sequence
+from typing import final
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
+from jaxdamp.dampers._stateless import AbstractStateless
+from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.table import Table
+from jaxdamp.parameters import as_float, increasing, setting
+
+
+Grid = Float[Array, "strokes velocities"] | Float[np.ndarray, "strokes velocities"] | Sequence[Sequence[float]]
+
+
+def _forces(laws: tuple[AbstractDamper, ...], x: ScalarLike, v: ScalarLike) -> Float[Array, " laws"]:
+    """Forces [N] of the laws; those that differ in their numbers only, as in a table, are computed as one batch."""
+    kinds = {(jax.tree.structure(law), tuple(jnp.shape(a) for a in jax.tree.leaves(law))) for law in laws}
+    if len(kinds) > 1:
+        return jnp.stack([law.force(x, v, law.initial_state()) for law in laws])
+    batch = jax.tree.map(lambda *leaves: jnp.stack(leaves), *laws)
+    return jax.vmap(lambda law: law.force(x, v, law.initial_state()))(batch)
+
+
+@final
+class StrokeDependent(AbstractStateless):
+    """F(x, v) between laws Fₖ(v) that hold at strokes xₖ: straight lines in x from each to the next.
+
+    Below the first stroke and above the last the law there goes on unchanged. The force is continuous in x, its slope
+    changes at each xₖ. Laws with F v ≥ 0 make a whole with F v ≥ 0.
+
+    - A factor along the stroke, such as a hydraulic stop: `StrokeDependent((3.0 * law, law), [-0.06, -0.04])`.
+    - A table over stroke and velocity: `StrokeDependent.from_grid(stroke, velocity, force)`.
+    - Another law in each zone: the two laws at strokes close together, on either side of the border.
+
+    Arguments:
+        laws: k ≥ 1 laws without states.
+        stroke: strictly increasing strokes xₖ [m], shape (k,). Fixed: a fit changes the laws.
+
+    >>> from jaxdamp.dampers import Linear
+    >>> law = StrokeDependent((3.0 * Linear(1000.0), Linear(1000.0)), stroke=[-0.06, -0.04])
+    >>> [round(float(law.force(x, 0.5, law.initial_state())), 6) for x in (-0.1, -0.05, 0.0)]
+    [1500.0, 1000.0, 500.0]
+    """
+
+    laws: tuple[AbstractDamper, ...]
+    stroke: Vector = setting("m", "strokes where the laws hold", increasing)
+
+    def __check_init__(self) -> None:
+        if self.stroke.ndim != 1 or self.stroke.size != len(self.laws) or not self.laws:
+            must = "hold one stroke or more, one for each law"
+            _checks.refuse("stroke", must, f"of shape {self.stroke.shape} for {len(self.laws)} laws")
+        for k, law in enumerate(self.laws):
+            if law.initial_state().size:
+                remedy = f"Put it outside: `{type(law).__name__}(StrokeDependent(...), ...)`."
+                _checks.refuse(f"laws[{k}]", "be without states", f"a {type(law).__name__}", remedy)
+
+    def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
+        """Force [N] at stroke x [m] and velocity v [m/s]."""
+        forces = _forces(self.laws, x, v)
+        shares = jnp.clip((x - self.stroke[:-1]) / jnp.diff(self.stroke), 0.0, 1.0)
+        return forces[0] + jnp.sum(shares * jnp.diff(forces))
+
+    @classmethod
+    def from_grid(cls, stroke: VectorLike, velocity: VectorLike, force: Grid) -> "StrokeDependent":
+        """Bilinear interpolation of forces [N], shape (strokes, velocities), on a grid, uniform or not.
+
+        Beyond the first and last velocity the slopes there go on, beyond the first and last stroke nothing changes.
+
+        >>> force = [[-400.0, 0.0, 900.0], [-600.0, 0.0, 1300.0]]
+        >>> law = StrokeDependent.from_grid([0.0, 0.1], [-1.0, 0.0, 1.0], force)
+        >>> [round(float(law.force(x, v, law.initial_state())), 6) for x, v in ((0.05, 0.5), (0.2, -2.0))]
+        [550.0, -1200.0]
+        """
+        rows = as_float(force)
+        if rows.shape != (np.size(stroke), np.size(velocity)):
+            must = "have one row for each stroke and one column for each velocity"
+            expected = f"of shape {rows.shape} for {np.size(stroke)} strokes and {np.size(velocity)} velocities"
+            _checks.refuse("force", must, expected)
+        return cls(tuple(Table(velocity, row) for row in rows), stroke)

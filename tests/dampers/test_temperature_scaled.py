@@ -1,0 +1,56 @@
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxdamp import respond
+from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.dampers import Bilinear, Lag, Linear, TemperatureScaled
+from jaxdamp.identify import fit
+from jaxdamp.parameters import get
+
+
+@pytest.mark.parametrize(("temperature", "share"), [(293.15, 1.0), (343.15, 0.85), (273.15, 1.06)])
+def test_force_falls_in_proportion(temperature, share):
+    law = TemperatureScaled(Bilinear(2600.0, 1200.0), temperature, sensitivity=0.003)
+    found = [law.force(0.0, v, law.initial_state()) for v in (0.5, -0.5)]
+    np.testing.assert_allclose(found, [1300.0 * share, -600.0 * share], rtol=1e-12)
+
+
+def test_another_reference():
+    law = TemperatureScaled(Linear(1000.0), 300.0, 350.0, 0.002)
+    np.testing.assert_allclose(law.force(0.0, 1.0, law.initial_state()), 1100.0, rtol=1e-13)
+
+
+def test_states_are_those_of_the_law():
+    t = np.linspace(0.0, 0.5, 1001)
+    x, v = 0.01 * np.sin(40 * t), 0.4 * np.cos(40 * t)
+    cold = respond(Lag(Linear(2000.0), 0.004), t, x, v)
+    warm = respond(TemperatureScaled(Lag(Linear(2000.0), 0.004), 333.15, sensitivity=0.0025), t, x, v)
+    np.testing.assert_allclose(warm, 0.9 * cold, rtol=1e-12)
+
+
+def test_fit_of_a_warm_record_gives_the_numbers_of_the_cold_law():
+    cold = Bilinear(2600.0, 1200.0)
+    runs = VirtualDyno(0.88 * cold, force_noise=5.0, seed=1).run(SineTest(0.02, 5.0))
+    result = fit(TemperatureScaled(Bilinear(900.0, 900.0), 333.15, sensitivity=0.003), runs, freeze=["sensitivity"])
+    found = [get(result.law, name) for name in ("law.rebound_rate", "law.compression_rate")]
+    np.testing.assert_allclose(found, [2600.0, 1200.0], rtol=2e-3)
+
+
+def test_fit_of_the_sensitivity():
+    runs = VirtualDyno(0.88 * Bilinear(2600.0, 1200.0), force_noise=5.0, seed=1).run(SineTest(0.02, 5.0))
+    result = fit(TemperatureScaled(Bilinear(2600.0, 1200.0), 333.15, sensitivity=0.001), runs, freeze=["law.*"])
+    np.testing.assert_allclose(get(result.law, "sensitivity"), 0.003, rtol=0.01)
+
+
+@pytest.mark.parametrize("temperature", [793.15, 900.0])
+def test_a_factor_that_is_not_positive_is_refused(temperature):
+    with pytest.raises(ValueError, match=r"`sensitivity` must leave a positive factor .* nearby"):
+        TemperatureScaled(Linear(1000.0), temperature)
+
+
+def test_single_precision():
+    law = TemperatureScaled(Linear(jnp.asarray(1000.0, jnp.float32)), *jnp.array([333.0, 293.0, 2e-3], jnp.float32))
+    force = law.force(jnp.float32(0.0), jnp.float32(0.5), law.initial_state())
+    assert force.dtype == jnp.float32
+    np.testing.assert_allclose(force, 460.0, rtol=1e-5)
