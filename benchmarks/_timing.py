@@ -39,4 +39,8 @@ def show(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None
     print(title)
     print(machine())
     for row in [head, ["-" * w for w in widths], *rows]:
-        print("  ".join(cell.ljust(w) if i == 0 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))))
+        print(
+            "  ".join(
+                cell.ljust(w) if i == 0 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+            )
+        )

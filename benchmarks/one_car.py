@@ -1,7 +1,7 @@
 """How long one quarter car takes for 10 s of road at 1 kHz, and how accurate it is.
 
-    python -m benchmarks.one_car            with the whole loop compiled as one function (see OPTION)
-    python -m benchmarks.one_car --plain    as JAX comes
+python -m benchmarks.one_car            with the whole loop compiled as one function (see OPTION)
+python -m benchmarks.one_car --plain    as JAX comes
 """
 
 import os

@@ -6,4 +6,15 @@ from jaxdamp.identify.ladder import LAWS, default_ladder
 from jaxdamp.identify.result import Estimate, FitResult, Score, fit_percent
 
 
-__all__ = ["LAWS", "Comparison", "Estimate", "FitResult", "Rung", "Score", "compare", "default_ladder", "fit", "fit_percent"]
+__all__ = [
+    "LAWS",
+    "Comparison",
+    "Estimate",
+    "FitResult",
+    "Rung",
+    "Score",
+    "compare",
+    "default_ladder",
+    "fit",
+    "fit_percent",
+]

@@ -1,6 +1,6 @@
 """The ladder: laws from plain to rich, each with a start taken from the records."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -61,9 +61,7 @@ _MEMORYLESS = {
 LAWS = (*_MEMORYLESS, "besinger_lag", "besinger_series_spring", "linear_friction_lag")
 
 
-def default_ladder(
-    runs: Sequence[BenchRun], names: Sequence[str] = LAWS
-) -> dict[str, AbstractDamper]:
+def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dict[str, AbstractDamper]:
     """Laws from plain to rich by name, each started from the records, ready for `compare` or `fit`.
 
     Memoryless: `linear`, `bilinear`, `power_law`, `polynomial` (degree 5), `segmented_polynomial` (paper 000),
@@ -91,5 +89,3 @@ def default_ladder(
             series = SeriesSpring(law, stiffness, 0.1 * stiffness / deflection**2)
             ladder[name] = Lag(law, lag) if name == "besinger_lag" else series
     return ladder
-
-

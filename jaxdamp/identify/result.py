@@ -1,7 +1,7 @@
 """What a fit found, how well it is determined and how good it is."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify.traces import predict_runs, used_samples
+from jaxdamp.identify.traces import is_memoryless, predict_runs, used_samples
 
 
 if TYPE_CHECKING:
@@ -17,13 +17,17 @@ if TYPE_CHECKING:
 
 
 class Estimate(NamedTuple):
-    """One fitted number."""
+    """One fitted number.
+
+    The standard error of a number at an edge of its range is what it would be without that edge; the errors of the
+    others count it as frozen there.
+    """
 
     name: str
     value: float
     unit: str
     standard_error: float
-    interval: tuple[float, float]  # 95 %
+    interval: tuple[float, float]  # 95 %, cut at the edges of the range
     meaning: str
     note: str  # "", "not identifiable" or "at a bound"
 
@@ -38,15 +42,21 @@ class Score(NamedTuple):
 
 
 def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray]) -> float:
-    """100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all samples: 100 is perfect, 0 no better than a constant."""
+    """100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all samples: 100 is perfect, 0 no better than a constant.
+
+    −∞ for a measured force that is constant and missed.
+    """
     y, p = np.concatenate(list(measured)), np.concatenate(list(predicted))
-    return float(100.0 * (1.0 - np.linalg.norm(y - p) / np.linalg.norm(y - y.mean())))
+    missed, spread = (float(np.sqrt(np.sum(a * a))) for a in (y - p, y - y.mean()))
+    if missed == 0.0:
+        return 100.0
+    return 100.0 * (1.0 - missed / spread) if spread > 0.0 else -np.inf
 
 
 def score(law: AbstractDamper, runs: Sequence[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
     """Fit percent and RMSE [N] of a law over records together, and for each of them."""
     forces = predict_runs(law, runs)
-    kept = [used_samples(law, run) for run in runs]
+    kept = [slice(None)] * len(runs) if is_memoryless(law) else [used_samples(law, run) for run in runs]
     measured = [run.force[k] for run, k in zip(runs, kept, strict=True)]
     predicted = [force[k] for force, k in zip(forces, kept, strict=True)]
     rows = []
@@ -94,19 +104,19 @@ class FitResult:
                 return estimate
         raise KeyError(f"No parameter is named {name!r}; there are {', '.join(e.name for e in self.parameters)}.")
 
-    def predict(self, runs: BenchRun | Sequence[BenchRun]) -> list[np.ndarray]:
+    def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
         """Force [N] of the fitted law at every sample of records, old or new."""
         return predict_runs(self.law, [runs] if isinstance(runs, BenchRun) else list(runs))
 
-    def score(self, runs: Sequence[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
+    def score(self, runs: Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
         """Fit percent, RMSE [N] and the scores by record, on other records."""
         return score(self.law, list(runs))
 
-    def plot(self, runs: Sequence[BenchRun] | None = None, **options: Any) -> "Figure":
+    def plot(self, runs: Iterable[BenchRun] | None = None, **options: Any) -> "Figure":
         """Loops of force over velocity and over stroke, measured and fitted, with residuals."""
         from jaxdamp.plots import fit_loops
 
-        return fit_loops(self, runs, **options)
+        return fit_loops(self, runs if runs is None else tuple(runs), **options)
 
     def __repr__(self) -> str:
         width = max(len(e.name) for e in self.parameters)

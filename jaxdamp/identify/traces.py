@@ -1,7 +1,7 @@
 """Bench records as batches of equal length, ready for one compiled call."""
 
 from collections.abc import Sequence
-from typing import final
+from typing import NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -15,6 +15,8 @@ from jaxdamp.rig import march
 
 
 STEP_ANGLE = 0.06  # rad of the dominant frequency per step: keeps the error of a law's step near 1e-4
+MOST_GROUPS = 2  # batches of a law with states: each is compiled on its own
+PREDICTED_PER_CYCLE = 1000  # samples at which a law with states is evaluated; straight lines between them: error 5e-6
 
 
 @final
@@ -35,6 +37,27 @@ class Batch(eqx.Module):
     def residual(self, law: AbstractDamper) -> Float[Array, "runs time"]:
         """Weighted difference of the law's force from the measured one."""
         return (self.predict(law) - self.force) * self.weight
+
+
+class Place(NamedTuple):
+    """Where a record is: samples `start` to `stop` of a row of a batch, each the mean of `block` measured ones."""
+
+    batch: int
+    row: int
+    start: int
+    stop: int
+    block: int
+
+
+class _Row(NamedTuple):
+    """A record made ready for a law with states."""
+
+    dt: float
+    signals: tuple[np.ndarray, np.ndarray, np.ndarray]  # stroke, velocity, force
+    weight: np.ndarray
+    lead: int
+    block: int
+    substeps: int
 
 
 def is_memoryless(law: AbstractDamper) -> bool:
@@ -69,54 +92,102 @@ def settling(run: BenchRun) -> float:
     return min(np.pi / pace(run), 0.25 * run.duration)
 
 
+def _with_lead(run: BenchRun, lead: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stroke, velocity and force, preceded by a copy of the record's own first cycle, its stroke shifted to join."""
+    period = min(2 * np.pi / pace(run), run.duration)
+    since = run.time - run.time[0]
+    instants = period + np.arange(-lead, 0) / run.sampling_rate
+    stroke, velocity = (np.interp(instants, since, values) for values in (run.stroke, run.velocity))
+    stroke = stroke + run.stroke[0] - np.interp(period, since, run.stroke)
+    before = (stroke, velocity, np.zeros(lead))
+    after = (run.stroke, run.velocity, run.force)
+    return tuple(np.concatenate(pair) for pair in zip(before, after, strict=True))  # type: ignore[return-value]
+
+
+def _row(run: BenchRun, sigma: float, samples_per_cycle: int | None) -> _Row:
+    dt, omega = 1.0 / run.sampling_rate, pace(run)
+    block = 1 if samples_per_cycle is None else max(int(2 * np.pi / (omega * dt * samples_per_cycle)), 1)
+    substeps = int(np.clip(np.ceil(omega * dt * block / STEP_ANGLE), 1, 8))
+    lead = int(min(2 * np.pi / omega, run.duration) / (dt * block))
+    stroke, velocity, force = (_averaged(values, block) for values in _with_lead(run, lead * block))
+    weight = np.full(len(force), np.sqrt(block) / sigma)
+    weight[: lead + int(np.ceil(settling(run) / (dt * block)))] = 0.0
+    return _Row(dt * block, (stroke, velocity, force), weight, lead, block, substeps)
+
+
+def _grouped(rows: Sequence[_Row]) -> list[list[int]]:
+    """Numbers of the rows that march together, so that little time is lost on padding and few loops are compiled.
+
+    All records of a group take the steps of its longest. A step costs about as much as 16 records beside each other.
+    """
+
+    def cost(group: list[int]) -> int:
+        steps = max(len(rows[i].weight) for i in group) * max(rows[i].substeps for i in group)
+        return steps * (16 + len(group))
+
+    alike: dict[tuple[int, int], list[int]] = {}
+    for i, row in enumerate(rows):
+        alike.setdefault((_round_up(len(row.weight)), row.substeps), []).append(i)
+    groups = list(alike.values())
+    while len(groups) > MOST_GROUPS:
+        pairs = [(a, b) for a in range(len(groups)) for b in range(a)]
+        a, b = min(pairs, key=lambda p: cost(groups[p[0]] + groups[p[1]]) - cost(groups[p[0]]) - cost(groups[p[1]]))
+        groups[b] = groups[b] + groups.pop(a)
+    return groups
+
+
+def _batch(rows: Sequence[_Row]) -> Batch:
+    length = _round_up(max(len(row.weight) for row in rows))
+    columns = [np.stack([_pad(row.signals[k], length) for row in rows]) for k in range(3)]
+    weight = np.stack([_pad(row.weight, length, "constant") for row in rows])
+    arrays = (np.array([row.dt for row in rows]), *columns, weight)
+    return Batch(*map(jnp.asarray, arrays), substeps=max(row.substeps for row in rows))
+
+
+def _memoryless_batch(runs: Sequence[BenchRun], sigma: Sequence[float]) -> tuple[list[Batch], list[Place]]:
+    ends = np.cumsum([len(run) for run in runs])
+    length = _round_up(int(ends[-1]))
+    stroke, velocity, force = (
+        _pad(np.concatenate([getattr(run, name) for run in runs]), length)[None]
+        for name in ("stroke", "velocity", "force")
+    )
+    weight = np.concatenate([np.full(len(run), 1.0 / s) for run, s in zip(runs, sigma, strict=True)])
+    arrays = (np.ones(1), stroke, velocity, force, _pad(weight, length, "constant")[None])
+    places = [Place(0, 0, int(end) - len(run), int(end), 1) for end, run in zip(ends, runs, strict=True)]
+    return [Batch(*map(jnp.asarray, arrays), substeps=1)], places
+
+
 def batches(
     law: AbstractDamper,
     runs: Sequence[BenchRun],
     sigma: Sequence[float],
-    samples_per_cycle: int | None = None,
-) -> tuple[list[Batch], list[tuple[int, int, int, int]]]:
+    samples_per_cycle: int | None,
+) -> tuple[list[Batch], list[Place]]:
     """Prepare records for a law.
 
-    For a memoryless law all samples stand in one batch. For a law with states the records are grouped by length and
-    substeps; where a record has more than `samples_per_cycle`, blocks of samples are averaged, whose weight grows with
-    the root of their number, so that nothing is lost but the noise; its first half cycle gets weight zero.
+    For a memoryless law all samples stand in one batch. For a law with states every record is preceded by a copy of
+    its first cycle, over which the states come from rest to where a steady motion has them; the copy and the first
+    half cycle of the record get weight zero. Where a record has more than `samples_per_cycle`, blocks of samples are
+    averaged, whose weight grows with the root of their number, so that nothing is lost but the noise.
+
+    Arguments:
+        law: the law, of which only matters whether it has states.
+        runs: the records.
+        sigma: standard deviation [N] of the force for each record.
+        samples_per_cycle: see above; `None` takes every sample.
 
     Returns:
-        The batches, and for each record (batch, row, count, block): where its samples are.
+        The batches, and for each record where it is.
     """
     if is_memoryless(law):
-        ends = np.cumsum([len(run) for run in runs])
-        length = _round_up(int(ends[-1]))
-        stroke, velocity, force = (
-            _pad(np.concatenate([getattr(run, name) for run in runs]), length)[None]
-            for name in ("stroke", "velocity", "force")
-        )
-        weight = np.concatenate([np.full(len(run), 1.0 / s) for run, s in zip(runs, sigma, strict=True)])
-        arrays = (np.ones(1), stroke, velocity, force, _pad(weight, length, "constant")[None])
-        return [Batch(*map(jnp.asarray, arrays), substeps=1)], [
-            (0, 0, int(end), len(run)) for end, run in zip(ends, runs, strict=True)
-        ]
-    groups: dict[tuple[int, int], list[tuple]] = {}
-    places = []
-    for run, s in zip(runs, sigma, strict=True):
-        dt, omega = 1.0 / run.sampling_rate, pace(run)
-        block = 1 if samples_per_cycle is None else max(int(2 * np.pi / (omega * dt * samples_per_cycle)), 1)
-        substeps = int(np.clip(np.ceil(omega * dt * block / STEP_ANGLE), 1, 8))
-        signals = [_averaged(getattr(run, name), block) for name in ("stroke", "velocity", "force")]
-        count = len(signals[0])
-        weight = np.full(count, np.sqrt(block) / s)
-        weight[: int(np.ceil(settling(run) / (dt * block)))] = 0.0
-        length = _round_up(count)
-        row = (dt * block, *(_pad(signal, length) for signal in signals), _pad(weight, length, "constant"))
-        group = groups.setdefault((length, substeps), [])
-        places.append(((length, substeps), len(group), count, block))
-        group.append(row)
-    keys = list(groups)
-    made = [
-        Batch(*(jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)), substeps=key[1])
-        for key, rows in groups.items()
-    ]
-    return made, [(keys.index(key), row, count, block) for key, row, count, block in places]
+        return _memoryless_batch(runs, sigma)
+    rows = [_row(run, s, samples_per_cycle) for run, s in zip(runs, sigma, strict=True)]
+    groups = _grouped(rows)
+    places: dict[int, Place] = {}
+    for number, group in enumerate(groups):
+        for k, i in enumerate(group):
+            places[i] = Place(number, k, rows[i].lead, len(rows[i].weight), rows[i].block)
+    return [_batch([rows[i] for i in group]) for group in groups], [places[i] for i in range(len(runs))]
 
 
 @eqx.filter_jit
@@ -124,13 +195,23 @@ def _predict(batch: Batch, law: AbstractDamper) -> Array:
     return batch.predict(law)
 
 
+def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
+    """Values at every sample from the means of blocks: straight lines between their middles and beyond the ends."""
+    if block == 1:
+        return values
+    places = (np.arange(count) - 0.5 * (block - 1)) / block
+    left = np.clip(np.floor(places).astype(int), 0, len(values) - 2)
+    return values[left] + (places - left) * (values[left + 1] - values[left])
+
+
 def predict_runs(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[np.ndarray]:
     """Force [N] of the law at every sample of every record."""
-    made, places = batches(law, runs, [1.0] * len(runs))
+    made, places = batches(law, runs, [1.0] * len(runs), PREDICTED_PER_CYCLE)
     forces = [np.asarray(_predict(batch, law)) for batch in made]
-    if is_memoryless(law):
-        return [forces[0][0, end - count : end] for _, _, end, count in places]
-    return [forces[batch][row, :count] for batch, row, count, _ in places]
+    return [
+        _spread(forces[p.batch][p.row, p.start : p.stop], p.block, len(run))
+        for p, run in zip(places, runs, strict=True)
+    ]
 
 
 def used_samples(law: AbstractDamper, run: BenchRun) -> slice:

@@ -12,6 +12,9 @@ from jaxdamp._types import Scalar, Signal, State
 from jaxdamp.vehicles import AbstractVehicle
 
 
+STEPS_PER_INSTANT = 100  # on average: more are a law too fast for the solver, and would take for ever
+
+
 @eqx.filter_jit
 def adaptive_steps(
     vehicle: AbstractVehicle,
@@ -21,7 +24,7 @@ def adaptive_steps(
     rtol: float,
     atol: float,
 ) -> tuple[Float[Array, "time n"], Float[Array, "time ports"], list[State], Any]:
-    """Motion and forces at the instants of the road, which is linear between them; steps end where its slope changes."""
+    """Motion and forces at the instants of the road, linear between them; steps end where its slope changes."""
     form, laws = vehicle.port_form(), vehicle.elements()
     q = form.mass.shape[0]
     a, b_f = form.state_matrix(), form.port_input()
@@ -37,7 +40,7 @@ def adaptive_steps(
         deflection, rate = form.ports @ x[:q], form.ports @ x[q:]
         return jnp.stack([law.force(deflection[i], rate[i], states[i]) for i, law in enumerate(laws)])
 
-    def field(t: Scalar, y: tuple[Array, list[State]], args: None) -> tuple[Array, list[State]]:
+    def field(t: Any, y: Any, args: None) -> tuple[Array, list[State]]:
         del args
         x, states = y
         height, slope = road(t)
@@ -45,7 +48,7 @@ def adaptive_steps(
         inner = [law.state_rate(deflection[i], rate[i], states[i]) for i, law in enumerate(laws)]
         return a @ x + b_f @ forces(x, states) + b_r @ height + b_d @ slope, inner
 
-    start = jnp.concatenate([form.settled() @ heights[0], jnp.zeros(q, heights.dtype)])
+    start = form.at_rest_on(heights[0])
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(field),
         solver,
@@ -57,7 +60,7 @@ def adaptive_steps(
         stepsize_controller=diffrax.ClipStepSizeController(
             diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=time[1:-1]
         ),
-        max_steps=None,
+        max_steps=STEPS_PER_INSTANT * time.size,
         adjoint=diffrax.ForwardMode(),
         throw=False,
     )

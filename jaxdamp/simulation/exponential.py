@@ -5,55 +5,19 @@ carried on exactly by the matrix exponential, however stiff the tyre. The forces
 predicted from the motion under held forces, then corrected: second order in the step.
 """
 
-from typing import final
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import jax.scipy.linalg
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar, State
-from jaxdamp.dampers import AbstractDamper
-from jaxdamp.vehicles import AbstractVehicle, PortForm
+from jaxdamp.simulation.propagator import Propagator
+from jaxdamp.vehicles import AbstractVehicle
 
 
-@final
-class Propagator(eqx.Module):
-    """x₁ = Φ x₀ + H₀ f₀ + H₁ (f₁ − f₀) + R₀ z₀ + R₁ (z₁ − z₀), exact for f and z linear over the step."""
-
-    phi: Float[Array, "n n"]
-    force_held: Float[Array, "n ports"]
-    force_ramp: Float[Array, "n ports"]
-    road_held: Float[Array, "n wheels"]
-    road_ramp: Float[Array, "n wheels"]
-
-
-def propagator(form: PortForm, dt: Scalar) -> Propagator:
-    """The step matrices, from one exponential of the matrix augmented by its inputs."""
-    a = form.state_matrix()
-    inputs = jnp.concatenate([form.port_input(), form.road_input(), form.road_rate_input()], axis=1)
-    n, m = inputs.shape
-    ports, wheels = form.ports.shape[0], form.road_stiffness.shape[1]
-    big = jnp.zeros((n + 2 * m, n + 2 * m), a.dtype)
-    big = big.at[:n, :n].set(a * dt).at[:n, n : n + m].set(inputs * dt).at[n : n + m, n + m :].set(jnp.eye(m))
-    exponential = jax.scipy.linalg.expm(big)
-    held, ramp = exponential[:n, n : n + m], exponential[:n, n + m :]
-    heights, rates = slice(ports, ports + wheels), slice(ports + wheels, None)
-    road_ramp = ramp[:, heights] + held[:, rates] / dt
-    return Propagator(exponential[:n, :n], held[:, :ports], ramp[:, :ports], held[:, heights], road_ramp)
-
-
-def _affine(matrix: Array, vector: list[Scalar]) -> list[Scalar]:
-    """matrix @ vector, written out: on small systems XLA fuses the scalars of a batch into one kernel."""
-    return [sum(matrix[i, j] * x for j, x in enumerate(vector)) for i in range(matrix.shape[0])]  # type: ignore[misc]
-
-
-def _forces(laws: tuple[AbstractDamper, ...], moves: list[tuple], states: list[State], dt: Scalar) -> tuple:
-    """States and forces at the end of a step, from (x₀, v₀, x₁, v₁) at each port."""
-    after = [law.advance(*move, state, dt) for law, move, state in zip(laws, moves, states, strict=True)]
-    force = [law.force(move[2], move[3], state) for law, move, state in zip(laws, moves, after, strict=True)]
-    return after, force
+def _times(matrix: Float[Array, "m n"], vector: Float[Array, " n"]) -> Float[Array, " m"]:
+    """Matrix @ vector as products and sums, which XLA fuses with what is around them; a `dot` stands alone."""
+    return jnp.sum(matrix * vector[None, :], axis=1)
 
 
 @eqx.filter_jit
@@ -62,38 +26,34 @@ def exponential_steps(
 ) -> tuple[Float[Array, "time n"], Float[Array, "time ports"], list[State]]:
     """Motion (q, q̇) and element forces at every instant of the road, and the laws' states at the end."""
     form, laws = vehicle.port_form(), vehicle.elements()
-    p = propagator(form, dt)
-    q = form.mass.shape[0]
+    start, p = form.at_rest_on(heights[0]), Propagator.over(form, dt)
 
-    def at_ports(x: list[Scalar]) -> list[tuple[Scalar, Scalar]]:
-        return list(zip(_affine(form.ports, x[:q]), _affine(form.ports, x[q:]), strict=True))
+    def at_ports(x: Array) -> list[tuple[Scalar, Scalar]]:
+        deflection, rate = jnp.split(x, 2)
+        return list(zip(_times(form.ports, deflection), _times(form.ports, rate), strict=True))
 
-    def step(carry: tuple, road: tuple[Array, Array]) -> tuple[tuple, tuple]:
-        x, here, states, force = carry
-        z0, dz = list(road[0]), list(road[1])
-        parts = zip(
-            _affine(p.phi, x),
-            _affine(p.force_held, force),
-            _affine(p.road_held, z0),
-            _affine(p.road_ramp, dz),
-            strict=True,
-        )
-        predicted = [sum(part) for part in parts]
-        moves = [(*old, *new) for old, new in zip(here, at_ports(predicted), strict=True)]
-        _, guess = _forces(laws, moves, states, dt)
-        change = [new - old for new, old in zip(guess, force, strict=True)]
-        x = [a + b for a, b in zip(predicted, _affine(p.force_ramp, change), strict=True)]
-        there = at_ports(x)
-        moves = [(*old, *new) for old, new in zip(here, there, strict=True)]
-        states, force = _forces(laws, moves, states, dt)
-        return (x, there, states, force), (jnp.stack(x), jnp.stack(force))
+    def respond(x0: Array, x1: Array, states: list[State]) -> tuple[list[State], Array]:
+        """States and forces of the elements after a step over which the motion goes from x0 to x1."""
+        moves = list(zip(at_ports(x0), at_ports(x1), laws, states, strict=True))
+        after = [law.advance(*old, *new, state, dt) for old, new, law, state in moves]
+        forces = [law.force(*new, state) for (_, new, law, _), state in zip(moves, after, strict=True)]
+        return after, jnp.stack(forces)
 
-    start = jnp.concatenate([form.settled() @ heights[0], jnp.zeros(q, heights.dtype)])
-    x = list(start)
-    here = at_ports(x)
-    states = [law.initial_state() for law in laws]
-    force = [law.force(*place, state) for law, place, state in zip(laws, here, states, strict=True)]
-    first = (start, jnp.stack(force))
-    carry, saved = jax.lax.scan(step, (x, here, states, force), (heights[:-1], jnp.diff(heights, axis=0)))
-    motion, forces = (jnp.concatenate([a[None], b]) for a, b in zip(first, saved, strict=True))
-    return motion, forces, carry[2]
+    def step(now: tuple[Array, list[State], Array], road: tuple[Array, Array]) -> tuple:
+        x, states, force = now
+        height, rise = road
+        held = _times(p.phi, x) + _times(p.force_held, force)
+        held = held + _times(p.road_held, height) + _times(p.road_ramp, rise)
+        _, predicted = respond(x, held, states)
+        after = held + _times(p.force_ramp, predicted - force)
+        states, force = respond(x, after, states)
+        return (after, states, force), (after, states)
+
+    def forces(x: Array, states: list[State]) -> Array:
+        places = zip(laws, at_ports(x), states, strict=True)
+        return jnp.stack([law.force(*place, state) for law, place, state in places])
+
+    first = start, [law.initial_state() for law in laws]
+    now, saved = jax.lax.scan(step, (*first, forces(*first)), (heights[:-1], jnp.diff(heights, axis=0)))
+    motion, states = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), first, saved)
+    return motion, jax.vmap(forces)(motion, states), now[1]

@@ -49,6 +49,7 @@ class Response(eqx.Module):
         return jnp.concatenate([steps[:1], 0.5 * (steps[1:] + steps[:-1]), steps[-1:]])
 
     @property
+    @eqx.filter_jit
     def channels(self) -> dict[str, Signal]:
         """All channels by name; with tyre damping the road's rate is the mean of the slopes on both sides."""
         form = self.vehicle.port_form()
@@ -63,6 +64,7 @@ class Response(eqx.Module):
         _checks.one_of("channel", channel, self.units)
         return self.channels[channel]
 
+    @eqx.filter_jit
     def metrics(self) -> dict[str, Scalar]:
         """The vehicle's ride metrics by name, over the whole run."""
         channels = self.channels
@@ -72,12 +74,13 @@ class Response(eqx.Module):
         """Unit of each ride metric."""
         return {m.name: self.units[m.channel] for m in self.vehicle.ride_metrics}
 
+    @eqx.filter_jit
     def energy_balance(self) -> dict[str, Scalar]:
         """Where the energy that the road put in has gone [J].
 
         `road_work` = `stored` (in masses and springs, at the end less at the start) + `absorbed` (by the laws, in
-        which a series spring also stores some) + `dashpots` (linear ones, as in the tyre), up to `error`, which falls with the square of
-        the step. All integrals by the trapezoid rule.
+        which a series spring also stores some) + `dashpots` (linear ones, as in the tyre), up to `error`, which falls
+        with the square of the step. All integrals by the trapezoid rule.
         """
         form = self.vehicle.port_form()
         n = form.mass.shape[0]
@@ -111,5 +114,3 @@ class Response(eqx.Module):
             name: ("time", np.asarray(values), {"units": self.units[name]}) for name, values in self.channels.items()
         }
         return xarray.Dataset(channels, {"time": ("time", np.asarray(self.time), {"units": "s"})})
-
-

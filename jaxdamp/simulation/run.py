@@ -38,7 +38,8 @@ def simulate(
             cars with memoryless laws).
         method: `"exponential"`, the fixed-step engine; `"diffrax"`, adaptive Tsit5; or any diffrax solver, such as
             `diffrax.Kvaerno5()` for a stiff law.
-        rtol, atol: tolerances of the adaptive methods.
+        rtol: relative tolerance of the adaptive methods.
+        atol: absolute tolerance of the adaptive methods, in the units of the states.
 
     Returns:
         The response at `round(duration/dt) + 1` instants.
@@ -65,9 +66,6 @@ def simulate(
     count = round(duration / dt)
     time = jnp.arange(count + 1, dtype=float) * dt
     heights = road.height(time)
-    wheels = vehicle.port_form().road_stiffness.shape[1]
-    if heights.shape[1] != wheels:
-        _checks.refuse("road", f"have a track for each of {wheels} wheels", f"a road of {heights.shape[1]} track(s)")
     if method == "exponential":
         motion, forces, states = exponential_steps(vehicle, heights, jnp.asarray(dt, dtype=float))
         remedy = f"Take a shorter step than {dt:g} s, or an implicit solver, `method=diffrax.Kvaerno5()`."
@@ -80,7 +78,7 @@ def simulate(
             _checks.one_of("method", method, ["exponential", "diffrax"])
             method = diffrax.Tsit5()
         motion, forces, states, result = adaptive_steps(vehicle, time, heights, method, rtol, atol)
-        remedy = f"The solver says: {diffrax.RESULTS[result] or 'finished'}."
+        remedy = f"The solver says: {diffrax.RESULTS[result] or 'finished'} Fast laws need `method=diffrax.Kvaerno5()`."
     last = _checks.concrete(motion[-1])
     if last is not None and not np.all(np.isfinite(last)):
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)

@@ -9,12 +9,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._progress import Progress
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Response, simulate
 from jaxdamp.simulation.exponential import exponential_steps
-from jaxdamp.tune.result import Change, TuneResult
+from jaxdamp.tune.result import Change, TuneResult, V
 from jaxdamp.vehicles import AbstractVehicle, stationary_rms
 
 
@@ -24,7 +25,7 @@ Ride = Callable[[AbstractVehicle], dict[str, Scalar]]
 
 def minimise(
     metric: str,
-    vehicle: AbstractVehicle,
+    vehicle: V,
     road: AbstractRoad | WhiteRoad,
     *,
     over: Sequence[str] = ("damper*",),
@@ -35,7 +36,7 @@ def minimise(
     dt: float = 1e-3,
     max_steps: int = 100,
     progress: Callable[[int, float], None] | None = None,
-) -> TuneResult:
+) -> TuneResult[V]:
     """Make a ride metric of a vehicle as small as its free parameters allow.
 
     Sequential quadratic programming with exact first derivatives, taken forward through every step of the simulation
@@ -53,7 +54,8 @@ def minimise(
         duration: length of the run [s], as in `simulate`.
         dt: step [s], as in `simulate`.
         max_steps: of the search.
-        progress: called with the number of the step and the metric after each step.
+        progress: called with the number of the step and the metric after each step; a line in the terminal if it is
+            left out.
 
     Returns:
         The tuned vehicle, all metrics before and after, and warnings: a search that does not end well, or a limit that
@@ -76,7 +78,9 @@ def minimise(
     table = _Table(ride, free, names)
     before, _ = table.at(np.asarray(free.values))
     scale = np.array([abs(v) if v else 1.0 for v in np.asarray(free.values)])
-    values, history, message = _search(table, free, scale, metric, limits, before, max_steps, progress)
+    with Progress("Tuning") as shown:
+        progress = progress or (lambda step, value: shown(f"step {step}, {metric} {value:.5g}"))
+        values, history, message = _search(table, free, scale, metric, limits, before, max_steps, progress)
     after, slopes = table.at(values)
     lower, upper = free.limits()
     bounded = (values <= lower + 2 * INSIDE * scale) | (values >= upper - 2 * INSIDE * scale)
@@ -179,7 +183,7 @@ def _search(
     limits: Mapping[str, float],
     before: Mapping[str, float],
     max_steps: int,
-    progress: Callable[[int, float], None] | None,
+    progress: Callable[[int, float], None],
 ) -> tuple[np.ndarray, list[float], str]:
     """SLSQP in values divided by their start, objective divided by its start."""
     import scipy.optimize
@@ -189,8 +193,7 @@ def _search(
 
     def note(u: np.ndarray) -> None:
         history.append(table.at(u * scale)[0][metric])
-        if progress is not None:
-            progress(len(history), history[-1])
+        progress(len(history), history[-1])
 
     constraints = [
         {
@@ -225,9 +228,7 @@ def _orders(free: FreeParameters, scale: np.ndarray) -> list[dict]:
             for i in range(size - 1):
                 rows[i, start + i], rows[i, start + i + 1] = -scale[start + i], scale[start + i + 1]
             gap = 1e-6 * scale[start : start + size].max()
-            orders.append(
-                {"type": "ineq", "fun": lambda u, r=rows, g=gap: r @ u - g, "jac": lambda u, r=rows: r}
-            )
+            orders.append({"type": "ineq", "fun": lambda u, r=rows, g=gap: r @ u - g, "jac": lambda u, r=rows: r})
         start += size
     return orders
 

@@ -1,13 +1,16 @@
 """What a tuning changed and what that did to the ride."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from jaxdamp.vehicles import AbstractVehicle
 
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+V = TypeVar("V", bound=AbstractVehicle)
 
 
 class Change(NamedTuple):
@@ -21,7 +24,7 @@ class Change(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class TuneResult:
+class TuneResult(Generic[V]):
     """A tuned vehicle beside the one it came from.
 
     Attributes:
@@ -38,8 +41,8 @@ class TuneResult:
         history: the metric after each step of the search.
     """
 
-    vehicle: AbstractVehicle
-    start: AbstractVehicle
+    vehicle: V
+    start: V
     metric: str
     parameters: tuple[Change, ...]
     before: dict[str, float]

@@ -1,7 +1,7 @@
 """What every vehicle offers: its port form, its elements, its channels and its ride metrics."""
 
 from abc import abstractmethod
-from typing import NamedTuple, final
+from typing import ClassVar, NamedTuple, final
 
 import equinox as eqx
 from jaxtyping import Array, Float
@@ -35,8 +35,8 @@ class RideMetric(NamedTuple):
 class AbstractVehicle(eqx.Module):
     """Masses and springs with damper laws at ports."""
 
-    units: eqx.AbstractClassVar[dict[str, str]]
-    ride_metrics: eqx.AbstractClassVar[tuple[RideMetric, ...]]
+    units: ClassVar[dict[str, str]]
+    ride_metrics: ClassVar[tuple[RideMetric, ...]]
 
     def __check_init__(self) -> None:
         check_parameters(self)
@@ -52,5 +52,3 @@ class AbstractVehicle(eqx.Module):
     @abstractmethod
     def channels(self, instant: Instant) -> dict[str, Scalar]:
         """What a test engineer would measure, by name, in the units of `units`; linear in the motion."""
-
-

@@ -13,6 +13,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from jaxdamp import _checks
 from jaxdamp._types import Scalar
 
 
@@ -72,10 +73,17 @@ class PortForm(eqx.Module):
         """Coordinates of the vehicle at rest on unit road heights, K⁻¹ K_r."""
         return jnp.linalg.solve(self.stiffness, self.road_stiffness)
 
+    def at_rest_on(self, heights: Float[Array, " tracks"]) -> Float[Array, " n"]:
+        """The motion (q, q̇) of the vehicle settled and at rest on the road; refuses a road of other tracks."""
+        wheels = self.road_stiffness.shape[1]
+        if heights.shape[0] != wheels:
+            must = f"have a track for each of {wheels} wheels"
+            _checks.refuse("road", must, f"a road of {heights.shape[0]} track(s)")
+        position = self.settled() @ heights
+        return jnp.concatenate([position, jnp.zeros_like(position)])
 
-def assemble(
-    mass: Float[Array, "q q"], connections: Sequence[Connection], ports: Float[Array, "ports q"]
-) -> PortForm:
+
+def assemble(mass: Float[Array, "q q"], connections: Sequence[Connection], ports: Float[Array, "ports q"]) -> PortForm:
     """Sum the connections into matrices: K = Σ Rᵀ k R, K_r = Σ Rᵀ k S, K_g = Σ Sᵀ k S."""
     rows = jnp.stack([c.row for c in connections])
     road = jnp.stack([c.road for c in connections])

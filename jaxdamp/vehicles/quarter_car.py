@@ -33,7 +33,7 @@ class QuarterCar(AbstractVehicle):
     unsprung_mass: Number = parameter("kg", "mass of wheel and hub", positive)
     spring_rate: Number = parameter("N/m", "suspension spring rate at the wheel", positive)
     tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness", positive)
-    damper: AbstractDamper
+    damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
     tyre_damping: Number = parameter("N s/m", "vertical tyre damping", nonnegative, default=0.0)
 
     units: ClassVar[dict[str, str]] = {

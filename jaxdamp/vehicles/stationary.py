@@ -15,7 +15,7 @@ from jaxdamp.vehicles.base import AbstractVehicle, Instant
 
 @final
 class LinearVehicle(eqx.Module):
-    """ξ̇ = A ξ + B ż_r, channels = C ξ + D ż_r, with ξ = (q − K⁻¹K_r z_r, q̇, law states): all bounded on a white road."""
+    """ξ̇ = A ξ + B ż_r, channels = C ξ + D ż_r, ξ = (q − K⁻¹K_r z_r, q̇, law states): bounded on a white road."""
 
     state_matrix: Float[Array, "n n"]
     road_rate_input: Float[Array, "n wheels"]

@@ -202,13 +202,22 @@ def test_duration_of_the_road_is_used():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"dt": 0.01}, r"`dt` must not be longer than the road's grid of 0.005 s, but is 0.01. Pass `dt=0.005` or less"),
+        (
+            {"dt": 0.01},
+            r"`dt` must not be longer than the road's grid of 0.005 s, but is 0.01. Pass `dt=0.005` or less",
+        ),
         ({"duration": -1.0}, r"`duration` must be positive and finite, but is -1"),
         ({"dt": 0.0}, r"`dt` must be positive"),
         ({"dt": 2.0}, r"`dt` must be shorter than the run"),
         ({"method": "exponental"}, r"`method` must be one of.*Did you mean 'exponential'"),
-        ({"road": roads.sine(0.01, frequency=1.0), "duration": None}, r"`duration` must be given.*Pass `duration=10.0`"),
-        ({"road": roads.from_profile(np.arange(400) * 5e-3, np.zeros((400, 2)))}, r"`road` must have a track for each of 1"),
+        (
+            {"road": roads.sine(0.01, frequency=1.0), "duration": None},
+            r"`duration` must be given.*Pass `duration=10.0`",
+        ),
+        (
+            {"road": roads.from_profile(np.arange(400) * 5e-3, np.zeros((400, 2)))},
+            r"`road` must have a track for each of 1",
+        ),
     ],
 )
 def test_refuses_runs_that_make_no_sense(change, message):
@@ -229,8 +238,21 @@ def test_unknown_channel_suggests_the_nearest():
         simulate(quarter_car_000(), BUMP, duration=0.2)["sprung_aceleration"]
 
 
-def test_implicit_solver_can_be_asked_for():
-    car = quarter_car_000(dampers.Lag(dampers.Linear(2500.0), 1e-3))
-    implicit = simulate(car, BUMP, duration=0.2, method=diffrax.Kvaerno3(), rtol=1e-6, atol=1e-8)
-    explicit = simulate(car, BUMP, duration=0.2, method="diffrax")
+def test_the_adaptive_engine_gives_up_where_it_would_take_for_ever():
+    car = quarter_car_000(dampers.Linear(1e9))
+    with pytest.raises(ValueError, match=r"must have a finite response.*maximum number of solver steps.*Kvaerno5"):
+        simulate(car, BUMP, duration=0.3, method="diffrax")
+
+
+def test_an_implicit_solver_takes_a_law_with_kinks_in_series_with_a_spring():
+    car = quarter_car_000(dampers.SeriesSpring(LAWS["bilinear"], 5e6))
+    implicit = simulate(car, BUMP, duration=0.4, method=diffrax.Kvaerno3(), rtol=1e-6, atol=1e-8)
+    explicit = simulate(car, BUMP, duration=0.4, method="diffrax")
     np.testing.assert_allclose(implicit["stroke"], explicit["stroke"], atol=1e-6)
+
+
+def test_responses_of_a_linear_car_add_up():
+    car, time = quarter_car_000(), np.arange(1001) * 1e-3
+    one, two = BUMP.height(time), 0.01 * jnp.sin(20.0 * jnp.asarray(time))[:, None]
+    runs = [simulate(car, roads.from_profile(time, h)).motion for h in (one, two, one - 3.0 * two)]
+    np.testing.assert_allclose(runs[0] - 3.0 * runs[1], runs[2], atol=1e-13)

@@ -26,7 +26,7 @@ BEST_TYRE = np.sqrt(M * K**2 / KT - 2 * MU * MS * K / M + MU * MS**2 * KT / M**2
 def test_finds_the_closed_form_optimum_on_a_white_road(metric, best, start):
     car = vehicles.presets.quarter_car_000(dampers.Linear(start))
     result = tune.minimise(metric, car, roads.white("C", speed=20.0))
-    assert float(result.vehicle.damper.rate) == pytest.approx(best, rel=1e-6)
+    assert float(parameters.get(result.vehicle, "damper.rate")) == pytest.approx(best, rel=1e-6)
     assert result.converged and not result.warnings
     assert result.after[metric] < result.before[metric]
 
@@ -37,13 +37,13 @@ def test_closed_form_optima_are_those_of_paper_000():
 
 
 def test_simulated_roads_find_the_optimum_within_their_sampling_error():
-    """Roads that repeat after the run hold every wave whole times; their optima scatter little about the closed form."""
+    """Roads that repeat after the run hold every wave whole times; their optima scatter little."""
     found = []
     for seed in range(4):
         road = roads.iso8608("C", speed=20.0, seed=seed, length=1000.0)
         result = tune.minimise("rms_sprung_acceleration", CAR, road, duration=50.0, dt=2e-3)
         assert result.converged
-        found.append(float(result.vehicle.damper.rate))
+        found.append(float(parameters.get(result.vehicle, "damper.rate")))
     spread = np.std(found, ddof=1)
     assert 0 < spread < 0.05 * BEST_ACCELERATION
     assert abs(np.mean(found) - BEST_ACCELERATION) < 3.0 * spread / np.sqrt(len(found))
@@ -94,7 +94,7 @@ def test_bounds_hold_and_are_said():
     result = tune.minimise(
         "rms_sprung_acceleration", CAR, roads.white("C", 20.0), bounds={"damper.rate": (1000.0, 4000.0)}
     )
-    assert float(result.vehicle.damper.rate) == pytest.approx(4000.0, rel=1e-5)
+    assert float(parameters.get(result.vehicle, "damper.rate")) == pytest.approx(4000.0, rel=1e-5)
     assert result.parameters[0].note == "at a bound"
     assert any("ended at a bound" in w for w in result.warnings)
     assert result.converged
@@ -109,8 +109,8 @@ def test_several_parameters_of_any_kind_can_be_free():
         bounds={"spring_rate": (30e3, 90e3)},
     )
     # without a limit on travel the softest spring is best, and then c* = k sqrt(M/k_t)
-    assert float(result.vehicle.spring_rate) == pytest.approx(30e3, rel=1e-4)
-    assert float(result.vehicle.damper.rate) == pytest.approx(30e3 * np.sqrt(M / KT), rel=1e-3)
+    assert float(parameters.get(result.vehicle, "spring_rate")) == pytest.approx(30e3, rel=1e-4)
+    assert float(parameters.get(result.vehicle, "damper.rate")) == pytest.approx(30e3 * np.sqrt(M / KT), rel=1e-3)
 
 
 def test_knots_stay_in_order():
@@ -118,8 +118,8 @@ def test_knots_stay_in_order():
     car = vehicles.presets.quarter_car_000(law)
     road = roads.cosine_bump(0.05, start=0.1, duration=0.2)
     result = tune.minimise("rms_sprung_acceleration", car, road, duration=1.0, max_steps=15)
-    assert np.all(np.diff(np.asarray(result.vehicle.damper.knots)) > 0)
-    assert np.all(np.asarray(result.vehicle.damper.slopes) > 0)
+    assert np.diff(np.asarray(parameters.get(result.vehicle, "damper.knots"))).min() > 0
+    assert np.asarray(parameters.get(result.vehicle, "damper.slopes")).min() > 0
     assert result.after["rms_sprung_acceleration"] < result.before["rms_sprung_acceleration"]
 
 

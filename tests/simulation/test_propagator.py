@@ -1,0 +1,67 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import scipy.linalg
+
+from jaxdamp.parameters import replace
+from jaxdamp.simulation.propagator import Propagator, phi_functions
+from jaxdamp.vehicles.presets import quarter_car_000
+
+
+def by_scipy(z):
+    """eᶻ, φ₁ and φ₂ from one exponential of the matrix augmented by a constant and a ramp."""
+    n = z.shape[0]
+    big = np.zeros((3 * n, 3 * n))
+    big[:n, :n], big[:n, n : 2 * n], big[n : 2 * n, 2 * n :] = z, np.eye(n), np.eye(n)
+    whole = scipy.linalg.expm(big)
+    return whole[:n, :n], whole[:n, n : 2 * n], whole[:n, 2 * n :]
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 1e-3, 0.4, 0.6, 7.0, 300.0])
+def test_phi_functions_are_those_of_scipy(size, rng):
+    a = rng.normal(size=(5, 5))
+    z = size * (a - a.T - 0.2 * np.eye(5)) / 5
+    for found, expected in zip(phi_functions(jnp.asarray(z)), by_scipy(z), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-15 * (10 + 10 * size))
+
+
+def test_phi_functions_of_a_defective_matrix():
+    found = phi_functions(jnp.array([[0.0, 3.0], [0.0, 0.0]]))
+    for matrix, corner in zip(found, (3.0, 3.0 / 2, 3.0 / 6), strict=True):
+        assert float(matrix[0, 1]) == pytest.approx(corner, rel=1e-14)
+
+
+@pytest.mark.parametrize("dt", [1e-4, 1e-3, 0.02])
+def test_step_is_exact_for_forces_and_roads_linear_over_it(dt, rng):
+    """Two half steps along straight inputs are the whole step, with tyre damping; and the ramp moves the middle."""
+    form = replace(quarter_car_000(), {"tyre_damping": 300.0}).port_form()
+    whole, half = Propagator.over(form, jnp.asarray(dt)), Propagator.over(form, jnp.asarray(dt / 2))
+    x, force, road = rng.normal(size=4), 1e3 * rng.normal(size=(3, 1)), 0.01 * rng.normal(size=(3, 1))
+    force[1], road[1] = (force[0] + force[2]) / 2, (road[0] + road[2]) / 2
+
+    def step(p, x, i, j):
+        held = p.phi @ x + p.force_held @ force[i] + p.road_held @ road[i]
+        return held + p.force_ramp @ (force[j] - force[i]) + p.road_ramp @ (road[j] - road[i])
+
+    np.testing.assert_allclose(step(half, step(half, x, 0, 1), 1, 2), step(whole, x, 0, 2), rtol=1e-11, atol=1e-12)
+
+
+def test_a_vehicle_at_rest_stays():
+    form = quarter_car_000().port_form()
+    p = Propagator.over(form, jnp.asarray(1e-3))
+    start = form.at_rest_on(jnp.array([0.3]))
+    np.testing.assert_allclose(p.phi @ start + p.road_held @ jnp.array([0.3]), start, atol=1e-14)
+
+
+def test_batches_and_derivatives_pass_through():
+    car = quarter_car_000()
+
+    def phi(rate):
+        return Propagator.over(replace(car, {"spring_rate": rate}).port_form(), jnp.asarray(1e-3)).phi[2, 0]
+
+    rates = jnp.array([1e3, 6e4, 5e6])
+    np.testing.assert_allclose(jax.vmap(phi)(rates), [phi(r) for r in rates], rtol=1e-13)
+    difference = (phi(60_060.0) - phi(59_940.0)) / 120.0
+    for mode in (jax.grad, jax.jacfwd):
+        assert float(mode(phi)(60e3)) == pytest.approx(float(difference), rel=1e-7)
