@@ -23,6 +23,7 @@ class LinearVehicle(eqx.Module):
     feed_through: dict[str, Float[Array, " wheels"]]
 
 
+@eqx.filter_jit
 def linearise(vehicle: AbstractVehicle) -> LinearVehicle:
     """Linearise the laws about rest and write the vehicle relative to where it would settle on the road.
 
@@ -92,6 +93,11 @@ def stationary_rms(vehicle: AbstractVehicle, velocity_psd: ScalarLike = 1.0) -> 
     853.472
     """
     _checks.positive("velocity_psd", velocity_psd)
+    return _root_mean_squares(vehicle, velocity_psd)
+
+
+@eqx.filter_jit
+def _root_mean_squares(vehicle: AbstractVehicle, velocity_psd: ScalarLike) -> dict[str, Scalar]:
     linear = linearise(vehicle)
     b = linear.road_rate_input
     covariance = lyapunov(linear.state_matrix, velocity_psd * (b @ b.T))

@@ -57,6 +57,7 @@ def test_a_vehicle_at_rest_stays():
 def test_batches_and_derivatives_pass_through():
     car = quarter_car_000()
 
+    @jax.jit
     def phi(rate):
         return Propagator.over(replace(car, {"spring_rate": rate}).port_form(), jnp.asarray(1e-3)).phi[2, 0]
 

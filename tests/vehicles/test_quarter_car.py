@@ -59,6 +59,7 @@ def test_figures_of_paper_000_on_class_c():
 def test_gradient_vanishes_at_the_best_coefficient_and_agrees_with_differences(channel, best):
     car = quarter_car_000()
 
+    @jax.jit
     def rms(c):
         return stationary_rms(replace(car, {"damper.rate": c}))[channel]
 
