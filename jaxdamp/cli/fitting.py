@@ -75,14 +75,14 @@ def fit_laws(
 ) -> Findings:
     """Fit the laws of these names."""
     title = f"Fitting {len(names)} law{'s' * (len(names) > 1)} to {len(runs)} record{'s' * (len(runs) > 1)}"
-    done = itertools.count(1)
+    done = itertools.count()
     with screen.stage(title, total=len(names)) as advance:
         starts = identify.default_ladder(tuple(runs), names)
         comparison = identify.compare(
             starts,
             tuple(runs),
             held_out=tuple(held_out),
-            progress=lambda name: advance(f"{name} done", next(done)),
+            progress=lambda name: advance(name, next(done)),
             weighting=weighting,
         )
         shares = {rung.name: residual_shares(rung.result) for rung in comparison.rungs}

@@ -1,9 +1,7 @@
 """`compare`: several laws on the same records, scored on records they were not fitted to."""
 
 import dataclasses
-import os
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any, NamedTuple
 
 from jaxdamp import _checks
@@ -71,7 +69,7 @@ def compare(
         laws: starts by name, such as `default_ladder(runs)`.
         runs: records to fit.
         held_out: records to score on, not fitted.
-        progress: called with each name after its fit; a line in the terminal if it is left out.
+        progress: called with each name before its fit; a line in the terminal if it is left out.
         options: passed on to `fit`.
 
     Raises:
@@ -86,21 +84,14 @@ def compare(
     """
     if not laws:
         _checks.refuse("laws", "hold at least one law", "empty", "Take `default_ladder(runs)`.")
-    runs, held_out = tuple(runs), tuple(held_out)
-
-    def rung(name: str, start: Start) -> Rung:
-        result = fit(start, runs, **options)
-        percent, rmse = result.score(held_out)[:2] if held_out else (None, None)
-        return Rung(name, len(result.parameters), result.fit_percent, result.rmse, percent, rmse, result)
-
-    # Most of the time goes into compiling, which leaves the other cores idle unless laws are fitted side by side.
-    with Progress("Fitting") as shown, ThreadPoolExecutor(min(len(laws), os.cpu_count() or 1)) as pool:
-        jobs = {pool.submit(rung, name, start): name for name, start in laws.items()}
-        for number, job in enumerate(as_completed(jobs), 1):
-            job.result()  # an error stops here
+    runs, held_out, rungs = tuple(runs), tuple(held_out), []
+    with Progress("Fitting") as shown:
+        for number, (name, start) in enumerate(laws.items(), 1):
             if progress is None:
-                shown(f"{number} of {len(laws)} laws done, last {jobs[job]}")
+                shown(f"{name}, {number} of {len(laws)}")
             else:
-                progress(jobs[job])
-    rungs = [job.result() for job in jobs]
+                progress(name)
+            result = fit(start, runs, **options)
+            percent, rmse = result.score(held_out)[:2] if held_out else (None, None)
+            rungs.append(Rung(name, len(result.parameters), result.fit_percent, result.rmse, percent, rmse, result))
     return Comparison(tuple(rungs), held_out)

@@ -104,9 +104,15 @@ def _with_lead(run: BenchRun, lead: int) -> tuple[np.ndarray, np.ndarray, np.nda
     return tuple(np.concatenate(pair) for pair in zip(before, after, strict=True))  # type: ignore[return-value]
 
 
+def _block(run: BenchRun, samples_per_cycle: int | None) -> int:
+    """How many samples of a record are averaged."""
+    cycle = 2 * np.pi * run.sampling_rate / pace(run)
+    return 1 if samples_per_cycle is None else max(int(cycle / samples_per_cycle), 1)
+
+
 def _row(run: BenchRun, sigma: float, samples_per_cycle: int | None) -> _Row:
     dt, omega = 1.0 / run.sampling_rate, pace(run)
-    block = 1 if samples_per_cycle is None else max(int(2 * np.pi / (omega * dt * samples_per_cycle)), 1)
+    block = _block(run, samples_per_cycle)
     substeps = int(np.clip(np.ceil(omega * dt * block / STEP_ANGLE), 1, 8))
     lead = int(min(2 * np.pi / omega, run.duration) / (dt * block))
     stroke, velocity, force = (_averaged(values, block) for values in _with_lead(run, lead * block))
@@ -144,16 +150,20 @@ def _batch(rows: Sequence[_Row]) -> Batch:
     return Batch(*map(jnp.asarray, arrays), substeps=max(row.substeps for row in rows))
 
 
-def _memoryless_batch(runs: Sequence[BenchRun], sigma: Sequence[float]) -> tuple[list[Batch], list[Place]]:
-    ends = np.cumsum([len(run) for run in runs])
+def _memoryless_batch(
+    runs: Sequence[BenchRun], sigma: Sequence[float], samples_per_cycle: int | None
+) -> tuple[list[Batch], list[Place]]:
+    blocks = [_block(run, samples_per_cycle) for run in runs]
+    counts = [len(run) // block for run, block in zip(runs, blocks, strict=True)]
+    ends = np.cumsum(counts)
     length = _round_up(int(ends[-1]))
     stroke, velocity, force = (
-        _pad(np.concatenate([getattr(run, name) for run in runs]), length)[None]
+        _pad(np.concatenate([_averaged(getattr(r, name), b) for r, b in zip(runs, blocks, strict=True)]), length)[None]
         for name in ("stroke", "velocity", "force")
     )
-    weight = np.concatenate([np.full(len(run), 1.0 / s) for run, s in zip(runs, sigma, strict=True)])
+    weight = np.repeat(np.sqrt(blocks) / np.asarray(sigma), counts)
     arrays = (np.ones(1), stroke, velocity, force, _pad(weight, length, "constant")[None])
-    places = [Place(0, 0, int(end) - len(run), int(end), 1) for end, run in zip(ends, runs, strict=True)]
+    places = [Place(0, 0, int(end) - n, int(end), b) for end, n, b in zip(ends, counts, blocks, strict=True)]
     return [Batch(*map(jnp.asarray, arrays), substeps=1)], places
 
 
@@ -165,10 +175,10 @@ def batches(
 ) -> tuple[list[Batch], list[Place]]:
     """Prepare records for a law.
 
-    For a memoryless law all samples stand in one batch. For a law with states every record is preceded by a copy of
-    its first cycle, over which the states come from rest to where a steady motion has them; the copy and the first
-    half cycle of the record get weight zero. Where a record has more than `samples_per_cycle`, blocks of samples are
-    averaged, whose weight grows with the root of their number, so that nothing is lost but the noise.
+    Where a record has more than `samples_per_cycle`, blocks of samples are averaged, whose weight grows with the root
+    of their number, so that nothing is lost but the noise. For a memoryless law all records stand in one batch. For a
+    law with states every record is preceded by a copy of its first cycle, over which the states come from rest to
+    where a steady motion has them; the copy and the first half cycle of the record get weight zero.
 
     Arguments:
         law: the law, of which only matters whether it has states.
@@ -180,7 +190,7 @@ def batches(
         The batches, and for each record where it is.
     """
     if is_memoryless(law):
-        return _memoryless_batch(runs, sigma)
+        return _memoryless_batch(runs, sigma, samples_per_cycle)
     rows = [_row(run, s, samples_per_cycle) for run, s in zip(runs, sigma, strict=True)]
     groups = _grouped(rows)
     places: dict[int, Place] = {}
@@ -206,7 +216,7 @@ def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
 
 def predict_runs(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[np.ndarray]:
     """Force [N] of the law at every sample of every record."""
-    made, places = batches(law, runs, [1.0] * len(runs), PREDICTED_PER_CYCLE)
+    made, places = batches(law, runs, [1.0] * len(runs), None if is_memoryless(law) else PREDICTED_PER_CYCLE)
     forces = [np.asarray(_predict(batch, law)) for batch in made]
     return [
         _spread(forces[p.batch][p.row, p.start : p.stop], p.block, len(run))

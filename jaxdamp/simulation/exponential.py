@@ -3,6 +3,10 @@
 Over a step the road and the element forces are taken as linear in time (first-order hold); then masses and springs are
 carried on exactly by the matrix exponential, however stiff the tyre. The forces at the end of the step are first
 predicted from the motion under held forces, then corrected: second order in the step.
+
+XLA compiles a loop on a CPU into one function, ten times as fast, if its body touches few bytes: 1 kB unless told
+otherwise. A quarter car with most memoryless laws stays below that because the step is written in small arrays and
+saves no more than it must.
 """
 
 import equinox as eqx
@@ -42,18 +46,18 @@ def exponential_steps(
     def step(now: tuple[Array, list[State], Array], road: tuple[Array, Array]) -> tuple:
         x, states, force = now
         height, rise = road
-        held = _times(p.phi, x) + _times(p.force_held, force)
-        held = held + _times(p.road_held, height) + _times(p.road_ramp, rise)
+        held = _times(p.road_held, height) + _times(p.road_ramp, rise) + _times(p.phi, x)
+        held = held + _times(p.force_held, force)  # last, as the force is known last
         _, predicted = respond(x, held, states)
         after = held + _times(p.force_ramp, predicted - force)
         states, force = respond(x, after, states)
         return (after, states, force), (after, states)
 
-    def forces(x: Array, states: list[State]) -> Array:
-        places = zip(laws, at_ports(x), states, strict=True)
-        return jnp.stack([law.force(*place, state) for law, place, state in places])
-
     first = start, [law.initial_state() for law in laws]
-    now, saved = jax.lax.scan(step, (*first, forces(*first)), (heights[:-1], jnp.diff(heights, axis=0)))
+    at_rest = [law.force(*place, state) for law, place, state in zip(laws, at_ports(start), first[1], strict=True)]
+    now, saved = jax.lax.scan(step, (*first, jnp.stack(at_rest)), (heights[:-1], jnp.diff(heights, axis=0)))
     motion, states = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), first, saved)
-    return motion, jax.vmap(forces)(motion, states), now[1]
+    # Saving the states and taking the forces from them here keeps the loop's body small: see the module's docstring.
+    deflections, rates = (part @ form.ports.T for part in jnp.split(motion, 2, axis=1))
+    saved_forces = [jax.vmap(law.force)(deflections[:, i], rates[:, i], states[i]) for i, law in enumerate(laws)]
+    return motion, jnp.stack(saved_forces, axis=1), now[1]

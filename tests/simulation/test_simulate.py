@@ -84,6 +84,14 @@ def test_the_error_falls_with_the_step(name):
     assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2]
 
 
+def test_tyre_damping_is_the_same_in_both_engines_and_in_the_channels():
+    car = replace(quarter_car_000(), {"tyre_damping": 2000.0})
+    run, reference = (simulate(car, BUMP, duration=0.6, method=method) for method in ("exponential", "diffrax"))
+    np.testing.assert_allclose(run["stroke"], reference["stroke"], atol=3e-6)
+    force = MS * run["sprung_acceleration"] + MU * run["unsprung_acceleration"]
+    np.testing.assert_allclose(force, run["dynamic_tyre_load"], atol=1e-9 * KT * 0.06)
+
+
 def test_agrees_with_equations_written_by_hand():
     """SciPy at tight tolerance on the textbook equations, with random cars, laws and bumps."""
     rng = np.random.default_rng(3)
