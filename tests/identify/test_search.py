@@ -107,7 +107,7 @@ def test_bounds_hold_in_a_search(sines):
     [(0.010, 2.0, (0.07, 0.39, 4.82, 0.006, 5.82)), (0.020, 2.5, (0.013, 0.074, 0.005, 0.003, 1.41))],
 )
 def test_fisher_information_of_paper_001(amplitude, frequency, relative):
-    """20 N noise, 1000 samples of one cycle, the published set: C_b and α are not identifiable (PHYSICS, A1)."""
+    """20 N noise, 1000 samples of one cycle, the published set: C_b and α are not identifiable."""
     law = Besinger(14_400.0, 15_600.0, 3_600.0, limit_velocity=0.125, transition_velocity=0.7)
     angle = 2 * np.pi * np.arange(1000) / 1000
     velocity = 2 * np.pi * frequency * amplitude * np.cos(angle)
