@@ -4,8 +4,7 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 `law + law`, `2.0 * law`, `SeriesSpring(law, ...)`, `Lag(law, ...)`, `MotionRatio(law, ...)`.
 """
 
-from jaxdamp.dampers._stateless import AbstractStateless
-from jaxdamp.dampers.base import AbstractDamper, AbstractMemoryless, AbstractStateful, Scaled, Sum
+from jaxdamp.dampers.base import AbstractDamper, AbstractMemoryless, AbstractStateful, AbstractStateless, Scaled, Sum
 from jaxdamp.dampers.besinger import Besinger
 from jaxdamp.dampers.bilinear import Bilinear
 from jaxdamp.dampers.bouc_wen import BoucWen

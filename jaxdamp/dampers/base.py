@@ -20,7 +20,8 @@ class AbstractDamper(eqx.Module):
     """A force law between two points, with a flat array of states (empty for memoryless laws).
 
     A law whose states are fast compared with a step of about a millisecond derives from this class and brings its own
-    `advance`, exact or implicit. Other laws derive from `AbstractStateful` or `AbstractMemoryless`, which bring it.
+    `advance`, exact or implicit. Other laws derive from `AbstractStateful`, `AbstractStateless` or
+    `AbstractMemoryless`, which bring it.
     """
 
     def __check_init__(self) -> None:
@@ -64,22 +65,21 @@ class AbstractDamper(eqx.Module):
     __rmul__ = __mul__
 
 
-class AbstractMemoryless(AbstractDamper):
-    """A law whose force depends on the velocity alone: it has one method, `force_velocity`."""
+class AbstractStateless(AbstractDamper):
+    """A law whose force depends on stroke and velocity at this instant: it has one method, `force_stroke_velocity`."""
 
     @abstractmethod
-    def force_velocity(self, v: ScalarLike) -> Scalar:
-        """Force [N] at velocity v [m/s]."""
+    def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
+        """Force [N] at stroke x [m] and velocity v [m/s]."""
 
     def initial_state(self) -> State:
         """No states."""
         return jnp.zeros(0)
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
-        """Force [N] at velocity v [m/s]."""
-        del x
+        """Force [N] at stroke x [m] and velocity v [m/s]."""
         _check_stateless(self, state)
-        return self.force_velocity(v)
+        return self.force_stroke_velocity(x, v)
 
     def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
         """No states."""
@@ -94,6 +94,19 @@ class AbstractMemoryless(AbstractDamper):
         del x0, v0, x1, v1, dt
         _check_stateless(self, state)
         return state
+
+
+class AbstractMemoryless(AbstractStateless):
+    """A law whose force depends on the velocity alone: it has one method, `force_velocity`."""
+
+    @abstractmethod
+    def force_velocity(self, v: ScalarLike) -> Scalar:
+        """Force [N] at velocity v [m/s]."""
+
+    def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
+        """Force [N] at velocity v [m/s]."""
+        del x
+        return self.force_velocity(v)
 
 
 class AbstractStateful(AbstractDamper):

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike
-from jaxdamp.dampers._stateless import AbstractStateless
+from jaxdamp.dampers.base import AbstractStateless
 from jaxdamp.parameters import nonnegative, parameter, positive, setting
 
 

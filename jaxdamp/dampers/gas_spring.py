@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxdamp._types import Number, Scalar, ScalarLike
-from jaxdamp.dampers._stateless import AbstractStateless
+from jaxdamp.dampers.base import AbstractStateless
 from jaxdamp.parameters import parameter, positive, setting
 
 

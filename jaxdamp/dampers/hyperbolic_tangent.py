@@ -7,7 +7,7 @@ import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import secant_rate
-from jaxdamp.dampers._stateless import AbstractStateless
+from jaxdamp.dampers.base import AbstractStateless
 from jaxdamp.parameters import nonnegative, parameter, positive, real, setting
 
 

@@ -10,8 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
-from jaxdamp.dampers._stateless import AbstractStateless
-from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.base import AbstractDamper, AbstractStateless
 from jaxdamp.dampers.table import Table
 from jaxdamp.parameters import as_float, increasing, setting
 
