@@ -1,14 +1,24 @@
-"""Metrics: what a signal says about ride, tyre load and damper, as one number or one spectrum.
+"""Metrics: what a signal says about ride, tyre load, damper and road, as one number or one spectrum.
 
 Every function takes plain arrays of uniformly sampled signals, simulated or measured, NumPy or JAX, in SI units. A
 signal has one axis, time; use `jax.vmap` for many. All are pure JAX functions and can be compiled, batched and
-differentiated; where a derivative is zero or undefined, the docstring says so. NaN in a signal gives NaN.
+differentiated; where a derivative is zero or undefined, the docstring says so and names a smooth stand-in. NaN in a
+signal gives NaN. Only what answers in words (`evaluation_method`, `comfort_reaction`) does not compile.
 
-- Size of a signal: `rms`, `peak`, `crest_factor`.
-- Spectrum: `power_spectral_density`.
-- Suspension travel: `working_space_rms`, `working_space_peak`.
-- Tyre load: `dynamic_load_coefficient`, `road_stress_factor`, `lift_off_fraction`.
-- Damper: `dissipated_energy`, `equivalent_damping`.
+- Size of a signal: `rms`, `peak`, `smooth_peak`, `crest_factor`, `running_rms`.
+- Spectrum: `power_spectral_density`, `transmissibility`, `coherence`.
+- Human vibration, ISO 2631-1: `weighting_factor`, `weighting_response`, `weighting_state_space`, `weighted_signal`,
+  `weighted_rms`, `max_transient_value`, `vibration_dose_value`, `estimated_vibration_dose_value`,
+  `motion_sickness_dose`, `motion_sickness_percentage`, `shock_ratios`, `evaluation_method`, `vibration_total_value`,
+  `total_vibration`, `comfort_reaction`.
+- Suspension travel: `working_space_rms`, `working_space_peak`, `working_space_exceedance`, `gaussian_exceedance`.
+- Free motion: `settling_time`, `smooth_settling_time`, `logarithmic_decrement`, `damping_ratio`.
+- Tyre load: `dynamic_load_coefficient`, `road_stress_factor`, `lift_off_fraction`, `aggregate_force`,
+  `aggregate_force_percentile`.
+- Damper: `dissipated_energy`, `dissipated_power`, `equivalent_damping`, `velocity_histogram`,
+  `dissipation_histogram`, `temperature_rise`, `damper_temperature`.
+- Fatigue: `spectral_moments`, `spectral_damage`.
+- Road: `international_roughness_index`.
 
 >>> import jax
 >>> import jax.numpy as jnp
@@ -22,23 +32,86 @@ differentiated; where a derivative is zero or undefined, the docstring says so. 
 Array([0.707107, 1.414214, 2.828427], dtype=float64)
 """
 
-from jaxdamp.metrics.amplitude import crest_factor, peak, rms
-from jaxdamp.metrics.dissipation import dissipated_energy, equivalent_damping
+from jaxdamp.metrics._linear_system import StateSpace
+from jaxdamp.metrics.aggregate_force import aggregate_force, aggregate_force_percentile
+from jaxdamp.metrics.amplitude import crest_factor, peak, rms, smooth_peak
+from jaxdamp.metrics.comfort import AXES, comfort_reaction, total_vibration, vibration_total_value
+from jaxdamp.metrics.decay import damping_ratio, logarithmic_decrement, settling_time, smooth_settling_time
+from jaxdamp.metrics.dissipation import dissipated_energy, dissipated_power, equivalent_damping
+from jaxdamp.metrics.dose import (
+    estimated_vibration_dose_value,
+    motion_sickness_dose,
+    motion_sickness_percentage,
+    vibration_dose_value,
+)
+from jaxdamp.metrics.evaluation import Evaluation, ShockRatios, evaluation_method, shock_ratios
+from jaxdamp.metrics.fatigue import spectral_damage, spectral_moments
+from jaxdamp.metrics.heat import damper_temperature, temperature_rise
+from jaxdamp.metrics.histogram import dissipation_histogram, velocity_histogram
+from jaxdamp.metrics.roughness_index import international_roughness_index
+from jaxdamp.metrics.running import max_transient_value, running_rms
 from jaxdamp.metrics.spectrum import power_spectral_density
+from jaxdamp.metrics.transfer import coherence, transmissibility
 from jaxdamp.metrics.tyre_load import dynamic_load_coefficient, lift_off_fraction, road_stress_factor
-from jaxdamp.metrics.working_space import working_space_peak, working_space_rms
+from jaxdamp.metrics.weighted import weighted_rms, weighted_signal
+from jaxdamp.metrics.weighting import weighting_factor, weighting_response, weighting_state_space
+from jaxdamp.metrics.working_space import (
+    gaussian_exceedance,
+    working_space_exceedance,
+    working_space_peak,
+    working_space_rms,
+)
 
 
 __all__ = [
+    "AXES",
+    "Evaluation",
+    "ShockRatios",
+    "StateSpace",
+    "aggregate_force",
+    "aggregate_force_percentile",
+    "coherence",
+    "comfort_reaction",
     "crest_factor",
+    "damper_temperature",
+    "damping_ratio",
     "dissipated_energy",
+    "dissipated_power",
+    "dissipation_histogram",
     "dynamic_load_coefficient",
     "equivalent_damping",
+    "estimated_vibration_dose_value",
+    "evaluation_method",
+    "gaussian_exceedance",
+    "international_roughness_index",
     "lift_off_fraction",
+    "logarithmic_decrement",
+    "max_transient_value",
+    "motion_sickness_dose",
+    "motion_sickness_percentage",
     "peak",
     "power_spectral_density",
     "rms",
     "road_stress_factor",
+    "running_rms",
+    "settling_time",
+    "shock_ratios",
+    "smooth_peak",
+    "smooth_settling_time",
+    "spectral_damage",
+    "spectral_moments",
+    "temperature_rise",
+    "total_vibration",
+    "transmissibility",
+    "velocity_histogram",
+    "vibration_dose_value",
+    "vibration_total_value",
+    "weighted_rms",
+    "weighted_signal",
+    "weighting_factor",
+    "weighting_response",
+    "weighting_state_space",
+    "working_space_exceedance",
     "working_space_peak",
     "working_space_rms",
 ]

@@ -1,14 +1,18 @@
-"""Checks of signals, shared by the metrics."""
+"""Checks of signals and a safe root, shared by the metrics."""
 
 import jax.numpy as jnp
+from jax.typing import ArrayLike
+from jaxtyping import Array
 
 from jaxdamp import _checks
-from jaxdamp._types import Signal, SignalLike
+from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 
 
 def as_signal(argument: str, signal: SignalLike, *, least: int = 1) -> Signal:
-    """The signal as a JAX array, refused unless it has one axis and `least` samples."""
+    """The signal as a JAX array of floats, refused unless it has one axis and `least` samples."""
     array = jnp.asarray(signal)
+    if not jnp.issubdtype(array.dtype, jnp.inexact):
+        array = array.astype(float)
     if array.ndim != 1:
         remedy = "Pass one channel at a time, or batch with jax.vmap."
         _checks.refuse(argument, "have one axis, time", f"of shape {array.shape}", remedy)
@@ -17,8 +21,32 @@ def as_signal(argument: str, signal: SignalLike, *, least: int = 1) -> Signal:
     return array
 
 
+def as_numbers(*values: ArrayLike) -> list[Array]:
+    """Numbers or arrays of them as floats of one type, the one that JAX finds for all."""
+    dtype = jnp.result_type(*values)
+    dtype = dtype if jnp.issubdtype(dtype, jnp.floating) else jnp.result_type(float)
+    return [jnp.asarray(value, dtype) for value in values]
+
+
 def same_length(first: str, one: Signal, second: str, other: Signal) -> None:
     """Refuse two signals of different length."""
     if one.shape != other.shape:
         remedy = "Cut or resample them to the same time base."
         _checks.refuse(second, f"be as long as `{first}` ({one.size} samples)", f"of length {other.size}", remedy)
+
+
+def check_interval(dt: ScalarLike | int) -> None:
+    """Refuse a sampling interval that is not positive and finite."""
+    _checks.positive("dt", dt, "It is the sampling interval in s.")
+
+
+def root(power: Scalar | Signal, order: int = 2) -> Scalar | Signal:
+    """The root of numbers that are not negative; at zero, where it has no slope, the slope is taken as zero.
+
+    What rounding has made a little negative counts as zero; NaN stays NaN.
+    """
+    zero = power <= 0.0
+    positive = jnp.where(zero, jnp.ones_like(power), power)
+    for _ in range(order // 2):  # 2 and 4 are what is needed
+        positive = jnp.sqrt(positive)
+    return jnp.where(zero, jnp.zeros_like(power), positive)

@@ -1,9 +1,11 @@
 """The size of a signal."""
 
+import jax
 import jax.numpy as jnp
 
-from jaxdamp._types import Scalar, SignalLike
-from jaxdamp.metrics._signals import as_signal
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, SignalLike
+from jaxdamp.metrics._signals import as_signal, root
 
 
 def rms(signal: SignalLike) -> Scalar:
@@ -21,15 +23,14 @@ def rms(signal: SignalLike) -> Scalar:
     Raises:
         ValueError: If the signal is empty or has more than one axis.
     """
-    square = jnp.mean(as_signal("signal", signal) ** 2)
-    zero = square == 0.0
-    return jnp.where(zero, square, jnp.sqrt(jnp.where(zero, jnp.ones_like(square), square)))
+    return root(jnp.mean(as_signal("signal", signal) ** 2))
 
 
 def peak(signal: SignalLike) -> Scalar:
     """Largest magnitude, max |x|, in the unit of the signal.
 
     Only the sample that holds the peak has a gradient; it jumps where two samples compete, and ties share it equally.
+    Tune on `smooth_peak` instead.
 
     >>> import jax.numpy as jnp
     >>> round(float(peak(jnp.array([0.2, -1.5, 1.0]))), 6)
@@ -42,6 +43,40 @@ def peak(signal: SignalLike) -> Scalar:
         ValueError: If the signal is empty or has more than one axis.
     """
     return jnp.max(jnp.abs(as_signal("signal", signal)))
+
+
+def smooth_peak(signal: SignalLike, order: ScalarLike | int = 16) -> Scalar:
+    """A smooth stand-in for `peak`: the power mean (mean |x|^p)^(1/p), in the unit of the signal.
+
+    It lies between max |x| / n^(1/p) and max |x| and rises to it with the order p; as a mean over time it does not
+    depend on the sampling rate. All large samples have a gradient. A sine gives 0.90 of its peak with p = 16; a
+    Gaussian record gives 2.48 standard deviations, its peak some 4. It is computed relative to the largest sample, so
+    nothing overflows. The gradient for a signal that is zero throughout is zero.
+
+    >>> import jax.numpy as jnp
+    >>> x = jnp.sin(2.0 * jnp.pi * jnp.arange(100.0) / 100)
+    >>> [round(float(smooth_peak(x, p)), 4) for p in (2, 8, 16, 64)]
+    [0.7071, 0.8504, 0.9033, 0.9646]
+
+    Args:
+        signal: Uniformly sampled values, shape [time], any unit.
+        order: The power p, at least 2; 8 to 16 for tuning.
+
+    Raises:
+        ValueError: If the signal is empty or has more than one axis, or `order` is not finite or below 2.
+    """
+    x = as_signal("signal", signal)
+    _checks.finite("order", order)
+    known = _checks.concrete(order)
+    if known is not None and known < 2.0:
+        _checks.refuse("order", "be at least 2", known, "Use `rms` for 2 and larger orders to come closer to the peak.")
+    p = jnp.asarray(order, x.dtype)
+    largest = jax.lax.stop_gradient(jnp.max(jnp.abs(x)))
+    zero = largest == 0.0
+    scale = jnp.where(zero, jnp.ones_like(largest), largest)
+    mean = jnp.mean(jnp.abs(x / scale) ** p)
+    safe = jnp.where(zero, jnp.ones_like(mean), mean)
+    return jnp.where(zero, jnp.zeros_like(mean), scale * safe ** (1.0 / p))
 
 
 def crest_factor(signal: SignalLike) -> Scalar:

@@ -3,11 +3,11 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Complex, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
-from jaxdamp.metrics._signals import as_signal
+from jaxdamp.metrics._signals import as_signal, check_interval
 
 
 # Coefficients a_k of the periodic windows w_j = sum_k (-1)^k a_k cos(2 pi k j/n).
@@ -73,34 +73,46 @@ def power_spectral_density(
     Source: Welch, IEEE Trans. Audio Electroacoustics 15 (1967) 70-73.
     """
     signal = as_signal("signal", signal, least=2)
-    _checks.positive("dt", dt, "It is the sampling interval in s.")
+    weights, step = welch_plan(signal, dt, segment_length, overlap, window)
+    return _density(signal, jnp.asarray(dt, signal.dtype), weights, step=step, remove_mean=remove_mean)
+
+
+def welch_plan(
+    signal: Signal, dt: ScalarLike | int, segment_length: int | None, overlap: float | int, window: str
+) -> tuple[Float[Array, " size"], int]:
+    """The window of a segment and the step from one to the next, checked."""
+    check_interval(dt)
     size = max(2, signal.size // 8) if segment_length is None else segment_length
     if not 2 <= size <= signal.size:
         remedy = "Shorten the segments."
         _checks.refuse("segment_length", f"lie between 2 and the length of the signal ({signal.size})", size, remedy)
     if not 0.0 <= overlap < 1.0:
-        _checks.refuse(
-            "overlap", "be at least 0 and below 1", overlap, "It is a part of a segment: write 0.5 for 50 %."
-        )
-    step = size - min(int(overlap * size), size - 1)
-    weights = jnp.asarray(cosine_window(window, size), signal.dtype)
-    return _welch(signal, jnp.asarray(dt, signal.dtype), weights, step=step, remove_mean=remove_mean)
+        remedy = "It is a part of a segment: write 0.5 for 50 %."
+        _checks.refuse("overlap", "be at least 0 and below 1", overlap, remedy)
+    return jnp.asarray(cosine_window(window, size), signal.dtype), size - min(int(overlap * size), size - 1)
+
+
+def segment_spectra(
+    signal: Signal, weights: Float[Array, " size"], *, step: int, remove_mean: bool
+) -> Complex[Array, "segments frequencies"]:
+    """The discrete Fourier transform of every windowed segment."""
+    starts = np.arange(0, signal.size - weights.size + 1, step)
+    segments = signal[starts[:, None] + np.arange(weights.size)[None, :]]
+    if remove_mean:
+        segments = segments - jnp.mean(segments, axis=1, keepdims=True)
+    return jnp.fft.rfft(segments * weights[None, :])
 
 
 @jax.jit(static_argnames=("step", "remove_mean"))
-def _welch(
+def _density(
     signal: Signal, dt: Scalar, weights: Float[Array, " size"], *, step: int, remove_mean: bool
 ) -> tuple[Float[Array, " frequencies"], Float[Array, " frequencies"]]:
     size = weights.size
-    starts = np.arange(0, signal.size - size + 1, step)
-    segments = signal[starts[:, None] + np.arange(size)[None, :]]
-    if remove_mean:
-        segments = segments - jnp.mean(segments, axis=1, keepdims=True)
-    spectrum = jnp.fft.rfft(segments * weights[None, :])
+    spectra = segment_spectra(signal, weights, step=step, remove_mean=remove_mean)
     sided = np.full(size // 2 + 1, 2.0)
     sided[0] = 1.0
     if size % 2 == 0:
         sided[-1] = 1.0
     scale = jnp.asarray(sided, signal.dtype) * (dt / jnp.sum(weights**2))
-    density = scale * jnp.mean(spectrum.real**2 + spectrum.imag**2, axis=0)
+    density = scale * jnp.mean(spectra.real**2 + spectra.imag**2, axis=0)
     return jnp.arange(size // 2 + 1, dtype=signal.dtype) / (size * dt), density

@@ -1,9 +1,13 @@
 """How much suspension travel is used."""
 
-import jax.numpy as jnp
+import math
 
-from jaxdamp._types import Scalar, SignalLike
-from jaxdamp.metrics._signals import as_signal
+import jax.numpy as jnp
+from jax.scipy.special import erfc
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, SignalLike
+from jaxdamp.metrics._signals import as_numbers, as_signal
 from jaxdamp.metrics.amplitude import rms
 
 
@@ -46,3 +50,63 @@ def working_space_peak(deflection: SignalLike) -> Scalar:
     """
     deflection = as_signal("deflection", deflection)
     return jnp.max(deflection) - jnp.min(deflection)
+
+
+def _check_range(lower: ScalarLike | int, upper: ScalarLike | int) -> None:
+    _checks.finite("lower", lower)
+    _checks.finite("upper", upper)
+    low, high = _checks.concrete(lower), _checks.concrete(upper)
+    if low is not None and high is not None and not low < high:
+        _checks.refuse("upper", f"be above `lower` ({low})", high, "`lower` is the bump side and mostly negative.")
+
+
+def working_space_exceedance(deflection: SignalLike, lower: ScalarLike | int, upper: ScalarLike | int) -> Scalar:
+    """The part of the time, from 0 to 1, during which the deflection lies below `lower` or above `upper` [-].
+
+    It counts samples, so its gradient is zero everywhere: tune on
+    `gaussian_exceedance(mean(d), working_space_rms(d), lower, upper)` instead.
+
+    >>> import jax.numpy as jnp
+    >>> round(float(working_space_exceedance(jnp.array([0.0, 0.05, -0.02, -0.07]), -0.06, 0.04)), 6)
+    0.5
+
+    Args:
+        deflection: Suspension deflection z_sprung - z_unsprung [m], shape [time]; extension is positive.
+        lower: The end of the travel in compression [m], negative where deflections count from the static position.
+        upper: The end of the travel in extension [m].
+
+    Raises:
+        ValueError: If the signal is empty or has more than one axis, or `lower` is not below `upper`.
+    """
+    d = as_signal("deflection", deflection)
+    _check_range(lower, upper)
+    outside = (d < jnp.asarray(lower, d.dtype)) | (d > jnp.asarray(upper, d.dtype))
+    return jnp.mean(jnp.where(jnp.isnan(d), d, outside.astype(d.dtype)))
+
+
+def gaussian_exceedance(
+    mean: ScalarLike | int, standard_deviation: ScalarLike | int, lower: ScalarLike | int, upper: ScalarLike | int
+) -> Scalar:
+    """The part of the time that a Gaussian deflection spends outside [lower, upper], Q((u - m)/s) + Q((m - l)/s) [-].
+
+    With limits at -x and x about a zero mean it is 2 Q(x/s); Q is the upper tail of the normal distribution. Real
+    suspensions stiffen towards their stops, so it overestimates large excursions. Differentiable in all arguments.
+
+    >>> round(float(gaussian_exceedance(0.0, 0.02, -0.06, 0.06)), 6)  # three standard deviations
+    0.0027
+
+    Args:
+        mean: Mean deflection [m].
+        standard_deviation: Its standard deviation [m], positive: `working_space_rms`, or a stationary response.
+        lower: The end of the travel in compression [m].
+        upper: The end of the travel in extension [m].
+
+    Raises:
+        ValueError: If `standard_deviation` is not positive, anything is not finite, or `lower` is not below `upper`.
+    """
+    _checks.finite("mean", mean)
+    _checks.positive("standard_deviation", standard_deviation, "It is that of the deflection in m.")
+    _check_range(lower, upper)
+    centre, spread, low, high = as_numbers(mean, standard_deviation, lower, upper)
+    width = spread * math.sqrt(2.0)
+    return 0.5 * (erfc((high - centre) / width) + erfc((centre - low) / width))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import beta
 
-from jaxdamp.metrics import dissipated_energy, equivalent_damping
+from jaxdamp.metrics import dissipated_energy, dissipated_power, equivalent_damping
 
 
 STROKE, OMEGA, CYCLES = 0.02, 2 * np.pi * 1.5, 3
@@ -48,6 +48,13 @@ def test_trapezoidal_rule(rng):
     assert float(dissipated_energy(force, velocity, 0.1)) == pytest.approx(np.trapezoid(force * velocity, dx=0.1))
 
 
+def test_power_is_energy_per_time(rng):
+    assert float(dissipated_power(1800.0 * V, V)) == pytest.approx(1800.0 * (STROKE * OMEGA) ** 2 / 2, rel=1e-12)
+    force, velocity = rng.standard_normal((2, 50))
+    energy = float(dissipated_energy(force, velocity, 0.1))
+    assert float(dissipated_power(force, velocity)) == pytest.approx(energy / 4.9, rel=1e-12)
+
+
 def test_gradients():
     rate = jax.grad(lambda c: dissipated_energy(c * jnp.asarray(V), V, DT))(1800.0)
     assert float(rate) == pytest.approx(CYCLES * np.pi * OMEGA * STROKE**2, rel=1e-12)
@@ -60,7 +67,7 @@ def test_a_damper_at_rest_has_no_equivalent():
     assert np.isnan(equivalent_damping(np.zeros(9), np.zeros(9)))
 
 
-@pytest.mark.parametrize("metric", [equivalent_damping, lambda f, v: dissipated_energy(f, v, 0.01)])
+@pytest.mark.parametrize("metric", [equivalent_damping, dissipated_power, lambda f, v: dissipated_energy(f, v, 0.01)])
 def test_errors_of_length(metric, unchecked):
     with pytest.raises(
         ValueError, match=r"`velocity` must be as long as `force` \(9 samples\), but is of length 8.*time base"

@@ -1,0 +1,105 @@
+"""Fatigue damage of a random load from its spectrum."""
+
+import math
+
+import jax
+import jax.numpy as jnp
+from jax.scipy.special import gammaln
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, SignalLike
+from jaxdamp.metrics._signals import as_signal, same_length
+
+
+def spectral_moments(
+    frequency: SignalLike, density: SignalLike, orders: tuple[int, ...] = (0, 1, 2, 4)
+) -> Float[Array, " orders"]:
+    """Moments of a one-sided power spectral density, m_n = int f^n G(f) df [unit^2 Hz^n], by the trapezoidal rule.
+
+    m_0 is the variance; sqrt(m_2/m_0) is the rate of upward crossings of the mean [1/s] and sqrt(m_4/m_2) that of
+    peaks. High moments hang on the upper end of the spectrum: cut it where the load ends and noise begins.
+    Differentiable in the density.
+
+    >>> f = jnp.linspace(0.0, 10.0, 1001)
+    >>> spectral_moments(f, jnp.where(f >= 0.0, 2.0, 0.0)).round(1)  # flat: 2 * 10^(n+1)/(n+1)
+    Array([   20. ,   100. ,   666.7, 40000.1], dtype=float64)
+
+    Args:
+        frequency: Frequencies [Hz], increasing, shape [frequencies]; as from `power_spectral_density`.
+        density: Power spectral density at each [unit^2/Hz], not negative.
+        orders: The orders n, not negative.
+
+    Raises:
+        ValueError: If the lengths differ, if there are fewer than two frequencies, or if an order is negative.
+    """
+    f, g = as_signal("frequency", frequency, least=2), as_signal("density", density, least=2)
+    same_length("frequency", f, "density", g)
+    if min(orders) < 0:
+        _checks.refuse("orders", "not be negative", orders)
+    powers = [jnp.ones_like(f) if n == 0 else f**n for n in orders]
+    return jnp.stack([jnp.trapezoid(power * g, f) for power in powers])
+
+
+def spectral_damage(
+    frequency: SignalLike, density: SignalLike, exponent: ScalarLike | int, *, method: str = "dirlik"
+) -> Scalar:
+    """Expected sum of cycle amplitudes to the power k, per second, of a Gaussian load [unit^k/s].
+
+    With a Woehler line N S^k = K (S the amplitude, not the range) the damage after T seconds is T/K times this, by
+    Palmgren and Miner. Cycles are those of rainflow counting; their means are not counted.
+
+    - "dirlik": nu_p m_0^(k/2) (D1 Q^k Gamma(1 + k) + 2^(k/2) Gamma(1 + k/2) (D2 |R|^k + D3)), for any width of band; a
+      fit to simulated records, which for k from 3 to 6 mostly lies within 10 % of counting.
+    - "narrow-band": nu_0 (2 m_0)^(k/2) Gamma(1 + k/2), Rayleigh amplitudes: exact for a narrow band, otherwise an
+      upper estimate.
+
+    nu_p = sqrt(m_4/m_2), nu_0 = sqrt(m_2/m_0). Where the band is so narrow that Dirlik's coefficients lose their
+    digits (irregularity factor within 1e-4 of one) the narrow-band value stands in. Differentiable in density and
+    exponent; NaN for a spectrum of zeros.
+
+    >>> f = jnp.linspace(0.0, 20.0, 2001)  # a flat spectrum: as wide a band as can be
+    >>> g = jnp.where(f >= 0.0, 1.0, 0.0)
+    >>> ratio = spectral_damage(f, g, 4) / spectral_damage(f, g, 4, method="narrow-band")
+    >>> round(float(ratio), 2)
+    0.76
+
+    Args:
+        frequency: Frequencies [Hz], increasing, shape [frequencies]; as from `power_spectral_density`.
+        density: Power spectral density of the load at each [unit^2/Hz].
+        exponent: k, the slope of the Woehler line [-], positive: 3 for welds to 8 or more for plain parts.
+        method: "dirlik" or "narrow-band".
+
+    Raises:
+        ValueError: If the lengths differ, there are fewer than two frequencies, `exponent` is not positive, or
+            `method` is unknown.
+
+    Source: Dirlik, thesis, University of Warwick 1985, as in public implementations.
+    """
+    _checks.positive("exponent", exponent, "It is the slope k of the line N S^k = K.")
+    _checks.one_of("method", method, ["dirlik", "narrow-band"])
+    moments = spectral_moments(frequency, density)
+    narrow, dirlik = _damage(moments, jnp.asarray(exponent, moments.dtype))
+    return narrow if method == "narrow-band" else dirlik
+
+
+@jax.jit
+def _damage(moments: Float[Array, "4"], k: Scalar) -> tuple[Scalar, Scalar]:
+    """By the narrow-band formula and by Dirlik's."""
+    m0, m1, m2, m4 = moments
+    rayleigh = jnp.exp(0.5 * k * math.log(2.0) + gammaln(1.0 + 0.5 * k))
+    narrow = jnp.sqrt(m2 / m0) * m0 ** (0.5 * k) * rayleigh
+    irregularity = m2 / jnp.sqrt(m0 * m4)
+    wide = irregularity < 1.0 - 1e-4
+    # numbers of some wide band stand in where they are not used, so that gradients stay finite
+    gamma = jnp.where(wide, irregularity, 0.7)
+    mean_frequency = jnp.where(wide, m1 / m0 * jnp.sqrt(m2 / m4), 0.6)
+    d1 = 2.0 * (mean_frequency - gamma**2) / (1.0 + gamma**2)
+    rest = 1.0 - gamma - d1 + d1**2
+    r = (gamma - mean_frequency - d1**2) / rest
+    d2 = rest / (1.0 - r)
+    d3 = 1.0 - d1 - d2
+    q = 1.25 * (gamma - d3 - d2 * r) / d1
+    shape = d1 * q**k * jnp.exp(gammaln(1.0 + k)) + rayleigh * (d2 * jnp.abs(r) ** k + d3)
+    damage = jnp.where(wide, jnp.sqrt(m4 / m2) * m0 ** (0.5 * k) * shape, narrow)
+    return narrow, jnp.where(jnp.isnan(irregularity), irregularity, damage)
