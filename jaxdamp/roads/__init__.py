@@ -1,18 +1,22 @@
 """Roads: the height under each wheel as a function of time.
 
 A road answers one question, `height(time)`: the height [m], up positive, under every wheel at the times asked for, as
-an array of shape [time, wheels]. A road with a single track has one column; a vehicle with several axles delays it.
+an array of shape [time, wheels]. A road with a single track has one column.
 
-- Single events: `cosine_bump`, `step`.
-- Periodic excitation: `sine`.
-- Random roads: `iso8608` (a roughness class at a vehicle speed) and `band_limited` (a flat spectrum between two
-  frequencies).
-- Measured roads: `from_profile`.
+- Single events: `cosine_bump`, `half_sine_bump`, `trapezoid_bump`, `triangular_bump`, `pothole`, `step`.
+- Periodic excitation: `sine`, `wave_course`, `sweep_sine`.
+- Random roads: `iso8608` and `iso8608_filtered` (a roughness class at a vehicle speed), `band_limited` (a flat spectrum
+  between two frequencies).
+- Measured roads: `from_profile`, `read_profile` (text files), `read_crg` (OpenCRG).
+- Several wheels: `two_track` puts tracks beside each other, `delayed` axles behind each other; do it in this order, and
+  the wheels are front-left, front-right, rear-left, rear-right.
+- From roads make roads: `joined`, `superposed`, and for the tyre `contact_patch` and `rolling_disc`.
+- How rough is it? `assess_roughness`, `class_limits`, `road_class`; `coherency` of two tracks.
 - For stationary responses: `white`, a road known by its spectrum alone.
 
 Roads are pure functions of their parameters, so that they can be compiled, batched and differentiated in height,
-speed or roughness. Simulations start at rest on level ground: random roads therefore fade in over the first half
-second (`ramp`).
+speed or roughness. Simulations start settled and at rest on the heights at time 0: random roads therefore fade in over
+the first half second (`ramp`).
 
 Two roads through the same corner of a village, first a speed hump and then a poor surface, both at 10 m/s:
 
@@ -25,26 +29,63 @@ Two roads through the same corner of a village, first a speed hump and then a po
 >>> surface = roads.iso8608("D", speed=10.0, seed=1)
 >>> surface.height(time).shape
 (10001, 1)
+>>> car = roads.delayed(roads.two_track(surface, track_width=1.5, seed=2), positions=[0.0, 2.7], speed=10.0)
+>>> car.height(time).shape
+(10001, 4)
 """
 
+from jaxdamp.roads.assessment import RoughnessAssessment, assess_roughness
+from jaxdamp.roads.axles import delayed
 from jaxdamp.roads.base import AbstractRoad
 from jaxdamp.roads.bump import cosine_bump
+from jaxdamp.roads.coherency import coherency
+from jaxdamp.roads.contact import contact_patch, rolling_disc
+from jaxdamp.roads.cornered_bump import half_sine_bump, trapezoid_bump, triangular_bump
+from jaxdamp.roads.crg import read_crg
 from jaxdamp.roads.edge import step
-from jaxdamp.roads.harmonic import sine
+from jaxdamp.roads.filtered_noise import iso8608_filtered
+from jaxdamp.roads.harmonic import sine, wave_course
+from jaxdamp.roads.iso_classes import class_limits, road_class
 from jaxdamp.roads.iso_roughness import iso8608
+from jaxdamp.roads.pothole import pothole
 from jaxdamp.roads.profile import from_profile
+from jaxdamp.roads.profile_file import read_profile
 from jaxdamp.roads.random_band import band_limited
+from jaxdamp.roads.sequence import joined
+from jaxdamp.roads.superposition import superposed
+from jaxdamp.roads.sweep import sweep_sine
+from jaxdamp.roads.tracks import two_track
 from jaxdamp.roads.white import WhiteRoad, white
 
 
 __all__ = [
     "AbstractRoad",
+    "RoughnessAssessment",
     "WhiteRoad",
+    "assess_roughness",
     "band_limited",
+    "class_limits",
+    "coherency",
+    "contact_patch",
     "cosine_bump",
+    "delayed",
     "from_profile",
+    "half_sine_bump",
     "iso8608",
+    "iso8608_filtered",
+    "joined",
+    "pothole",
+    "read_crg",
+    "read_profile",
+    "road_class",
+    "rolling_disc",
     "sine",
     "step",
+    "superposed",
+    "sweep_sine",
+    "trapezoid_bump",
+    "triangular_bump",
+    "two_track",
+    "wave_course",
     "white",
 ]

@@ -1,5 +1,6 @@
 """Roads made of uniformly spaced samples."""
 
+import math
 from typing import final
 
 import equinox as eqx
@@ -59,6 +60,11 @@ class SampledRoad(AbstractRoad):
         return height * jnp.reshape(fade_in(time, self.ramp), (-1, 1))
 
     @property
+    def wheels(self) -> int:
+        """The number of tracks."""
+        return self.samples.shape[1]
+
+    @property
     def grid(self) -> float | None:
         """The spacing of the samples [s]."""
         if self.speed is None:
@@ -71,6 +77,14 @@ class SampledRoad(AbstractRoad):
         """The time [s] from the first sample to the last, or to the first repeated one if the road is periodic."""
         intervals = self.samples.shape[0] - (0 if self.periodic else 1)
         return None if self.grid is None else intervals * self.grid
+
+    @property
+    def span(self) -> tuple[Scalar | float, Scalar | float]:
+        """From 0 to the time [s] of the last sample; without ends if the road is periodic."""
+        if self.periodic:
+            return -math.inf, math.inf
+        length = (self.samples.shape[0] - 1) * self.spacing
+        return 0.0, length if self.speed is None else length / self.speed
 
     def _refuse_outside(self, time: SignalLike) -> None:
         times, grid, duration = _checks.concrete(time), self.grid, self.duration

@@ -1,11 +1,12 @@
 """What every road is."""
 
+import math
 from abc import abstractmethod
 
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from jaxdamp._types import SignalLike
+from jaxdamp._types import Scalar, SignalLike
 
 
 class AbstractRoad(eqx.Module):
@@ -13,6 +14,9 @@ class AbstractRoad(eqx.Module):
 
     Concrete roads are made by the functions of `jaxdamp.roads`. They are pytrees: their array leaves (heights, speed,
     roughness) can be traced, batched and differentiated.
+
+    The properties are those of a formula: one track, no samples, no beginning and no end. Roads made of samples or of
+    other roads say otherwise.
     """
 
     @abstractmethod
@@ -20,11 +24,21 @@ class AbstractRoad(eqx.Module):
         """The height [m], up positive, under each wheel at each `time` [s]; one column for a single track."""
 
     @property
-    @abstractmethod
-    def grid(self) -> float | None:
-        """The spacing [s] of the samples the road is made of; `None` if it is a formula, or if its speed is traced."""
+    def wheels(self) -> int:
+        """The number of columns of `height`."""
+        return 1
 
     @property
-    @abstractmethod
+    def grid(self) -> float | None:
+        """The spacing [s] of the samples the road is made of; `None` if it is a formula, or if its speed is traced."""
+        return None
+
+    @property
     def duration(self) -> float | None:
         """The time [s] after which the road ends or repeats; `None` if it does neither, or if its speed is traced."""
+        return None
+
+    @property
+    def span(self) -> tuple[Scalar | float, Scalar | float]:
+        """The first and the last time [s] at which the road has a height; infinite where it has no such end."""
+        return -math.inf, math.inf

@@ -1,44 +1,66 @@
-"""A single smooth bump."""
+"""Single events on a level road: a shape, scaled and placed in time."""
 
 from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
+from jax.tree_util import Partial
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
+from jaxdamp.roads._crossing import given_in_time
+from jaxdamp.roads._fade import quintic_step
 from jaxdamp.roads.base import AbstractRoad
 
 
-def haversine(fraction: Signal, height: Scalar) -> Signal:
-    """h(s) = H/2 (1 - cos(2 pi s)) [m] for 0 <= s <= 1, else zero; the slope is continuous, the curvature is not."""
-    return 0.5 * height * (1.0 - jnp.cos(2.0 * jnp.pi * jnp.clip(fraction, 0.0, 1.0)))
-
-
 @final
-class CosineBump(AbstractRoad):
-    """A haversine in time; made by `cosine_bump`."""
+class Bump(AbstractRoad):
+    """z(t) = H f((t - t0)/T); made by `cosine_bump`, `half_sine_bump`, `trapezoid_bump`, `pothole` and others.
 
+    Attributes:
+        shape: f, a function of the fraction of the event that the wheel has passed.
+        peak: H [m], negative for a hole.
+        start: t0 [s].
+        width: T [s].
+    """
+
+    shape: Partial
     peak: Scalar
     start: Scalar
     width: Scalar
 
     @eqx.filter_jit
     def height(self, time: SignalLike) -> Float[Array, "time 1"]:
-        """The height [m] at each `time` [s]; see `cosine_bump`."""
+        """The height [m] at each `time` [s]; see the function that made the road."""
         time = jnp.asarray(time, self.peak.dtype)
-        return haversine((time - self.start) / self.width, self.peak)[:, None]
+        return (self.peak * self.shape((time - self.start) / self.width))[:, None]
 
-    @property
-    def grid(self) -> None:
-        """A formula has no samples."""
-        return None
 
-    @property
-    def duration(self) -> None:
-        """The ground behind the bump is level for ever."""
-        return None
+def place(
+    shape: Partial,
+    height: ScalarLike | int,
+    start: ScalarLike | int,
+    duration: ScalarLike | int | None,
+    length: ScalarLike | int | None,
+    speed: ScalarLike | int | None,
+) -> Bump:
+    """The event with its arguments checked; its width T is `duration` or length/speed."""
+    _checks.finite("height", height)
+    _checks.finite("start", start)
+    in_time = given_in_time("duration", duration, "s", "length", length, speed)
+    width = jnp.asarray(duration, float) if in_time else jnp.asarray(length, float) / jnp.asarray(speed, float)
+    return Bump(shape, peak=jnp.asarray(height, float), start=jnp.asarray(start, float), width=width)
+
+
+def haversine(fraction: Signal) -> Signal:
+    """f(s) = (1 - cos(2 pi s))/2 for 0 <= s <= 1, else zero; the slope is continuous, the curvature is not."""
+    return 0.5 * (1.0 - jnp.cos(2.0 * jnp.pi * jnp.clip(fraction, 0.0, 1.0)))
+
+
+def quintic_bump(fraction: Signal) -> Signal:
+    """f(s) = S(1 - |2 s - 1|) with the quintic step S: up and down, continuous with slope and curvature."""
+    return quintic_step(1.0 - jnp.abs(2.0 * fraction - 1.0))
 
 
 def cosine_bump(
@@ -48,11 +70,14 @@ def cosine_bump(
     duration: ScalarLike | int | None = None,
     length: ScalarLike | int | None = None,
     speed: ScalarLike | int | None = None,
-) -> CosineBump:
+    smooth: bool = False,
+) -> Bump:
     """A bump in the shape of one cosine period, z(t) = H/2 (1 - cos(2 pi (t - t0)/T)) for t0 <= t <= t0 + T, else zero.
 
     Give its width either as `duration`, or as `length` and `speed` (T = length/speed). Slope and height are zero at
-    both ends; the vertical acceleration jumps there by 2 pi^2 H/T^2. Differentiable in every argument.
+    both ends; the vertical acceleration jumps there by 2 pi^2 H/T^2. With `smooth` the flanks are quintic polynomials
+    instead, s^3 (10 - 15 s + 6 s^2), whose acceleration is continuous everywhere; its largest value, 40 H/(sqrt(3)
+    T^2), is 17 % greater. Differentiable in every argument.
 
     >>> import jax.numpy as jnp
     >>> bump = cosine_bump(0.06, start=1.0, duration=0.25)
@@ -65,6 +90,7 @@ def cosine_bump(
         duration: T, the time [s] to cross the bump.
         length: The length of the bump along the road [m], instead of `duration`.
         speed: The speed of the vehicle [m/s], with `length`.
+        smooth: Continuous acceleration.
 
     Raises:
         ValueError: If not exactly one of `duration` and `length` is given, if `speed` is missing with `length` or
@@ -72,22 +98,4 @@ def cosine_bump(
 
     Source: Barethiye, Pohit and Mitra (half car with a hybrid damper), equation 5: H = 0.06 m, 1 s <= t <= 1.25 s.
     """
-    _checks.finite("height", height)
-    _checks.finite("start", start)
-    if (duration is None) == (length is None):
-        both = "neither was given" if duration is None else f"{duration} s, and length {length} m was given as well"
-        _checks.refuse(
-            "duration", "be given, or `length` with `speed`, but not both", both, "Give exactly one of them."
-        )
-    if duration is not None:
-        if speed is not None:
-            _checks.refuse("speed", "be left out when `duration` is given", speed, "Give `length` and `speed` instead.")
-        _checks.positive("duration", duration)
-        width = jnp.asarray(duration, float)
-    else:
-        if speed is None:
-            _checks.refuse("speed", "be given with `length`", speed, "Give the speed of the vehicle in m/s.")
-        _checks.positive("length", length)
-        _checks.positive("speed", speed, "Roads are driven forwards.")
-        width = jnp.asarray(length, float) / jnp.asarray(speed, float)
-    return CosineBump(peak=jnp.asarray(height, float), start=jnp.asarray(start, float), width=width)
+    return place(Partial(quintic_bump if smooth else haversine), height, start, duration, length, speed)

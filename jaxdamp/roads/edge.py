@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
-from jaxdamp.roads._fade import raised_cosine
+from jaxdamp.roads._fade import quintic_step, raised_cosine
 from jaxdamp.roads.base import AbstractRoad
 
 
@@ -19,29 +19,28 @@ class Step(AbstractRoad):
     rise: Scalar
     start: Scalar
     ramp: Scalar
+    smooth: bool = eqx.field(static=True)
 
     @eqx.filter_jit
     def height(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see `step`."""
         time = jnp.asarray(time, self.rise.dtype)
-        return (self.rise * raised_cosine((time - self.start) / self.ramp))[:, None]
-
-    @property
-    def grid(self) -> None:
-        """A formula has no samples."""
-        return None
-
-    @property
-    def duration(self) -> None:
-        """The ground stays up for ever."""
-        return None
+        flank = quintic_step if self.smooth else raised_cosine
+        return (self.rise * flank((time - self.start) / self.ramp))[:, None]
 
 
-def step(height: ScalarLike | int, *, start: ScalarLike | int = 1.0, ramp: ScalarLike | int = 0.01) -> Step:
+def step(
+    height: ScalarLike | int,
+    *,
+    start: ScalarLike | int = 1.0,
+    ramp: ScalarLike | int = 0.01,
+    smooth: bool = False,
+) -> Step:
     """A step of the ground with a rounded flank, z(t) = H/2 (1 - cos(pi (t - t0)/T)) for t0 <= t <= t0 + T, then H.
 
     Differentiable in every argument; that is why the ramp cannot be zero. Choose it several time steps long: a ramp
-    shorter than a step of the simulation is seen as a jump.
+    shorter than a step of the simulation is seen as a jump. The vertical acceleration jumps by pi^2 H/(2 T^2) at both
+    ends; with `smooth` the flank is a quintic polynomial instead and the acceleration is continuous.
 
     >>> import jax.numpy as jnp
     >>> kerb = step(0.05, start=1.0, ramp=0.02)
@@ -51,7 +50,8 @@ def step(height: ScalarLike | int, *, start: ScalarLike | int = 1.0, ramp: Scala
     Args:
         height: H, the height of the ground behind the step [m]; negative for a drop.
         start: t0, the time [s] at which the ground begins to rise.
-        ramp: T, the time [s] of the rise.
+        ramp: T, the time [s] of the rise: its length along the road divided by the speed of the vehicle.
+        smooth: Continuous acceleration.
 
     Raises:
         ValueError: If `height` or `start` is not finite, or `ramp` is not positive.
@@ -59,4 +59,9 @@ def step(height: ScalarLike | int, *, start: ScalarLike | int = 1.0, ramp: Scala
     _checks.finite("height", height)
     _checks.finite("start", start)
     _checks.positive("ramp", ramp, "A sudden jump has no derivative: give the rise a few milliseconds.")
-    return Step(rise=jnp.asarray(height, float), start=jnp.asarray(start, float), ramp=jnp.asarray(ramp, float))
+    return Step(
+        rise=jnp.asarray(height, float),
+        start=jnp.asarray(start, float),
+        ramp=jnp.asarray(ramp, float),
+        smooth=smooth,
+    )

@@ -1,4 +1,4 @@
-"""A sinusoidal road."""
+"""Sinusoidal roads."""
 
 from typing import final
 
@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
+from jaxdamp.roads._crossing import given_in_time
 from jaxdamp.roads._fade import fade_in
 from jaxdamp.roads.base import AbstractRoad
 
@@ -26,16 +27,6 @@ class Sine(AbstractRoad):
         time = jnp.asarray(time, self.amplitude.dtype)
         wave = self.amplitude * jnp.sin(2.0 * jnp.pi * self.frequency * time)
         return (fade_in(time, self.ramp) * wave)[:, None]
-
-    @property
-    def grid(self) -> None:
-        """A formula has no samples."""
-        return None
-
-    @property
-    def duration(self) -> None:
-        """A sine does not end."""
-        return None
 
 
 def sine(
@@ -70,22 +61,38 @@ def sine(
     """
     _checks.finite("amplitude", amplitude)
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
-    if (frequency is None) == (wavelength is None):
-        both = "neither was given" if frequency is None else f"{frequency} Hz, and wavelength {wavelength} m as well"
-        _checks.refuse(
-            "frequency", "be given, or `wavelength` with `speed`, but not both", both, "Give exactly one of them."
-        )
-    if frequency is not None:
-        if speed is not None:
-            _checks.refuse(
-                "speed", "be left out when `frequency` is given", speed, "Give `wavelength` and `speed` instead."
-            )
-        _checks.positive("frequency", frequency)
-        frequency = jnp.asarray(frequency, float)
-    else:
-        if speed is None:
-            _checks.refuse("speed", "be given with `wavelength`", speed, "Give the speed of the vehicle in m/s.")
-        _checks.positive("wavelength", wavelength)
-        _checks.positive("speed", speed, "Roads are driven forwards.")
-        frequency = jnp.asarray(speed, float) / jnp.asarray(wavelength, float)
+    in_time = given_in_time("frequency", frequency, "Hz", "wavelength", wavelength, speed)
+    frequency = jnp.asarray(frequency, float) if in_time else jnp.asarray(speed, float) / jnp.asarray(wavelength, float)
     return Sine(amplitude=jnp.asarray(amplitude, float), frequency=frequency, ramp=float(ramp))
+
+
+def wave_course(
+    height: ScalarLike | int, length: ScalarLike | int, speed: ScalarLike | int, *, ramp: float | int = 0.0
+) -> Sine:
+    """A course of equal waves, as tracked vehicles are tried on: z(t) = h/2 sin(2 pi V t/a), `sine` by other measures.
+
+    The usual measures of a wave are its height from trough to crest and its length from crest to crest; the amplitude
+    is half the height (the source takes the whole height by mistake).
+
+    >>> import jax.numpy as jnp
+    >>> course = wave_course(0.15, length=6.0, speed=12 / 3.6)
+    >>> round(float(course.frequency), 3)
+    0.556
+    >>> z = course.height(jnp.linspace(0.0, 3.6, 201))
+    >>> round(float(z.max() - z.min()), 6)
+    0.15
+
+    Args:
+        height: h, from trough to crest [m]; 0.1 to 0.2 m in the source.
+        length: a, from crest to crest [m]; 5 to 8 m in the source.
+        speed: V, the speed of the vehicle [m/s].
+        ramp: The time [s] over which the road fades in as a raised cosine; 0 turns it off.
+
+    Raises:
+        ValueError: If `length` or `speed` is not positive, if `height` is not finite, or if `ramp` is negative.
+
+    Source: identification of the shock absorbers of an M113, equation 17: f = V/a, 0.556 Hz for 12 km/h and 6 m.
+    """
+    _checks.finite("height", height)
+    _checks.positive("length", length)
+    return sine(0.5 * height, wavelength=length, speed=speed, ramp=ramp)

@@ -6,7 +6,6 @@ from typing import final
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
@@ -15,19 +14,12 @@ from jaxdamp.roads._cosine_sum import cosine_sum
 from jaxdamp.roads._fade import fade_in
 from jaxdamp.roads._seed import random_key
 from jaxdamp.roads.base import AbstractRoad
-
-
-REFERENCE_SPATIAL_FREQUENCY = 0.1  # n0 [cycle/m]
-
-ROUGHNESS_PSD = {road_class: 16e-6 * 4.0**k for k, road_class in enumerate("ABCDEFGH")}
-"""Geometric mean of G_d(n0) [m^3] of each class; the limit between two classes is twice the lower mean."""
-
-
-def displacement_psd(
-    spatial_frequency: Float[Array, " lines"], roughness_psd: Scalar, waviness: Scalar
-) -> Float[Array, " lines"]:
-    """G_d(n) = G_d(n0) (n/n0)^-w [m^3], one-sided, n in cycle/m (not rad/m), n0 = 0.1 cycle/m. Source: ISO 8608."""
-    return roughness_psd * (spatial_frequency / REFERENCE_SPATIAL_FREQUENCY) ** -waviness
+from jaxdamp.roads.iso_classes import (
+    HIGHEST_SPATIAL_FREQUENCY,
+    LOWEST_SPATIAL_FREQUENCY,
+    displacement_psd,
+    roughness,
+)
 
 
 @final
@@ -65,11 +57,6 @@ class Iso8608(AbstractRoad):
         return jnp.sqrt((upper - lower) / 3.0 * (ends[0] + 4.0 * ends[1] + ends[2]))
 
     @property
-    def grid(self) -> None:
-        """A formula has no samples."""
-        return None
-
-    @property
     def duration(self) -> float | None:
         """The time [s] after which the road repeats."""
         speed = _checks.concrete(self.speed)
@@ -83,8 +70,8 @@ def iso8608(
     *,
     seed: int | Array,
     waviness: ScalarLike | int = 2.0,
-    minimum_spatial_frequency: float = 0.011,
-    maximum_spatial_frequency: float = 2.83,
+    minimum_spatial_frequency: float = LOWEST_SPATIAL_FREQUENCY,
+    maximum_spatial_frequency: float = HIGHEST_SPATIAL_FREQUENCY,
     length: float | int | None = None,
     ramp: float | int = 0.5,
 ) -> Iso8608:
@@ -102,7 +89,8 @@ def iso8608(
     motion on several seeds.
 
     Differentiable in `speed`, `waviness` and a numeric `road_class`; the same ground is then driven faster or is
-    rougher.
+    rougher. `two_track` adds the right-hand track, `delayed` the rear axle; `iso8608_filtered` is the road made by a
+    shaping filter instead.
 
     >>> import jax.numpy as jnp
     >>> road = iso8608("C", speed=20.0, seed=1, ramp=0.0)
@@ -165,24 +153,6 @@ def iso8608(
 def _first_and_last(band: tuple[float, float], length: float) -> tuple[int, int]:
     """The multiples of 1/length whose own bands of that width cover the whole band."""
     return math.floor(band[0] * length + 0.5 + 1e-9), math.ceil(band[1] * length - 0.5 - 1e-9)
-
-
-def roughness(road_class: str | ScalarLike) -> ScalarLike:
-    """G_d(n0) [m^3] of a class, or the number itself."""
-    if not isinstance(road_class, str):
-        _checks.positive("road_class", road_class, "As a number it is G_d(n0) in m^3, for example 64e-6.")
-        value = _checks.concrete(road_class)
-        if value is not None and np.any(value >= 1.0):
-            _checks.refuse(
-                "road_class", "be below 1 m^3", value, "Tables give G_d(n0) in 1e-6 m^3: write 256e-6, not 256."
-            )
-        return road_class
-    if road_class not in ROUGHNESS_PSD:
-        letters = [letter for letter in road_class.upper() if letter in ROUGHNESS_PSD]
-        near = letters[-1] if letters else "H" if road_class.upper() > "H" else "A"
-        choices = ", ".join(map(repr, ROUGHNESS_PSD))
-        _checks.refuse("road_class", f"be one of {choices}, or a number", repr(road_class), f"Did you mean {near!r}?")
-    return ROUGHNESS_PSD[road_class]
 
 
 def _repeat_length(

@@ -26,8 +26,7 @@ def from_profile(
     """A road from measured or computed heights at equal spacing, with straight lines between the samples.
 
     The vehicle is at the first sample at time 0, whatever its position is called. Differentiable in `height` and
-    `speed`
-    (the slope jumps at each sample, so the gradient in speed is that of the piecewise linear road).
+    `speed` (the slope jumps at each sample, so the gradient in speed is that of the piecewise linear road).
 
     A road that is not periodic ends with its last sample: asking for later times raises a `ValueError`, and gives NaN
     inside compiled code, where times cannot be inspected.

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike
-from jaxdamp.roads.iso_roughness import REFERENCE_SPATIAL_FREQUENCY, roughness
+from jaxdamp.roads.iso_classes import REFERENCE_SPATIAL_FREQUENCY, roughness
 
 
 @final

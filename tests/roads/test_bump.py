@@ -3,7 +3,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxdamp.roads import cosine_bump
+from jaxdamp.roads import cosine_bump, half_sine_bump, pothole, step, trapezoid_bump, triangular_bump
 
 
 def test_closed_form_of_the_paper():
@@ -39,6 +39,43 @@ def test_a_formula_has_neither_grid_nor_end():
     bump = cosine_bump(0.06, duration=0.25)
     assert bump.grid is None
     assert bump.duration is None
+
+
+def curvature_jump(road, spacing):
+    """The greatest change of the second difference quotient between neighbours `spacing` [s] apart."""
+    z = np.asarray(road.height(np.arange(0.5, 2.5, spacing))[:, 0])
+    return np.max(np.abs(np.diff(z, 3))) / spacing**2
+
+
+# The change of curvature over h falls like h where the curvature is continuous (ratio 1/4 for a quarter of h), stays
+# where it jumps, and grows like 1/h where the slope jumps. Third derivatives of 1e5 H/T^3 leave h = 2e-4 T far inside.
+@pytest.mark.parametrize(
+    ("road", "low", "high"),
+    [
+        (cosine_bump(0.06, duration=1.0, smooth=True), 0.2, 0.3),
+        (half_sine_bump(0.06, duration=1.0, rounding=0.1), 0.2, 0.3),
+        (trapezoid_bump(0.06, duration=1.0, rounding=0.1), 0.2, 0.3),
+        (triangular_bump(0.06, duration=1.0, rounding=0.2), 0.2, 0.3),
+        (pothole(0.06, duration=1.0, edge=0.1), 0.2, 0.3),
+        (step(0.06, ramp=0.5, smooth=True), 0.2, 0.3),
+        (cosine_bump(0.06, duration=1.0), 0.9, 1.1),
+        (step(0.06, ramp=0.5), 0.9, 1.1),
+        (half_sine_bump(0.06, duration=1.0), 3.0, 5.0),
+        (trapezoid_bump(0.06, duration=1.0), 3.0, 5.0),
+        (triangular_bump(0.06, duration=1.0), 3.0, 5.0),
+    ],
+)
+def test_curvature_is_continuous_where_stated(road, low, high):
+    ratio = curvature_jump(road, 2e-4) / curvature_jump(road, 8e-4)
+    assert low < ratio < high
+
+
+def test_smooth_cosine_has_the_same_crest_and_ends_and_stated_acceleration():
+    bump = cosine_bump(0.06, start=1.0, duration=0.25, smooth=True)
+    np.testing.assert_allclose(bump.height(jnp.array([1.0, 1.0625, 1.125, 1.25]))[:, 0], [0, 0.03, 0.06, 0], atol=1e-16)
+    z = np.asarray(bump.height(np.arange(0.9, 1.4, 1e-5))[:, 0])
+    acceleration = np.diff(z, 2) / 1e-10
+    assert acceleration.max() == pytest.approx(40 * 0.06 / (np.sqrt(3) * 0.25**2), rel=1e-4)  # rounding 1e-17/1e-10
 
 
 @pytest.mark.parametrize(

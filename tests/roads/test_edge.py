@@ -16,6 +16,13 @@ def test_level_before_and_after():
     np.testing.assert_allclose(height, [0.0, 0.0, -0.05, -0.05], atol=1e-17)
 
 
+def test_smooth_is_the_quintic():
+    time = np.linspace(0.0, 2.0, 2001)
+    s = np.clip((time - 0.8) / 0.3, 0, 1)
+    expected = 0.05 * (6 * s**5 - 15 * s**4 + 10 * s**3)
+    np.testing.assert_allclose(step(0.05, start=0.8, ramp=0.3, smooth=True).height(time)[:, 0], expected, atol=1e-16)
+
+
 def test_a_formula_has_neither_grid_nor_end():
     assert step(0.05).grid is None
     assert step(0.05).duration is None

@@ -2,7 +2,7 @@ import jax
 import numpy as np
 import pytest
 
-from jaxdamp.roads import sine
+from jaxdamp.roads import sine, wave_course
 
 
 TIME = np.linspace(0.0, 4.0, 1001)
@@ -34,6 +34,14 @@ def test_gradient_in_speed_equals_closed_form():
 def test_has_neither_an_end_nor_samples():
     assert sine(0.01, frequency=2.0).duration is None
     assert sine(0.01, frequency=2.0).grid is None
+
+
+def test_wave_course_swings_by_half_its_height():
+    # 6 m long, 0.15 m from trough to crest, 12 km/h: 0.556 Hz, one wave in 1.8 s
+    course = wave_course(0.15, length=6.0, speed=12 / 3.6)
+    np.testing.assert_allclose(course.height(np.array([0.45, 1.35, 1.8]))[:, 0], [0.075, -0.075, 0.0], atol=1e-15)
+    with pytest.raises(ValueError, match=r"`length` must be positive and finite, but is 0.0"):
+        wave_course(0.15, length=0.0, speed=3.0)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,88 @@
+"""One road after another."""
+
+from typing import final
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, SignalLike
+from jaxdamp.roads._composed import least
+from jaxdamp.roads.base import AbstractRoad
+
+
+@final
+class Joined(AbstractRoad):
+    """A road that goes over into another one; made by `joined`."""
+
+    first: AbstractRoad
+    second: AbstractRoad
+    at: Scalar
+
+    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
+        """The height [m] at each `time` [s]; see `joined`."""
+        time = jnp.asarray(time, self.at.dtype)
+        before = self.first.height(jnp.minimum(time, self.at))
+        after = self.second.height(jnp.maximum(time - self.at, 0.0))
+        return before + after - self.second.height(jnp.zeros(1, time.dtype))
+
+    @property
+    def wheels(self) -> int:
+        """That of both roads."""
+        return self.first.wheels
+
+    @property
+    def grid(self) -> float | None:
+        """The finer of the two grids [s]."""
+        return least([self.first.grid, self.second.grid])
+
+    @property
+    def duration(self) -> float | None:
+        """The time [s] at which the second road ends or repeats."""
+        at, rest = _checks.concrete(self.at), self.second.duration
+        return None if at is None or rest is None else float(at) + rest
+
+    @property
+    def span(self) -> tuple[Scalar | float, Scalar | float]:
+        """From the beginning of the first road to the end of the second [s]."""
+        return self.first.span[0], self.at + self.second.span[1]
+
+
+def joined(first: AbstractRoad, second: AbstractRoad, *, at: ScalarLike | int | None = None) -> Joined:
+    """Drive over `first` up to the time t1, then over `second` from its own time 0, without a step between them.
+
+    z(t) = z1(t) up to t1, then z1(t1) + z2(t - t1) - z2(0): the second road is raised to where the first one stopped.
+    Its `ramp`, if it has one, fades it in there. Several roads join in turn: joined(joined(a, b), c). Differentiable
+    in `at` and in whatever the two roads are differentiable in.
+
+    >>> import jax.numpy as jnp
+    >>> from jaxdamp.roads import from_profile, step
+    >>> kerb, field = step(0.1, start=0.5), from_profile(jnp.arange(3.0), jnp.array([1.0, 1.2, 1.0]))
+    >>> road = joined(kerb, field, at=2.0)
+    >>> road.height(jnp.array([0.0, 1.0, 2.0, 3.0, 4.0]))[:, 0].round(6)
+    Array([0. , 0.1, 0.1, 0.3, 0.1], dtype=float64)
+    >>> road.duration
+    4.0
+
+    Args:
+        first: A road.
+        second: A road with as many tracks.
+        at: t1 [s]; by default the time at which the first road ends or repeats.
+
+    Raises:
+        ValueError: If the roads have different numbers of tracks, if `at` is negative or beyond the end of the first
+            road, or if it is left out where the first road has no end.
+    """
+    if first.wheels != second.wheels:
+        remedy = "Join single tracks first and use `two_track` and `delayed` on the result."
+        _checks.refuse("second", f"have {first.wheels} tracks, as `first` has", second.wheels, remedy)
+    if at is None:
+        at = first.duration
+    if at is None:
+        _checks.refuse("at", "be given where `first` has no end of its own", at, "Give the time in s.")
+    _checks.nonnegative("at", at)
+    time, end = _checks.concrete(at), _checks.concrete(first.span[1])
+    if time is not None and end is not None and np.any(time > end * (1.0 + 1e-9)):
+        _checks.refuse("at", f"lie within `first`, which ends at {float(end):.6g} s", f"{time} s", "Leave it out.")
+    return Joined(first, second, jnp.asarray(at, float))

@@ -1,0 +1,98 @@
+"""Two tracks beside each other."""
+
+from typing import final
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import ScalarLike, SignalLike
+from jaxdamp.roads._composed import AbstractOnSeveralRoads
+from jaxdamp.roads._seed import random_key
+from jaxdamp.roads.base import AbstractRoad
+from jaxdamp.roads.coherency import coherency
+from jaxdamp.roads.iso_roughness import Iso8608
+
+
+@final
+class TwoTrack(AbstractOnSeveralRoads):
+    """A left-hand and a right-hand track; made by `two_track`."""
+
+    roads: tuple[AbstractRoad, AbstractRoad]
+
+    def height(self, time: SignalLike) -> Float[Array, "time 2"]:
+        """The heights [m] at each `time` [s], left then right."""
+        return jnp.concatenate([track.height(time) for track in self.roads], axis=1)
+
+    @property
+    def wheels(self) -> int:
+        """Left and right."""
+        return 2
+
+
+def two_track(
+    left: AbstractRoad,
+    right: AbstractRoad | None = None,
+    *,
+    track_width: ScalarLike | int | None = None,
+    seed: int | Array | None = None,
+) -> TwoTrack:
+    """A road with a left-hand and a right-hand track, in this order; follow it with `delayed` for several axles.
+
+    Either give both tracks: any two roads with one track each, for example a pothole on the right and level ground on
+    the left. Or give a random road of `iso8608` and the `track_width` B: the right-hand track is then another random
+    road of the same spectrum, alike in long waves and independent in short ones, as on a surface without a preferred
+    direction (see `coherency`).
+
+    For the latter each cosine keeps its amplitude and has its phase shifted by arccos(gamma(n)), to a random side.
+    So every realisation, not only their average, has exactly the spectrum G_d of the class in both tracks,
+    G_d (1 + gamma)/2 in their mean (heave) and 2 G_d (1 - gamma) in their difference (roll); the coherence over bands
+    of many cosines is gamma^2. Differentiable in `track_width` and in what the road is differentiable in.
+
+    >>> import jax.numpy as jnp
+    >>> from jaxdamp.roads import delayed, iso8608
+    >>> road = two_track(iso8608("C", speed=20.0, seed=1), track_width=1.5, seed=2)
+    >>> road.height(jnp.linspace(0.0, 10.0, 1001)).shape
+    (1001, 2)
+    >>> delayed(road, positions=[0.0, 2.7], speed=20.0).wheels  # front-left, front-right, rear-left, rear-right
+    4
+
+    Args:
+        left: The road under the left wheels, with a single track.
+        right: The road under the right wheels, with a single track; the same object for a symmetric road.
+        track_width: B [m], the distance between the tracks, for a right-hand track made from `left`.
+        seed: A whole number, or a JAX random key, for the right-hand track: with `track_width` only.
+
+    Raises:
+        ValueError: If not exactly one of `right` and `track_width` is given, if a road has several tracks, if
+            `track_width` is not positive or comes without `seed`, or if it is given for a road that is not made by
+            `iso8608`.
+    """
+    for name, road in (("left", left), ("right", right)):
+        if road is not None and road.wheels != 1:
+            remedy = (
+                "First put the tracks beside each other, then the axles behind each other: delayed(two_track(...))."
+            )
+            _checks.refuse(name, "be a road with a single track", f"one with {road.wheels}", remedy)
+    if (right is None) == (track_width is None):
+        both = "neither was given" if right is None else f"a road, and track_width {track_width} m as well"
+        _checks.refuse("right", "be given, or `track_width` with `seed`, but not both", both, "Give exactly one.")
+    if right is not None:
+        if seed is not None:
+            _checks.refuse(
+                "seed", "be left out when `right` is given", seed, "It is for a track made by `track_width`."
+            )
+        return TwoTrack((left, right))
+    if not isinstance(left, Iso8608):
+        remedy = "Give the second track as `right`."
+        _checks.refuse("left", "be a road made by `iso8608` with `track_width`", f"a {type(left).__name__}", remedy)
+    _checks.positive("track_width", track_width, "It is in m.")
+    if seed is None:
+        _checks.refuse("seed", "be given with `track_width`", seed, "Any whole number: another one, another road.")
+    gamma = coherency(left.spatial_frequency, track_width, left.waviness)
+    # at 1, which gamma reaches only for a vanishing track, arccos has no slope
+    shift = jnp.arccos(jnp.minimum(gamma, 1.0 - 4.0 * float(jnp.finfo(gamma.dtype).eps)))
+    side = jax.random.rademacher(random_key(seed), gamma.shape, gamma.dtype)
+    return TwoTrack((left, eqx.tree_at(lambda road: road.phase, left, left.phase + side * shift)))

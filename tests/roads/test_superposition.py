@@ -1,0 +1,23 @@
+import numpy as np
+import pytest
+
+from jaxdamp.roads import cosine_bump, from_profile, iso8608, sine, superposed, two_track
+
+
+def test_heights_add_and_the_shortest_road_ends_it():
+    record = from_profile(0.1 * np.arange(100), 0.01 * np.sin(np.arange(100.0)), speed=10.0)
+    surface = iso8608("C", 10.0, seed=1, length=200.0)
+    road = superposed(record, surface, cosine_bump(0.1, start=0.2, duration=0.3))
+    time = np.linspace(0.0, 0.9, 50)
+    np.testing.assert_allclose(road.height(time), sum(part.height(time) for part in road.roads), atol=1e-16)
+    assert road.duration == pytest.approx(0.99) and road.grid == pytest.approx(0.01)
+    assert [float(t) for t in road.span] == pytest.approx([0.0, 0.99])
+
+
+def test_tracks_must_be_equal():
+    wave = sine(0.01, frequency=1.0)
+    assert superposed(two_track(wave, wave), two_track(wave, wave)).wheels == 2
+    with pytest.raises(ValueError, match=r"`roads` must have equal numbers of tracks, but is \[2, 1\]"):
+        superposed(two_track(wave, wave), wave)
+    with pytest.raises(ValueError, match=r"`roads` must hold at least one road"):
+        superposed()
