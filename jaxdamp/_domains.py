@@ -54,6 +54,8 @@ def _increasing_to_raw_positive(value: Array, scale: Array) -> Array:
 
 
 real = Domain("real", lambda a: True, lambda raw, scale: scale * raw, lambda value, scale: value / scale)
+# Weights of a network: their magnitude at the start says nothing about how far they should move.
+weight = dataclasses.replace(real, from_raw=lambda raw, scale: raw, to_raw=lambda value, scale: value)
 positive = Domain(
     "positive",
     lambda a: bool(np.all(a > 0)),
@@ -86,6 +88,11 @@ increasing_negative = Domain(
     steps=lambda value: jnp.diff(value, append=jnp.zeros(1, value.dtype)),
 )
 # For settings that hold the two ends of a range.
+ends = dataclasses.replace(
+    increasing,
+    name="a low and a high end",
+    contains=lambda a: a.shape == (2,) and bool(a[0] < a[1]),
+)
 around_zero = dataclasses.replace(
     increasing,
     name="a low and a high end with zero between them",

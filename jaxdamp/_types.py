@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     ScalarLike: TypeAlias = Any
     Number: TypeAlias = Any
     Vector: TypeAlias = Any
+    Matrix: TypeAlias = Any
 else:
     ScalarLike = Float[ArrayLike, ""]
     Number = Scalar
     Vector = Float[Array, " _"]
+    Matrix = Float[Array, "_ _"]

@@ -23,6 +23,7 @@ from jaxdamp import _checks
 from jaxdamp._domains import (
     Domain,
     around_zero,
+    ends,
     increasing,
     increasing_negative,
     interval,
@@ -30,6 +31,7 @@ from jaxdamp._domains import (
     ordered_interval,
     positive,
     real,
+    weight,
 )
 
 
@@ -40,6 +42,7 @@ __all__ = [
     "around_zero",
     "as_float",
     "check_parameters",
+    "ends",
     "free_parameters",
     "get",
     "increasing",
@@ -55,6 +58,7 @@ __all__ = [
     "real",
     "replace",
     "setting",
+    "weight",
 ]
 
 
@@ -81,9 +85,12 @@ def parameter(
     return eqx.field(converter=as_float, metadata={"parameter": metadata}, **field)
 
 
-def setting(unit: str, meaning: str, domain: Domain = real, **field: Any) -> Any:
-    """Declare a field that is a number with a unit but never changed by a fit or a tuning, such as a knee width."""
-    metadata = {"unit": unit, "meaning": meaning, "domain": domain}
+def setting(unit: str, meaning: str, domain: Domain = real, *, command: bool = False, **field: Any) -> Any:
+    """Declare a field that is a number with a unit but never changed by a fit or a tuning, such as a knee width.
+
+    A `command` is set from outside, run by run, such as a coil current (`dampers.with_command`).
+    """
+    metadata = {"unit": unit, "meaning": meaning, "domain": domain, "command": command}
     return eqx.field(converter=as_float, metadata={"setting": metadata}, **field)
 
 

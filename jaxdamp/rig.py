@@ -1,5 +1,7 @@
 """The bench: the force of a law under a prescribed stroke, and at constant velocity."""
 
+from typing import TYPE_CHECKING
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -8,12 +10,28 @@ from jaxtyping import Array, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp._types import Signal, SignalLike
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, Sum
+from jaxdamp.dampers.coverage import refuse_gaps
 from jaxdamp.parameters import as_float
 
 
+if TYPE_CHECKING:
+    import diffrax
+
+
+_STIFF = "Stiff laws need an implicit solver, `diffrax.Kvaerno5()`, or their own steps, which `method='step'` takes."
+
+
 def respond(
-    law: AbstractDamper, time: SignalLike, stroke: SignalLike, velocity: SignalLike | None = None, *, substeps: int = 1
+    law: AbstractDamper,
+    time: SignalLike,
+    stroke: SignalLike,
+    velocity: SignalLike | None = None,
+    *,
+    substeps: int = 1,
+    method: "str | diffrax.AbstractSolver" = "step",
+    rtol: float = 1e-8,
+    atol: float = 1e-10,
 ) -> Signal:
     """Force [N] of a damper law whose stroke is prescribed, as on a test bench.
 
@@ -28,12 +46,19 @@ def respond(
             differences, which is only good for a stroke without noise.
         substeps: steps from one instant to the next for laws with states, between which stroke and velocity are
             interpolated by cubics. The error of a step falls with its square.
+        method: `"step"`, the steps that the laws bring; or any adaptive diffrax solver of their rates, such as
+            `diffrax.Kvaerno5()`, as reference for stiff laws. Then the stroke between two instants is the cubic with
+            the velocities at its ends.
+        rtol: relative tolerance of a solver.
+        atol: absolute tolerance of a solver, in the units of the states.
 
     Returns:
         Force [N], positive when it resists extension, shape (time,).
 
     Raises:
-        ValueError: time not uniform or not increasing, shapes that differ, fewer than two instants.
+        ValueError: time not uniform or not increasing, shapes that differ, fewer than two instants; a stroke outside
+            the limits of a law (`law.stroke_limits`); a force that is not finite, as where the motion leaves the data
+            that a law was made from; a solver that gives up.
 
     >>> from jaxdamp.dampers import Linear
     >>> time = np.linspace(0.0, 1.0, 1001)
@@ -60,7 +85,56 @@ def respond(
             _checks.refuse("time", "increase in equal steps", value, "Resample the record to a uniform rate.")
     dt = (time[-1] - time[0]) / (time.size - 1)
     rate = jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else as_float(velocity)
-    return march(law, dt, stroke, rate, substeps)
+    _refuse_strokes(law, stroke)
+    if isinstance(method, str) and method != "step":
+        _checks.refuse("method", "be 'step' or a diffrax solver", repr(method), "Pass `method=diffrax.Kvaerno5()`.")
+    if isinstance(method, str) or not law.initial_state().size:
+        force = march(law, dt, stroke, rate, substeps)
+    else:
+        force = _solve(law, time, stroke, rate, substeps, method, rtol, atol)
+    refuse_gaps(law, force, "over the whole motion")
+    return force
+
+
+def _refuse_strokes(law: AbstractDamper, stroke: Signal) -> None:
+    """Refuse strokes outside the limits of a law, or of one in a sum (inside other laws the stroke is another)."""
+    found = _checks.concrete(stroke)
+    for part in law.terms if isinstance(law, Sum) else (law,):
+        limits = [_checks.concrete(limit) for limit in getattr(part, "stroke_limits", ())]
+        if found is None or not limits or any(limit is None for limit in limits):
+            continue
+        low, high = (float(limit) for limit in limits if limit is not None)
+        if found.min() < low or found.max() > high:
+            must = f"stay from {low:.4g} to {high:.4g} m for {type(part).__name__}"
+            value = f"from {found.min():.4g} to {found.max():.4g} m"
+            _checks.refuse("stroke", must, value, "The law's volumes are those at stroke zero: shift the stroke.")
+
+
+def _solve(
+    law: AbstractDamper,
+    time: Signal,
+    stroke: Signal,
+    velocity: Signal,
+    substeps: int,
+    solver: "diffrax.AbstractSolver",
+    rtol: float,
+    atol: float,
+) -> Signal:
+    """`march` by a solver of diffrax."""
+    import diffrax
+
+    from jaxdamp._driven import driven_states
+
+    if substeps != 1:
+        _checks.refuse("substeps", "be left out for a solver, which chooses its own", substeps)
+    _checks.positive("rtol", rtol)
+    _checks.positive("atol", atol)
+    states, result = driven_states(law.state_rate, law.initial_state(), time, stroke, velocity, solver, rtol, atol)
+    last = _checks.concrete(states[-1])
+    if last is not None and not np.all(np.isfinite(last)):
+        said = diffrax.RESULTS[result] or "finished with states that are not finite"
+        _checks.refuse("method", "reach the end", f"{type(solver).__name__}, which says: {said}", _STIFF)
+    return jax.vmap(law.force)(stroke, velocity, states)
 
 
 def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.ndarray) -> Float[Array, " points"]:
@@ -73,7 +147,8 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
         velocities: velocities [m/s], shape (points,).
 
     Raises:
-        ValueError: velocities that are not finite numbers in one dimension; a force that does not settle in 64 s.
+        ValueError: velocities that are not finite numbers in one dimension; a force that does not settle in 64 s; a
+            force that is not finite, as beyond the data that a law was made from.
 
     >>> from jaxdamp.dampers import Linear, SeriesSpring
     >>> quasi_static(SeriesSpring(Linear(2000.0), stiffness=1e6), np.array([-0.5, 0.0, 0.5]))
@@ -85,12 +160,14 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     _checks.finite("velocities", velocities)
     force = _hold(law, velocities, jnp.asarray(0))
     if law.initial_state().size == 0:
+        refuse_gaps(law, force, "at these velocities")
         return force
     tolerance = 1e-3 if force.dtype == jnp.float32 else 1e-9
     for seconds in (1, 2, 4, 8, 16, 32, 64):
         before, force = force, _hold(law, velocities, jnp.asarray(1000 * seconds))
         if np.max(np.abs(force - before)) <= tolerance * np.max(np.abs(force)):
             return force
+    refuse_gaps(law, force, "at these velocities")
     remedy = "Its force depends on how long it has moved: take `respond` with the motion that you mean."
     _checks.refuse("law", "settle at constant velocity", f"{law} with forces {before} N, then {force} N", remedy)
 

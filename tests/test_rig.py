@@ -1,3 +1,4 @@
+import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -111,6 +112,45 @@ def test_refusals(change, message):
     lengths = {np.shape(arguments[name]) for name in ("time", "stroke", "velocity")}
     with pytest.raises((ValueError, TypeError), match=message if len(lengths) == 1 else None):
         respond(Linear(1.0), **arguments)
+
+
+# ---- solvers of diffrax
+
+
+def test_a_solver_finds_the_same_force():
+    t, x, v = sine(1e-3)
+    law = Lag(Linear(1500.0), 0.01) + SeriesSpring(Bilinear(2600.0, 1200.0, 0.02), 4e5)
+    found = respond(law, t, x, v, method=diffrax.Kvaerno5(), rtol=1e-9, atol=1e-12)
+    fine = np.asarray(respond(law, t, x, v, substeps=16))
+    np.testing.assert_allclose(found, fine, atol=1e-4 * np.max(np.abs(fine)))
+
+
+def test_a_solver_is_not_needed_without_states():
+    t, x, v = sine(1e-3)
+    solved = respond(Bilinear(2600.0, 1200.0), t, x, v, method=diffrax.Tsit5())
+    np.testing.assert_array_equal(solved, respond(Bilinear(2600.0, 1200.0), t, x, v))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            {"method": "implicit"},
+            r"`method` must be 'step' or a diffrax solver, but is 'implicit'. Pass `method=diffrax",
+        ),
+        ({"method": diffrax.Tsit5(), "substeps": 2}, "`substeps` must be left out for a solver"),
+        ({"method": diffrax.Tsit5(), "rtol": 0.0}, "`rtol` must be positive"),
+        ({"method": diffrax.Tsit5(), "atol": -1.0}, "`atol` must be positive"),
+        (
+            {"method": diffrax.Tsit5()},
+            r"`method` must reach the end, but is Tsit5, which says: .*maximum number.*Kvaerno5",
+        ),
+    ],
+)
+def test_a_solver_that_cannot_work_says_so(options, message):
+    t, x, v = (a[:3] for a in sine(1e-3))
+    with pytest.raises(ValueError, match=message):
+        respond(Lag(Linear(1.0), 1e-9), t, x, v, **options)
 
 
 # ---- constant velocity

@@ -2,6 +2,8 @@
 
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from fnmatch import fnmatchcase
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Column, find_columns
 from jaxdamp.bench.files import find_files
 from jaxdamp.bench.motion import Samples
-from jaxdamp.bench.runs import FILE_MARK, NOTE_MARK, BenchRun
+from jaxdamp.bench.runs import COMMAND_MARK, FILE_MARK, NOTE_MARK, BenchRun
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.tables import Table, read_table
 from jaxdamp.bench.units import is_unit
@@ -27,6 +29,7 @@ def read(
     units: Mapping[str, str] | None = None,
     sampling_rate: float | int | None = None,
     delimiter: str | None = None,
+    command: float | Mapping[str, float] | None = None,
 ) -> BenchSet:
     r"""Read bench records from text files.
 
@@ -47,6 +50,8 @@ def read(
         units: quantity to unit, where the header has none or a wrong one.
         sampling_rate: samples per second [Hz], for files without a time column.
         delimiter: the character between columns, if the search fails.
+        command: what was set on the damper and held, such as a coil current: one number for all files, or a number for
+            each record by name or pattern, such as `{"*_0.5A": 0.5, "*_1.0A": 1.0}`.
 
     Returns:
         The records, named after their files, in the order of the paths, folders and patterns in natural order.
@@ -78,7 +83,25 @@ def read(
         table = read_table(file, delimiter, is_unit)
         found = find_columns(table, columns, units)
         runs.append(_record(table, found, name, sign, force_sign, sampling_rate))
-    return BenchSet(runs)
+    return BenchSet(_commanded(runs, command))
+
+
+def _commanded(runs: list[BenchRun], command: float | Mapping[str, float] | None) -> list[BenchRun]:
+    """The records with the commands given."""
+    if command is None:
+        return runs
+    if not isinstance(command, Mapping):
+        return [replace(run, command=command) for run in runs]
+    fitting = {run.name: [key for key in command if fnmatchcase(run.name, key)] for run in runs}
+    unused = [key for key in command if not any(key in keys for keys in fitting.values())]
+    if unused:
+        names = ", ".join(fitting)
+        _checks.refuse("command", "name records that are read", ", ".join(map(repr, unused)), f"There are {names}.")
+    doubtful = [f"{name} ({len(keys)})" for name, keys in fitting.items() if len(keys) != 1]
+    if doubtful:
+        must = "fit each record with exactly one pattern"
+        _checks.refuse("command", must, f"fitting otherwise for {', '.join(doubtful)}")
+    return [replace(run, command=command[fitting[run.name][0]]) for run in runs]
 
 
 def _record(
@@ -112,6 +135,7 @@ def _record(
     if velocity is None or not own:
         velocity, how = _velocity(time, stroke, velocity, where)
     earlier = [line.strip().removeprefix(NOTE_MARK) for line in table.preamble if line.startswith(NOTE_MARK)]
+    stated = [line.removeprefix(COMMAND_MARK) for line in table.preamble if own and line.startswith(COMMAND_MARK)]
     return BenchRun(
         name,
         time,
@@ -119,6 +143,7 @@ def _record(
         _turned(velocity, decision.motion),
         _turned(force, decision.force),
         temperature=channels.get("temperature"),
+        command=float(stated[0]) if stated else None,
         source=where,
         notes=(*earlier, *notes, *decision.notes, how),
     )

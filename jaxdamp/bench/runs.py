@@ -18,6 +18,7 @@ from jaxdamp.bench.velocity import estimate_velocity
 
 FILE_MARK = "# jaxdamp bench record: stroke and velocity positive in extension, force positive resisting it"
 NOTE_MARK = "# note: "
+COMMAND_MARK = "# command: "
 _HEADERS = {"time": "time [s]", "stroke": "stroke [m]", "velocity": "velocity [m/s]", "force": "force [N]"}
 
 
@@ -44,6 +45,8 @@ class BenchRun:
         velocity: [m/s], shape (time,).
         force: [N], shape (time,).
         temperature: [K], shape (time,), if it was measured.
+        command: what was set on the damper for this record and held: coil current, voltage, clicks, in a unit of your
+            choice; for laws that take a command (`dampers.with_command`).
         source: the file, or what else the record comes from.
         notes: sentences on what was done to the data.
 
@@ -64,6 +67,7 @@ class BenchRun:
     velocity: Float[np.ndarray, " time"]
     force: Float[np.ndarray, " time"]
     temperature: Float[np.ndarray, " time"] | None = None
+    command: float | None = None
     source: str = ""
     notes: tuple[str, ...] = ()
 
@@ -76,6 +80,9 @@ class BenchRun:
             sampling.check_numbers(values, channel, where)
             values.setflags(write=False)
             object.__setattr__(self, channel, values)
+        if self.command is not None:
+            _checks.finite("command", np.asarray(self.command))
+            object.__setattr__(self, "command", float(self.command))
         object.__setattr__(self, "notes", tuple(self.notes))
         sampling.check_count(len(self.time), where)
         sampling.check_time(self.time, where)
@@ -91,6 +98,7 @@ class BenchRun:
         velocity: ArrayLike | None = None,
         *,
         temperature: ArrayLike | None = None,
+        command: float | None = None,
         source: str = "",
         notes: Iterable[str] = (),
     ) -> "BenchRun":
@@ -102,7 +110,7 @@ class BenchRun:
             notes = (*notes, how)
         velocity, time = _column("velocity", velocity, count), _column("time", time, count)
         warm = None if temperature is None else _column("temperature", temperature, count)
-        return cls(name, time, stroke, velocity, force, temperature=warm, source=source, notes=notes)
+        return cls(name, time, stroke, velocity, force, temperature=warm, command=command, source=source, notes=notes)
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -178,6 +186,7 @@ class BenchRun:
         """The figures of the record in SI, one row of the set's table."""
         return {
             "name": self.name,
+            "command": self.command,
             "samples": len(self),
             "sampling_rate": self.sampling_rate,
             "cycles": self.cycles,
@@ -203,6 +212,8 @@ class BenchRun:
         if self.temperature is not None:
             warm = self.temperature - 273.15
             lines.append(f"  temperature  {warm.min():.1f} … {warm.max():.1f} °C")
+        if self.command is not None:
+            lines.append(f"  command      {self.command:g}")
         return "\n".join(lines + [f"  - {note}" for note in self.notes])
 
     def __repr__(self) -> str:
@@ -218,7 +229,9 @@ class BenchRun:
         header = list(_HEADERS.values())
         if self.temperature is not None:
             channels, header = [*channels, self.temperature], [*header, "temperature [K]"]
-        lines = [FILE_MARK, *(NOTE_MARK + " ".join(note.split()) for note in self.notes), ",".join(header)]
+        command = [] if self.command is None else [f"{COMMAND_MARK}{self.command!r}"]
+        notes = [NOTE_MARK + " ".join(note.split()) for note in self.notes]
+        lines = [FILE_MARK, *command, *notes, ",".join(header)]
         lines += [",".join(map(repr, row)) for row in np.stack(channels, axis=1).tolist()]
         path = Path(path)
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -33,6 +33,8 @@ LAWS = {
     "besinger_lag": Law(True, "besinger behind a first-order lag"),
     "besinger_series_spring": Law(True, "besinger in series with a spring: mount, bushing or oil column"),
     "linear_friction_lag": Law(True, "linear_friction behind a first-order lag"),
+    "bouc_wen": Law(True, "one coefficient, friction that gives before it slides, a spring"),
+    "lugre_spring": Law(True, "friction that sticks, breaks away and slides, one coefficient, a spring"),
 }
 
 

@@ -4,29 +4,41 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 `law + law`, `2.0 * law`, `SeriesSpring(law, ...)`, `Lag(law, ...)`, `MotionRatio(law, ...)`.
 """
 
+from jaxdamp.dampers.acceleration_surface import AccelerationSurface
 from jaxdamp.dampers.base import AbstractDamper, AbstractMemoryless, AbstractStateful, AbstractStateless, Scaled, Sum
 from jaxdamp.dampers.besinger import Besinger
 from jaxdamp.dampers.bilinear import Bilinear
 from jaxdamp.dampers.bouc_wen import BoucWen
 from jaxdamp.dampers.bump_stop import BumpStop
+from jaxdamp.dampers.bushing import Bushing
+from jaxdamp.dampers.command import takes_command, with_command
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
 from jaxdamp.dampers.dahl import Dahl
 from jaxdamp.dampers.degressive import Degressive
 from jaxdamp.dampers.digressive_progressive import DigressiveProgressive
+from jaxdamp.dampers.force_surface import ForceSurface
+from jaxdamp.dampers.frequency_selective import FrequencySelective
 from jaxdamp.dampers.gas_spring import GasSpring
+from jaxdamp.dampers.hybrid import Hybrid
 from jaxdamp.dampers.hyperbolic_tangent import HyperbolicTangent
 from jaxdamp.dampers.karadayi_masada import KaradayiMasada
 from jaxdamp.dampers.lag import Lag
 from jaxdamp.dampers.linear import Linear
 from jaxdamp.dampers.lugre import LuGre
 from jaxdamp.dampers.modified_bouc_wen import ModifiedBoucWen
+from jaxdamp.dampers.mono_tube import MonoTube
 from jaxdamp.dampers.motion_ratio import MotionRatio
+from jaxdamp.dampers.neural_hysteresis import NeuralHysteresis
 from jaxdamp.dampers.piecewise_linear import PiecewiseLinear
+from jaxdamp.dampers.piston_flow import PistonFlow
 from jaxdamp.dampers.polynomial import Polynomial
 from jaxdamp.dampers.power_law import PowerLaw
 from jaxdamp.dampers.saturating import Saturating
+from jaxdamp.dampers.scheduled import Scheduled
 from jaxdamp.dampers.segmented_polynomial import SegmentedPolynomial
 from jaxdamp.dampers.series_spring import SeriesSpring
+from jaxdamp.dampers.spline_table import SplineTable
+from jaxdamp.dampers.spring import Spring
 from jaxdamp.dampers.stribeck_friction import StribeckFriction
 from jaxdamp.dampers.stroke_dependent import StrokeDependent
 from jaxdamp.dampers.table import Table
@@ -38,32 +50,45 @@ __all__ = [
     "AbstractMemoryless",
     "AbstractStateful",
     "AbstractStateless",
+    "AccelerationSurface",
     "Besinger",
     "Bilinear",
     "BoucWen",
     "BumpStop",
+    "Bushing",
     "CoulombFriction",
     "Dahl",
     "Degressive",
     "DigressiveProgressive",
+    "ForceSurface",
+    "FrequencySelective",
     "GasSpring",
+    "Hybrid",
     "HyperbolicTangent",
     "KaradayiMasada",
     "Lag",
     "Linear",
     "LuGre",
     "ModifiedBoucWen",
+    "MonoTube",
     "MotionRatio",
+    "NeuralHysteresis",
     "PiecewiseLinear",
+    "PistonFlow",
     "Polynomial",
     "PowerLaw",
     "Saturating",
     "Scaled",
+    "Scheduled",
     "SegmentedPolynomial",
     "SeriesSpring",
+    "SplineTable",
+    "Spring",
     "StribeckFriction",
     "StrokeDependent",
     "Sum",
     "Table",
     "TemperatureScaled",
+    "takes_command",
+    "with_command",
 ]

@@ -32,3 +32,17 @@ def secant_rate(velocity: np.ndarray, force: np.ndarray, side: int, low: float =
     if not use.any():
         return max(float(np.vdot(velocity, force) / max(np.vdot(velocity, velocity), 1e-12)), 1.0)
     return max(float(np.vdot(v[use], f[use]) / np.vdot(v[use], v[use])), 1.0)
+
+
+TYPICAL_GIVE = 5e-4  # m, over which seals and guides give before they slide
+
+
+def sliding_fit(velocity: np.ndarray, force: np.ndarray) -> tuple[float, float, float]:
+    """C [N s/m], F_c [N] and f₀ [N] of F ≈ c v + F_c sgn v + f₀ at the higher velocities, where friction slides."""
+    velocity, force = np.asarray(velocity), np.asarray(force)
+    fast = np.abs(velocity) >= 0.5 * np.max(np.abs(velocity))
+    velocity, force = velocity[fast], force[fast]
+    columns = np.stack([velocity, np.sign(velocity), np.ones_like(velocity)], axis=1)
+    rate, level, offset = (float(a) for a in np.linalg.lstsq(columns, force, rcond=None)[0])
+    least = 0.02 * max(float(np.max(np.abs(force - offset))), 1e-3)
+    return max(rate, 1.0), max(level, least), offset

@@ -4,6 +4,7 @@ Stroke x [m] and velocity v [m/s] are positive in extension (rebound), the force
 extension: a passive law takes in energy, ∮ F v dt ≥ 0. One instance is one damper; batches are made with `jax.vmap`.
 """
 
+import dataclasses
 from abc import abstractmethod
 from typing import Any, ClassVar, final
 
@@ -126,6 +127,19 @@ _START = "Start from `law.initial_state()`."
 def _check_stateless(law: AbstractDamper, state: State) -> None:
     if state.size:
         _checks.refuse("state", f"be empty for {type(law).__name__}", f"of shape {state.shape}", _START)
+
+
+def parts(law: AbstractDamper) -> list[AbstractDamper]:
+    """The laws directly inside a law, in the order of its fields."""
+    values = [getattr(law, field.name) for field in dataclasses.fields(law)]
+    inside = [part for value in values for part in (value if isinstance(value, tuple) else (value,))]
+    return [part for part in inside if isinstance(part, AbstractDamper)]
+
+
+def refuse_states(argument: str, law: AbstractDamper, remedy: str) -> None:
+    """Refuse a law with states where only the force of this instant has a meaning."""
+    if law.initial_state().size:
+        _checks.refuse(argument, "be without states", f"a {type(law).__name__}", remedy)
 
 
 def own_and_inner(law: AbstractDamper, state: State) -> tuple[Scalar, Float[Array, " inner"]]:

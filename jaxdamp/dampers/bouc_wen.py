@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers._guesses import sliding_fit
 from jaxdamp.dampers._hysteresis import direction, own_states
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.parameters import interval, nonnegative, parameter, positive, real
@@ -131,10 +132,5 @@ class BoucWen(AbstractDamper):
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "BoucWen":
         """Start values from measured data: F ≈ c₀ v + F_y sgn v + f₀ at the higher velocities; x_y starts at 1 mm."""
-        velocity, force = np.asarray(velocity), np.asarray(force)
-        fast = np.abs(velocity) >= 0.5 * np.max(np.abs(velocity))  # there the hysteresis has saturated
-        velocity, force = velocity[fast], force[fast]
-        columns = np.stack([velocity, np.sign(velocity), np.ones_like(velocity)], axis=1)
-        rate, level, offset = (float(a) for a in np.linalg.lstsq(columns, force, rcond=None)[0])
-        least = 0.02 * max(float(np.max(np.abs(force - offset))), 1e-3)
-        return cls(max(rate, 1.0), 0.0, max(level, least), 1e-3, static_force=offset)
+        rate, level, offset = sliding_fit(velocity, force)
+        return cls(rate, 0.0, level, 1e-3, static_force=offset)

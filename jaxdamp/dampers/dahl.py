@@ -3,8 +3,10 @@
 from typing import ClassVar, final
 
 import jax.numpy as jnp
+import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers._guesses import TYPICAL_GIVE, sliding_fit
 from jaxdamp.dampers._hysteresis import direction, own_states, travels
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.parameters import parameter, positive
@@ -64,3 +66,9 @@ class Dahl(AbstractDamper):
         for travel in travels(v0, v1, dt):
             force = dahl_step(travel, force, self.stiffness, self.friction_force)
         return force[None]
+
+    @classmethod
+    def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "Dahl":
+        """Start values from measured data: friction of fast sliding, a contact that gives half a millimetre."""
+        level = sliding_fit(velocity, force)[1]
+        return cls(level / TYPICAL_GIVE, level)

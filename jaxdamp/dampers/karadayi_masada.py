@@ -3,13 +3,15 @@
 from typing import ClassVar, final
 
 import jax.numpy as jnp
+import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers._guesses import TYPICAL_GIVE, sliding_fit
 from jaxdamp.dampers._hysteresis import own_states
+from jaxdamp.dampers._series import one_spring, series_rate, series_step
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.bilinear import Bilinear
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
-from jaxdamp.dampers.series_spring import series_rate, series_step
 from jaxdamp.parameters import nonnegative, parameter, positive
 
 
@@ -66,7 +68,7 @@ class KaradayiMasada(AbstractDamper):
     def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
         """ẋ_k = v − v_d [m/s]."""
         (deflection,) = own_states(self, state, 1)
-        return series_rate(self.dashpot(), self.spring, x, v, deflection, jnp.zeros(0, state.dtype))
+        return series_rate(self.dashpot(), self.spring(deflection), x - deflection, v, jnp.zeros(0, state.dtype))
 
     def advance(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
@@ -74,9 +76,12 @@ class KaradayiMasada(AbstractDamper):
         """Two-stage SDIRK step, as in `SeriesSpring`."""
         del x1
         (deflection,) = own_states(self, state, 1)
-        inner = jnp.zeros(0, state.dtype)
+        springs = one_spring(self.spring, lambda force: self.clearance + force / self.stiffness)
+        return series_step(self.dashpot(), springs, x0, v0, v1, (deflection,), jnp.zeros(0, state.dtype), dt)
 
-        def reach(force: Scalar) -> Scalar:
-            return self.clearance + force / self.stiffness
-
-        return series_step(self.dashpot(), self.spring, reach, x0, v0, v1, deflection, inner, dt)
+    @classmethod
+    def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "KaradayiMasada":
+        """Start values from measured data: c and friction of fast sliding; spring and clearance give a millimetre."""
+        rate, level, _ = sliding_fit(velocity, force)
+        slow = max(0.1 * float(np.max(np.abs(velocity))), 1e-6)
+        return cls(rate, rate, level, slow, level / TYPICAL_GIVE, 0.5 * TYPICAL_GIVE)

@@ -5,6 +5,7 @@ from typing import ClassVar, final
 import jax.numpy as jnp
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers._first_order import follow
 from jaxdamp.dampers.base import AbstractDamper, own_and_inner
 from jaxdamp.parameters import parameter, positive
 
@@ -26,6 +27,7 @@ class Lag(AbstractDamper):
     lag_time: Number = parameter("s", "time constant of the lag", positive)
 
     preserves_linearity: ClassVar[bool] = True
+    answers_at_once: ClassVar[bool] = False
 
     def initial_state(self) -> State:
         """No force; then the states of the law."""
@@ -50,8 +52,5 @@ class Lag(AbstractDamper):
         before = self.law.force(x0, v0, inner)
         inner = self.law.advance(x0, v0, x1, v1, inner, dt)
         after = self.law.force(x1, v1, inner)
-        z = dt / self.lag_time
-        kept = jnp.exp(-z)
-        mean = -jnp.expm1(-z) / z
-        force = kept * force + (mean - kept) * before + (1.0 - mean) * after
+        force = follow(force, before, after, dt, self.lag_time)
         return jnp.concatenate([force[None], inner])

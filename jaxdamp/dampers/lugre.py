@@ -3,8 +3,10 @@
 from typing import final
 
 import jax.numpy as jnp
+import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers._guesses import TYPICAL_GIVE, sliding_fit
 from jaxdamp.dampers._hysteresis import direction, own_states, travels
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.parameters import nonnegative, parameter, positive
@@ -81,3 +83,10 @@ class LuGre(AbstractDamper):
             settled = (mean - kept) * self.sliding_force(start) + (1.0 - mean) * self.sliding_force(end)
             z = kept * z + way * settled / self.stiffness
         return z[None]
+
+    @classmethod
+    def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "LuGre":
+        """Start values from measured data: c and friction of fast sliding; the bristles give over half a millimetre."""
+        rate, level, _ = sliding_fit(velocity, force)
+        slow = max(0.2 * float(np.max(np.abs(velocity))), 1e-6)
+        return cls(level / TYPICAL_GIVE, 0.1 * level / slow, rate, level, level, slow)

@@ -4,9 +4,11 @@ import math
 from typing import final
 
 import jax.numpy as jnp
+import numpy as np
 
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers._guesses import sliding_fit
 from jaxdamp.dampers._hysteresis import own_states
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.bouc_wen import hysteresis_rate, hysteresis_step
@@ -47,7 +49,7 @@ class ModifiedBoucWen(AbstractDamper):
     viscous_rate_per_volt: Number = parameter("N s/m/V", "c₀ᵤ, change of c₀ with voltage", nonnegative, default=0.0)
     series_rate_per_volt: Number = parameter("N s/m/V", "c₁ᵤ, change of c₁ with voltage", nonnegative, default=0.0)
     yield_force_per_volt: Number = parameter("N/V", "F_yᵤ, change of F_y with voltage", nonnegative, default=0.0)
-    voltage: Number = setting("V", "U, voltage at the damper", nonnegative, default=0.0)
+    voltage: Number = setting("V", "U, voltage at the damper", nonnegative, command=True, default=0.0)
 
     def at_voltage(self) -> tuple[Scalar, Scalar, Scalar]:
         """c₀ and c₁ [N s/m] and F_y [N] at the voltage."""
@@ -129,3 +131,10 @@ class ModifiedBoucWen(AbstractDamper):
             yield_force_per_volt=69_500.0 * largest,
             voltage=voltage,
         )
+
+    @classmethod
+    def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "ModifiedBoucWen":
+        """Start values from measured data: as for `BoucWen`, with a dashpot in series that hardly moves."""
+        rate, level, offset = sliding_fit(velocity, force)
+        series = max(20.0 * rate, 5.0 * level / max(float(np.max(np.abs(velocity))), 1e-6))
+        return cls(rate, series, rate, level, 1e-3, accumulator_stiffness=0.1 * rate, static_force=offset)

@@ -1,7 +1,7 @@
 """A damper that changes along its stroke: hydraulic stops, grooves in the tube, tables over stroke and velocity."""
 
 from collections.abc import Sequence
-from typing import final
+from typing import ClassVar, final
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
-from jaxdamp.dampers.base import AbstractDamper, AbstractStateless
+from jaxdamp.dampers.base import AbstractDamper, AbstractStateless, refuse_states
 from jaxdamp.dampers.table import Table
 from jaxdamp.parameters import as_float, increasing, setting
 
@@ -51,14 +51,14 @@ class StrokeDependent(AbstractStateless):
     laws: tuple[AbstractDamper, ...]
     stroke: Vector = setting("m", "strokes where the laws hold", increasing)
 
+    preserves_linearity: ClassVar[bool] = True
+
     def __check_init__(self) -> None:
         if self.stroke.ndim != 1 or self.stroke.size != len(self.laws) or not self.laws:
             must = "hold one stroke or more, one for each law"
             _checks.refuse("stroke", must, f"of shape {self.stroke.shape} for {len(self.laws)} laws")
         for k, law in enumerate(self.laws):
-            if law.initial_state().size:
-                remedy = f"Put it outside: `{type(law).__name__}(StrokeDependent(...), ...)`."
-                _checks.refuse(f"laws[{k}]", "be without states", f"a {type(law).__name__}", remedy)
+            refuse_states(f"laws[{k}]", law, f"Put it outside: `{type(law).__name__}(StrokeDependent(...), ...)`.")
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m] and velocity v [m/s]."""

@@ -5,10 +5,10 @@ from typing import final
 import jax.numpy as jnp
 import numpy as np
 
-from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers._guesses import velocity_grid
 from jaxdamp.dampers._hinges import hinges
+from jaxdamp.dampers._points import check_points
 from jaxdamp.dampers.base import AbstractMemoryless
 from jaxdamp.parameters import as_float, increasing, parameter, setting
 
@@ -34,9 +34,7 @@ class Table(AbstractMemoryless):
         self.force_points = as_float(force)
 
     def __check_init__(self) -> None:
-        if self.velocity.ndim != 1 or self.velocity.size < 2 or self.force_points.shape != self.velocity.shape:
-            must = "hold two or more points, one force for each velocity"
-            _checks.refuse("force", must, f"of shape {self.force_points.shape} beside {self.velocity.shape} velocities")
+        check_points(self.velocity, self.force_points)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

@@ -1,20 +1,26 @@
 """From bench records to a damper law: `fit` one law, `compare` many, and say how well the records determine them."""
 
 from jaxdamp.identify.comparing import Comparison, Rung, compare
+from jaxdamp.identify.cross_validation import CrossValidation, cross_validate
 from jaxdamp.identify.fitting import fit
 from jaxdamp.identify.ladder import LAWS, default_ladder
 from jaxdamp.identify.result import Estimate, FitResult, Score, fit_percent
+from jaxdamp.identify.training import Training, train
 
 
 __all__ = [
     "LAWS",
     "Comparison",
+    "CrossValidation",
     "Estimate",
     "FitResult",
     "Rung",
     "Score",
+    "Training",
     "compare",
+    "cross_validate",
     "default_ladder",
     "fit",
     "fit_percent",
+    "train",
 ]

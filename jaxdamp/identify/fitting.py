@@ -1,5 +1,6 @@
 """`fit`: weighted nonlinear least squares of a damper law over many bench records."""
 
+import inspect
 import warnings as python_warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -10,7 +11,9 @@ from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper, AbstractMemoryless
+from jaxdamp.dampers import AbstractDamper, AbstractStateless
+from jaxdamp.dampers.base import parts
+from jaxdamp.dampers.coverage import coverage
 from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.coordinates import box, edges, to_values
 from jaxdamp.identify.judgement import judge, warn
@@ -21,7 +24,7 @@ from jaxdamp.identify.uncertainty import uncertainty
 from jaxdamp.parameters import FreeParameters, free_parameters
 
 
-Start = AbstractDamper | type[AbstractDamper] | Callable[[np.ndarray, np.ndarray], AbstractDamper]
+Start = AbstractDamper | type[AbstractDamper] | Callable[..., AbstractDamper]
 
 
 def fit(
@@ -46,12 +49,14 @@ def fit(
 
     Arguments:
         law: a law to start from; or a law class, or a function `(velocity, force) -> law`, which is given all samples
-            and returns a start from the data.
+            and returns a start from the data. If it has arguments `stroke` or `time`, it is given those too, one
+            record after the other.
         runs: one record or many.
         freeze: parameters to leave alone, by path, last part of a path, or pattern.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
         weighting: `"samples"`, every sample counts the same; `"runs"`, every record counts the same, relative to its
-            RMS force; or one standard deviation [N] for each record, of which only the ratios matter.
+            RMS force; or one standard deviation [N] for each record, of which only the ratios matter. `inf` leaves a
+            record out of the fit; it is scored all the same.
         force_noise: standard deviation [N] of the measured force where it is known. Otherwise the residual gives it,
             which makes the standard errors right only if the law can follow the data.
         samples_per_cycle: see above; `None` uses every sample.
@@ -73,8 +78,9 @@ def fit(
     """
     runs = (runs,) if isinstance(runs, BenchRun) else tuple(runs)
     _check(runs, force_noise, max_steps)
-    begin = _started(law, runs)
-    sigma = _sigmas(weighting, runs)
+    sigma = weights(weighting, runs)
+    fitted_to = np.isfinite(sigma)
+    begin = started(law, [run for run, yes in zip(runs, fitted_to, strict=True) if yes])
     free = free_parameters(begin, freeze=freeze, bounds=bounds)
     _checks.finite("law", free.values)
     made, places = batches(begin, runs, sigma, samples_per_cycle)
@@ -82,7 +88,7 @@ def fit(
     found = _solve_linear(free, made) if is_linear(begin, free) else search(free, made, level, max_steps)
     if not (np.all(np.isfinite(found.residual)) and np.all(np.isfinite(found.jacobian))):
         must = "give finite forces and derivatives over the records"
-        _checks.refuse("law", must, f"{begin}, which does not", "Start from another law.")
+        _checks.refuse("law", must, f"{begin}, which does not", coverage(begin) or "Start from another law.")
 
     used = np.concatenate([np.ravel(batch.weight) for batch in made]) > 0
     dof = max(int(np.count_nonzero(used)) - found.values.size, 1)
@@ -91,7 +97,7 @@ def fit(
     known = uncertainty(found.jacobian, found.residual, noise, sides != 0)
     estimates = judge(free, found.values, known, sides, np.linalg.norm(found.jacobian, axis=0) / level, dof)
     fitted = free.build(jnp.asarray(found.values))
-    percent, rmse, scores = score(fitted, runs)
+    percent, rmse, scores = score(fitted, runs, fitted_to)
     notes = warn(estimates, "" if found.converged else found.said, found.residual[used], force_noise is None)
     return FitResult(
         fitted, runs, estimates, known.covariance, percent, rmse, scores, tuple(notes), found.converged, found.steps
@@ -109,24 +115,24 @@ def _check(runs: Sequence[BenchRun], force_noise: float | None, max_steps: int) 
         _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
 
 
-def _started(law: Start, runs: Sequence[BenchRun]) -> AbstractDamper:
+def started(law: Start, runs: Sequence[BenchRun]) -> AbstractDamper:
     """An instance to start from."""
     if isinstance(law, AbstractDamper):
         return law
-    velocity = np.concatenate([run.velocity for run in runs])
-    force = np.concatenate([run.force for run in runs])
     guess = getattr(law, "guess", None) if isinstance(law, type) else law
     if guess is None:
         name = getattr(law, "__name__", law)
         remedy = f"Pass an instance, `{name}(...)`, as the start."
         _checks.refuse("law", "know how to start from data", f"the class {name} without `guess`", remedy)
+    asked = [name for name in ("stroke", "time") if name in inspect.signature(guess).parameters]
+    channels = {name: np.concatenate([getattr(run, name) for run in runs]) for name in ("velocity", "force", *asked)}
     with python_warnings.catch_warnings():
         python_warnings.simplefilter("ignore", np.exceptions.RankWarning)
-        return guess(velocity, force)
+        return guess(channels.pop("velocity"), channels.pop("force"), **channels)
 
 
-def _sigmas(weighting: str | Sequence[float], runs: Sequence[BenchRun]) -> list[float]:
-    """Standard deviation [N] by which each record's residuals are divided."""
+def weights(weighting: str | Sequence[float], runs: Sequence[BenchRun]) -> list[float]:
+    """Standard deviation [N] by which each record's residuals are divided; infinite for a record to be left out."""
     if isinstance(weighting, str):
         _checks.one_of("weighting", weighting, ["samples", "runs"])
         if weighting == "samples":
@@ -137,7 +143,10 @@ def _sigmas(weighting: str | Sequence[float], runs: Sequence[BenchRun]) -> list[
     sigma = [float(s) for s in weighting]
     if len(sigma) != len(runs):
         _checks.refuse("weighting", f"give one number for each of {len(runs)} records", f"{len(sigma)} numbers")
-    _checks.positive("weighting", np.array(sigma))
+    kept = np.array([s for s in sigma if s != np.inf])
+    _checks.positive("weighting", kept)
+    if not kept.size:
+        _checks.refuse("weighting", "leave at least one record", "infinite for all")
     return sigma
 
 
@@ -160,7 +169,7 @@ def _noise(
 ) -> Float[np.ndarray, " samples"]:
     """Standard deviation of each weighted residual: as known, or of all together, or (`each`) of its own record."""
     if force_noise is not None:
-        return force_noise / sigma[owner]
+        return np.where(used, force_noise / sigma[owner], 1.0)
     count = np.bincount(owner, used, minlength=sigma.size)
     squares = np.bincount(owner, residual**2, minlength=sigma.size) * (count.sum() / dof)
     if not each:
@@ -172,10 +181,9 @@ def is_linear(law: AbstractDamper, free: FreeParameters) -> bool:
     """Whether the force is linear in all that is free, so that the least squares have a closed form."""
 
     def keeps(law: AbstractDamper) -> bool:
-        wrapped = getattr(law, "law", None)
-        inner = [*getattr(law, "terms", ()), *([] if wrapped is None else [wrapped])]
-        kept = isinstance(law, AbstractMemoryless) if not inner else getattr(law, "preserves_linearity", False)
-        return kept and all(keeps(part) for part in inner)
+        inner = parts(law)
+        kept = getattr(law, "preserves_linearity", isinstance(law, AbstractStateless) and not inner)
+        return kept and all(map(keeps, inner))
 
     return keeps(law) and all(p.linear and p.domain.steps is None for p in free.chosen)
 

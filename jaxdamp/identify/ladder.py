@@ -11,14 +11,17 @@ from jaxdamp.dampers import (
     AbstractMemoryless,
     Besinger,
     Bilinear,
+    BoucWen,
     CoulombFriction,
     Lag,
     Linear,
+    LuGre,
     PiecewiseLinear,
     Polynomial,
     PowerLaw,
     SegmentedPolynomial,
     SeriesSpring,
+    Spring,
     Table,
 )
 
@@ -58,7 +61,7 @@ _MEMORYLESS = {
     "besinger": Besinger.guess,
     "linear_friction": _friction,
 }
-LAWS = (*_MEMORYLESS, "besinger_lag", "besinger_series_spring", "linear_friction_lag")
+LAWS = (*_MEMORYLESS, "besinger_lag", "besinger_series_spring", "linear_friction_lag", "bouc_wen", "lugre_spring")
 
 
 def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dict[str, AbstractDamper]:
@@ -66,7 +69,8 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dic
 
     Memoryless: `linear`, `bilinear`, `power_law`, `polynomial` (degree 5), `segmented_polynomial` (paper 000),
     `piecewise_linear`, `table`, `besinger` (paper 001), `linear_friction` (with smooth Coulomb friction). With
-    hysteresis: `besinger_lag`, `besinger_series_spring` (paper 001), `linear_friction_lag`.
+    hysteresis: `besinger_lag`, `besinger_series_spring` (paper 001), `linear_friction_lag`, and for friction that gives
+    before it slides, as in magnetorheological dampers, `bouc_wen` and `lugre_spring` (with a spring beside it).
 
     Raises:
         ValueError: an unknown name.
@@ -82,6 +86,11 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dic
             ladder[name] = _MEMORYLESS[name](velocity, force)
         elif name == "linear_friction_lag":
             ladder[name] = Lag(_friction(velocity, force), lag)
+        elif name == "bouc_wen":
+            ladder[name] = BoucWen.guess(velocity, force)
+        elif name == "lugre_spring":
+            stroke = np.concatenate([run.stroke for run in runs])
+            ladder[name] = LuGre.guess(velocity, force) + Spring.guess(velocity, force, stroke)
         else:
             law = Besinger.guess(velocity, force)
             stiffness = max(_rate(law, velocity), 1.0) / lag

@@ -53,8 +53,10 @@ def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray])
     return 100.0 * (1.0 - missed / spread) if spread > 0.0 else -np.inf
 
 
-def score(law: AbstractDamper, runs: Sequence[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
-    """Fit percent and RMSE [N] of a law over records together, and for each of them."""
+def score(
+    law: AbstractDamper, runs: Sequence[BenchRun], counted: Sequence[bool] | np.ndarray | None = None
+) -> tuple[float, float, tuple[Score, ...]]:
+    """Fit percent and RMSE [N] of a law over the records that count together, and for each record."""
     forces = predict_runs(law, runs)
     kept = [slice(None)] * len(runs) if is_memoryless(law) else [used_samples(law, run) for run in runs]
     measured = [run.force[k] for run, k in zip(runs, kept, strict=True)]
@@ -65,8 +67,10 @@ def score(law: AbstractDamper, runs: Sequence[BenchRun]) -> tuple[float, float, 
         rows.append(
             Score(run.name, float(np.sqrt(np.mean(error**2))), fit_percent([y], [p]), float(np.abs(error).max()))
         )
-    everything = np.concatenate(predicted) - np.concatenate(measured)
-    return fit_percent(measured, predicted), float(np.sqrt(np.mean(everything**2))), tuple(rows)
+    chosen = [i for i in range(len(runs)) if counted is None or counted[i]]
+    y, p = [measured[i] for i in chosen], [predicted[i] for i in chosen]
+    errors = np.concatenate(p) - np.concatenate(y)
+    return fit_percent(y, p), float(np.sqrt(np.mean(errors**2))), tuple(rows)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -75,12 +79,12 @@ class FitResult:
 
     Attributes:
         law: the fitted law.
-        runs: the records it was fitted to.
+        runs: the records given; those with an infinite weighting were not fitted.
         parameters: an estimate for each free number, with unit, standard error and 95 % interval.
         covariance: of the free numbers, in their units, in the order of `parameters`.
-        fit_percent: 100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all records.
-        rmse: root of the mean squared error over all records [N].
-        scores: the same for each record.
+        fit_percent: 100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all records fitted.
+        rmse: root of the mean squared error over all records fitted [N].
+        scores: the same for each record given.
         warnings: what a user should know before trusting the numbers, in words.
         converged: whether the search ended by its tolerance.
         steps: steps of the search, 0 for a closed form.

@@ -9,8 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers.command import takes_command, with_command
+from jaxdamp.dampers.coverage import refuse_gaps
 from jaxdamp.rig import march
 
 
@@ -28,15 +31,20 @@ class Batch(eqx.Module):
     velocity: Float[Array, "runs time"]
     force: Float[Array, "runs time"]
     weight: Float[Array, "runs time"]
+    command: Float[Array, " runs"] | None  # for laws that take one
     substeps: int = eqx.field(static=True)
 
     def predict(self, law: AbstractDamper) -> Float[Array, "runs time"]:
         """Force of the law under these strokes [N]."""
-        return jax.vmap(lambda dt, x, v: march(law, dt, x, v, self.substeps))(self.dt, self.stroke, self.velocity)
+
+        def one(dt: Array, x: Array, v: Array, command: Array | None) -> Array:
+            return march(law if command is None else with_command(law, command), dt, x, v, self.substeps)
+
+        return jax.vmap(one)(self.dt, self.stroke, self.velocity, self.command)
 
     def residual(self, law: AbstractDamper) -> Float[Array, "runs time"]:
-        """Weighted difference of the law's force from the measured one."""
-        return (self.predict(law) - self.force) * self.weight
+        """Weighted difference of the law's force from the measured one; zero where the weight is, even beside NaN."""
+        return jnp.where(self.weight > 0, (self.predict(law) - self.force) * self.weight, 0.0)
 
 
 class Place(NamedTuple):
@@ -55,6 +63,7 @@ class _Row(NamedTuple):
     dt: float
     signals: tuple[np.ndarray, np.ndarray, np.ndarray]  # stroke, velocity, force
     weight: np.ndarray
+    command: float | None
     lead: int
     block: int
     substeps: int
@@ -110,15 +119,16 @@ def _block(run: BenchRun, samples_per_cycle: int | None) -> int:
     return 1 if samples_per_cycle is None else max(int(cycle / samples_per_cycle), 1)
 
 
-def _row(run: BenchRun, sigma: float, samples_per_cycle: int | None) -> _Row:
+def _row(run: BenchRun, sigma: float, samples_per_cycle: int | None, led: bool, command: float | None) -> _Row:
     dt, omega = 1.0 / run.sampling_rate, pace(run)
     block = _block(run, samples_per_cycle)
     substeps = int(np.clip(np.ceil(omega * dt * block / STEP_ANGLE), 1, 8))
-    lead = int(min(2 * np.pi / omega, run.duration) / (dt * block))
+    lead = int(min(2 * np.pi / omega, run.duration) / (dt * block)) if led else 0
     stroke, velocity, force = (_averaged(values, block) for values in _with_lead(run, lead * block))
     weight = np.full(len(force), np.sqrt(block) / sigma)
-    weight[: lead + int(np.ceil(settling(run) / (dt * block)))] = 0.0
-    return _Row(dt * block, (stroke, velocity, force), weight, lead, block, substeps)
+    if led:
+        weight[: lead + int(np.ceil(settling(run) / (dt * block)))] = 0.0
+    return _Row(dt * block, (stroke, velocity, force), weight, command, lead, block, substeps)
 
 
 def _grouped(rows: Sequence[_Row]) -> list[list[int]]:
@@ -146,8 +156,10 @@ def _batch(rows: Sequence[_Row]) -> Batch:
     length = _round_up(max(len(row.weight) for row in rows))
     columns = [np.stack([_pad(row.signals[k], length) for row in rows]) for k in range(3)]
     weight = np.stack([_pad(row.weight, length, "constant") for row in rows])
+    commands = [row.command for row in rows if row.command is not None]
     arrays = (np.array([row.dt for row in rows]), *columns, weight)
-    return Batch(*map(jnp.asarray, arrays), substeps=max(row.substeps for row in rows))
+    substeps = max(row.substeps for row in rows)
+    return Batch(*map(jnp.asarray, arrays), command=jnp.asarray(commands) if commands else None, substeps=substeps)
 
 
 def _memoryless_batch(
@@ -164,7 +176,21 @@ def _memoryless_batch(
     weight = np.repeat(np.sqrt(blocks) / np.asarray(sigma), counts)
     arrays = (np.ones(1), stroke, velocity, force, _pad(weight, length, "constant")[None])
     places = [Place(0, 0, int(end) - n, int(end), b) for end, n, b in zip(ends, counts, blocks, strict=True)]
-    return [Batch(*map(jnp.asarray, arrays), substeps=1)], places
+    return [Batch(*map(jnp.asarray, arrays), command=None, substeps=1)], places
+
+
+def _commands(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[float | None]:
+    """The command of each record, if the law takes one and the records state it; otherwise the law keeps its own."""
+    commands = [run.command for run in runs]
+    if not takes_command(law) or all(command is None for command in commands):
+        return [None] * len(runs)
+    lacking = [run.name for run in runs if run.command is None]
+    if lacking:
+        must, remedy = "all state their command", 'Pass it when reading, `bench.read(..., command={"*_0.5A": 0.5})`.'
+        _checks.refuse("runs", must, f"without one: {', '.join(lacking)}", remedy)
+    for command in set(commands):
+        with_command(law, command)  # refuses what is out of range
+    return commands
 
 
 def batches(
@@ -181,7 +207,7 @@ def batches(
     where a steady motion has them; the copy and the first half cycle of the record get weight zero.
 
     Arguments:
-        law: the law, of which only matters whether it has states.
+        law: the law, of which only matters whether it has states and takes a command.
         runs: the records.
         sigma: standard deviation [N] of the force for each record.
         samples_per_cycle: see above; `None` takes every sample.
@@ -189,9 +215,10 @@ def batches(
     Returns:
         The batches, and for each record where it is.
     """
-    if is_memoryless(law):
+    commands, led = _commands(law, runs), not is_memoryless(law)
+    if not led and set(commands) == {None}:
         return _memoryless_batch(runs, sigma, samples_per_cycle)
-    rows = [_row(run, s, samples_per_cycle) for run, s in zip(runs, sigma, strict=True)]
+    rows = [_row(run, s, samples_per_cycle, led, c) for run, s, c in zip(runs, sigma, commands, strict=True)]
     groups = _grouped(rows)
     places: dict[int, Place] = {}
     for number, group in enumerate(groups):
@@ -218,10 +245,13 @@ def predict_runs(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[np.ndarr
     """Force [N] of the law at every sample of every record."""
     made, places = batches(law, runs, [1.0] * len(runs), None if is_memoryless(law) else PREDICTED_PER_CYCLE)
     forces = [np.asarray(_predict(batch, law)) for batch in made]
-    return [
+    spread = [
         _spread(forces[p.batch][p.row, p.start : p.stop], p.block, len(run))
         for p, run in zip(places, runs, strict=True)
     ]
+    for run, force in zip(runs, spread, strict=True):
+        refuse_gaps(law, force[used_samples(law, run)], f"over the record {run.name!r}")
+    return spread
 
 
 def used_samples(law: AbstractDamper, run: BenchRun) -> slice:

@@ -4,11 +4,23 @@ Save one with `figure.savefig("fit.png", dpi=150)`; in a notebook it is shown as
 touches pyplot or its global state, and matplotlib is loaded by the first call only.
 """
 
+from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
 from jaxdamp.plots.curves import force_velocity
 from jaxdamp.plots.errors import ladder
+from jaxdamp.plots.history import training_history
 from jaxdamp.plots.loops import fit_loops
 from jaxdamp.plots.rides import ride
+from jaxdamp.plots.validation import cross_validation
 
 
-__all__ = ["fit_loops", "force_velocity", "ladder", "ride", "tuning"]
+__all__ = [
+    "cross_validation",
+    "fit_loops",
+    "force_velocity",
+    "ladder",
+    "law_card",
+    "ride",
+    "training_history",
+    "tuning",
+]

@@ -86,7 +86,8 @@ def fit_loops(
 def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun]) -> str:
     own = runs is result.runs
     percent, rmse = (result.fit_percent, result.rmse) if own else result.score(runs)[:2]
-    records = f"{len(runs)} record{'s' * (len(runs) > 1)}{'' if own else ' not fitted'}"
+    new = not any(run is known for run in runs for known in result.runs)
+    records = f"{len(runs)} record{'s' * (len(runs) > 1)}{' not fitted' * new}"
     score = f"{_style.law_name(result.law)}: fit {percent:.1f} %, RMSE {_style.short(rmse)} N on {records}"
     return score + (f"\n{len(shown)} of them shown, last full cycle of each" if len(shown) < len(runs) else "")
 

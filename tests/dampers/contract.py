@@ -330,4 +330,16 @@ def check_round_trip(law: AbstractDamper) -> None:
     assert to_json(again) == text
 
 
+def check_single_precision(law: AbstractDamper) -> None:
+    """In single precision the response is that of double precision to 3e-5 of the peak force."""
+    dt, x, v = _motion()
+    free = free_parameters(law)
+    force = _responses(free, free.values, dt, x, v)[0][0]
+    with jax.enable_x64(False):
+        half = jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf), jnp.float32), law)
+        single = march(half, *(jnp.asarray(a, jnp.float32) for a in (dt, x, v)), 1)
+    assert single.dtype == jnp.float32
+    np.testing.assert_allclose(np.asarray(single, dtype=float), force, atol=3e-5 * np.max(np.abs(force)))
+
+
 CHECKS = {name: check for name, check in globals().items() if name.startswith("check_")}

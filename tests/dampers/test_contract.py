@@ -12,28 +12,39 @@ from jaxdamp import dampers
 from jaxdamp.dampers import (
     AbstractDamper,
     AbstractMemoryless,
+    AccelerationSurface,
     Besinger,
     Bilinear,
     BoucWen,
     BumpStop,
+    Bushing,
     CoulombFriction,
     Dahl,
     Degressive,
     DigressiveProgressive,
+    ForceSurface,
+    FrequencySelective,
     GasSpring,
+    Hybrid,
     HyperbolicTangent,
     KaradayiMasada,
     Lag,
     Linear,
     LuGre,
     ModifiedBoucWen,
+    MonoTube,
     MotionRatio,
+    NeuralHysteresis,
     PiecewiseLinear,
+    PistonFlow,
     Polynomial,
     PowerLaw,
     Saturating,
+    Scheduled,
     SegmentedPolynomial,
     SeriesSpring,
+    SplineTable,
+    Spring,
     StribeckFriction,
     StrokeDependent,
     Table,
@@ -64,6 +75,12 @@ def blow_off(knee_width=0.0):
 def stroke_table():
     force = [[-900.0, -150.0, 0.0, 300.0, 1500.0], [-800.0, -250.0, 0.0, 500.0, 2000.0]]
     return StrokeDependent.from_grid([-0.012, 0.007], [-1.0, -0.1, 0.0, 0.2, 1.0], force)
+
+
+def network(elements=2):
+    return NeuralHysteresis.random(
+        jax.random.key(2), elements=elements, width=3, velocity_scale=0.3, force_scale=500.0, stiffness=2e5
+    )
 
 
 LAWS = {
@@ -125,11 +142,37 @@ LAWS = {
     "LuGre, stiff": lambda: LuGre(1e6, 300.0, 0.0, 40.0, 60.0, 0.01),
     "hyperbolic tangent": lambda: HyperbolicTangent(900.0, 500.0, 400.0, 30.0, 0.6),
     "Karadayi and Masada": lambda: KaradayiMasada(2600.0, 1200.0, 40.0, 0.01, 1e6, 3e-4),
+    "piston flow": lambda: PistonFlow(1.42e-3, 1.6e-6, 1.2e6, 1.2e11, 2.5e-5, 5e5, 4e10, 4e-5, 2e-13),
+    "mono-tube": MonoTube.reference,
     "modified Bouc and Wen, published": lambda: ModifiedBoucWen.prototype(1.5),
+    "neural hysteresis": network,
+    "hybrid": lambda: Hybrid(PiecewiseLinear([-0.1, 0.1], [700.0, 2000.0, 900.0], 0.02), network(1)),
+    "spring": lambda: Linear(900.0) + Spring(2000.0),
+    "scheduled": lambda: Scheduled((BoucWen(400.0, 0.0, 50.0, 1e-3), BoucWen(900.0, 0.0, 600.0, 2e-3)), [0, 2], 0.7),
+    "lag of a schedule": lambda: Lag(Scheduled((slopes(0.02), slopes(0.02)), [0, 1], 0.3), 0.003),
+    "spline table": lambda: SplineTable(
+        [-1.1, -0.4, -0.1, 0.0, 0.05, 0.3, 1.0], [-1400.0, -1350.0, -450.0, 0.0, 300.0, 1500.0, 2900.0]
+    ),
+    "spline table of two": lambda: SplineTable([-1.0, 1.0], [-1500.0, 1500.0]),
+    "frequency selective": lambda: FrequencySelective(slopes(0.02), Linear(800.0), 0.03, 0.003),
+    "bushing": lambda: Bushing(Bilinear(2600.0, 1200.0, knee_width=0.02), 2e6, 6e5, 800.0),
+    "surface over stroke and velocity": lambda: ForceSurface(
+        [[0.0, 900.0, 0.0, 40.0], [0.0, 100.0, 0.0, 0.0], [0.0, 150.0, 0.0, 0.0]],
+        (-0.03, 0.04),
+        (-0.6, 0.6),
+        500.0,
+        outside="hold",
+    ),
+    "surface over velocity and acceleration": lambda: AccelerationSurface(
+        [[0.0, -60.0], [900.0, 0.0], [0.0, 0.0], [40.0, 10.0]], (-0.6, 0.6), (-60.0, 60.0), 500.0, outside="hold"
+    ),
 }
 
 # What a law breaks by its nature, and why. It must indeed break it; all other checks hold for it too.
-EXCEPTIONS = {"gas spring": {"check_rest": "its charge pushes the rod out at rest"}}
+EXCEPTIONS = {
+    "gas spring": {"check_rest": "its charge pushes the rod out at rest"},
+    "mono-tube": {"check_rest": "its charge pushes the rod out at rest"},
+}
 
 
 def _parts(law):

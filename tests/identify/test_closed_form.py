@@ -5,7 +5,20 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from jaxdamp.dampers import Besinger, Bilinear, Linear, PiecewiseLinear, Polynomial, Table
+from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.dampers import (
+    AbstractDamper,
+    AbstractStateless,
+    Besinger,
+    Bilinear,
+    ForceSurface,
+    FrequencySelective,
+    Linear,
+    PiecewiseLinear,
+    Polynomial,
+    StrokeDependent,
+    Table,
+)
 from jaxdamp.identify import fit
 from jaxdamp.parameters import get
 
@@ -125,3 +138,80 @@ def test_a_table_point_without_data_is_not_identifiable(sines):
     assert [e.note for e in result.parameters] == ["", "", "", "not identifiable", "not identifiable"]
     assert np.isinf(result.parameters[-1].standard_error)
     assert np.all(np.isfinite(result.covariance[:3, :3])) and result.parameters[0].standard_error < 10.0
+
+
+# ---- laws of the stroke and laws whose states no free parameter moves
+
+
+def reference(columns, force):
+    return np.linalg.lstsq(columns, force, rcond=None)[0]
+
+
+def test_a_table_over_stroke_and_velocity_equals_lstsq(sines):
+    runs = sines(TRUTH, noise=20.0)
+    stroke, (v, force) = np.concatenate([r.stroke for r in runs]), channels(runs)
+    result = fit(StrokeDependent.from_grid([-0.01, 0.01], GRID, np.zeros((2, 6))), runs)
+    hats = np.stack([np.interp(v, GRID, e) for e in np.eye(6)], axis=1)
+    upper = np.clip((stroke + 0.01) / 0.02, 0.0, 1.0)[:, None]
+    expected = reference(np.concatenate([(1 - upper) * hats, upper * hats], axis=1), force)
+    assert result.converged and result.steps == 0
+    assert np.allclose([e.value for e in result.parameters], expected, rtol=1e-7, atol=1e-6)
+
+
+def test_a_force_surface_starts_from_stroke_and_velocity_and_equals_lstsq(sines):
+    runs = sines(TRUTH, noise=20.0)
+    stroke, (v, force) = np.concatenate([r.stroke for r in runs]), channels(runs)
+    result = fit(ForceSurface, runs)
+    law = result.law
+    ranges = np.array([get(law, "stroke_range"), get(law, "velocity_range")])
+    u, w = ((2 * a - r.sum()) / np.ptp(r) for a, r in zip((stroke, v), ranges, strict=True))
+    expected = reference(np.polynomial.chebyshev.chebvander2d(u, w, (3, 7)), force)
+    assert result.converged and result.steps == 0
+    assert np.allclose([e.value for e in result.parameters], expected, rtol=1e-6, atol=1e-5)
+
+
+def test_a_single_sine_leaves_a_surface_open_and_the_fit_says_so(sines):
+    runs = sines(TRUTH, noise=20.0, tests=[(0.02, 3.0)])
+    result = fit(ForceSurface, runs)
+    assert any("not identifiable" in w for w in result.warnings)
+    assert result.rmse < 30.0
+    assert np.max(np.abs([e.value for e in result.parameters])) < 10 * np.max(np.abs(runs[0].force))
+
+
+def test_a_law_with_states_that_are_frozen_needs_no_search(sines):
+    truth = FrequencySelective(Linear(900.0), Linear(2000.0), 0.03, 0.002)
+    runs = VirtualDyno(truth, force_noise=5.0).run([SineTest(0.02, f) for f in (0.5, 2.0, 6.0)])
+    start = FrequencySelective(Linear(100.0), Linear(100.0), 0.03, 0.002)
+    found = fit(start, runs, freeze=["*_time"])
+    assert found.steps == 0
+    for estimate, expected in zip(found.parameters, (900.0, 2000.0), strict=True):
+        assert abs(estimate.value - expected) < 4 * estimate.standard_error + 0.5
+    searched = fit(start, runs)
+    assert searched.converged and searched.steps > 0
+    assert searched["filter_time"].value == pytest.approx(0.03, rel=0.01)
+
+
+class _Squared(AbstractStateless):
+    law: AbstractDamper
+
+    def force_stroke_velocity(self, x, v):
+        force = self.law.force(x, v, self.law.initial_state())
+        return force * abs(force)
+
+
+def test_a_wrapper_that_says_nothing_is_searched(sines):
+    result = fit(_Squared(Linear(40.0)), sines(Linear(1000.0), noise=5.0))
+    assert result.steps > 0
+
+
+def test_a_start_is_given_the_channels_that_it_asks_for(sines):
+    runs = sines(TRUTH, noise=20.0)
+    seen = {}
+
+    def start(velocity, force, time, stroke):
+        seen.update(velocity=velocity, force=force, time=time, stroke=stroke)
+        return Linear(1000.0)
+
+    fit(start, runs)
+    for name, values in seen.items():
+        assert np.array_equal(values, np.concatenate([getattr(run, name) for run in runs]))

@@ -103,3 +103,8 @@ def test_the_result_plots_itself(comparison: Comparison) -> None:
 def test_no_record_is_refused(comparison: Comparison) -> None:
     with pytest.raises(ValueError, match="`runs` must hold at least one record"):
         plots.fit_loops(comparison["linear"], [])
+
+
+def test_some_of_the_fitted_records_are_not_called_new(comparison: Comparison, runs: BenchSet) -> None:
+    title = plots.fit_loops(comparison["linear"], [runs[2], runs[4]]).get_suptitle()
+    assert "on 2 records" in title and "not fitted" not in title

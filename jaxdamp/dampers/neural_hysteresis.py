@@ -1,0 +1,134 @@
+"""Hysteresis learnt by a small network, passive whatever its weights are."""
+
+from typing import final
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from jaxdamp import _checks
+from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
+from jaxdamp.dampers._hysteresis import own_states
+from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.parameters import parameter, positive, setting, weight
+
+
+_ROUNDING = 0.01  # of the velocity scale, over which |v| is rounded at zero
+
+
+@final
+class NeuralHysteresis(AbstractDamper):
+    """F = Σ zᵢ, żᵢ = kᵢ v − ρᵢ(v, z) zᵢ: springs that let go at rates ρᵢ ≥ 0 which a network has learnt.
+
+    Each of n elements is a spring kᵢ in series with something that yields. It yields with travel, as friction does,
+    and with time, as a dashpot does, and the network says how fast:
+
+        ρᵢ = (kᵢ/F₀) (αᵢ |v| + βᵢ v₀),   (α, β) = softplus(W₂ tanh(W₁ [v/v₀, z/F₀] + b₁) + b₂).
+
+    A constant β is a Maxwell element, a constant α is Dahl's friction, both depending on v and z give the loops in
+    between. **Passive by construction**: the springs store E = Σ zᵢ²/2kᵢ and Ė = F v − Σ ρᵢ zᵢ²/kᵢ, so the law can
+    give back only what was put in, for any weights, also far outside the data. v₀ and F₀ are the velocity and the
+    force to which the network is scaled. |v| is rounded within 0.01 v₀.
+
+    States: zᵢ [N]. The step is exact for constant rates and of second order otherwise; as ρᵢ ≥ 0 it is bounded and
+    stable for any step. Fit it with `identify.train` (gradient descent with early stopping) or, while it has up to
+    about a hundred numbers, with `identify.fit`. The weights have no physical meaning: their errors tell nothing.
+
+    >>> law = NeuralHysteresis.random(jax.random.key(0), elements=2, width=4, velocity_scale=0.3, force_scale=900.0)
+    >>> law.initial_state().shape, law.hidden_weights.shape
+    ((2,), (4, 3))
+    """
+
+    stiffness: Vector = parameter("N/m", "kᵢ, stiffness of each element", positive)
+    hidden_weights: Float[Array, "width inputs"] = parameter("", "W₁, from v and z to the hidden layer", weight)
+    hidden_biases: Vector = parameter("", "b₁, of the hidden layer", weight)
+    output_weights: Float[Array, "outputs width"] = parameter("", "W₂, from the hidden layer to α and β", weight)
+    output_biases: Vector = parameter("", "b₂, of α and β", weight)
+    velocity_scale: Number = setting("m/s", "v₀, velocity that the network sees as one", positive)
+    force_scale: Number = setting("N", "F₀, force that the network sees as one", positive)
+
+    def __check_init__(self) -> None:
+        n, width = self.stiffness.size, self.hidden_biases.size
+        shapes = {"stiffness": (n,), "hidden_weights": (width, n + 1), "hidden_biases": (width,)}
+        shapes |= {"output_weights": (2 * n, width), "output_biases": (2 * n,)}
+        for name, shape in shapes.items():
+            found = getattr(self, name).shape
+            if found != shape or 0 in shape:
+                must = f"be of shape {shape} for {n} elements and {width} hidden units"
+                _checks.refuse(name, must, f"of shape {found}", "`NeuralHysteresis.random` makes a network that fits.")
+
+    def relaxation(self, v: ScalarLike, forces: Vector) -> Vector:
+        """ρᵢ [1/s], the rates at which the elements let go, never negative."""
+        seen = jnp.concatenate([jnp.asarray(v / self.velocity_scale)[None], forces / self.force_scale])
+        hidden = jnp.tanh(self.hidden_weights @ seen + self.hidden_biases)
+        with_travel, with_time = jnp.split(jax.nn.softplus(self.output_weights @ hidden + self.output_biases), 2)
+        small = _ROUNDING * self.velocity_scale
+        speed = jnp.sqrt(v * v + small * small) - small
+        return self.stiffness / self.force_scale * (with_travel * speed + with_time * self.velocity_scale)
+
+    def initial_state(self) -> State:
+        """No force in any element."""
+        return jnp.zeros_like(self.stiffness)
+
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Force [N]."""
+        del x, v
+        return jnp.sum(jnp.stack(own_states(self, state, self.stiffness.size)))
+
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """Rates [N/s] of the elements' forces."""
+        del x
+        forces = jnp.stack(own_states(self, state, self.stiffness.size))
+        return self.stiffness * v - self.relaxation(v, forces) * forces
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """Two exponential steps: to the middle with the rates of the start, then all the way with those found there."""
+        del x0, x1
+        forces = jnp.stack(own_states(self, state, self.stiffness.size))
+        middle = self._relaxed(forces, self.relaxation(v0, forces), 0.75 * v0 + 0.25 * v1, 0.5 * dt)
+        v = 0.5 * (v0 + v1)
+        return self._relaxed(forces, self.relaxation(v, middle), v, dt)
+
+    def _relaxed(self, forces: Vector, rates: Vector, v: ScalarLike, dt: ScalarLike) -> Vector:
+        """The forces after a time at constant rates and velocity, exactly."""
+        z = rates * dt
+        tiny = jnp.finfo(z.dtype).tiny
+        return jnp.exp(-z) * forces + self.stiffness * v * dt * (-jnp.expm1(-z) / jnp.maximum(z, tiny))
+
+    @classmethod
+    def random(
+        cls,
+        key: PRNGKeyArray,
+        *,
+        elements: int = 2,
+        width: int = 6,
+        velocity_scale: ScalarLike,
+        force_scale: ScalarLike,
+        stiffness: ScalarLike | None = None,
+    ) -> "NeuralHysteresis":
+        """A start for training, its weights drawn by the key (`jax.random.key(0)`).
+
+        Arguments:
+            key: the same key gives the same weights.
+            elements: n, springs side by side.
+            width: hidden units.
+            velocity_scale: v₀ [m/s], about the RMS velocity of the records.
+            force_scale: F₀ [N], about their RMS force.
+            stiffness: kᵢ [N/m], the first; F₀ over 3 ms at v₀ if it is left out. Each further one is a third.
+        """
+        for name, count in (("elements", elements), ("width", width)):
+            if count < 1:
+                _checks.refuse(name, "be 1 or more", count)
+        first = force_scale / (3e-3 * velocity_scale) if stiffness is None else stiffness
+        hidden, output = jax.random.split(key)
+        return cls(
+            jnp.asarray(first) * (1.0 / 3.0) ** jnp.arange(float(elements)),
+            jax.random.normal(hidden, (width, elements + 1)),
+            jnp.zeros(width),
+            0.3 * jax.random.normal(output, (2 * elements, width)),
+            jnp.zeros(2 * elements),
+            velocity_scale,
+            force_scale,
+        )

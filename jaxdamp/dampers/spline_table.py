@@ -1,0 +1,101 @@
+"""A smooth curve through force-velocity points."""
+
+from typing import final
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
+from jaxdamp.dampers._points import check_points
+from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.dampers.table import Table
+from jaxdamp.parameters import as_float, increasing, parameter, setting
+
+
+def monotone_slopes(gaps: Float[Array, " gaps"], secants: Float[Array, " gaps"]) -> Float[Array, " gaps+1"]:
+    """Slopes at k points of a cubic that rises and falls with them (Fritsch and Butland 1984; SciPy's PCHIP).
+
+    Inside, the weighted harmonic mean of the secants on both sides, zero where these differ in sign. At the ends the
+    slope of a parabola through three points, held between zero and three times the secant.
+    """
+    if secants.size == 1:
+        return jnp.concatenate([secants, secants])
+    left, right = secants[:-1], secants[1:]
+    on_left, on_right = 2.0 * gaps[1:] + gaps[:-1], gaps[1:] + 2.0 * gaps[:-1]
+    # The quotient has 0/0 where both secants are zero: it is taken of ones there, lest its derivatives are NaN.
+    alike = left * right > 0.0
+    left, right = jnp.where(alike, left, 1.0), jnp.where(alike, right, 1.0)
+    mean = (on_left + on_right) * left * right / (on_left * right + on_right * left)
+
+    def end(gap: Scalar, next_gap: Scalar, secant: Scalar, next_secant: Scalar) -> Scalar:
+        parabola = ((2.0 * gap + next_gap) * secant - gap * next_secant) / (gap + next_gap)
+        return jnp.clip(parabola, jnp.minimum(3.0 * secant, 0.0), jnp.maximum(3.0 * secant, 0.0))
+
+    first = end(gaps[0], gaps[1], secants[0], secants[1])
+    last = end(gaps[-1], gaps[-2], secants[-1], secants[-2])
+    return jnp.concatenate([first[None], jnp.where(alike, mean, 0.0), last[None]])
+
+
+@final
+class SplineTable(AbstractMemoryless):
+    """Monotone cubics between the points (vₖ, Fₖ), as PCHIP; beyond the first and last point the end slopes go on.
+
+    The slope is continuous, so that forces have no kinks; the curve rises and falls only where the points do and
+    never overshoots them. A strong bend before an end makes the slope there, and beyond, zero. The law is not linear in
+    the forces, unlike `Table`. Where two neighbouring secants are zero or change sign, the slope there has a kink as a
+    function of the forces; its derivatives are finite there too.
+
+    Arguments:
+        velocity: strictly increasing velocities [m/s], shape (k,), k ≥ 2. Fixed: a fit changes the forces.
+        force: forces [N] at these velocities, shape (k,).
+
+    Raises:
+        ValueError: fewer than two points, shapes that differ, velocities that do not increase.
+
+    >>> law = SplineTable(velocity=[-1.0, 0.0, 0.2, 1.0], force=[-900.0, 0.0, 500.0, 1900.0])
+    >>> [round(float(law.force_velocity(v)), 3) for v in (0.0, 0.1, 0.2, 1.2)]
+    [0.0, 233.599, 500.0, 2130.0]
+    """
+
+    velocity: Vector = setting("m/s", "velocities of the points", increasing)
+    force_points: Vector = parameter("N", "forces at the points")
+
+    def __init__(self, velocity: VectorLike, force: VectorLike) -> None:
+        self.velocity = as_float(velocity)
+        self.force_points = as_float(force)
+
+    def __check_init__(self) -> None:
+        check_points(self.velocity, self.force_points)
+
+    def force_velocity(self, v: ScalarLike) -> Scalar:
+        """Force [N] at velocity v [m/s]."""
+        if jnp.ndim(v):
+            remedy = "For several use `jax.vmap(law.force_velocity)(velocities)`."
+            _checks.refuse("v", "be one velocity", f"of shape {jnp.shape(v)}", remedy)
+        gaps, rises = jnp.diff(self.velocity), jnp.diff(self.force_points)
+        slopes = monotone_slopes(gaps, rises / gaps)
+        left, right = gaps * slopes[:-1], gaps * slopes[1:]
+        # What each segment adds, from its beginning to v or to its end: a sum without a search, fast inside loops.
+        u = jnp.clip((v - self.velocity[:-1]) / gaps, 0.0, 1.0)
+        added = u * (left + u * (3.0 * rises - 2.0 * left - right + u * (left + right - 2.0 * rises)))
+        below = slopes[0] * jnp.minimum(v - self.velocity[0], 0.0)
+        above = slopes[-1] * jnp.maximum(v - self.velocity[-1], 0.0)
+        return self.force_points[0] + below + jnp.sum(added) + above
+
+    @classmethod
+    def guess(cls, velocity: np.ndarray, force: np.ndarray, points_a_side: int = 6) -> "SplineTable":
+        """Points from measured data, closer together towards zero velocity: about the least squares.
+
+        The least squares of straight lines lie outside a bend, where the curve through the same points does not follow:
+        what it misses is added, as straight lines again, three times.
+        """
+        velocity, force = np.asarray(velocity, dtype=float), np.asarray(force, dtype=float)
+        start = Table.guess(velocity, force, points_a_side)
+        law = cls(start.velocity, start.force_points)
+        for _ in range(3):
+            missed = force - np.asarray(jax.vmap(law.force_velocity)(jnp.asarray(velocity)))
+            law = cls(law.velocity, law.force_points + Table.guess(velocity, missed, points_a_side).force_points)
+        return law

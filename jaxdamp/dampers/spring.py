@@ -1,0 +1,39 @@
+"""A linear spring with a preload, the elastic part that a bench finds beside the damping."""
+
+from typing import final
+
+import numpy as np
+
+from jaxdamp._types import Number, Scalar, ScalarLike
+from jaxdamp.dampers.base import AbstractStateless
+from jaxdamp.parameters import nonnegative, parameter
+
+
+@final
+class Spring(AbstractStateless):
+    """F = k x + f₀: a stiffness beside the damper and the force at stroke zero.
+
+    A gas pocket over small strokes, an accumulator, seals that give, or the offset of a load cell. It takes in no
+    energy over a cycle. f₀ < 0 pushes the rod out. `GasSpring` follows the pressure over the whole stroke.
+
+    >>> law = Spring(stiffness=2000.0, preload=-150.0)
+    >>> float(law.force(0.01, 0.0, law.initial_state()))
+    -130.0
+    """
+
+    stiffness: Number = parameter("N/m", "k, stiffness beside the damper", nonnegative, linear=True)
+    preload: Number = parameter("N", "f₀, force at rest at stroke zero", linear=True, default=0.0)
+
+    def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
+        """Force [N] at stroke x [m]."""
+        del v
+        return self.stiffness * x + self.preload
+
+    @classmethod
+    def guess(cls, velocity: np.ndarray, force: np.ndarray, stroke: np.ndarray) -> "Spring":
+        """Start values from measured data: what of the force goes with the stroke, beside what goes with v."""
+        velocity, force, stroke = np.asarray(velocity), np.asarray(force), np.asarray(stroke)
+        columns = np.stack([stroke, np.ones_like(stroke), velocity, np.sign(velocity)], axis=1)
+        stiffness, preload = np.linalg.lstsq(columns, force, rcond=None)[0][:2]
+        least = 1e-3 * float(np.max(np.abs(force))) / max(float(np.ptp(stroke)), 1e-9)
+        return cls(max(float(stiffness), least), float(preload))

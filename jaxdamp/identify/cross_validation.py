@@ -1,0 +1,144 @@
+"""`cross_validate`: every record is predicted by laws fitted to the others."""
+
+import dataclasses
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._progress import Progress
+from jaxdamp.bench import BenchRun
+from jaxdamp.identify.fitting import Start, fit
+from jaxdamp.identify.result import FitResult, score
+from jaxdamp.identify.training import Training
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Fold(NamedTuple):
+    """One law fitted without one record."""
+
+    law: str
+    group: Hashable
+    held_out: str
+    fit_percent: float  # of the record held out
+    rmse: float  # of the record held out, N
+    result: Any
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class CrossValidation:
+    """How well laws predict records that they were not fitted to. Results of the same records are joined with `+`."""
+
+    folds: tuple[Fold, ...]
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Names in the order given."""
+        return tuple(dict.fromkeys(fold.law for fold in self.folds))
+
+    @property
+    def groups(self) -> tuple[Hashable, ...]:
+        """Groups in the order of their records."""
+        return tuple(dict.fromkeys(fold.group for fold in self.folds))
+
+    def fit_percent(self, law: str, group: Hashable = None) -> float:
+        """Mean over the records held out, of one group or of all."""
+        return float(np.mean([fold.fit_percent for fold in self._of(law, group)]))
+
+    def rmse(self, law: str, group: Hashable = None) -> float:
+        """Root of the mean squared error over the records held out [N], every record counted the same."""
+        return float(np.sqrt(np.mean([fold.rmse**2 for fold in self._of(law, group)])))
+
+    @property
+    def best(self) -> str:
+        """The law with the highest mean fit percent."""
+        return max(self.laws, key=self.fit_percent)
+
+    def _of(self, law: str, group: Hashable) -> list[Fold]:
+        found = [f for f in self.folds if f.law == law and (group is None or f.group == group)]
+        if not found:
+            raise KeyError(f"No folds of {law!r} in {group!r}; laws: {self.laws}, groups: {self.groups}.")
+        return found
+
+    def __add__(self, other: "CrossValidation") -> "CrossValidation":
+        return CrossValidation(self.folds + other.folds)
+
+    def plot(self, **options: Any) -> "Figure":
+        """The fit of every held-out record, law by law."""
+        from jaxdamp.plots import cross_validation
+
+        return cross_validation(self, **options)
+
+    def table(self) -> list[dict[str, Any]]:
+        """One row for each law: mean held-out fit percent by group and in all, RMSE [N]."""
+        rows = []
+        for law in self.laws:
+            groups = self.groups if len(self.groups) > 1 else ()
+            by_group = {f"{group}": self.fit_percent(law, group) for group in groups}
+            rows.append({"law": law} | by_group | {"all": self.fit_percent(law), "rmse": self.rmse(law)})
+        return rows
+
+    def __repr__(self) -> str:
+        rows = self.table()
+        columns = [name for name in rows[0] if name not in ("law", "rmse")]
+        width = max(4, *(len(law) for law in self.laws))
+        head = f"{'held-out fit %':<{width}}" + "".join(f"{name:>9}" for name in columns) + f"{'RMSE N':>9}"
+        lines = [
+            f"{row['law']:<{width}}" + "".join(f"{row[name]:>9.1f}" for name in columns) + f"{row['rmse']:>9.1f}"
+            for row in rows
+        ]
+        return "\n".join([head, *lines, f"best: {self.best}"])
+
+
+def cross_validate(
+    laws: Mapping[str, Start],
+    runs: Iterable[BenchRun],
+    *,
+    by: Callable[[BenchRun], Hashable] | None = None,
+    method: Callable[..., FitResult | Training] = fit,
+    **options: Any,
+) -> CrossValidation:
+    """Hold out each record in turn, fit every law to the others, and score it on the record held out.
+
+    Arguments:
+        laws: starts by name, as `fit` takes them; those that are classes or functions are started anew from the
+            records of each fit, so that nothing of the held-out record leaks into them.
+        runs: two records or more.
+        by: a group for each record, such as `lambda run: run.command`: the laws are fitted to each group on its own.
+        method: called as `method(start, runs, weighting=..., **options)`, with an infinite weighting for the record
+            held out; gives back something with a `law`. `fit`, or for networks a function that calls `train`.
+        options: passed on to the method.
+
+    Raises:
+        ValueError: no laws; a group with a single record; or what the method raises.
+
+    >>> from jaxdamp import bench, dampers
+    >>> dyno = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=5.0)
+    >>> runs = dyno.run([bench.SineTest(amplitude=a, frequency=2.0) for a in (0.01, 0.02, 0.03)])
+    >>> cross_validate({"linear": dampers.Linear, "bilinear": dampers.Bilinear}, runs).best
+    'bilinear'
+    """
+    if not laws:
+        _checks.refuse("laws", "hold at least one law", "empty")
+    groups: dict[Hashable, list[BenchRun]] = {}
+    for run in runs:
+        groups.setdefault(None if by is None else by(run), []).append(run)
+    for group, members in groups.items():
+        if len(members) < 2:
+            name, must = ("runs", "hold") if by is None else ("by", f"put into group {group}")
+            _checks.refuse(name, f"{must} two records or more", [run.name for run in members])
+    total, folds = len(laws) * sum(map(len, groups.values())), []
+    with Progress("Cross-validating") as shown:
+        for name, start in laws.items():
+            for group, members in groups.items():
+                for out, run in enumerate(members):
+                    shown(f"{name} without {run.name}, {len(folds) + 1} of {total}")
+                    weighting = [np.inf if i == out else 1.0 for i in range(len(members))]
+                    result = method(start, members, weighting=weighting, **options)
+                    found = score(result.law, members)[2][out]
+                    folds.append(Fold(name, group, run.name, found.fit_percent, found.rmse, result))
+    return CrossValidation(tuple(folds))

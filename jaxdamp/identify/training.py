@@ -1,0 +1,235 @@
+"""`train`: gradient descent for laws with many weights, stopped when records left out get no better."""
+
+import dataclasses
+import functools
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._progress import Progress
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.fitting import Start, started, weights
+from jaxdamp.identify.result import Score, score
+from jaxdamp.identify.traces import Batch, batches
+from jaxdamp.parameters import FreeParameters, free_parameters
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+CHUNK = 25  # steps in one compiled call, after each of which the records left out are looked at
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class Training:
+    """A trained law and how it came about.
+
+    Attributes:
+        law: the law where the error on the held-out records was smallest.
+        runs: the records it was trained on.
+        held_out: the records that decided when to stop.
+        fit_percent: over the training records together.
+        rmse: over the training records together [N].
+        held_out_fit_percent: over the held-out records together.
+        held_out_rmse: over the held-out records together [N].
+        scores: of every record, `runs` first.
+        steps: after how many steps each entry of the histories was taken.
+        history: RMSE [N] over the training records as trained on (averaged samples), for each entry.
+        held_out_history: the same over the held-out records.
+        best_step: the step that the law comes from.
+        stopped: why the training ended, in words.
+    """
+
+    law: AbstractDamper
+    runs: tuple[BenchRun, ...]
+    held_out: tuple[BenchRun, ...]
+    fit_percent: float
+    rmse: float
+    held_out_fit_percent: float
+    held_out_rmse: float
+    scores: tuple[Score, ...]
+    steps: Float[np.ndarray, " entries"]
+    history: Float[np.ndarray, " entries"]
+    held_out_history: Float[np.ndarray, " entries"]
+    best_step: int
+    stopped: str
+
+    def plot(self, **options: Any) -> "Figure":
+        """The errors over the steps of the training."""
+        from jaxdamp.plots import training_history
+
+        return training_history(self, **options)
+
+    def __repr__(self) -> str:
+        return (
+            f"{type(self.law).__name__} trained on {len(self.runs)} records: {self.fit_percent:.1f} %, RMSE "
+            f"{self.rmse:.4g} N; on {len(self.held_out)} held out: {self.held_out_fit_percent:.1f} %, RMSE "
+            f"{self.held_out_rmse:.4g} N; best at step {self.best_step}, {self.stopped}"
+        )
+
+
+def train(
+    law: Start,
+    runs: BenchRun | Iterable[BenchRun],
+    *,
+    held_out: BenchRun | Iterable[BenchRun],
+    weighting: Sequence[float] | None = None,
+    freeze: Sequence[str] = (),
+    steps: int = 2000,
+    patience: int = 400,
+    learning_rate: float = 0.02,
+    optimiser: optax.GradientTransformation | None = None,
+    samples_per_cycle: int = 200,
+) -> Training:
+    """Train a law with many weights, such as `Hybrid`, by gradient descent with early stopping.
+
+    Minimises the mean squared error of the force over all samples of `runs` with the whole gradient in every step
+    (reverse mode through the law and its states). Every 25 steps the error on `held_out` is looked at; the law
+    returned is the one for which it was smallest. Nothing is random here: the same law, whose weights a key has drawn,
+    and the same records give the same result. Parameters stay in their domains by their smooth maps.
+
+    A handful of parameters with a meaning are better served by `fit`, which also knows their errors.
+
+    Arguments:
+        law: a start, or as in `fit` a law class or a function that makes one from `runs`.
+        runs: records to train on. A few steady cycles of each are enough: `run.last_cycles(3)`.
+        held_out: records that decide when to stop; they are not trained on. Judge the law on records that are in
+            neither of the two.
+        weighting: one standard deviation [N] for each of `runs`, of which only the ratios matter; `inf` leaves one
+            out. All count the same if it is left out.
+        freeze: parameters to leave alone, by path, last part of a path, or pattern.
+        steps: at most so many.
+        patience: stop when the held-out error has not fallen for so many steps.
+        learning_rate: of Adam, at the start; it falls to a hundredth along a cosine over `steps`.
+        optimiser: any optax optimiser instead.
+        samples_per_cycle: slow records are averaged down to it.
+
+    Raises:
+        ValueError: no records on either side, a record on both; a law without finite forces; names that fit no
+            parameter.
+
+    >>> from jaxdamp import bench, dampers
+    >>> dyno = bench.VirtualDyno(dampers.Lag(dampers.Linear(2000.0), 0.004), force_noise=5.0)
+    >>> runs = dyno.run([bench.SineTest(0.01, f) for f in (2.0, 4.0)])
+    >>> start = dampers.Lag(dampers.Linear(1500.0), 0.002)
+    >>> trained = train(start, runs[0], held_out=runs[1], steps=200)
+    >>> trained.held_out_fit_percent > 90.0
+    True
+    """
+    runs, held_out = (tuple([r] if isinstance(r, BenchRun) else r) for r in (runs, held_out))
+    _check(runs, held_out, steps, patience)
+    _checks.positive("learning_rate", learning_rate)
+    sigma = weights([1.0] * len(runs) if weighting is None else weighting, runs)
+    trained_on = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
+    law = started(law, trained_on)
+    free = free_parameters(law, freeze=freeze)
+    used = batches(law, runs, sigma, samples_per_cycle)[0]
+    checked = batches(law, held_out, [1.0] * len(held_out), samples_per_cycle)[0]
+    level = float(np.sqrt(np.mean(np.concatenate([run.force for run in trained_on]) ** 2)))
+    rule = _adam(learning_rate, steps) if optimiser is None else optimiser
+
+    raw = free.raw
+    state = rule.init(raw)
+    best, best_step, reached = raw, 0, float(_error(free, raw, checked))
+    if not np.isfinite(reached):
+        _checks.refuse("law", "give finite forces over the records", f"{law}, which does not", "Start from another.")
+    taken, history, tested = [0], [float(_error(free, raw, used))], [reached]
+    stopped = f"after all {steps} steps"
+    with Progress("Training") as shown:
+        for done in range(CHUNK, steps + CHUNK, CHUNK):
+            done = min(done, steps)
+            raw, state = _descend(free, raw, state, used, rule, level, jnp.asarray(done - taken[-1]))
+            taken.append(done)
+            history.append(float(_error(free, raw, used)))
+            tested.append(float(_error(free, raw, checked)))
+            shown(f"step {done} of {steps}, RMSE {history[-1]:.4g} N, held out {tested[-1]:.4g} N")
+            if tested[-1] < reached:
+                best, best_step, reached = raw, done, tested[-1]
+            if not np.isfinite(history[-1]):
+                stopped = f"stopped at step {done}, where the error was no longer finite: take a smaller learning rate"
+                break
+            if done - best_step >= patience:
+                stopped = f"stopped at step {done}, {patience} steps after the held-out error last fell"
+                break
+
+    trained = free.build(free.physical(best))
+    percent, rmse, scores = score(trained, runs, np.isfinite(sigma))
+    held_percent, held_rmse, held_scores = score(trained, held_out)
+    return Training(
+        law=trained,
+        runs=runs,
+        held_out=held_out,
+        fit_percent=percent,
+        rmse=rmse,
+        held_out_fit_percent=held_percent,
+        held_out_rmse=held_rmse,
+        scores=scores + held_scores,
+        steps=np.array(taken, dtype=float),
+        history=np.array(history),
+        held_out_history=np.array(tested),
+        best_step=best_step,
+        stopped=stopped,
+    )
+
+
+def _check(runs: Sequence[BenchRun], held_out: Sequence[BenchRun], steps: int, patience: int) -> None:
+    for name, some in (("runs", runs), ("held_out", held_out)):
+        if not some:
+            remedy = "Take for example `runs=records[:-1], held_out=records[-1]`."
+            _checks.refuse(name, "hold at least one record", "empty", remedy)
+    both = [run.name for run in held_out if any(run is other for other in runs)]
+    if both:
+        _checks.refuse("held_out", "hold records that are not trained on", ", ".join(both))
+    for name, count in (("steps", steps), ("patience", patience)):
+        if count < 1:
+            _checks.refuse(name, "be 1 or more", count)
+
+
+@functools.lru_cache
+def _adam(learning_rate: float, steps: int) -> optax.GradientTransformation:
+    """Adam with clipped gradients; one object for each choice, so that the compiled step is found again."""
+    schedule = optax.cosine_decay_schedule(learning_rate, steps, alpha=0.01)
+    return optax.chain(optax.clip_by_global_norm(1.0), optax.adam(schedule))
+
+
+def _mean_square(free: FreeParameters, raw: Array, made: Sequence[Batch]) -> Array:
+    """Mean squared error [N²] of the law over the samples that count, each as often as it was measured."""
+    law = free.build(free.physical(raw))
+    squares = jnp.stack([jnp.sum(jnp.square(batch.residual(law))) for batch in made])
+    return jnp.sum(squares) / jnp.sum(jnp.stack([jnp.sum(jnp.square(batch.weight)) for batch in made]))
+
+
+@eqx.filter_jit
+def _error(free: FreeParameters, raw: Array, made: Sequence[Batch]) -> Array:
+    return jnp.sqrt(_mean_square(free, raw, made))
+
+
+@eqx.filter_jit
+def _descend(
+    free: FreeParameters,
+    raw: Array,
+    state: Any,
+    made: Sequence[Batch],
+    rule: optax.GradientTransformation,
+    level: float,
+    count: Array,
+) -> tuple[Array, Any]:
+    """So many steps of the optimiser on the mean square relative to the level of the force."""
+
+    def step(_: Any, now: tuple[Array, Any]) -> tuple[Array, Any]:
+        raw, state = now
+        slope = jax.grad(lambda raw: _mean_square(free, raw, made) / level**2)(raw)
+        with jax.numpy_dtype_promotion("standard"):  # optax mixes its integer count with floats
+            change, state = rule.update(slope, state, raw)
+        return optax.apply_updates(raw, change), state  # type: ignore[return-value]
+
+    return jax.lax.fori_loop(0, count, step, (raw, state))

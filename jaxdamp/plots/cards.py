@@ -1,0 +1,113 @@
+"""A law at a glance: its loops, and what each of its numbers does."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import FreeParameters, free_parameters
+from jaxdamp.plots import _style
+from jaxdamp.rig import march
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+
+_CYCLES, _SAMPLES = 3, 400  # to settle, and in a cycle
+_MOST_CURVES = 8
+
+
+class _Loops(NamedTuple):
+    """Last cycles at all frequencies: arrays of shape (frequencies, samples), the effects with one axis more."""
+
+    stroke: np.ndarray
+    velocity: np.ndarray
+    force: np.ndarray
+    effects: np.ndarray  # derivative of the force by each number, times its value
+
+
+@eqx.filter_jit
+def _response(free: FreeParameters, dt: jax.Array, x: jax.Array, v: jax.Array) -> tuple[jax.Array, jax.Array]:
+    def force(values: jax.Array) -> tuple[jax.Array, jax.Array]:
+        found = march(free.build(values), dt, x, v, 1)
+        return found, found
+
+    slopes, found = jax.jacfwd(force, has_aux=True)(free.values)
+    return found, slopes * free.values[None, :]
+
+
+def _loops(law: AbstractDamper, amplitude: float, frequencies: Sequence[float]) -> _Loops:
+    free = free_parameters(law)
+    phase = 2 * np.pi * np.arange(_CYCLES * _SAMPLES + 1) / _SAMPLES
+    rows = []
+    for frequency in frequencies:
+        x, v = amplitude * np.sin(phase), 2 * np.pi * frequency * amplitude * np.cos(phase)
+        found = _response(free, *(jnp.asarray(a) for a in (1.0 / (frequency * _SAMPLES), x, v)))
+        rows.append([np.asarray(a)[-_SAMPLES - 1 :] for a in (x, v, *found)])
+    return _Loops(*(np.stack(column) for column in zip(*rows, strict=True)))
+
+
+def law_card(
+    law: AbstractDamper,
+    *,
+    amplitude: float = 0.02,
+    frequencies: Sequence[float] = (0.5, 1.0, 2.0, 4.0),
+    title: str = "",
+) -> "matplotlib.figure.Figure":
+    """Loops of a law over velocity and stroke at several frequencies, and the effect of each of its parameters.
+
+    The effect is p ∂F/∂p, by automatic differentiation through the law and its states: the change of the force [N] for
+    a change of the parameter by its own value, over the cycle of the highest frequency. A parameter whose curve is flat
+    cannot be found from such a test; two whose curves have one shape cannot be told apart. Parameters that are zero
+    have none. Of many numbers the eight with the largest effect are drawn.
+
+    Arguments:
+        law: any law.
+        amplitude: of the sines [m], zero to peak.
+        frequencies: of the sines [Hz].
+        title: above the picture; the classes of the law if it is left out.
+    """
+    _checks.positive("amplitude", amplitude)
+    _checks.positive("frequencies", np.asarray(frequencies))
+    loops = _loops(law, float(amplitude), frequencies)
+    figure = _style.new_figure(13.0, 3.9)
+    over_velocity, over_stroke, effects = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.15))
+    for index, frequency in enumerate(frequencies):
+        look = {"color": _style.graded(index, len(frequencies)), "linewidth": 1.6}
+        over_velocity.plot(loops.velocity[index], loops.force[index], **look)
+        over_stroke.plot(1e3 * loops.stroke[index], loops.force[index], label=f"{frequency:g} Hz", **look)
+    fastest = int(np.argmax(frequencies))
+    sizes = np.max(np.abs(loops.effects[fastest]), axis=0)
+    drawn = [int(i) for i in np.argsort(-sizes, kind="stable")[:_MOST_CURVES] if sizes[i] > 0]
+    names = free_parameters(law).names
+    for number, i in enumerate(drawn):
+        curve = loops.effects[fastest][:, i]
+        effects.plot(loops.velocity[fastest], curve, label=names[i], linewidth=1.4, **_style.line_style(number))
+    left_out = int(np.count_nonzero(sizes)) - len(drawn)
+    more = f", {left_out} more" if left_out else ""
+    _style.dress(over_velocity, "velocity [m/s]   (+ rebound)", "force [N]   (+ resists extension)")
+    _style.dress(over_stroke, "stroke [mm]   (+ rebound)", "force [N]")
+    _style.dress(effects, f"velocity [m/s] at {frequencies[fastest]:g} Hz", "effect p ∂F/∂p [N]")
+    for axes in (over_velocity, over_stroke, effects):
+        _style.cross(axes)
+    for axes, place, heading in (
+        (effects, "upper", f"effect of{more}"),
+        (over_stroke, "lower", f"loops of ±{1e3 * amplitude:g} mm at"),
+    ):
+        handles = axes.get_legend_handles_labels()[0]
+        figure.legend(
+            handles=handles,
+            loc=f"outside right {place}",
+            frameon=False,
+            fontsize="small",
+            title=heading,
+            alignment="left",
+        )
+    figure.suptitle(title or _style.law_name(law), x=0.01, ha="left", fontsize="large", fontweight="bold")
+    return figure

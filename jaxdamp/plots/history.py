@@ -1,0 +1,27 @@
+"""The course of a training."""
+
+from typing import TYPE_CHECKING
+
+from jaxdamp.identify import Training
+from jaxdamp.plots import _style
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+
+def training_history(training: Training) -> "matplotlib.figure.Figure":
+    """Errors over the steps of a training, on its records and on those held out, and the step that was kept."""
+    figure = _style.new_figure(8.0, 4.0)
+    axes = figure.subplots()
+    handles = []
+    lines = (("training records", training.history), ("held-out records", training.held_out_history))
+    for number, (label, values) in enumerate(lines):
+        handles += axes.plot(training.steps, values, label=label, linewidth=1.8, **_style.line_style(number))
+    handles.append(axes.axvline(training.best_step, color=_style.GREY, linestyle=":", label="law kept"))
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(lambda value, _: _style.short(value))
+    axes.yaxis.set_minor_formatter(lambda value, _: _style.short(value))
+    _style.dress(axes, "step", "root of the mean squared force error [N]", training.stopped)
+    _style.legend_beside(figure, handles)
+    return figure

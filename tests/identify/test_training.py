@@ -1,0 +1,81 @@
+"""Gradient descent with early stopping: it finds what is there, stops in time, and gives the same again."""
+
+import jax
+import numpy as np
+import optax
+import pytest
+
+from jaxdamp import identify
+from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.dampers import BoucWen, Hybrid, Lag, Linear
+from jaxdamp.parameters import free_parameters, get
+
+
+@pytest.fixture(scope="module")
+def lagged():
+    dyno = VirtualDyno(Lag(Linear(2000.0), 0.004), sampling_rate=400.0, force_noise=5.0)
+    return list(dyno.run([SineTest(0.01, f, cycles=3) for f in (1.5, 3.0, 6.0)]))
+
+
+def test_finds_the_parameters(lagged):
+    start = Lag(Linear(1500.0), 0.002)
+    result = identify.train(start, lagged[:2], held_out=lagged[2], steps=400, learning_rate=0.05)
+    np.testing.assert_allclose(result.law.law.rate, 2000.0, rtol=0.01)
+    np.testing.assert_allclose(result.law.lag_time, 0.004, rtol=0.05)
+    best = int(np.argmin(result.held_out_history))
+    assert result.best_step == result.steps[best]
+    assert result.held_out_history[best] < 0.1 * result.held_out_history[0]
+    assert result.held_out_fit_percent > 97.0
+    assert [s.name for s in result.scores] == [run.name for run in lagged]
+    assert "Lag trained on 2 records" in repr(result)
+
+
+def test_hybrid_learns_a_hysteresis_that_it_does_not_contain_the_same_each_time():
+    law = BoucWen(300.0, 0.0, 500.0, 1e-3)
+    runs = list(VirtualDyno(law, sampling_rate=400.0).run([SineTest(a, 2.0, cycles=3) for a in (0.02, 0.01, 0.005)]))
+
+    rule = optax.adam(0.05)
+
+    def train(steps):
+        def start(velocity, force):
+            return Hybrid.guess(velocity, force, key=jax.random.key(3), elements=1, width=4)
+
+        options = {"steps": steps, "optimiser": rule, "samples_per_cycle": 100}
+        return identify.train(start, runs[::2], held_out=runs[1], **options)
+
+    result, first, again = train(250), train(25), train(25)
+    assert result.held_out_fit_percent > 90.0
+    static = identify.fit(type(result.law.backbone), runs[::2])
+    assert static.score([runs[1]])[0] < 80.0
+    np.testing.assert_array_equal(free_parameters(first.law).values, free_parameters(again.law).values)
+    np.testing.assert_array_equal(result.history[:2], again.history)
+
+
+def test_stops_when_the_held_out_error_grows(lagged):
+    # ascent in small steps on the records held out: the first error is the best
+    rising = optax.sgd(-1e-3)
+    start = Lag(Linear(1900.0), 0.004)
+    result = identify.train(start, lagged[:1], held_out=lagged[1], optimiser=rising, steps=1000, patience=50)
+    assert result.best_step == 0 and result.steps[-1] == 50
+    assert "stopped at step 50, 50 steps after the held-out error last fell" in result.stopped
+    np.testing.assert_allclose(get(result.law, "law.rate"), 1900.0, rtol=1e-9)
+
+
+def test_a_record_of_infinite_weighting_is_not_trained_on(lagged):
+    start, options = Lag(Linear(1500.0), 0.002), {"held_out": lagged[2], "steps": 25}
+    alone = identify.train(start, lagged[:1], **options)
+    beside = identify.train(start, lagged[:2], weighting=[1.0, np.inf], **options)
+    np.testing.assert_allclose(free_parameters(beside.law).values, free_parameters(alone.law).values, rtol=1e-6)
+    np.testing.assert_allclose(beside.rmse, alone.rmse, rtol=1e-6)
+
+
+def test_refusals(lagged):
+    start = Linear(1000.0)
+    with pytest.raises(ValueError, match="`held_out` must hold at least one record, but is empty"):
+        identify.train(start, lagged, held_out=[])
+    with pytest.raises(ValueError, match="`held_out` must hold records that are not trained on"):
+        identify.train(start, lagged, held_out=lagged[0])
+    with pytest.raises(ValueError, match="`patience` must be 1 or more"):
+        identify.train(start, lagged[:1], held_out=lagged[1], patience=0)
+    with pytest.raises(ValueError, match="`learning_rate` must be positive"):
+        identify.train(start, lagged[:1], held_out=lagged[1], learning_rate=-0.1)
