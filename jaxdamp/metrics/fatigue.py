@@ -50,7 +50,8 @@ def spectral_damage(
     Palmgren and Miner. Cycles are those of rainflow counting; their means are not counted.
 
     - "dirlik": nu_p m_0^(k/2) (D1 Q^k Gamma(1 + k) + 2^(k/2) Gamma(1 + k/2) (D2 |R|^k + D3)), for any width of band; a
-      fit to simulated records, which for k from 3 to 6 mostly lies within 10 % of counting.
+      fit to simulated records; for k of 3 and 4 within some 10 % of counting, for k of 6 and more it can lie 30 % low
+      where the band has two peaks far apart.
     - "narrow-band": nu_0 (2 m_0)^(k/2) Gamma(1 + k/2), Rayleigh amplitudes: exact for a narrow band, otherwise an
       upper estimate.
 

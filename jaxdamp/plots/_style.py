@@ -1,7 +1,7 @@
 """What all pictures share: figure, colours, labels with unit and sign, legends beside the axes."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from jaxdamp.dampers import AbstractDamper, Sum
 
@@ -65,11 +65,15 @@ def cross(axes: "matplotlib.axes.Axes", horizontal: bool = True, vertical: bool 
         axes.axvline(0.0, color="0.6", linewidth=0.8, zorder=1)
 
 
-def legend_beside(figure: "matplotlib.figure.Figure", handles: Sequence[Any], title: str = "") -> None:
+def legend_beside(
+    figure: "matplotlib.figure.Figure",
+    handles: Sequence[Any],
+    title: str = "",
+    place: Literal["upper", "lower"] = "upper",
+) -> None:
     """A legend to the right of all axes, never over data."""
-    figure.legend(
-        handles=list(handles), loc="outside right upper", frameon=False, title=title or None, alignment="left"
-    )
+    where = "outside right upper" if place == "upper" else "outside right lower"
+    figure.legend(handles=list(handles), loc=where, frameon=False, title=title or None, alignment="left")
 
 
 def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[Any], columns: int = 3) -> None:

@@ -96,18 +96,8 @@ def law_card(
     _style.dress(effects, f"velocity [m/s] at {frequencies[fastest]:g} Hz", "effect p ∂F/∂p [N]")
     for axes in (over_velocity, over_stroke, effects):
         _style.cross(axes)
-    for axes, place, heading in (
-        (effects, "upper", f"effect of{more}"),
-        (over_stroke, "lower", f"loops of ±{1e3 * amplitude:g} mm at"),
-    ):
-        handles = axes.get_legend_handles_labels()[0]
-        figure.legend(
-            handles=handles,
-            loc=f"outside right {place}",
-            frameon=False,
-            fontsize="small",
-            title=heading,
-            alignment="left",
-        )
+    _style.legend_beside(figure, effects.get_legend_handles_labels()[0], f"effect of{more}")
+    heading = f"loops of ±{1e3 * amplitude:g} mm at"
+    _style.legend_beside(figure, over_stroke.get_legend_handles_labels()[0], heading, "lower")
     figure.suptitle(title or _style.law_name(law), x=0.01, ha="left", fontsize="large", fontweight="bold")
     return figure

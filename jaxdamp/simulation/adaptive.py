@@ -9,7 +9,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar, Signal, State
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.simulation.exponential import road_rate
+from jaxdamp.vehicles import AbstractVehicle, Ports, rest_position
+from jaxdamp.vehicles.ports import States
 
 
 STEPS_PER_INSTANT = 100  # on average: more are a law too fast for the solver, and would take for ever
@@ -23,39 +25,42 @@ def adaptive_steps(
     solver: diffrax.AbstractSolver,
     rtol: float,
     atol: float,
+    start: Float[Array, " n"] | None = None,
 ) -> tuple[Float[Array, "time n"], Float[Array, "time ports"], list[State], Any]:
     """Motion and forces at the instants of the road, linear between them; steps end where its slope changes."""
     form, laws = vehicle.port_form(), vehicle.elements()
+    ports = Ports(laws)
     q = form.mass.shape[0]
-    a, b_f = form.state_matrix(), form.port_input()
-    b_r, b_d = form.road_input(), form.road_rate_input()
+    system = form.first_order()
     dt = (time[-1] - time[0]) / (time.size - 1)
+    if start is None:
+        position = rest_position(form, laws, heights[0])
+        start = jnp.concatenate([position, jnp.zeros_like(position)])
 
     def road(t: Scalar) -> tuple[Array, Array]:
         index = jnp.clip(jnp.floor((t - time[0]) / dt).astype(int), 0, time.size - 2)
         slope = (heights[index + 1] - heights[index]) / dt
         return heights[index] + slope * (t - time[index]), slope
 
-    def forces(x: Array, states: list[State]) -> Array:
-        deflection, rate = form.ports @ x[:q], form.ports @ x[q:]
-        return jnp.stack([law.force(deflection[i], rate[i], states[i]) for i, law in enumerate(laws)])
+    def at_ports(x: Array, height: Array, slope: Array) -> tuple[Array, Array]:
+        return form.at_ports(x[:q], height), form.at_ports(x[q:], slope)
 
-    def field(t: Any, y: Any, args: None) -> tuple[Array, list[State]]:
+    def field(t: Any, y: Any, args: None) -> tuple[Array, States]:
         del args
         x, states = y
         height, slope = road(t)
-        deflection, rate = form.ports @ x[:q], form.ports @ x[q:]
-        inner = [law.state_rate(deflection[i], rate[i], states[i]) for i, law in enumerate(laws)]
-        return a @ x + b_f @ forces(x, states) + b_r @ height + b_d @ slope, inner
+        place = at_ports(x, height, slope)
+        driven = system.road_input @ height + system.road_rate_input @ slope
+        motion = system.state_matrix @ x + system.port_input @ ports.force(*place, states) + driven
+        return motion, ports.state_rate(*place, states)
 
-    start = form.at_rest_on(heights[0])
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(field),
         solver,
         time[0],
         time[-1],
         0.1 * dt,
-        (start, [law.initial_state() for law in laws]),
+        (start, ports.initial()),
         saveat=diffrax.SaveAt(ts=time),
         stepsize_controller=diffrax.ClipStepSizeController(
             diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=time[1:-1]
@@ -66,4 +71,5 @@ def adaptive_steps(
     )
     assert solution.ys is not None
     motion, states = solution.ys
-    return motion, jax.vmap(forces)(motion, states), [s[-1] for s in states], solution.result
+    places = jax.vmap(at_ports)(motion, heights, road_rate(heights, dt))
+    return motion, jax.vmap(ports.force)(*places, states), ports.by_port([s[-1] for s in states]), solution.result

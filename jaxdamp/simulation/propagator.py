@@ -31,9 +31,10 @@ class Propagator(eqx.Module):
     @classmethod
     def over(cls, form: PortForm, dt: Scalar) -> "Propagator":
         """The matrices of a step of dt [s]: Φ = φ₀(A dt), H₀ = φ₁ B dt, H₁ = φ₂ B dt."""
-        phi, held, ramp = phi_functions(form.state_matrix() * dt)
-        forces, heights = form.port_input() * dt, form.road_input() * dt
-        return cls(phi, held @ forces, ramp @ forces, held @ heights, ramp @ heights + held @ form.road_rate_input())
+        system = form.first_order()
+        phi, held, ramp = phi_functions(system.state_matrix * dt)
+        forces, heights = system.port_input * dt, system.road_input * dt
+        return cls(phi, held @ forces, ramp @ forces, held @ heights, ramp @ heights + held @ system.road_rate_input)
 
 
 def phi_functions(z: Float[Array, "n n"]) -> tuple[Float[Array, "n n"], Float[Array, "n n"], Float[Array, "n n"]]:

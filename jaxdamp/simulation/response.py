@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks, metrics
 from jaxdamp._types import Scalar, Signal, State
+from jaxdamp.simulation.exponential import road_rate
 from jaxdamp.vehicles import AbstractVehicle, Instant
 
 
@@ -23,6 +24,11 @@ STATISTICS = {
     "peak_to_peak": metrics.working_space_peak,
     "standard_deviation": jnp.std,
 }
+
+
+def _middle(values: Array) -> Array:
+    """Mean over each step."""
+    return 0.5 * (values[1:] + values[:-1])
 
 
 @final
@@ -44,19 +50,14 @@ class Response(eqx.Module):
         """Unit of each channel."""
         return self.vehicle.units
 
-    def _road_rate(self) -> Float[Array, "time wheels"]:
-        steps = jnp.diff(self.road, axis=0) / jnp.diff(self.time)[:, None]
-        return jnp.concatenate([steps[:1], 0.5 * (steps[1:] + steps[:-1]), steps[-1:]])
-
     @property
     @eqx.filter_jit
     def channels(self) -> dict[str, Signal]:
-        """All channels by name; with tyre damping the road's rate is the mean of the slopes on both sides."""
-        form = self.vehicle.port_form()
-        n = form.mass.shape[0]
-        rate = self._road_rate()
-        forces = self.port_force @ form.port_input().T + self.road @ form.road_input().T
-        change = self.motion @ form.state_matrix().T + forces + rate @ form.road_rate_input().T
+        """All channels by name; the road's rate is the mean of the slopes before and after an instant."""
+        system, n = self.vehicle.port_form().first_order(), len(self.vehicle.coordinates)
+        rate = road_rate(self.road, self.time[1] - self.time[0])
+        forces = self.port_force @ system.port_input.T + self.road @ system.road_input.T
+        change = self.motion @ system.state_matrix.T + forces + rate @ system.road_rate_input.T
         parts = (self.motion[:, :n], self.motion[:, n:], change[:, n:], self.road, rate, self.port_force)
         return jax.vmap(lambda *instant: self.vehicle.channels(Instant(*instant)))(*parts)
 
@@ -78,12 +79,12 @@ class Response(eqx.Module):
     def energy_balance(self) -> dict[str, Scalar]:
         """Where the energy that the road put in has gone [J].
 
-        `road_work` = `stored` (in masses and springs, at the end less at the start) + `absorbed` (by the laws, in
-        which a series spring also stores some) + `dashpots` (linear ones, as in the tyre), up to `error`, which falls
-        with the square of the step. All integrals by the trapezoid rule.
+        `road_work` = `stored` (in masses and linear springs, at the end less at the start) + `absorbed` (by the laws;
+        springs among them give it back later, dampers do not: `absorbed_by` takes them apart) + `dashpots` (linear
+        ones, as in the tyre), up to `error`, which falls with the square of the step. All integrals by the trapezoid
+        rule. Heights count from static equilibrium, so that weight and static loads do no work.
         """
-        form = self.vehicle.port_form()
-        n = form.mass.shape[0]
+        form, n = self.vehicle.port_form(), len(self.vehicle.coordinates)
         q, rate, dt = self.motion[:, :n], self.motion[:, n:], jnp.diff(self.time)
         slope = jnp.diff(self.road, axis=0) / dt[:, None]
 
@@ -92,19 +93,30 @@ class Response(eqx.Module):
             ground = 0.5 * self.road[i] @ form.ground_stiffness @ self.road[i]
             return 0.5 * rate[i] @ form.mass @ rate[i] + q[i] @ spring + ground
 
-        def over_step(values: Array) -> Array:
-            return 0.5 * (values[1:] + values[:-1])
-
-        spring_push = over_step(self.road @ form.ground_stiffness - q @ form.road_stiffness)
-        towed = over_step(rate) @ form.road_damping
+        push = self.road @ form.ground_stiffness - q @ form.road_stiffness
+        if form.port_road is not None:
+            push = push - self.port_force @ form.port_road
+        towed = _middle(rate) @ form.road_damping
         rolled = slope @ form.ground_damping
-        road_work = jnp.sum((spring_push + rolled - towed) * slope * dt[:, None])
-        absorbed = jnp.sum(over_step(self.port_force * (rate @ form.ports.T)) * dt[:, None])
-        dashpots = over_step(jnp.sum((rate @ form.damping) * rate, axis=1))
-        tyre = jnp.sum((dashpots + jnp.sum((rolled - 2.0 * towed) * slope, axis=1)) * dt)
+        road_work = jnp.sum((_middle(push) + rolled - towed) * slope * dt[:, None])
+        dashpots = _middle(jnp.sum((rate @ form.damping) * rate, axis=1))
+        dashed = jnp.sum((dashpots + jnp.sum((rolled - 2.0 * towed) * slope, axis=1)) * dt)
+        absorbed = sum(self.absorbed_by().values(), jnp.zeros(()))
         change = stored(-1) - stored(0)
-        parts = {"road_work": road_work, "stored": change, "absorbed": absorbed, "dashpots": tyre}
-        return parts | {"error": road_work - change - absorbed - tyre}
+        parts = {"road_work": road_work, "stored": change, "absorbed": absorbed, "dashpots": dashed}
+        return parts | {"error": road_work - change - absorbed - dashed}
+
+    @eqx.filter_jit
+    def absorbed_by(self) -> dict[str, Scalar]:
+        """Energy that each element has taken in [J], ∫ F ė dt, by its name."""
+        form, n = self.vehicle.port_form(), len(self.vehicle.coordinates)
+        dt = jnp.diff(self.time)
+        moved = _middle(self.port_force * (self.motion[:, n:] @ form.ports.T))
+        if form.port_road is not None:
+            slope = jnp.diff(self.road, axis=0) / dt[:, None]
+            moved = moved - _middle(self.port_force) * (slope @ form.port_road.T)
+        taken = jnp.sum(moved * dt[:, None], axis=0)
+        return dict(zip(self.vehicle.frame().element_names, taken, strict=True))
 
     def to_xarray(self) -> "xarray.Dataset":
         """All channels as an `xarray.Dataset` over time, with units."""

@@ -1,15 +1,19 @@
 """`simulate`: a vehicle on a road."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp.dampers.coverage import coverage
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.exponential import exponential_steps
 from jaxdamp.simulation.response import Response
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.vehicles import AbstractVehicle, static_equilibrium
+from jaxdamp.vehicles.equilibrium import refuse_restless
 
 
 if TYPE_CHECKING:
@@ -25,14 +29,18 @@ def simulate(
     method: "str | diffrax.AbstractSolver" = "exponential",
     rtol: float = 1e-8,
     atol: float = 1e-10,
+    start: Mapping[str, float] | None = None,
 ) -> Response:
     """Drive a vehicle over a road.
 
-    The vehicle starts settled and at rest on the road's first height. The road is taken as linear between instants.
+    The vehicle starts at rest in its static equilibrium on the road's first heights, or as `start` says. The road is
+    taken as linear between instants.
 
     Arguments:
         vehicle: any vehicle, with its laws.
-        road: heights under its wheels over time.
+        road: heights under its wheels over time, a track for each (`vehicle.wheel_names`) or for each axle, under both
+            sides of it. A road with one track goes under all wheels together; `roads.delayed` sends it on from axle
+            to axle.
         duration: length of the run [s]; the road's own if it has one and this is left out.
         dt: spacing of the instants [s], for the exponential engine also its step (second order; 1 ms is right for
             cars with memoryless laws).
@@ -40,12 +48,14 @@ def simulate(
             `diffrax.Kvaerno5()` for a stiff law.
         rtol: relative tolerance of the adaptive methods.
         atol: absolute tolerance of the adaptive methods, in the units of the states.
+        start: coordinates [m, rad] at time zero that differ from the equilibrium, such as `{"pitch": 0.05}`; at rest.
 
     Returns:
         The response at `round(duration/dt) + 1` instants.
 
     Raises:
-        ValueError: a step longer than the spacing of a sampled road, no duration, a run that diverged.
+        ValueError: a step longer than the spacing of a sampled road, no duration, a road of other tracks than wheels,
+            an unknown coordinate, a vehicle without equilibrium, a run that diverged.
 
     >>> from jaxdamp import roads, vehicles
     >>> car = vehicles.presets.quarter_car_000()
@@ -65,9 +75,10 @@ def simulate(
         _checks.refuse("dt", f"not be longer than the road's grid of {road.grid:g} s", dt, remedy)
     count = round(duration / dt)
     time = jnp.arange(count + 1, dtype=float) * dt
-    heights = road.height(time)
+    heights = _under_wheels(vehicle, road.height(time))
+    begin = None if start is None else _displaced(vehicle, heights[0], start)
     if method == "exponential":
-        motion, forces, states = exponential_steps(vehicle, heights, jnp.asarray(dt, dtype=float))
+        motion, forces, states = exponential_steps(vehicle, heights, jnp.asarray(dt, dtype=float), begin)
         remedy = f"Take a shorter step than {dt:g} s, or an implicit solver, `method=diffrax.Kvaerno5()`."
     else:
         import diffrax
@@ -77,9 +88,39 @@ def simulate(
         if isinstance(method, str):
             _checks.one_of("method", method, ["exponential", "diffrax"])
             method = diffrax.Tsit5()
-        motion, forces, states, result = adaptive_steps(vehicle, time, heights, method, rtol, atol)
+        motion, forces, states, result = adaptive_steps(vehicle, time, heights, method, rtol, atol, begin)
         remedy = f"The solver says: {diffrax.RESULTS[result] or 'finished'} Fast laws need `method=diffrax.Kvaerno5()`."
     last = _checks.concrete(motion[-1])
     if last is not None and not np.all(np.isfinite(last)):
+        if not np.all(np.isfinite(np.asarray(motion[0]))):
+            refuse_restless(vehicle)
+        remedy = " ".join([*filter(None, map(coverage, vehicle.elements())), remedy])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
     return Response(vehicle, time, motion, forces, heights, states)
+
+
+def _under_wheels(vehicle: AbstractVehicle, heights: Float[Array, "time tracks"]) -> Float[Array, "time wheels"]:
+    """A track for each wheel: those of the road; its tracks by axle under both sides; or its only one under all."""
+    names, axles, tracks = vehicle.wheel_names, vehicle.frame().axles, heights.shape[1]
+    if tracks == len(names):
+        return heights
+    if tracks == 1:
+        return jnp.broadcast_to(heights, (heights.shape[0], len(names)))
+    if tracks == max(axles) + 1:
+        return heights[:, np.array(axles)]
+    called = f" ({', '.join(names)})" if any(names) else ""
+    must = f"have a track for each of {len(names)} wheel(s){called} or of {max(axles) + 1} axle(s), or one for all"
+    remedy = "`roads.delayed(road, positions=vehicle.axle_positions, speed=...)` makes one for each axle."
+    _checks.refuse("road", must, f"a road of {tracks} tracks", remedy)
+
+
+def _displaced(
+    vehicle: AbstractVehicle, road: Float[Array, " wheels"], start: Mapping[str, float]
+) -> Float[Array, " n"]:
+    """The motion (q, q̇) at rest in the static equilibrium, with other values of some coordinates."""
+    names = vehicle.coordinates
+    for name, value in start.items():
+        _checks.one_of("start", name, names)
+        _checks.finite(f"start[{name!r}]", value)
+    position = static_equilibrium(vehicle, road) | {name: jnp.asarray(v, dtype=float) for name, v in start.items()}
+    return jnp.concatenate([jnp.stack([position[name] for name in names]), jnp.zeros(len(names))])

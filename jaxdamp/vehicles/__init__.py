@@ -1,23 +1,83 @@
-"""Vehicles in one form: linear masses and springs, damper laws at ports. Published sets are in `vehicles.presets`."""
+"""Vehicles in one form: linear masses and springs, laws at ports.
+
+- Ready-made: `QuarterCar`, `HalfCar`, `RollCar`, `FullCar`, `TandemTruck`, `TrackedHull`, built from `Corner`, `Axle`,
+  `WalkingBeam` or `IndependentTandem`, `Cab`, `Seat`, `Place`; published sets are in `vehicles.presets`.
+- Your own: a `LumpedVehicle` from a `Frame` of `Body`, `Link` and `Wheel` parts (`docs/vehicles.md`).
+- What they say of themselves: `static_equilibrium`, `modes`, `linearise`, `frequency_response`, `stationary_rms`,
+  `spectral_rms`; in time, `jaxdamp.simulate`.
+
+z is up, pitch positive nose up, roll positive left side up.
+"""
 
 from jaxdamp.vehicles import presets
-from jaxdamp.vehicles.base import AbstractVehicle, Instant, RideMetric
+from jaxdamp.vehicles.axle import Axle
+from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle
+from jaxdamp.vehicles.cab import Cab
+from jaxdamp.vehicles.channels import Instant, RideMetric
+from jaxdamp.vehicles.corner import Corner
+from jaxdamp.vehicles.cubic_spring import CubicSpring
+from jaxdamp.vehicles.equilibrium import rest_position, static_equilibrium
+from jaxdamp.vehicles.frame import Frame
+from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
+from jaxdamp.vehicles.full_car import FullCar
+from jaxdamp.vehicles.half_car import HalfCar
+from jaxdamp.vehicles.lift_off import LiftOff
+from jaxdamp.vehicles.linear import LinearVehicle, linearise
+from jaxdamp.vehicles.modes import Modes, modes
+from jaxdamp.vehicles.parts import Body, Element, Link, Place, Wheel
+from jaxdamp.vehicles.points import Point
 from jaxdamp.vehicles.port_form import Connection, PortForm, assemble
+from jaxdamp.vehicles.ports import Ports
 from jaxdamp.vehicles.quarter_car import QuarterCar
-from jaxdamp.vehicles.stationary import LinearVehicle, linearise, lyapunov, stationary_rms
+from jaxdamp.vehicles.roll_car import RollCar
+from jaxdamp.vehicles.seat import Seat, SeatMass
+from jaxdamp.vehicles.stationary import lyapunov, stationary_rms
+from jaxdamp.vehicles.tandem import IndependentTandem, WalkingBeam
+from jaxdamp.vehicles.tandem_truck import TandemTruck
+from jaxdamp.vehicles.tracked_hull import PitchDecay, TrackedHull
 
 
 __all__ = [
     "AbstractVehicle",
+    "Axle",
+    "Body",
+    "Cab",
     "Connection",
+    "Corner",
+    "CubicSpring",
+    "Element",
+    "Frame",
+    "FullCar",
+    "HalfCar",
+    "IndependentTandem",
     "Instant",
+    "LiftOff",
     "LinearVehicle",
+    "Link",
+    "LumpedVehicle",
+    "Modes",
+    "PitchDecay",
+    "Place",
+    "Point",
     "PortForm",
+    "Ports",
     "QuarterCar",
     "RideMetric",
+    "RollCar",
+    "Seat",
+    "SeatMass",
+    "TandemTruck",
+    "TrackedHull",
+    "WalkingBeam",
+    "Wheel",
     "assemble",
+    "frequency_response",
     "linearise",
     "lyapunov",
+    "modes",
     "presets",
+    "rest_position",
+    "spectral_rms",
+    "static_equilibrium",
     "stationary_rms",
 ]

@@ -1,54 +1,103 @@
-"""What every vehicle offers: its port form, its elements, its channels and its ride metrics."""
+"""What every vehicle offers, all from its frame of parts."""
 
 from abc import abstractmethod
-from typing import ClassVar, NamedTuple, final
+from typing import final
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import check_parameters
+from jaxdamp.parameters import check_parameters, readable
+from jaxdamp.vehicles.channels import Instant, RideMetric, channels_of, ride_metrics_of, units_of
+from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
 
 
-@final
-class Instant(eqx.Module):
-    """The motion of a vehicle at one instant, SI units."""
-
-    position: Float[Array, " q"]
-    velocity: Float[Array, " q"]
-    acceleration: Float[Array, " q"]
-    road: Float[Array, " wheels"]
-    road_rate: Float[Array, " wheels"]
-    port_force: Float[Array, " ports"]
-
-
-class RideMetric(NamedTuple):
-    """A number that says how a vehicle rides: a statistic ("rms", "peak", "peak_to_peak") of a channel."""
-
-    name: str
-    channel: str
-    statistic: str
-
-
 class AbstractVehicle(eqx.Module):
-    """Masses and springs with damper laws at ports."""
+    """Masses and springs with damper laws at ports.
 
-    units: ClassVar[dict[str, str]]
-    ride_metrics: ClassVar[tuple[RideMetric, ...]]
+    A vehicle names its parameters and has one method, `frame`, which says what it is made of; matrices, elements,
+    channels, units, metrics and static loads follow. `docs/vehicles.md` builds one.
+    """
 
     def __check_init__(self) -> None:
         check_parameters(self)
 
+    def __repr__(self) -> str:
+        return readable(self)
+
     @abstractmethod
+    def frame(self) -> Frame:
+        """The parts, from the geometry."""
+
     def port_form(self) -> PortForm:
         """The matrices, built from geometry."""
+        return self.frame().port_form()
 
-    @abstractmethod
     def elements(self) -> tuple[AbstractDamper, ...]:
         """The law at each port."""
+        return self.frame().elements()
 
-    @abstractmethod
     def channels(self, instant: Instant) -> dict[str, Scalar]:
         """What a test engineer would measure, by name, in the units of `units`; linear in the motion."""
+        return channels_of(self.frame(), instant)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates, heights [m] and angles [rad]."""
+        return self.frame().coordinates
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each channel."""
+        return units_of(self.frame())
+
+    @property
+    def ride_metrics(self) -> tuple[RideMetric, ...]:
+        """The numbers that say how the vehicle rides."""
+        return ride_metrics_of(self.frame())
+
+    def static_wheel_loads(self) -> Float[Array, " wheels"]:
+        """Load of each wheel at rest on level ground [N] (see `Frame.static_wheel_loads`)."""
+        return self.frame().static_wheel_loads()
+
+    @property
+    def wheel_names(self) -> tuple[str, ...]:
+        """Names of the wheels, in the order of the tracks that a road must have."""
+        return tuple(wheel.name for wheel in self.frame().wheels)
+
+    @property
+    def axle_positions(self) -> Float[Array, " axles"]:
+        """Distance of each axle behind the front axle [m]: `roads.delayed(road, positions=..., speed=...)` takes it."""
+        return jnp.stack([wheel.behind for wheel in self.frame().wheels if not wheel.beside])
+
+    @property
+    def track_width(self) -> Scalar:
+        """Largest distance between left and right wheels [m]; zero where a wheel stands for both sides."""
+        offsets = jnp.stack([wheel.left for wheel in self.frame().wheels])
+        return jnp.max(offsets) - jnp.min(offsets)
+
+
+@final
+class LumpedVehicle(AbstractVehicle):
+    """A vehicle that is a list of parts and nothing else, for one of its own kind.
+
+    Its parameters are those of the parts, such as `parts.links.0.stiffness`. To give parameters names of your own,
+    derive a class from `AbstractVehicle` (`docs/vehicles.md` shows both).
+
+    >>> from jaxdamp.dampers import Linear
+    >>> from jaxdamp.vehicles import Body, Element, Link, Wheel
+    >>> body, wheel = Body("sprung", 300.0), Body("unsprung", 40.0)
+    >>> suspension = Link("", body.at() - wheel.at(), stiffness=20e3, elements=(Element("damper", Linear(1500.0)),))
+    >>> car = LumpedVehicle(Frame((body, wheel), (suspension,), (Wheel("", wheel.at(), 180e3),)))
+    >>> car.static_wheel_loads().round(2)
+    Array([3334.26], dtype=float64)
+    """
+
+    parts: Frame
+
+    def frame(self) -> Frame:
+        """The parts."""
+        return self.parts

@@ -1,9 +1,9 @@
 """The one form of all vehicles: linear masses and springs, and nonlinear elements at ports.
 
-    M q̈ = −K q − C q̇ + K_r z_r + C_r ż_r − Pᵀ f,    fᵢ = element i (deflection Pᵢ q, rate Pᵢ q̇, its states)
+    M q̈ = −K q − C q̇ + K_r z_r + C_r ż_r − Pᵀ f,    fᵢ = element i (deflection eᵢ = Pᵢ q − Sᵢ z_r, rate ėᵢ, its states)
 
-The coordinates q [m, rad] are measured from static equilibrium, z up. Every spring and every port is a row R of
-geometry, so that forces return through the same row, −Rᵀ F, and no sign is written by hand.
+The coordinates q [m, rad] are measured from the static equilibrium on the linear springs, z up. Every spring and every
+port is a row R of geometry, so that forces return through the same row, −Rᵀ F, and no sign is written by hand.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,6 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxdamp import _checks
 from jaxdamp._types import Scalar
 
 
@@ -45,45 +44,42 @@ class PortForm(eqx.Module):
     ground_stiffness: Float[Array, "wheels wheels"]
     ground_damping: Float[Array, "wheels wheels"]
     ports: Float[Array, "ports q"]
+    port_road: Float[Array, "ports wheels"] | None = None  # S; None where no element stands on the road
 
-    def state_matrix(self) -> Float[Array, "n n"]:
-        """A of ẋ = A x + …, x = (q, q̇)."""
-        n = self.mass.shape[0]
-        lower = -jnp.linalg.solve(self.mass, jnp.concatenate([self.stiffness, self.damping], axis=1))
-        upper = jnp.concatenate([jnp.zeros((n, n), lower.dtype), jnp.eye(n, dtype=lower.dtype)], axis=1)
-        return jnp.concatenate([upper, lower])
+    def first_order(self) -> "FirstOrder":
+        """The matrices of ẋ = A x + B_f f + B_r z_r + B_d ż_r, x = (q, q̇), from one system with the mass matrix."""
+        n, ports, wheels = self.mass.shape[0], self.ports.shape[0], self.road_stiffness.shape[1]
+        forces = [-self.stiffness, -self.damping, -self.ports.T, self.road_stiffness, self.road_damping]
+        rates = jnp.linalg.solve(self.mass, jnp.concatenate(forces, axis=1))
+        eye = jnp.eye(n, 2 * n + ports + 2 * wheels, n, dtype=rates.dtype)  # the upper half: q̇ is q̇
+        whole = jnp.concatenate([eye, rates])
+        ends = [2 * n, 2 * n + ports, 2 * n + ports + wheels]
+        return FirstOrder(*jnp.split(whole, ends, axis=1))
 
-    def _driven(self, forces: Float[Array, "q inputs"]) -> Float[Array, "n inputs"]:
-        rates = jnp.linalg.solve(self.mass, forces)
-        return jnp.concatenate([jnp.zeros_like(rates), rates])
-
-    def port_input(self) -> Float[Array, "n ports"]:
-        """B_f: how the element forces act on ẋ."""
-        return self._driven(-self.ports.T)
-
-    def road_input(self) -> Float[Array, "n wheels"]:
-        """B_r: how the road heights act on ẋ."""
-        return self._driven(self.road_stiffness)
-
-    def road_rate_input(self) -> Float[Array, "n wheels"]:
-        """How the rates of the road heights act on ẋ."""
-        return self._driven(self.road_damping)
-
-    def settled(self) -> Float[Array, "q wheels"]:
-        """Coordinates of the vehicle at rest on unit road heights, K⁻¹ K_r."""
-        return jnp.linalg.solve(self.stiffness, self.road_stiffness)
-
-    def at_rest_on(self, heights: Float[Array, " tracks"]) -> Float[Array, " n"]:
-        """The motion (q, q̇) of the vehicle settled and at rest on the road; refuses a road of other tracks."""
-        wheels = self.road_stiffness.shape[1]
-        if heights.shape[0] != wheels:
-            must = f"have a track for each of {wheels} wheels"
-            _checks.refuse("road", must, f"a road of {heights.shape[0]} track(s)")
-        position = self.settled() @ heights
-        return jnp.concatenate([position, jnp.zeros_like(position)])
+    def at_ports(
+        self, coordinates: Float[Array, "*time q"], road: Float[Array, "*time wheels"]
+    ) -> Float[Array, "*time ports"]:
+        """Deflections of the elements from coordinates and road heights; their rates from the rates of both."""
+        deflections = coordinates @ self.ports.T
+        return deflections if self.port_road is None else deflections - road @ self.port_road.T
 
 
-def assemble(mass: Float[Array, "q q"], connections: Sequence[Connection], ports: Float[Array, "ports q"]) -> PortForm:
+@final
+class FirstOrder(eqx.Module):
+    """ẋ = A x + B_f f + B_r z_r + B_d ż_r of the motion x = (q, q̇)."""
+
+    state_matrix: Float[Array, "n n"]
+    port_input: Float[Array, "n ports"]
+    road_input: Float[Array, "n wheels"]
+    road_rate_input: Float[Array, "n wheels"]
+
+
+def assemble(
+    mass: Float[Array, "q q"],
+    connections: Sequence[Connection],
+    ports: Float[Array, "ports q"],
+    port_road: Float[Array, "ports wheels"] | None = None,
+) -> PortForm:
     """Sum the connections into matrices: K = Σ Rᵀ k R, K_r = Σ Rᵀ k S, K_g = Σ Sᵀ k S."""
     rows = jnp.stack([c.row for c in connections])
     road = jnp.stack([c.road for c in connections])
@@ -100,4 +96,5 @@ def assemble(mass: Float[Array, "q q"], connections: Sequence[Connection], ports
         ground_springs @ road,
         ground_dashpots @ road,
         ports,
+        port_road,
     )

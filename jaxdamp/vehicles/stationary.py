@@ -1,66 +1,16 @@
 """Stationary response of the linearised vehicle to a road whose rate of height is white noise."""
 
-from typing import final
-
 import equinox as eqx
 import jax
-import jax.flatten_util
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike
-from jaxdamp.vehicles.base import AbstractVehicle, Instant
-
-
-@final
-class LinearVehicle(eqx.Module):
-    """ξ̇ = A ξ + B ż_r, channels = C ξ + D ż_r, ξ = (q − K⁻¹K_r z_r, q̇, law states): bounded on a white road."""
-
-    state_matrix: Float[Array, "n n"]
-    road_rate_input: Float[Array, "n wheels"]
-    output: dict[str, Float[Array, " n"]]
-    feed_through: dict[str, Float[Array, " wheels"]]
-
-
-@eqx.filter_jit
-def linearise(vehicle: AbstractVehicle) -> LinearVehicle:
-    """Linearise the laws about rest and write the vehicle relative to where it would settle on the road.
-
-    Valid for small motion about a law's slope at zero velocity. Absolute heights (`z_…`) then mean heights above the
-    settled position.
-    """
-    form, laws = vehicle.port_form(), vehicle.elements()
-    n, wheels = form.road_stiffness.shape
-    starts = [law.initial_state() for law in laws]
-    flat, unravel = jax.flatten_util.ravel_pytree(starts)
-    settled = form.settled()
-    a, b_f, b_d = form.state_matrix(), form.port_input(), form.road_rate_input()
-
-    def forces(xi: Array) -> Array:
-        deflection, rate = form.ports @ xi[:n], form.ports @ xi[n : 2 * n]
-        states = unravel(xi[2 * n :])
-        return jnp.stack([law.force(deflection[i], rate[i], states[i]) for i, law in enumerate(laws)])
-
-    def rates(xi: Array, road_rate: Array) -> Array:
-        deflection, rate = form.ports @ xi[:n], form.ports @ xi[n : 2 * n]
-        states = unravel(xi[2 * n :])
-        motion = a @ xi[: 2 * n] + b_f @ forces(xi) + b_d @ road_rate
-        motion = motion - jnp.concatenate([settled @ road_rate, jnp.zeros(n)])
-        inner = [law.state_rate(deflection[i], rate[i], states[i]) for i, law in enumerate(laws)]
-        return jnp.concatenate([motion, *inner])
-
-    def outputs(xi: Array, road_rate: Array) -> dict[str, Scalar]:
-        acceleration = (a @ xi[: 2 * n] + b_f @ forces(xi) + b_d @ road_rate)[n:]
-        instant = Instant(xi[:n], xi[n : 2 * n], acceleration, jnp.zeros(wheels), road_rate, forces(xi))
-        return vehicle.channels(instant)
-
-    rest, still = jnp.concatenate([jnp.zeros(2 * n), flat]), jnp.zeros(wheels)
-    state_matrix, road_rate_input = jax.jacfwd(rates, (0, 1))(rest, still)
-    both = jax.jacfwd(outputs, (0, 1))(rest, still)
-    return LinearVehicle(
-        state_matrix, road_rate_input, {k: v[0] for k, v in both.items()}, {k: v[1] for k, v in both.items()}
-    )
+from jaxdamp.vehicles.base import AbstractVehicle
+from jaxdamp.vehicles.frequency_response import root
+from jaxdamp.vehicles.linear import LinearVehicle, as_linear
 
 
 def lyapunov(a: Float[Array, "n n"], q: Float[Array, "n n"]) -> Float[Array, "n n"]:
@@ -71,20 +21,31 @@ def lyapunov(a: Float[Array, "n n"], q: Float[Array, "n n"]) -> Float[Array, "n 
     return jnp.linalg.solve(system, -jnp.ravel(q)).reshape(n, n)
 
 
-def stationary_rms(vehicle: AbstractVehicle, velocity_psd: ScalarLike = 1.0) -> dict[str, Scalar]:
+def stationary_rms(
+    vehicle: AbstractVehicle | LinearVehicle, velocity_psd: ScalarLike = 1.0, *, speed: ScalarLike | int | None = None
+) -> dict[str, Scalar]:
     """RMS of every channel of the linearised vehicle when the road's rate of height is white noise.
 
-    Solves A P + P Aᵀ + S B Bᵀ = 0 for the covariance P. Differentiable in every parameter. Channels that carry the
-    white noise itself (with tyre damping, the tyre load) have an infinite RMS and are given as `inf`; heights are above
-    the settled position.
+    One road goes under all wheels: together, or at a `speed` one axle after the other, which correlates what they do.
+    A channel is then y(t) = ∫ k(s) u(t − s) ds with the white rate u of the road, and its mean square S ∫ k² ds is
+    summed exactly from axle to axle: over a stretch in which no wheel meets the impulse, k is a row times the matrix
+    exponential of the state, plus a constant. Behind the last axle A X + X Aᵀ + x xᵀ = 0 gives the rest. Differentiable
+    in every parameter and in the speed.
+
+    Channels that carry the white noise itself (with tyre damping, the tyre load) have an infinite RMS and are given as
+    `inf`. Absolute heights (`z_…`) grow without bound: those given are above the road under the front axle.
 
     Arguments:
-        vehicle: with one wheel, or with wheels on independent roads.
-        velocity_psd: two-sided power spectral density S of the road's rate of height [(m/s)²/Hz];
-            an ISO 8608 road of waviness 2 has 2π² G_d(n₀) n₀² V.
+        vehicle: a vehicle, linearised about rest, or what `linearise` made of it.
+        velocity_psd: two-sided power spectral density S of the rate of height [(m/s)²/Hz]; of an ISO 8608 road of
+            waviness 2, 2π² G_d(n₀) n₀² V (`roads.white`).
+        speed: of the vehicle [m/s]; left out, all wheels go over the road together.
 
     Returns:
         RMS by channel name, in the units of the vehicle's channels.
+
+    Raises:
+        ValueError: a density or a speed that is not positive; a vehicle that does not come to rest.
 
     Source: for the quarter car, closed forms exist (see the tests).
 
@@ -93,17 +54,39 @@ def stationary_rms(vehicle: AbstractVehicle, velocity_psd: ScalarLike = 1.0) -> 
     853.472
     """
     _checks.positive("velocity_psd", velocity_psd)
-    return _root_mean_squares(vehicle, velocity_psd)
+    linear = as_linear(vehicle)
+    matrix = _checks.concrete(linear.state_matrix)
+    if matrix is not None and np.max(np.linalg.eigvals(matrix).real) > -1e-9 * np.abs(matrix).max():
+        remedy = (
+            "Friction that holds at rest (Dahl, LuGre, Bouc-Wen) never forgets, for small motion: pass "
+            "`linearise(vehicle, amplitude=0.02, frequency=1.2)`."
+        )
+        _checks.refuse("vehicle", "come to rest when linearised", "one that does not", remedy)
+    found = root(velocity_psd * _mean_squares(linear, linear.delays(speed)))
+    return {name: found[i] for i, name in enumerate(linear.channels)}
 
 
 @eqx.filter_jit
-def _root_mean_squares(vehicle: AbstractVehicle, velocity_psd: ScalarLike) -> dict[str, Scalar]:
-    linear = linearise(vehicle)
-    b = linear.road_rate_input
-    covariance = lyapunov(linear.state_matrix, velocity_psd * (b @ b.T))
-    result = {}
-    for name, row in linear.output.items():
-        variance = jnp.maximum(row @ covariance @ row, 0.0)
-        root = jnp.where(variance > 0, jnp.sqrt(jnp.where(variance > 0, variance, 1.0)), 0.0)
-        result[name] = jnp.where(jnp.any(linear.feed_through[name] != 0), jnp.inf, root)
-    return result
+def _mean_squares(linear: LinearVehicle, delays: Float[Array, " wheels"]) -> Float[Array, " channels"]:
+    """∫ k² ds of every channel, `inf` where it holds the white noise."""
+    a, c, settled = linear.state_matrix, linear.output, linear.settled()
+    # ξ = x − settled z_r obeys ξ̇ = A ξ + (E − settled) ż_r; channels are C ξ + (C settled + D) z_r + F ż_r
+    order = jnp.argsort(delays)
+    times, pushes = delays[order], (linear.road_rate_input - settled)[:, order]
+    static = (c @ settled + linear.road_feed)[:, order]
+
+    def seen(covariance: Float[Array, "n n"]) -> Float[Array, " channels"]:
+        return jnp.sum((c @ covariance) * c, axis=1)
+
+    state, total = pushes[:, 0], jnp.zeros(c.shape[0])
+    for i in range(1, times.size):
+        gap = times[i] - times[i - 1]
+        after = jax.scipy.linalg.expm(a * gap) @ state
+        # ∫ ξξᵀ over the stretch: the whole tail from its beginning less that from its end
+        covariance = lyapunov(a, jnp.outer(state, state) - jnp.outer(after, after))
+        mean = c @ jnp.linalg.solve(a, after - state)
+        held = -jnp.sum(static[:, i:], axis=1)  # wheels still to come stand on the road that the front axle has left
+        total = total + seen(covariance) + 2.0 * held * mean + held**2 * gap
+        state = after + pushes[:, i]
+    total = jnp.maximum(total + seen(lyapunov(a, jnp.outer(state, state))), 0.0)
+    return jnp.where(jnp.any(linear.feed_through != 0, axis=1), jnp.inf, total)

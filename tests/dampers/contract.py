@@ -337,7 +337,8 @@ def check_single_precision(law: AbstractDamper) -> None:
     force = _responses(free, free.values, dt, x, v)[0][0]
     with jax.enable_x64(False):
         half = jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf), jnp.float32), law)
-        single = march(half, *(jnp.asarray(a, jnp.float32) for a in (dt, x, v)), 1)
+        dt, x, v = (jnp.asarray(a, jnp.float32) for a in (dt, x, v))
+        single = march(half, dt, x, v, 1)
     assert single.dtype == jnp.float32
     np.testing.assert_allclose(np.asarray(single, dtype=float), force, atol=3e-5 * np.max(np.abs(force)))
 

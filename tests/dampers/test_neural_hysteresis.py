@@ -12,12 +12,13 @@ from jaxdamp.dampers import Hybrid, Lag, Linear, NeuralHysteresis, PiecewiseLine
 from jaxdamp.parameters import free_parameters, replace
 
 
-SCALES = {"velocity_scale": 0.3, "force_scale": 800.0}
+def network(key, **options):
+    return NeuralHysteresis.random(jax.random.key(key), velocity_scale=0.3, force_scale=800.0, **options)
 
 
 def wild(seed, elements=2, width=5, size=3.0):
     """A network with weights far beyond those of a trained one."""
-    law = NeuralHysteresis.random(jax.random.key(seed), elements=elements, width=width, **SCALES)
+    law = network(seed, elements=elements, width=width)
     names = ("hidden_weights", "hidden_biases", "output_weights", "output_biases")
     keys = jax.random.split(jax.random.key(1000 + seed), 4)
     drawn = [size * jax.random.normal(key, getattr(law, name).shape) for key, name in zip(keys, names, strict=True)]
@@ -41,7 +42,7 @@ def relaxation(law, v, z):
 
 
 def test_response_against_an_independent_integration():
-    law = NeuralHysteresis.random(jax.random.key(3), elements=2, width=4, **SCALES)
+    law = network(3, elements=2, width=4)
     t = 1e-3 * np.arange(301)
     w = 2 * np.pi * 7.0
     x, v = 0.5 / w * (1 - np.cos(w * t)), 0.5 * np.sin(w * t)
@@ -91,7 +92,7 @@ def test_work_is_what_is_stored_and_what_is_dissipated():
 
 
 def test_constant_relaxation_in_time_is_a_maxwell_element():
-    law = elastic(NeuralHysteresis.random(jax.random.key(0), elements=1, width=1, **SCALES), alpha=1e-12, beta=0.7)
+    law = elastic(network(0, elements=1, width=1), alpha=1e-12, beta=0.7)
     k = float(law.stiffness[0])
     lag = 800.0 / (k * 0.7 * 0.3)
     t = 1e-3 * np.arange(400)
@@ -101,7 +102,7 @@ def test_constant_relaxation_in_time_is_a_maxwell_element():
 
 
 def test_constant_relaxation_with_travel_saturates_as_friction_does():
-    law = elastic(NeuralHysteresis.random(jax.random.key(0), elements=1, width=1, **SCALES), alpha=2.0, beta=1e-12)
+    law = elastic(network(0, elements=1, width=1), alpha=2.0, beta=1e-12)
     state = law.initial_state()
     for _ in range(200):
         state = law.advance(0.0, 0.5, 0.0, 0.5, state, 1e-3)
@@ -118,19 +119,17 @@ def test_bounded_at_any_step():
 
 
 def test_the_key_makes_the_weights():
-    first, again, other = (
-        free_parameters(NeuralHysteresis.random(jax.random.key(k), **SCALES)).values for k in (4, 4, 5)
-    )
+    first, again, other = (free_parameters(network(k)).values for k in (4, 4, 5))
     np.testing.assert_array_equal(first, again)
     assert np.max(np.abs(first - other)) > 0.1
 
 
 def test_shapes_that_do_not_fit_are_refused():
-    law = NeuralHysteresis.random(jax.random.key(0), **SCALES)
+    law = network(0)
     with pytest.raises(ValueError, match=r"`output_weights` must be of shape \(4, 6\) for 2 elements and 6 hidden"):
         replace(law, {"output_weights": jnp.zeros((3, 6))}).__check_init__()
     with pytest.raises(ValueError, match="`elements` must be 1 or more"):
-        NeuralHysteresis.random(jax.random.key(0), elements=0, **SCALES)
+        network(0, elements=0)
 
 
 # ---- Hybrid
@@ -156,4 +155,4 @@ def test_guess_of_the_hybrid():
 def test_a_backbone_that_could_drive_the_motion_is_refused():
     backbone = PiecewiseLinear([-0.2, 0.2], [900.0, 2500.0, -300.0], monotone=False)
     with pytest.raises(ValueError, match="`backbone` must be monotone, so that the hybrid is passive"):
-        Hybrid(backbone, NeuralHysteresis.random(jax.random.key(0), **SCALES))
+        Hybrid(backbone, network(0))

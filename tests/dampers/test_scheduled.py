@@ -18,6 +18,7 @@ from jaxdamp.dampers import (
     takes_command,
     with_command,
 )
+from jaxdamp.parameters import get
 
 
 def bouc_wen(u):
@@ -55,7 +56,7 @@ def test_the_command_reaches_laws_inside_others():
     x, v = motion()[1:]
     low, high = (respond(with_command(law, u), motion()[0], x, v) for u in (0.0, 1.0))
     np.testing.assert_allclose(high, 3.0 * low, rtol=1e-9, atol=1e-9)
-    assert float(law.law.law.command) == 0.0
+    assert float(get(law, "law.law.command")) == 0.0
 
 
 def test_batched_over_the_command():

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from jaxdamp import dampers
 from jaxdamp.parameters import replace
 from jaxdamp.simulation.propagator import Propagator, phi_functions
+from jaxdamp.vehicles import rest_position
 from jaxdamp.vehicles.presets import quarter_car_000
 
 
@@ -50,7 +52,9 @@ def test_step_is_exact_for_forces_and_roads_linear_over_it(dt, rng):
 def test_a_vehicle_at_rest_stays():
     form = quarter_car_000().port_form()
     p = Propagator.over(form, jnp.asarray(1e-3))
-    start = form.at_rest_on(jnp.array([0.3]))
+    road = jnp.array([0.3])
+    position = rest_position(form, [dampers.Linear(2500.0)], road)
+    start = jnp.concatenate([position, jnp.zeros(2)])
     np.testing.assert_allclose(p.phi @ start + p.road_held @ jnp.array([0.3]), start, atol=1e-14)
 
 

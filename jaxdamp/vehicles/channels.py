@@ -1,0 +1,115 @@
+"""What a test engineer would measure on a vehicle, by name: channels, their units and the ride metrics made of them."""
+
+from typing import NamedTuple, final
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from jaxdamp._types import Scalar
+from jaxdamp.vehicles.frame import Frame
+from jaxdamp.vehicles.parts import Link, Wheel, prefixed
+
+
+@final
+class Instant(eqx.Module):
+    """The motion of a vehicle at one instant, SI units."""
+
+    position: Float[Array, " q"]
+    velocity: Float[Array, " q"]
+    acceleration: Float[Array, " q"]
+    road: Float[Array, " wheels"]
+    road_rate: Float[Array, " wheels"]
+    port_force: Float[Array, " ports"]
+
+
+class RideMetric(NamedTuple):
+    """A number that says how a vehicle rides: a statistic ("rms", "peak", "peak_to_peak") of a channel."""
+
+    name: str
+    channel: str
+    statistic: str
+
+
+def _acceleration(coordinate: str) -> str:
+    return f"{coordinate.removeprefix('z_')}_acceleration"
+
+
+def units_of(frame: Frame) -> dict[str, str]:
+    """Unit of each channel, by name."""
+    units: dict[str, str] = {}
+    for name in frame.coordinates:
+        unit = "m" if name.startswith("z_") else "rad"
+        units |= {name: unit, _acceleration(name): f"{unit}/s^2"}
+    for place in frame.places:
+        units |= {f"z_{place.name}": "m", f"{place.name}_acceleration": "m/s^2"}
+    parts: list[Link | Wheel] = [*frame.links, *frame.wheels]
+    for part in parts:
+        if part.elements:
+            units |= {prefixed(part.name, "stroke"): "m", prefixed(part.name, "damper_velocity"): "m/s"}
+            units |= {prefixed(part.name, f"{element.name}_force"): "N" for element in part.elements}
+    for wheel in frame.wheels:
+        units |= {f"z_{prefixed(wheel.name, 'road')}": "m", prefixed(wheel.name, "dynamic_tyre_load"): "N"}
+        units |= {prefixed(wheel.name, "relative_tyre_load"): ""}
+    return units
+
+
+def channels_of(frame: Frame, instant: Instant) -> dict[str, Scalar]:
+    """Value of each channel at an instant; linear in the motion, the road and the forces of the elements.
+
+    Heights and angles, their accelerations, stroke, velocity and forces of the links with laws, road heights, tyre
+    loads beyond the static ones (positive: more load).
+    """
+    names = frame.coordinates
+    position, velocity, acceleration = (
+        dict(zip(names, values, strict=True)) for values in (instant.position, instant.velocity, instant.acceleration)
+    )
+    found: dict[str, Scalar] = {}
+    for name in names:
+        found |= {name: position[name], _acceleration(name): acceleration[name]}
+    for place in frame.places:
+        point = frame.place(place)
+        found[f"z_{place.name}"] = point.of(position)
+        found[f"{place.name}_acceleration"] = point.of(acceleration)
+    forces = dict(zip(frame.element_names, instant.port_force, strict=True))
+    for link in frame.links:
+        if link.elements:
+            found[prefixed(link.name, "stroke")] = link.extension.of(position)
+            found[prefixed(link.name, "damper_velocity")] = link.extension.of(velocity)
+    loads = frame.static_wheel_loads()
+    for i, wheel in enumerate(frame.wheels):
+        stretch = wheel.point.of(position) - instant.road[i]
+        rate = wheel.point.of(velocity) - instant.road_rate[i]
+        own = [prefixed(wheel.name, element.name) for element in wheel.elements]
+        pull = wheel.stiffness * stretch + wheel.damping * rate
+        for name in own + [prefixed(wheel.name, "lift_off")] * wheel.lifts:
+            pull = pull + forces[name]
+        if wheel.elements:
+            found |= {prefixed(wheel.name, "stroke"): stretch, prefixed(wheel.name, "damper_velocity"): rate}
+        found[f"z_{prefixed(wheel.name, 'road')}"] = instant.road[i]
+        found[prefixed(wheel.name, "dynamic_tyre_load")] = -pull
+        found[prefixed(wheel.name, "relative_tyre_load")] = -pull / loads[i]
+    found |= {f"{name}_force": force for name, force in forces.items() if not name.endswith("lift_off")}
+    return found
+
+
+def ride_metrics_of(frame: Frame) -> tuple[RideMetric, ...]:
+    """Accelerations of the bodies that are not wheels and of the places, working space, damper velocity, tyre loads."""
+    on_wheels = {name for wheel in frame.wheels for name in wheel.point.terms}
+    riding = [b for b in frame.bodies if b.name == frame.main_body.name or on_wheels.isdisjoint(b.masses)]
+    channels = [_acceleration(name) for body in riding for name in body.masses]
+    channels += [f"{place.name}_acceleration" for place in frame.places]
+    metrics = [m for c in channels for m in (RideMetric(f"rms_{c}", c, "rms"), RideMetric(f"peak_{c}", c, "peak"))]
+    parts: list[Link | Wheel] = [*frame.links, *frame.wheels]
+    for part in parts:
+        if part.elements:
+            stroke, velocity = prefixed(part.name, "stroke"), prefixed(part.name, "damper_velocity")
+            metrics += [
+                RideMetric(prefixed(part.name, "working_space_rms"), stroke, "rms"),
+                RideMetric(prefixed(part.name, "working_space_peak"), stroke, "peak_to_peak"),
+                RideMetric(f"peak_{velocity}", velocity, "peak"),
+            ]
+    for wheel in frame.wheels:
+        load, relative = prefixed(wheel.name, "dynamic_tyre_load"), prefixed(wheel.name, "relative_tyre_load")
+        coefficient = prefixed(wheel.name, "dynamic_load_coefficient")
+        metrics += [RideMetric(f"rms_{load}", load, "rms"), RideMetric(coefficient, relative, "standard_deviation")]
+    return tuple(metrics)

@@ -1,0 +1,27 @@
+"""A spring whose rate changes along its stroke."""
+
+from typing import final
+
+from jaxdamp._types import Number, Scalar, ScalarLike
+from jaxdamp.dampers import AbstractStateless
+from jaxdamp.parameters import nonnegative, parameter
+
+
+@final
+class CubicSpring(AbstractStateless):
+    """F = k₂ x² + k₃ x³: what a progressive spring has beside its linear rate.
+
+    Its tangent rate is k + 2 k₂ x + 3 k₃ x² with the linear rate k of the vehicle. With k₂ < 0 it is stiffer in
+    compression than in extension; the whole stays stiff at every stroke where k₂² < 3 k k₃. No energy is lost.
+
+    >>> float(CubicSpring(quadratic_stiffness=-1e5, cubic_stiffness=2e6).force_stroke_velocity(-0.1, 0.0))
+    -3000.0
+    """
+
+    quadratic_stiffness: Number = parameter("N/m²", "k₂, quadratic stiffness", default=0.0, linear=True)
+    cubic_stiffness: Number = parameter("N/m³", "k₃, cubic stiffness", nonnegative, default=0.0, linear=True)
+
+    def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
+        """Force [N] at stroke x [m]; the velocity does not matter."""
+        del v
+        return (self.quadratic_stiffness + self.cubic_stiffness * x) * x * x

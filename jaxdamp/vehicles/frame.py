@@ -1,0 +1,181 @@
+"""A vehicle as a list of parts, and its matrices, elements and static loads."""
+
+from collections.abc import Sequence
+from functools import reduce
+from operator import or_
+from typing import final
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar
+from jaxdamp.dampers import (
+    AbstractDamper,
+    AbstractMemoryless,
+    Lag,
+    MotionRatio,
+    Scaled,
+    SeriesSpring,
+    Sum,
+    TemperatureScaled,
+)
+from jaxdamp.dampers.base import parts
+from jaxdamp.vehicles.lift_off import LiftOff
+from jaxdamp.vehicles.parts import SPRUNG, Body, Element, Link, Place, Wheel
+from jaxdamp.vehicles.points import Point
+from jaxdamp.vehicles.port_form import Connection, PortForm, assemble
+from jaxdamp.vehicles.ports import Ports
+
+
+STANDARD_GRAVITY = 9.80665  # m/s²
+
+
+@final
+class Frame(eqx.Module):
+    """Bodies, links between their points, wheels on the road, places of interest: all that a vehicle is.
+
+    Coordinates follow the bodies, tracks of the road the wheels, ports the elements of links and then of wheels.
+
+    Arguments:
+        bodies: rigid bodies; names differ.
+        links: springs, dashpots and laws between their points.
+        wheels: what stands on the road.
+        places: where else the acceleration is of interest.
+
+    Raises:
+        ValueError: two parts of one name, a point of a body that is not there, no wheel.
+
+    >>> body, wheel = Body("sprung", 300.0), Body("unsprung", 40.0)
+    >>> suspension = Link("", body.at() - wheel.at(), stiffness=20e3)
+    >>> frame = Frame((body, wheel), (suspension,), (Wheel("", wheel.at(), 180e3),))
+    >>> frame.coordinates
+    ('z_sprung', 'z_unsprung')
+    """
+
+    bodies: tuple[Body, ...]
+    links: tuple[Link, ...]
+    wheels: tuple[Wheel, ...]
+    places: tuple[Place, ...] = ()
+
+    def __check_init__(self) -> None:
+        if not self.wheels or not self.bodies:
+            _checks.refuse("wheels", "hold one or more, and `bodies` too", f"{len(self.wheels)} and {len(self.bodies)}")
+        moving: list[Link | Wheel] = [*self.links, *self.wheels]
+        for kind, names in (
+            ("bodies and places", [part.name for part in [*self.bodies, *self.places]]),
+            ("wheels", [wheel.name for wheel in self.wheels]),
+            ("links and wheels with elements", [part.name for part in moving if part.elements]),
+            ("elements", [name for name, _, _ in self._elements()]),
+        ):
+            if len(set(names)) < len(names):
+                _checks.refuse(kind, "have names that differ", names, "Channels are named after them.")
+        points = [link.extension for link in self.links] + [wheel.point for wheel in self.wheels]
+        for name in sorted(set().union(*[point.terms for point in points])):
+            _checks.one_of("point", name, self.coordinates)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates q: heights `z_…` [m] and angles [rad]."""
+        return tuple(name for body in self.bodies for name in body.masses)
+
+    def body(self, name: str) -> Body:
+        """The body of a name."""
+        _checks.one_of("body", name, [body.name for body in self.bodies])
+        return next(body for body in self.bodies if body.name == name)
+
+    def place(self, place: Place) -> Point:
+        """The point of a place of interest."""
+        return self.body(place.body).at(place.ahead, place.left)
+
+    def _elements(self) -> list[tuple[str, Link | Wheel, Element]]:
+        parts: list[Link | Wheel] = [*self.links, *self.wheels]
+        return [(f"{part.name}_{e.name}" if part.name else e.name, part, e) for part in parts for e in part.elements]
+
+    @property
+    def element_names(self) -> tuple[str, ...]:
+        """Name of the element at each port; those of tyres that can leave the road come last."""
+        lifting = [f"{wheel.name}_lift_off" if wheel.name else "lift_off" for wheel in self.wheels if wheel.lifts]
+        return (*[name for name, _, _ in self._elements()], *lifting)
+
+    def elements(self) -> tuple[AbstractDamper, ...]:
+        """The law at each port."""
+        own = tuple(element.law for _, _, element in self._elements())
+        if not any(wheel.lifts for wheel in self.wheels):
+            return own
+        pairs = zip(self.wheels, self.static_wheel_loads(), strict=True)
+        return (*own, *[LiftOff(wheel.stiffness, wheel.damping, load) for wheel, load in pairs if wheel.lifts])
+
+    def port_form(self) -> PortForm:
+        """The matrices."""
+        return self._assembled([part for _, part, _ in self._elements()] + [w for w in self.wheels if w.lifts])
+
+    def _assembled(self, ports: Sequence[Link | Wheel]) -> PortForm:
+        count, names = len(self.wheels), self.coordinates
+        tracks = {id(wheel): jnp.eye(count)[i] for i, wheel in enumerate(self.wheels)}
+        nowhere = jnp.zeros(count)
+
+        def row(part: Link | Wheel) -> Float[Array, " q"]:
+            return (part.extension if isinstance(part, Link) else part.point).row(names)
+
+        connections = [
+            Connection(row(part), tracks.get(id(part), nowhere), part.stiffness, part.damping)
+            for part in [*self.links, *self.wheels]
+        ]
+        rows = jnp.stack([row(part) for part in ports]) if ports else jnp.zeros((0, len(names)))
+        road = None
+        if any(isinstance(part, Wheel) for part in ports):
+            road = jnp.stack([tracks.get(id(part), nowhere) for part in ports])
+        masses: dict[str, Scalar] = reduce(or_, [body.masses for body in self.bodies])
+        return assemble(jnp.diag(jnp.stack([masses[name] for name in names])), connections, rows, road)
+
+    def static_wheel_loads(self) -> Float[Array, " wheels"]:
+        """Load of each wheel at rest on level ground [N], in the order of the wheels.
+
+        Where the weight can stand on the wheels in one way only, it does. Where there are more wheels than that, it is
+        shared as if all springs were free of load on the same level ground before: K_t q = −weight, with the springs
+        of the laws in the tangent stiffness K_t.
+        """
+        own = [element.law for _, _, element in self._elements()]
+        form = self._assembled([part for _, part, _ in self._elements()])
+        weight = jnp.zeros(len(self.coordinates)).at[jnp.array(self._heights())].set(STANDARD_GRAVITY)
+        stiffness = tangent_stiffness(form, own, jnp.zeros(len(self.coordinates)))
+        sunk = jnp.linalg.solve(stiffness, -jnp.diag(form.mass) * weight)
+        tyres = jnp.stack([wheel.stiffness for wheel in self.wheels])
+        loads = -tyres * (jnp.stack([wheel.point.row(self.coordinates) for wheel in self.wheels]) @ sunk)
+        direct = [i for i, (_, part, _) in enumerate(self._elements()) if isinstance(part, Wheel)]
+        if direct and form.port_road is not None:
+            slopes, _ = Ports(own).stiffness_and_damping(jnp.zeros(len(own)))
+            loads = loads - form.port_road[jnp.array(direct)].T @ (slopes * (form.ports @ sunk))[jnp.array(direct)]
+        return loads
+
+    def _heights(self) -> list[int]:
+        return [i for i, name in enumerate(self.coordinates) if name in {f"z_{body.name}" for body in self.bodies}]
+
+    @property
+    def axles(self) -> tuple[int, ...]:
+        """Number of the axle that each wheel is on, from 0 in the order of the wheels."""
+        return tuple(int(i) for i in np.cumsum([not wheel.beside for wheel in self.wheels]) - 1)
+
+    @property
+    def main_body(self) -> Body:
+        """The body named "sprung", or the first."""
+        return next((body for body in self.bodies if body.name == SPRUNG), self.bodies[0])
+
+
+def holds_no_stroke(law: AbstractDamper) -> bool:
+    """Whether the kind of the law alone says that its force at rest is the same at every stroke."""
+    around = (Sum, Scaled, MotionRatio, Lag, SeriesSpring, TemperatureScaled)
+    return isinstance(law, AbstractMemoryless) or (isinstance(law, around) and all(map(holds_no_stroke, parts(law))))
+
+
+def tangent_stiffness(
+    form: PortForm, laws: Sequence[AbstractDamper], position: Float[Array, " q"]
+) -> Float[Array, "q q"]:
+    """K + Pᵀ (∂F/∂x) P: the stiffness [N/m] with that of the laws at rest at a position on level ground."""
+    if all(map(holds_no_stroke, laws)):
+        return form.stiffness
+    stiffness, _ = Ports(laws).stiffness_and_damping(form.ports @ position)
+    return form.stiffness + (form.ports.T * stiffness[None, :]) @ form.ports

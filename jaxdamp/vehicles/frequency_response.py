@@ -1,0 +1,158 @@
+"""Frequency response of the linearised vehicle, from the road to every channel."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Complex, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar
+from jaxdamp.vehicles.base import AbstractVehicle
+from jaxdamp.vehicles.linear import LinearVehicle, as_linear
+
+
+def frequency_response(
+    vehicle: AbstractVehicle | LinearVehicle, frequency: Any, *, speed: Any = None, by_wheel: bool = False
+) -> dict[str, Complex[Array, "..."]]:
+    """Complex gain from road height to every channel, H(ω) = C (iω − A)⁻¹ (B + iω E) + D + iω F.
+
+    The road goes under all wheels: together, or at a `speed` one axle after the other, Σ_w H_w exp(−iω τ_w) with the
+    delay τ_w of wheel w behind the front axle. Differentiable in every parameter and in the speed.
+
+    Arguments:
+        vehicle: a vehicle, linearised about rest, or what `linearise` made of it.
+        frequency: [Hz], shape (frequencies,).
+        speed: of the vehicle [m/s]; left out, all wheels go over the road together.
+        by_wheel: give the gain from the height under each wheel instead of their sum.
+
+    Returns:
+        By channel, unit of the channel by metre: shape (frequencies,), or (frequencies, wheels) by wheel.
+
+    Raises:
+        ValueError: frequencies that are not a row of numbers ≥ 0, a speed that is not positive or comes with
+            `by_wheel`.
+
+    >>> from jaxdamp.vehicles.presets import quarter_car_000
+    >>> gain = frequency_response(quarter_car_000(), [0.0, 1.0])["z_sprung"]
+    >>> [round(float(abs(g)), 3) for g in gain]
+    [1.0, 5.174]
+    """
+    _checks.nonnegative("frequency", frequency)
+    points = jnp.asarray(frequency, dtype=float)
+    if points.ndim != 1:
+        _checks.refuse("frequency", "have one axis", f"of shape {points.shape}", "Pass `np.linspace(0.1, 20.0, 400)`.")
+    if by_wheel and speed is not None:
+        _checks.refuse("speed", "be left out with `by_wheel`", speed, "Multiply by exp(−2πi f τ) as the roads need.")
+    linear = as_linear(vehicle)
+    gains = gains_by_wheel(linear, points)
+    if not by_wheel:
+        gains = jnp.sum(gains * turning(points, linear.delays(speed))[:, None], axis=2)
+    return {name: gains[:, i] for i, name in enumerate(linear.channels)}
+
+
+@eqx.filter_jit
+def gains_by_wheel(
+    linear: LinearVehicle, frequency: Float[Array, " frequencies"]
+) -> Complex[Array, "frequencies channels wheels"]:
+    """Gain of every channel from the height under each wheel."""
+    s = _imaginary(2.0 * jnp.pi * frequency)[:, None, None]
+    a, b, e, c, d, f = (
+        matrix.astype(s.dtype)[None]
+        for matrix in (
+            linear.state_matrix,
+            linear.road_input,
+            linear.road_rate_input,
+            linear.output,
+            linear.road_feed,
+            linear.feed_through,
+        )
+    )
+    states = jnp.linalg.solve(s * jnp.eye(a.shape[1], dtype=s.dtype)[None] - a, b + s * e)
+    return c @ states + d + s * f
+
+
+def turning(
+    frequency: Float[Array, " frequencies"], delays: Float[Array, " wheels"]
+) -> Complex[Array, "frequencies wheels"]:
+    """exp(−2πi f τ)."""
+    return jnp.exp(_imaginary(-2.0 * jnp.pi * frequency[:, None] * delays[None, :]))
+
+
+def _imaginary(values: Float[Array, "..."]) -> Complex[Array, "..."]:
+    return jax.lax.complex(jnp.zeros_like(values), values)
+
+
+def spectral_rms(
+    vehicle: AbstractVehicle | LinearVehicle,
+    frequency: Any,
+    density: Any,
+    *,
+    speed: Any = None,
+    coherence: Any = None,
+) -> dict[str, Scalar]:
+    """RMS of every channel of the linearised vehicle on a random road of any spectrum, √∫ |H(f)|² S(f) df.
+
+    By the trapezoid rule over the given frequencies: they have to resolve the resonances and, with a speed, the ripples
+    of width 1/τ that the axle delay makes. What lies outside them is left out. For a road whose rate is white noise,
+    `stationary_rms` is exact.
+
+    Arguments:
+        vehicle: a vehicle, linearised about rest, or what `linearise` made of it.
+        frequency: increasing frequencies [Hz], shape (frequencies,).
+        density: one-sided power spectral density of the height of each track there [m²/Hz]; of an ISO 8608 road
+            G_d(f/V)/V.
+        speed: of the vehicle [m/s]; left out, all axles go over the road together.
+        coherence: γ(f) in −1 … 1, cross spectrum of left and right track divided by S; one and the same track if left
+            out. Needs wheels on both sides.
+
+    Raises:
+        ValueError: frequencies that do not increase, a density or coherence of another shape, a coherence for a vehicle
+            whose wheels stand for both sides.
+
+    >>> import numpy as np
+    >>> from jaxdamp.vehicles.presets import quarter_car_000
+    >>> frequency = np.linspace(0.1, 50.0, 5000)  # white height, as in paper 000: 65.8 1/s²
+    >>> rms = spectral_rms(quarter_car_000(), frequency, np.full(5000, 1.0 / 49.9))
+    >>> round(float(rms["sprung_acceleration"]), 1)
+    65.8
+    """
+    points, levels = jnp.asarray(frequency, dtype=float), jnp.asarray(density, dtype=float)
+    _checks.finite("density", density)
+    values = _checks.concrete(frequency)
+    if values is not None and (values.ndim != 1 or values.size < 2):
+        _checks.refuse("frequency", "have one axis and two values or more", f"of shape {values.shape}")
+    if values is not None and not (values[1:] > values[:-1]).all():
+        i = int((values[1:] <= values[:-1]).argmax())
+        _checks.refuse("frequency", "increase", f"{values[i]} at number {i} and then {values[i + 1]}")
+    if levels.shape != points.shape:
+        _checks.refuse("density", f"have the shape {points.shape} of `frequency`", f"of shape {levels.shape}")
+    linear = as_linear(vehicle)
+    gains, turned = gains_by_wheel(linear, points), turning(points, linear.delays(speed))
+    shared = sides = None
+    if coherence is not None:
+        shared = jnp.asarray(coherence, dtype=float)
+        if shared.shape != points.shape:
+            _checks.refuse("coherence", f"have the shape {points.shape} of `frequency`", f"of shape {shared.shape}")
+        offsets = _checks.concrete(linear.left)
+        if offsets is not None and (offsets == 0).any():
+            remedy = "Take a `RollCar` or a `FullCar`, or leave it out."
+            _checks.refuse("coherence", "be left out where a wheel stands for both sides", "given", remedy)
+        sides = (linear.left > 0)[None, None, :]
+
+    moved = gains * turned[:, None]
+    if sides is None or shared is None:
+        squares = jnp.abs(jnp.sum(moved, axis=2)) ** 2
+    else:
+        left, right = (jnp.sum(jnp.where(side, moved, 0.0), axis=2) for side in (sides, ~sides))
+        squares = jnp.abs(left) ** 2 + jnp.abs(right) ** 2 + 2.0 * shared[:, None] * jnp.real(left * jnp.conj(right))
+    heights = squares * levels[:, None]
+    found = root(jnp.sum(0.5 * (heights[1:] + heights[:-1]) * jnp.diff(points)[:, None], axis=0))
+    return {name: found[i] for i, name in enumerate(linear.channels)}
+
+
+def root(squares: Float[Array, " channels"]) -> Float[Array, " channels"]:
+    """√ of mean squares, with a derivative of zero at zero."""
+    positive = squares > 0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, squares, 1.0)), 0.0)

@@ -1,0 +1,55 @@
+"""A whole car: body with heave, pitch and roll on four wheels."""
+
+from typing import final
+
+from jaxdamp._types import Number
+from jaxdamp.parameters import parameter, positive
+from jaxdamp.vehicles.axle import Axle, carry
+from jaxdamp.vehicles.base import AbstractVehicle
+from jaxdamp.vehicles.frame import Frame
+from jaxdamp.vehicles.parts import Body, Place
+from jaxdamp.vehicles.seat import Seat, seated
+
+
+@final
+class FullCar(AbstractVehicle):
+    """Seven degrees of freedom: heave z, pitch θ (nose up), roll φ (left side up), four wheels.
+
+        m z̈ = −Σ F_i,   J_θ θ̈ = −Σ x_i F_i,   J_φ φ̈ = −Σ y_i F_i − M_f − M_r,   m_ui z̈_ui = F_i − F_ti ± M/w,
+
+    with corner i x_i ahead and y_i left of the centre of gravity, at z + x_i θ + y_i φ, and the moments M of the
+    anti-roll bars (`Axle`). Left and right are alike; a `LumpedVehicle` need not be.
+
+    The road has four tracks: front left, front right, rear left, rear right.
+
+    Arguments:
+        front: axle at `front_distance`.
+        rear: axle at `rear_distance`.
+        places: where on the body accelerations are of interest.
+        seats: on the body.
+
+    >>> from jaxdamp.vehicles.presets import full_car_jazar
+    >>> full_car_jazar().wheel_names
+    ('front_left', 'front_right', 'rear_left', 'rear_right')
+    """
+
+    sprung_mass: Number = parameter("kg", "mass of the body", positive)
+    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the body in pitch", positive)
+    roll_inertia: Number = parameter("kg m²", "moment of inertia of the body in roll", positive)
+    front_distance: Number = parameter("m", "front axle ahead of the centre of gravity", positive)
+    rear_distance: Number = parameter("m", "rear axle behind the centre of gravity", positive)
+    front: Axle  # pyright: ignore[reportGeneralTypeIssues]
+    rear: Axle  # pyright: ignore[reportGeneralTypeIssues]
+    places: tuple[Place, ...] = ()
+    seats: tuple[Seat, ...] = ()
+
+    def frame(self) -> Frame:
+        """Coordinates z_sprung, pitch, roll, then wheels (front left, front right, rear left, rear right), seats."""
+        body = Body("sprung", self.sprung_mass, pitch_inertia=self.pitch_inertia, roll_inertia=self.roll_inertia)
+        front = carry(self.front, "front", body, ahead=self.front_distance)
+        wheelbase = self.front_distance + self.rear_distance
+        rear = carry(self.rear, "rear", body, ahead=-self.rear_distance, behind=wheelbase)
+        bodies, links = seated(self.seats, body)
+        return Frame(
+            (body, *front[0], *rear[0], *bodies), (*front[1], *rear[1], *links), front[2] + rear[2], self.places
+        )

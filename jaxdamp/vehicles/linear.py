@@ -1,0 +1,140 @@
+"""The vehicle linearised: about rest, or for a chosen amplitude of its elements."""
+
+from typing import Any, final
+
+import equinox as eqx
+import jax
+import jax.flatten_util
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import ScalarLike
+from jaxdamp.vehicles.base import AbstractVehicle
+from jaxdamp.vehicles.channels import Instant
+from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position
+from jaxdamp.vehicles.equivalent import equivalent_slopes
+from jaxdamp.vehicles.ports import Ports
+
+
+@final
+class LinearVehicle(eqx.Module):
+    """ẋ = A x + B z_r + E ż_r, channels = C x + D z_r + F ż_r, x = (q, q̇, states of the laws) less their rest.
+
+    Arguments:
+        state_matrix: A.
+        road_input: B, by height [m] of each wheel.
+        road_rate_input: E, by its rate [m/s].
+        output: C.
+        road_feed: D.
+        feed_through: F.
+        behind: distance of each wheel behind the front axle [m].
+        left: distance of each wheel to the left of the middle [m].
+        coordinates: names of q.
+        channels: names of the channels.
+    """
+
+    state_matrix: Float[Array, "n n"]
+    road_input: Float[Array, "n wheels"]
+    road_rate_input: Float[Array, "n wheels"]
+    output: Float[Array, "channels n"]
+    road_feed: Float[Array, "channels wheels"]
+    feed_through: Float[Array, "channels wheels"]
+    behind: Float[Array, " wheels"]
+    left: Float[Array, " wheels"]
+    coordinates: tuple[str, ...] = eqx.field(static=True)
+    channels: tuple[str, ...] = eqx.field(static=True)
+
+    def settled(self) -> Float[Array, "n wheels"]:
+        """−A⁻¹ B: where the vehicle comes to rest on unit road heights."""
+        return -jnp.linalg.solve(self.state_matrix, self.road_input)
+
+    def delays(self, speed: ScalarLike | int | None) -> Float[Array, " wheels"]:
+        """Delay of each wheel [s] behind the front axle at a speed [m/s]; none without a speed."""
+        if speed is None:
+            return jnp.zeros_like(self.behind)
+        _checks.positive("speed", speed, "Leave it out for a road that goes under all wheels together.")
+        return self.behind / speed
+
+
+def linearise(vehicle: AbstractVehicle, *, amplitude: Any = None, frequency: Any = None) -> LinearVehicle:
+    """Linearise the laws of a vehicle at its static equilibrium.
+
+    About rest, which holds for small motion and keeps the states of the laws; or for a sinusoidal stroke of an
+    amplitude and a frequency, where each law becomes the spring and the dashpot of its first harmonic
+    (`equivalent_slopes`). Differentiable in every parameter.
+
+    Arguments:
+        vehicle: any vehicle.
+        amplitude: of the deflection of every element [m], or one for each port; left out, about rest.
+        frequency: of that stroke [Hz]; it matters where a law depends on the velocity.
+
+    Raises:
+        ValueError: an amplitude without a frequency or the other way round, one that is not positive; a vehicle without
+            equilibrium.
+
+    >>> from jaxdamp.dampers import PowerLaw
+    >>> from jaxdamp.vehicles.presets import quarter_car_000
+    >>> car = quarter_car_000(PowerLaw(1800.0, 0.6, 900.0, 0.6, knee_width=0.01))
+    >>> linear = linearise(car, amplitude=0.02, frequency=1.0)
+    >>> round(float(-1200.0 * linear.state_matrix[2, 2]))  # equivalent damping [N s/m]
+    3355
+    """
+    if (amplitude is None) != (frequency is None):
+        missing = "frequency" if frequency is None else "amplitude"
+        _checks.refuse(missing, "be given with the other of the two", None, "Pass `amplitude=0.02, frequency=1.2`.")
+    if amplitude is not None:
+        _checks.positive("amplitude", amplitude)
+        _checks.positive("frequency", frequency)
+        amplitude, frequency = jnp.asarray(amplitude, dtype=float), jnp.asarray(frequency, dtype=float)
+    linear = _linearise(vehicle, amplitude, frequency)
+    matrix = _checks.concrete(linear.state_matrix)
+    if matrix is not None and not np.all(np.isfinite(matrix)):
+        refuse_restless(vehicle)
+    return linear
+
+
+@eqx.filter_jit
+def _linearise(vehicle: AbstractVehicle, amplitude: Array | None, frequency: Array | None) -> LinearVehicle:
+    form, laws = vehicle.port_form(), vehicle.elements()
+    ports = Ports(laws)
+    n, wheels = form.road_stiffness.shape
+    level = jnp.zeros(wheels)
+    rest = rest_position(form, laws, level)
+    start, unravel = jax.flatten_util.ravel_pytree(ports.initial())
+    equivalent = None
+    if amplitude is not None and frequency is not None:
+        equivalent = equivalent_slopes(ports, form.at_ports(rest, level), amplitude, frequency)
+        start = start[:0]
+    system = form.first_order()
+
+    rest_state = jnp.concatenate([rest, jnp.zeros(n), start])
+    size, names = rest_state.size, tuple(vehicle.units)
+
+    def everything(inputs: Array) -> Array:
+        """Rates of the state, then channels, from state, road heights and road rates."""
+        x, road, road_rate = inputs[:size], inputs[size : size + wheels], inputs[size + wheels :]
+        deflection, rate = form.at_ports(x[:n], road), form.at_ports(x[n : 2 * n], road_rate)
+        inner: list[Array] = []
+        if equivalent is not None:
+            forces = equivalent[0] * deflection + equivalent[1] * rate
+        else:
+            states = unravel(x[2 * n :])
+            forces = ports.force(deflection, rate, states)
+            inner = ports.state_rate(deflection, rate, states)
+        driven = system.road_input @ road + system.road_rate_input @ road_rate
+        motion = system.state_matrix @ x[: 2 * n] + system.port_input @ forces + driven
+        channels = vehicle.channels(Instant(x[:n], x[n : 2 * n], motion[n:], road, road_rate, forces))
+        return jnp.concatenate([motion, *map(jnp.ravel, inner), jnp.stack([channels[name] for name in names])])
+
+    slopes = jax.jacfwd(everything)(jnp.concatenate([rest_state, level, level]))
+    (a, b, e), (c, d, f) = (jnp.split(part, [size, size + wheels], axis=1) for part in jnp.split(slopes, [size]))
+    tyres = vehicle.frame().wheels
+    behind, left = jnp.stack([wheel.behind for wheel in tyres]), jnp.stack([wheel.left for wheel in tyres])
+    return LinearVehicle(a, b, e, c, d, f, behind, left, vehicle.coordinates, names)
+
+
+def as_linear(vehicle: AbstractVehicle | LinearVehicle) -> LinearVehicle:
+    """The vehicle linearised about rest, if it is not linear yet."""
+    return vehicle if isinstance(vehicle, LinearVehicle) else linearise(vehicle)

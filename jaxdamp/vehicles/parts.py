@@ -1,0 +1,177 @@
+"""What a vehicle is made of: rigid bodies, links between their points, wheels on the road."""
+
+from typing import Any, final
+
+import equinox as eqx
+
+from jaxdamp import _checks
+from jaxdamp._types import Number, Scalar
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import as_float, check_parameters, nonnegative, parameter, positive, readable
+from jaxdamp.vehicles.points import Point
+
+
+SPRUNG = "sprung"
+
+
+def prefixed(name: str, word: str) -> str:
+    """The name of a channel of a part: "front" and "stroke" give "front_stroke"; a part without a name adds nothing."""
+    return f"{name}_{word}" if name else word
+
+
+def _maybe(value: Any) -> Any:
+    return None if value is None else as_float(value)
+
+
+class AbstractPart(eqx.Module):
+    """Anything a vehicle is made of that has parameters of its own."""
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
+
+    def __repr__(self) -> str:
+        return readable(self)
+
+
+@final
+class Inertia(AbstractPart):
+    """An angle that a body turns by, pitch (nose up) or roll (left side up), and its moment of inertia."""
+
+    axis: str = eqx.field(static=True)
+    moment: Number = parameter("kg m²", "moment of inertia about the centre of gravity", positive)
+
+
+@final
+class Body(AbstractPart):
+    """A rigid body that moves up and down and, where it has the moment of inertia for it, pitches and rolls.
+
+    Its coordinates are the height of the centre of gravity `z_{name}` [m, up] and the angles [rad] `{name}_pitch`
+    (nose up) and `{name}_roll` (left side up); those of the body named "sprung" are `pitch` and `roll` for short.
+
+    Arguments:
+        name: of the body; names the coordinates and their channels.
+        mass: [kg].
+        pitch_inertia: moment of inertia in pitch [kg m²]; left out, the body does not pitch.
+        roll_inertia: moment of inertia in roll [kg m²]; left out, the body does not roll.
+
+    >>> body = Body("sprung", 580.0, pitch_inertia=1100.0)
+    >>> {name: float(share) for name, share in body.at(1.5).terms.items()}
+    {'z_sprung': 1.0, 'pitch': 1.5}
+    """
+
+    name: str = eqx.field(static=True)
+    mass: Number = parameter("kg", "mass of the body", positive)
+    turns: tuple[Inertia, ...]  # pyright: ignore[reportGeneralTypeIssues]
+
+    def __init__(self, name: str, mass: Any, *, pitch_inertia: Any = None, roll_inertia: Any = None) -> None:
+        self.name, self.mass = name, mass
+        given = (("pitch", pitch_inertia), ("roll", roll_inertia))
+        self.turns = tuple(Inertia(axis, moment) for axis, moment in given if moment is not None)
+
+    def angle(self, axis: str) -> str:
+        """Name of the coordinate of an angle."""
+        return axis if self.name == SPRUNG else prefixed(self.name, axis)
+
+    @property
+    def masses(self) -> dict[str, Scalar]:
+        """The coordinates of the body and the mass [kg] or moment of inertia [kg m²] that belongs to each."""
+        return {f"z_{self.name}": self.mass} | {self.angle(turn.axis): turn.moment for turn in self.turns}
+
+    def _turn(self, axis: str) -> Point:
+        if axis not in [turn.axis for turn in self.turns]:
+            _checks.refuse("axis", f"be one that {self.name!r} turns about", repr(axis), f"Give it a `{axis}_inertia`.")
+        return Point({self.angle(axis): 1.0})
+
+    @property
+    def pitch(self) -> Point:
+        """The pitch angle, nose up [rad]."""
+        return self._turn("pitch")
+
+    @property
+    def roll(self) -> Point:
+        """The roll angle, left side up [rad]."""
+        return self._turn("roll")
+
+    def at(self, ahead: Any = None, left: Any = None) -> Point:
+        """The height of a point `ahead` and `left` of the centre of gravity [m], z + ahead θ + left φ."""
+        point = Point({f"z_{self.name}": 1.0})
+        point = point if ahead is None else point + as_float(ahead) * self.pitch
+        return point if left is None else point + as_float(left) * self.roll
+
+
+@final
+class Element(AbstractPart):
+    """A law at a port, under a name: `Element("damper", law)` gives the channel `damper_force`."""
+
+    name: str = eqx.field(static=True)
+    law: AbstractDamper
+
+
+@final
+class Link(AbstractPart):
+    """A linear spring and dashpot and any laws, side by side, on one extension: upper point less lower point.
+
+    A link with laws has the channels `stroke` [m], `damper_velocity` [m/s] (of the extension: with a `MotionRatio` the
+    damper's own is ratio times that) and the force [N] of each law, after the name of the link. Across an angle, as in
+    an anti-roll bar, the units are N m/rad, N m s/rad, rad and N m.
+
+    Arguments:
+        name: of the link, may be empty.
+        extension: upper point less lower point.
+        stiffness: of the linear spring.
+        damping: of the linear dashpot.
+        elements: laws beside them.
+    """
+
+    name: str = eqx.field(static=True)
+    extension: Point
+    stiffness: Number = parameter("N/m", "stiffness of the linear spring", nonnegative, default=0.0)
+    damping: Number = parameter("N s/m", "coefficient of the linear dashpot", nonnegative, default=0.0)
+    elements: tuple[Element, ...] = ()
+
+
+@final
+class Wheel(AbstractPart):
+    """A point that stands on the road: a linear spring and dashpot to the height of its own track, and any laws.
+
+    Channels, after its name: `z_road` [m], `dynamic_tyre_load` [N] beyond the static one, `relative_tyre_load`; with
+    laws also `stroke`, `damper_velocity` and their forces. Wheels take the tracks of a road in their order.
+
+    Arguments:
+        name: of the wheel, may be empty.
+        point: of the vehicle that the tyre carries.
+        stiffness: of the tyre.
+        damping: of the tyre.
+        behind: distance behind the front axle [m], for delays.
+        left: distance to the left of the middle [m]; zero where both sides are one.
+        elements: laws between point and road.
+        lifts: whether the tyre can leave the road (`LiftOff`).
+        beside: whether it is on the axle of the wheel before it.
+    """
+
+    name: str = eqx.field(static=True)
+    point: Point
+    stiffness: Number = parameter("N/m", "vertical tyre stiffness", positive)
+    damping: Number = parameter("N s/m", "vertical tyre damping", nonnegative, default=0.0)
+    behind: Number = parameter("m", "distance behind the front axle", nonnegative, default=0.0)
+    left: Number = parameter("m", "distance to the left of the middle", default=0.0)
+    elements: tuple[Element, ...] = ()
+    lifts: bool = eqx.field(static=True, default=False)
+    beside: bool = eqx.field(static=True, default=False)
+
+
+@final
+class Place(AbstractPart):
+    """A place on the body where the acceleration is of interest: channels `z_{name}` and `{name}_acceleration`.
+
+    Arguments:
+        name: of the place.
+        ahead: of the centre of gravity [m]; `None` for a body that does not pitch.
+        left: of the centre of gravity [m]; `None` for a body that does not roll.
+        body: that it is on.
+    """
+
+    name: str = eqx.field(static=True)
+    ahead: Any = eqx.field(default=None, converter=_maybe)
+    left: Any = eqx.field(default=None, converter=_maybe)
+    body: str = eqx.field(static=True, default=SPRUNG)

@@ -1,0 +1,55 @@
+"""Points and angles of a vehicle as linear functions of its coordinates."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, final
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxdamp._types import ScalarLike
+
+
+def _is_one(coefficient: Any) -> bool:
+    return isinstance(coefficient, float) and coefficient == 1.0
+
+
+@final
+class Point(eqx.Module):
+    """Σ coefficient · coordinate: the height of a point [m] or an angle [rad], for small angles.
+
+    Points add, subtract and scale, so that the extension of a link reads `body.at(1.2) - wheel.at()`. A body gives
+    points by `Body.at`, angles by `Body.pitch` and `Body.roll`.
+
+    >>> twist = Point({"roll": 1.0}) - (Point({"z_left": 1.0}) - Point({"z_right": 1.0})) * 0.5
+    >>> twist.terms
+    {'roll': 1.0, 'z_left': -0.5, 'z_right': 0.5}
+    """
+
+    terms: dict[str, Any]
+
+    def __add__(self, other: "Point") -> "Point":
+        terms = dict(self.terms)
+        for name, coefficient in other.terms.items():
+            terms[name] = terms[name] + coefficient if name in terms else coefficient
+        return Point(terms)
+
+    def __mul__(self, factor: ScalarLike | int) -> "Point":
+        return Point({name: factor * coefficient for name, coefficient in self.terms.items()})
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> "Point":
+        return self * -1.0
+
+    def __sub__(self, other: "Point") -> "Point":
+        return self + -other
+
+    def of(self, values: Mapping[str, Any]) -> Any:
+        """Its value for values of the coordinates by name."""
+        shares = [values[name] if _is_one(c) else c * values[name] for name, c in self.terms.items()]
+        return sum(shares[1:], shares[0])
+
+    def row(self, coordinates: Sequence[str]) -> Float[Array, " q"]:
+        """The coefficients in the order of the coordinates; others are left out (`Frame` refuses them)."""
+        return jnp.stack([jnp.asarray(self.terms.get(name, 0.0), dtype=float) for name in coordinates])

@@ -1,0 +1,122 @@
+"""The elements at the ports of a vehicle, computed together: laws that differ in their numbers only go as one batch."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, final
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp._types import Scalar, State
+from jaxdamp.dampers import AbstractDamper
+
+
+AtPorts = Float[Array, " ports"]
+States = list[Array]  # by group: (states,) of a law alone, (laws, states) of a batch
+
+
+def _alike(one: AbstractDamper, other: AbstractDamper) -> bool:
+    """Whether two laws differ in nothing but the values of their arrays."""
+    if jax.tree.structure(one) != jax.tree.structure(other):
+        return False
+    pairs = list(zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True))
+    arrays = [eqx.is_array(a) and eqx.is_array(b) for a, b in pairs]
+    same_shape = [
+        jnp.shape(a) == jnp.shape(b) if array else a == b for (a, b), array in zip(pairs, arrays, strict=True)
+    ]
+    return all(same_shape)
+
+
+@final
+class Ports(eqx.Module):
+    """Forces, states and steps of all elements of a vehicle, in the order of its ports.
+
+    The laws of one kind are stacked and computed as one batch: four dampers of a car cost little more than one, and are
+    compiled once. A law alone is called as it is.
+
+    Arguments:
+        laws: the law at each port.
+    """
+
+    laws: tuple[AbstractDamper, ...]  # one of each kind, its arrays stacked where there are several
+    members: tuple[tuple[int, ...], ...]  # the ports of each kind
+
+    def __init__(self, laws: Sequence[AbstractDamper]) -> None:
+        kinds: list[list[int]] = []
+        for i, law in enumerate(laws):
+            found = next((kind for kind in kinds if _alike(laws[kind[0]], law)), None)
+            if found is None:
+                kinds.append([i])
+            else:
+                found.append(i)
+        self.members = tuple(tuple(kind) for kind in kinds)
+        self.laws = tuple(
+            laws[kind[0]] if len(kind) == 1 else jax.tree.map(_stacked, *[laws[i] for i in kind]) for kind in kinds
+        )
+
+    def initial(self) -> States:
+        """The states of elements at rest."""
+        return self._each(lambda law: law.initial_state(), [], [])
+
+    def force(self, x: AtPorts, v: AtPorts, states: States) -> AtPorts:
+        """Forces [N] at deflections [m] and rates [m/s]."""
+        forces = self._each(lambda law, x, v, state: law.force(x, v, state), [x, v], states)
+        flat = [force if len(kind) > 1 else force[None] for force, kind in zip(forces, self.members, strict=True)]
+        if not flat:
+            return jnp.zeros_like(x)
+        order = np.argsort([port for kind in self.members for port in kind])
+        joined = flat[0] if len(flat) == 1 else jnp.concatenate(flat)
+        return joined if np.all(order == np.arange(order.size)) else joined[order]
+
+    def state_rate(self, x: AtPorts, v: AtPorts, states: States) -> States:
+        """Time derivatives of the states [1/s]."""
+        return self._each(lambda law, x, v, state: law.state_rate(x, v, state), [x, v], states)
+
+    def advance(self, x0: AtPorts, v0: AtPorts, x1: AtPorts, v1: AtPorts, states: States, dt: Scalar) -> States:
+        """States after a step dt [s] over which deflections and rates go from (x0, v0) to (x1, v1)."""
+
+        def step(law: AbstractDamper, x0: Scalar, v0: Scalar, x1: Scalar, v1: Scalar, state: State) -> State:
+            return law.advance(x0, v0, x1, v1, state, dt)
+
+        return self._each(step, [x0, v0, x1, v1], states)
+
+    def by_port(self, states: States) -> list[State]:
+        """The states of each element, in the order of the ports."""
+        found = {}
+        for kind, state in zip(self.members, states, strict=True):
+            found |= {port: state if len(kind) == 1 else state[i] for i, port in enumerate(kind)}
+        return [found[port] for port in sorted(found)]
+
+    def stiffness_and_damping(self, x: AtPorts) -> tuple[AtPorts, AtPorts]:
+        """Slopes ∂F/∂x [N/m] and ∂F/∂v [N s/m] of the forces at rest at the deflections x."""
+        states, still, one = self.initial(), jnp.zeros_like(x), jnp.ones_like(x)
+        _, stiffness = jax.jvp(lambda x: self.force(x, still, states), (x,), (one,))
+        _, damping = jax.jvp(lambda v: self.force(x, v, states), (still,), (one,))
+        return stiffness, damping
+
+    def _each(self, call: Callable[..., Array], vectors: Sequence[AtPorts], states: States) -> list[Array]:
+        """The call for every law, as one batch for each kind."""
+        found = []
+        for i, (law, kind) in enumerate(zip(self.laws, self.members, strict=True)):
+            state = [states[i]] if states else []
+            if len(kind) == 1:
+                found.append(call(law, *[vector[kind[0]] for vector in vectors], *state))
+                continue
+            arrays, rest = eqx.partition(law, eqx.is_array)
+            picked = [_pick(vector, kind) for vector in vectors]
+            found.append(
+                jax.vmap(lambda a, *more, rest=rest: call(eqx.combine(a, rest), *more))(arrays, *picked, *state)
+            )
+        return found
+
+
+def _stacked(*leaves: Any) -> Any:
+    return jnp.stack(leaves) if eqx.is_array(leaves[0]) else leaves[0]
+
+
+def _pick(vector: AtPorts, kind: tuple[int, ...]) -> Float[Array, " laws"]:
+    """The entries of some ports, as a slice where they follow one another: a gather would cost more in a loop."""
+    first, last = kind[0], kind[-1]
+    return vector[first : last + 1] if len(kind) == last - first + 1 else vector[np.array(kind)]

@@ -1,0 +1,46 @@
+"""Half a car seen from the front: body with heave and roll on a left and a right wheel."""
+
+from typing import final
+
+from jaxdamp._types import Number
+from jaxdamp.parameters import parameter, positive
+from jaxdamp.vehicles.axle import Axle, carry
+from jaxdamp.vehicles.base import AbstractVehicle
+from jaxdamp.vehicles.frame import Frame
+from jaxdamp.vehicles.parts import Body, Place
+from jaxdamp.vehicles.seat import Seat, seated
+
+
+@final
+class RollCar(AbstractVehicle):
+    """Body with heave z and roll φ (left side up) on one axle with an anti-roll bar.
+
+        m z̈ = −F_l − F_r,   J φ̈ = −(w/2)(F_l − F_r) − M,   m_u z̈_ul = F_l − F_tl + M/w,  m_u z̈_ur = F_r − F_tr − M/w,
+        M = k_R (φ − (z_ul − z_ur)/w).
+
+    The road has two tracks, left and right.
+
+    Arguments:
+        axle: the two corners and the bar between them.
+        places: where on the body accelerations are of interest.
+        seats: on the body.
+
+    >>> from jaxdamp.vehicles.presets import full_car_jazar
+    >>> full = full_car_jazar()
+    >>> car = RollCar(420.0, full.roll_inertia, full.front)
+    >>> car.coordinates
+    ('z_sprung', 'roll', 'z_left_unsprung', 'z_right_unsprung')
+    """
+
+    sprung_mass: Number = parameter("kg", "mass of the body on this axle", positive)
+    roll_inertia: Number = parameter("kg m²", "moment of inertia of the body in roll", positive)
+    axle: Axle  # pyright: ignore[reportGeneralTypeIssues]
+    places: tuple[Place, ...] = ()
+    seats: tuple[Seat, ...] = ()
+
+    def frame(self) -> Frame:
+        """Coordinates z_sprung, roll, z_left_unsprung, z_right_unsprung, then seats; wheels left, right."""
+        body = Body("sprung", self.sprung_mass, roll_inertia=self.roll_inertia)
+        wheels, suspensions, tyres = carry(self.axle, "", body)
+        bodies, links = seated(self.seats, body)
+        return Frame((body, *wheels, *bodies), (*suspensions, *links), tyres, self.places)

@@ -1,0 +1,84 @@
+"""Two axles close together behind a truck: on a walking beam, or each on its own."""
+
+from typing import Any, final
+
+import equinox as eqx
+
+from jaxdamp._types import Number
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import nonnegative, parameter, positive
+from jaxdamp.vehicles.corner import Corner, suspend
+from jaxdamp.vehicles.parts import AbstractPart, Body, Element, Link, Wheel
+
+
+Parts = tuple[tuple[Body, ...], tuple[Link, ...], tuple[Wheel, ...]]
+
+
+@final
+class WalkingBeam(AbstractPart):
+    """Two axles on the ends of a beam, a leaf spring on its middle: both wheels carry the same load at rest.
+
+    m_b z̈_b = P − F_t1 − F_t2,  J_b ψ̈ = −(s/2)(F_t1 − F_t2), with the force P of the spring and of the damper over the
+    middle. Nothing damps the pitch of the beam but the tyres: with c_t = 0 its mode √(k_t s²/(2 J_b)) rings on, the
+    known weakness of walking beams.
+
+    Arguments:
+        mass: m_b of beam, axles and wheels together [kg].
+        pitch_inertia: J_b [kg m²]; m_b s²/4 if all of it sits in the axles.
+        spread: s, between the two axles [m].
+        spring_rate: of the leaf spring, both sides together [N/m].
+        tyre_stiffness: k_t of each axle [N/m].
+        damper: law over the middle.
+        tyre_damping: of each axle [N s/m].
+        tyre_lifts: whether the tyres can leave the road.
+    """
+
+    mass: Number = parameter("kg", "mass of beam, axles and wheels", positive)
+    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the beam in pitch", positive)
+    spread: Number = parameter("m", "distance between the two axles", positive)
+    spring_rate: Number = parameter("N/m", "rate of the leaf spring", positive)
+    tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness of an axle", positive)
+    damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
+    tyre_damping: Number = parameter("N s/m", "vertical tyre damping of an axle", nonnegative, default=0.0)
+    tyre_lifts: bool = eqx.field(static=True, default=False)
+
+    def parts(self, body: Body, ahead: Any, behind: Any) -> Parts:
+        """The beam under a point `ahead` of the centre of gravity, its middle `behind` the front axle [m]."""
+        beam, half = Body("beam", self.mass, pitch_inertia=self.pitch_inertia), 0.5 * self.spread
+        elements = (Element("damper", self.damper),)
+        leaf = Link("tandem", body.at(ahead) - beam.at(), self.spring_rate, elements=elements)
+        tyres = tuple(
+            Wheel(
+                f"tandem_{i}",
+                beam.at(forward),
+                self.tyre_stiffness,
+                self.tyre_damping,
+                behind - forward,
+                lifts=self.tyre_lifts,
+            )
+            for i, forward in ((1, half), (2, -half))
+        )
+        return (beam,), (leaf,), tyres
+
+
+@final
+class IndependentTandem(AbstractPart):
+    """Two axles alike, each with a spring and a damper of its own.
+
+    Arguments:
+        axle: each of the two; masses and rates are those of the whole axle.
+        spread: between the two [m].
+    """
+
+    axle: Corner
+    spread: Number = parameter("m", "distance between the two axles", positive)
+
+    def parts(self, body: Body, ahead: Any, behind: Any) -> Parts:
+        """The axles about a point `ahead` of the centre of gravity, `behind` the front axle [m]."""
+        half = 0.5 * self.spread
+        axles = [
+            suspend(self.axle, f"tandem_{i}", body.at(ahead + forward), behind=behind - forward)
+            for i, forward in ((1, half), (2, -half))
+        ]
+        bodies, links, tyres = zip(*axles, strict=True)
+        return bodies, links, tyres

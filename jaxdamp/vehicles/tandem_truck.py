@@ -1,0 +1,60 @@
+"""A truck with a front axle and two axles close together behind, seen from the side."""
+
+from typing import final
+
+from jaxdamp._types import Number
+from jaxdamp.parameters import parameter, positive
+from jaxdamp.vehicles.base import AbstractVehicle
+from jaxdamp.vehicles.cab import Cab
+from jaxdamp.vehicles.corner import Corner, suspend
+from jaxdamp.vehicles.frame import Frame
+from jaxdamp.vehicles.parts import Body, Place
+from jaxdamp.vehicles.seat import Seat, seated
+from jaxdamp.vehicles.tandem import IndependentTandem, WalkingBeam
+
+
+@final
+class TandemTruck(AbstractVehicle):
+    """Sprung mass with heave z and pitch θ on a front axle and a tandem, with or without a cab.
+
+        m z̈ = −F_f − P,   J θ̈ = −l_f F_f + l_t P,
+
+    l_f ahead of and l_t behind the centre of gravity, P the force of the tandem. Masses and rates are those of both
+    sides together. The road has three tracks: front, first and second axle of the tandem.
+
+    Arguments:
+        front: the front axle.
+        tandem: a `WalkingBeam` or an `IndependentTandem`.
+        cab: on mounts of its own, if it is wanted.
+        places: where on the body, or on the cab (`body="cab"`), accelerations are of interest.
+        seats: on the sprung mass.
+
+    >>> from jaxdamp.vehicles.presets import truck_001
+    >>> truck_001().coordinates
+    ('z_sprung', 'pitch', 'z_front_unsprung', 'z_beam', 'beam_pitch')
+    """
+
+    sprung_mass: Number = parameter("kg", "sprung mass", positive)
+    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the sprung mass in pitch", positive)
+    front_distance: Number = parameter("m", "front axle ahead of the centre of gravity", positive)
+    tandem_distance: Number = parameter("m", "middle of the tandem behind the centre of gravity", positive)
+    front: Corner  # pyright: ignore[reportGeneralTypeIssues]
+    tandem: WalkingBeam | IndependentTandem  # pyright: ignore[reportGeneralTypeIssues]
+    cab: Cab | None = None
+    places: tuple[Place, ...] = ()
+    seats: tuple[Seat, ...] = ()
+
+    def frame(self) -> Frame:
+        """Coordinates z_sprung, pitch, then front axle, tandem, cab, seats; wheels front, tandem_1, tandem_2."""
+        body = Body("sprung", self.sprung_mass, pitch_inertia=self.pitch_inertia)
+        front, suspension, tyre = suspend(self.front, "front", body.at(self.front_distance))
+        behind = self.front_distance + self.tandem_distance
+        axles, leaves, tyres = self.tandem.parts(body, -self.tandem_distance, behind)
+        cab, mounts = ((), ()) if self.cab is None else self.cab.parts(body)
+        bodies, links = seated(self.seats, body)
+        return Frame(
+            (body, front, *axles, *cab, *bodies),
+            (suspension, *leaves, *mounts, *links),
+            (tyre, *tyres),
+            self.places,
+        )

@@ -1,0 +1,151 @@
+"""Vehicles put together from parts."""
+
+import jax
+import numpy as np
+import pytest
+
+from jaxdamp import dampers, roads, simulate
+from jaxdamp.parameters import parameters, replace
+from jaxdamp.vehicles import (
+    Body,
+    Element,
+    Frame,
+    Link,
+    LumpedVehicle,
+    Place,
+    Point,
+    Seat,
+    SeatMass,
+    Wheel,
+    modes,
+    stationary_rms,
+)
+from jaxdamp.vehicles.presets import full_car_jazar, half_car_002, quarter_car_000
+
+
+BUMP = roads.cosine_bump(0.06, start=0.1, duration=0.25)
+BODY, WHEEL = Body("sprung", 1200.0), Body("unsprung", 125.0)
+DAMPER = Element("damper", dampers.Linear(2500.0))
+LINK, TYRE = Link("", BODY.at() - WHEEL.at(), 60e3, elements=(DAMPER,)), Wheel("", WHEEL.at(), 220e3)
+
+
+def test_parts_make_the_ready_made_car():
+    own = LumpedVehicle(Frame((BODY, WHEEL), (LINK,), (TYRE,)))
+    ready = quarter_car_000()
+    assert own.units == ready.units and own.ride_metrics == ready.ride_metrics
+    runs = [simulate(car, BUMP, duration=0.6) for car in (own, ready)]
+    for channel, values in runs[1].channels.items():
+        np.testing.assert_array_equal(runs[0][channel], values)
+
+
+def test_its_parameters_are_those_of_the_parts():
+    own = LumpedVehicle(Frame((BODY, WHEEL), (LINK,), (TYRE,)))
+    paths = {p.path: (float(p.value), p.unit) for p in parameters(own)}
+    assert paths["parts.links.0.elements.0.law.rate"] == (2500.0, "N s/m")
+    assert paths["parts.bodies.0.mass"] == (1200.0, "kg")
+    softer = replace(own, {"parts.links.0.stiffness": 30e3})
+    assert modes(softer).undamped_frequency[0] < 0.75 * modes(own).undamped_frequency[0]
+
+
+def test_points_are_linear_functions():
+    body = Body("sprung", 1.0, pitch_inertia=1.0, roll_inertia=1.0)
+    point = 2.0 * body.at(1.5, -0.7) - body.at(left=0.1) + -body.pitch
+    values = {"z_sprung": 0.3, "pitch": 0.02, "roll": -0.01}
+    expected = 2 * (0.3 + 1.5 * 0.02 + 0.7 * 0.01) - (0.3 - 0.1 * 0.01) - 0.02
+    assert float(point.of(values)) == pytest.approx(expected, rel=1e-14)
+    np.testing.assert_allclose(point.row(["roll", "z_sprung", "pitch", "else"]), [-1.5, 1.0, 2.0, 0.0])
+
+
+def test_a_dashpot_alone_takes_in_what_a_linear_damper_does():
+    """A linear dashpot in the matrices and a linear law at a port are the same thing, to the order of the scheme."""
+    bare = Link("", BODY.at() - WHEEL.at(), 60e3, 2500.0)
+    runs = [
+        simulate(LumpedVehicle(Frame((BODY, WHEEL), (link,), (TYRE,))), BUMP, duration=0.6) for link in (LINK, bare)
+    ]
+    np.testing.assert_allclose(runs[0].motion, runs[1].motion, atol=1e-3 * np.abs(runs[0].motion).max())
+    taken = [float(run.energy_balance()[name]) for run, name in zip(runs, ("absorbed", "dashpots"), strict=True)]
+    assert taken[0] == pytest.approx(taken[1], rel=1e-3)
+    assert runs[1].port_force.shape[1] == 0 and abs(float(runs[1].energy_balance()["error"])) < 1e-3 * taken[1]
+
+
+def test_two_masses_of_a_seat_isolate_and_say_so():
+    seat = Seat((SeatMass(20.0, 8e3, dampers.Linear(300.0)), SeatMass(60.0, 6e4, dampers.Linear(800.0))))
+    rms = stationary_rms(quarter_car_000(seats=(seat,)), 1e-3)
+    bare = stationary_rms(quarter_car_000(), 1e-3)
+    # 80 kg on 8 kN/m: 1.6 Hz, a little above the body's 1 Hz; a tenth of the car moves with it
+    assert {"seat_acceleration", "seat_2_stroke", "seat_damper_force"} <= set(rms)
+    assert float(rms["sprung_acceleration"]) == pytest.approx(float(bare["sprung_acceleration"]), rel=0.1)
+    light = Seat((SeatMass(1e-3, 1e3, dampers.Linear(10.0)),))
+    stiff = stationary_rms(quarter_car_000(seats=(light,)), 1e-3)
+    # a mass of next to nothing on a spring of 160 Hz rides as the floor does
+    assert float(stiff["seat_acceleration"]) == pytest.approx(float(bare["sprung_acceleration"]), rel=2e-2)
+
+
+def test_a_road_of_other_tracks_is_refused_with_the_way_out():
+    road = roads.from_profile(np.arange(200) * 5e-3, np.zeros((200, 3)))
+    with pytest.raises(ValueError, match=r"`road` must have a track for each of 2 wheel\(s\) \(front, rear\).*delayed"):
+        simulate(half_car_002(), road)
+    with pytest.raises(ValueError, match=r"4 wheel\(s\) .*2 axle\(s\), or one for all.*3 tracks"):
+        simulate(full_car_jazar(), road)
+    with pytest.raises(ValueError, match=r"`start` must be one of .*Did you mean 'pitch'"):
+        simulate(half_car_002(), BUMP, duration=0.2, start={"pich": 0.1})
+
+
+def test_tracks_of_the_axles_go_under_both_sides():
+    car = full_car_jazar()
+    np.testing.assert_allclose(car.axle_positions, [0.0, 2.87])
+    assert float(car.track_width) == pytest.approx(1.45)
+    run = simulate(car, roads.delayed(BUMP, positions=car.axle_positions, speed=14.35), duration=0.6)
+    heights = np.asarray(run.road)
+    np.testing.assert_array_equal(heights[:, 0], heights[:, 1])
+    np.testing.assert_allclose(heights[200:, 2], heights[:-200, 0], atol=1e-12)
+    both = roads.delayed(
+        roads.two_track(BUMP, roads.cosine_bump(0.0, duration=1.0)), positions=car.axle_positions, speed=14.35
+    )
+    tilted = simulate(car, both, duration=0.6)
+    assert np.abs(tilted["roll"]).max() > 1e-3 > 1e-9 > np.abs(run["roll"]).max()
+    assert float(tilted["roll"][160]) > 0  # left side up
+
+
+def test_gradients_of_ridden_metrics_agree_with_differences():
+    """In geometry, mass and damper of a half car on a bump with delay, forward and in reverse."""
+    names = ["front_distance", "sprung_mass", "rear.damper.rate"]
+    road, car = roads.delayed(BUMP, delays=[0.0, 0.1]), half_car_002()
+    start = np.array([1.0, 580.0, 1560.0])
+
+    @jax.jit
+    def metric(values):
+        changed = replace(car, dict(zip(names, values, strict=True)))
+        return simulate(changed, road, duration=0.8).metrics()["rms_sprung_acceleration"]
+
+    forward, reverse = jax.jit(jax.jacfwd(metric))(start), jax.jit(jax.grad(metric))(start)
+    np.testing.assert_allclose(forward, reverse, rtol=1e-9)
+    for i, scale in enumerate(start):
+        near, far = (
+            (metric(start + s) - metric(start - s)) / (2 * s[i])
+            for s in np.eye(3)[i] * scale * np.array([[1e-4], [2e-4]])
+        )
+        assert float(forward[i]) == pytest.approx(float((4 * near - far) / 3), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: Frame((BODY, BODY), (LINK,), (TYRE,)), r"`bodies and places` must have names that differ"),
+        (
+            lambda: Frame((BODY, WHEEL), (LINK, LINK), (TYRE,)),
+            r"`links and wheels with elements` must have names that differ",
+        ),
+        (lambda: Frame((BODY, WHEEL), (LINK,), (TYRE,), (Place("sprung"),)), r"`bodies and places` must have names"),
+        (lambda: Frame((BODY,), (LINK,), (TYRE,)), r"`point` must be one of 'z_sprung'.*Did you mean"),
+        (lambda: Frame((BODY, WHEEL), (LINK,), ()), r"`wheels` must hold one or more"),
+        (lambda: Frame((BODY,), (), (Wheel("", Point({"pitch": 1.0}), 1e5),)), r"`point` must be one of 'z_sprung'"),
+        (lambda: BODY.at(1.0), r"`axis` must be one that 'sprung' turns about, but is 'pitch'"),
+        (lambda: Body("sprung", 1.0, pitch_inertia=-1.0), r"`Inertia.moment` must be positive \[kg m²\]"),
+        (lambda: Seat(()), r"`masses` must hold one or more"),
+        (lambda: Frame((BODY, WHEEL), (LINK,), (TYRE,)).place(Place("eye", body="cab")), r"`body` must be one of"),
+    ],
+)
+def test_refuses_parts_that_do_not_fit(build, message):
+    with pytest.raises(ValueError, match=message):
+        build()
