@@ -17,9 +17,11 @@ class WhiteRoad(eqx.Module):
 
     Attributes:
         velocity_psd: two-sided power spectral density of the rate of height [(m/s)²/Hz].
+        speed: at which the axles of a vehicle go over it, one after the other [m/s].
     """
 
     velocity_psd: Scalar
+    speed: Scalar
 
 
 def white(road_class: str | ScalarLike, speed: ScalarLike) -> WhiteRoad:
@@ -39,4 +41,4 @@ def white(road_class: str | ScalarLike, speed: ScalarLike) -> WhiteRoad:
     """
     _checks.positive("speed", speed)
     density = 2.0 * np.pi**2 * roughness(road_class) * REFERENCE_SPATIAL_FREQUENCY**2 * speed
-    return WhiteRoad(jnp.asarray(density, float))
+    return WhiteRoad(jnp.asarray(density, float), jnp.asarray(speed, float))

@@ -126,7 +126,7 @@ def stationary_ride(road: WhiteRoad) -> Ride:
     """Ride metrics of the linearised vehicle on a white road."""
 
     def ride(vehicle: AbstractVehicle) -> dict[str, Scalar]:
-        rms = stationary_rms(vehicle, road.velocity_psd)
+        rms = stationary_rms(vehicle, road.velocity_psd, speed=road.speed)
         return {m.name: rms[m.channel] for m in vehicle.ride_metrics if m.name in ride_names(vehicle, road)}
 
     return ride

@@ -147,3 +147,12 @@ def test_refuses_names_and_starts_that_do_not_fit(change, message):
     arguments = {"metric": "rms_sprung_acceleration", "vehicle": CAR, "road": roads.white("C", 20.0)} | change
     with pytest.raises(ValueError, match=message):
         tune.minimise(**arguments)
+
+
+def test_on_a_white_road_the_rear_axle_follows_the_front():
+    car, road = vehicles.presets.half_car_002(), roads.white("C", 15.0)
+    result = tune.minimise("rms_pitch_acceleration", car, road, max_steps=1)
+    expected = vehicles.stationary_rms(car, road.velocity_psd, speed=15.0)["pitch_acceleration"]
+    together = vehicles.stationary_rms(car, road.velocity_psd)["pitch_acceleration"]
+    assert float(result.before["rms_pitch_acceleration"]) == pytest.approx(float(expected), rel=1e-9)
+    assert abs(float(together / expected) - 1.0) > 0.05
