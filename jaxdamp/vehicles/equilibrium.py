@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers.coverage import coverage
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.frame import holds_no_stroke
 from jaxdamp.vehicles.port_form import PortForm
@@ -102,4 +103,5 @@ def static_equilibrium(vehicle: AbstractVehicle, road: Any = None) -> dict[str, 
 def refuse_restless(vehicle: AbstractVehicle) -> NoReturn:
     """Refuse a vehicle for which no static equilibrium was found."""
     remedy = "Look for springs that are far too soft, or a law whose force falls as it is stretched."
+    remedy = " ".join([*filter(None, map(coverage, vehicle.elements())), remedy])
     _checks.refuse("vehicle", "have an equilibrium", f"a {type(vehicle).__name__} without one that was found", remedy)

@@ -146,7 +146,9 @@ def test_everything_that_runs_it_refuses_in_words():
     with pytest.raises(ValueError, match="`law` must give a finite force at these velocities.*" + COVERED):
         quasi_static(law, np.array([0.0, 0.7]))
     with pytest.raises(ValueError, match="`vehicle` must have a finite response.*" + COVERED):
-        simulate(quarter_car_000(2.0 * law + Linear(100.0)), cosine_bump(0.3, start=0.02, duration=0.1), duration=0.5)
+        simulate(quarter_car_000(0.1 * law + Linear(100.0)), cosine_bump(0.3, start=0.02, duration=0.1), duration=0.5)
+    with pytest.raises(ValueError, match="`vehicle` must have an equilibrium.*" + COVERED):
+        simulate(quarter_car_000(5.0 * law), cosine_bump(0.3, start=0.02, duration=0.1), duration=0.5)
     with pytest.raises(ValueError, match="`law` must give a finite force over the whole programme.*" + COVERED):
         VirtualDyno(law).run(SineTest(amplitude=0.06, frequency=2.0))
     run = BenchRun.from_arrays("wide", t, 0.06 * np.sin(9 * t), 800 * np.cos(9 * t), 0.54 * np.cos(9 * t))

@@ -5,7 +5,7 @@ import pytest
 
 from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
-from jaxdamp.dampers import BoucWen, Dahl, KaradayiMasada, Linear, LuGre, ModifiedBoucWen, Spring
+from jaxdamp.dampers import BoucWen, Dahl, KaradayiMasada, Linear, LuGre, Spring
 
 
 TRUTHS = {
@@ -13,7 +13,6 @@ TRUTHS = {
     "Dahl": (Linear(1500.0) + Dahl(3e5, 200.0), lambda v, f: Linear.guess(v, f) + Dahl.guess(v, f)),
     "LuGre": (LuGre(3e5, 800.0, 700.0, 250.0, 350.0, 0.05), LuGre),
     "Karadayi-Masada": (KaradayiMasada(2600.0, 1400.0, 120.0, 0.02, 6e5, 3e-4), KaradayiMasada),
-    "modified Bouc-Wen": (ModifiedBoucWen(900.0, 2e4, 900.0, 400.0, 1.5e-3), ModifiedBoucWen),
 }
 
 
