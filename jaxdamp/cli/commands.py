@@ -96,6 +96,34 @@ def demo(
 
 
 @app.command()
+def ride(
+    law: Annotated[Path, typer.Argument(help="A law as JSON, such as best_law.json of jaxdamp fit.")],
+    vehicle: Annotated[str, typer.Option(help="A published vehicle, such as half_car_002.")] = "quarter_car_000",
+    road: Annotated[
+        str, typer.Option(help="iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.")
+    ] = "iso:C",
+    speed: Annotated[float, typer.Option(help="Of the vehicle [m/s].")] = 20.0,
+    baseline: Annotated[Path | None, typer.Option(help="Another law to compare with, as JSON.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Of the ride [s]; the road's own, or 10.")] = None,
+    dt: Annotated[float, typer.Option(help="Step [s].")] = 1e-3,
+    seed: Annotated[int, typer.Option(help="Of a random road.")] = 0,
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-ride"),
+    force: Force = False,
+    debug: Debug = False,
+) -> None:
+    """Ride on a law: metrics, comfort by ISO 2631-1 and pictures, beside a baseline.
+
+    The law is at every damper of the vehicle.
+    """
+    from jaxdamp.cli import console, riding
+
+    with console.plain_errors(debug):
+        console.prepare()
+        options = {"vehicle": vehicle, "road": road, "speed": speed, "duration": duration, "dt": dt, "seed": seed}
+        riding.run_ride(console.Screen(), law, baseline=baseline, out=out, force=force, **options)
+
+
+@app.command()
 def laws() -> None:
     """List the laws that can be fitted by name."""
     from jaxdamp.cli.console import Screen

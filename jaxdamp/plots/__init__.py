@@ -7,6 +7,7 @@ touches pyplot or its global state, and matplotlib is loaded by the first call o
 from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
 from jaxdamp.plots.curves import force_velocity
+from jaxdamp.plots.damper_use import damper_use
 from jaxdamp.plots.errors import ladder
 from jaxdamp.plots.history import training_history
 from jaxdamp.plots.loops import fit_loops
@@ -16,6 +17,7 @@ from jaxdamp.plots.validation import cross_validation
 
 __all__ = [
     "cross_validation",
+    "damper_use",
     "fit_loops",
     "force_velocity",
     "ladder",

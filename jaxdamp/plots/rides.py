@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 
-CHANNELS = ("sprung_acceleration", "stroke", "dynamic_tyre_load")
 _WORDS = {
     "sprung_acceleration": "body acceleration [m/s²]   (+ up)",
     "stroke": "stroke [mm]   (+ rebound)",
@@ -26,7 +25,8 @@ _WORDS = {
 def ride(
     responses: Response | Mapping[str, Response],
     *,
-    channels: Sequence[str] = CHANNELS,
+    channels: Sequence[str] | None = None,
+    weighting: str | None = None,
     window: tuple[float | int, float | int] | None = None,
     frequencies: tuple[float | int, float | int] = (0.3, 30.0),
 ) -> "matplotlib.figure.Figure":
@@ -36,18 +36,22 @@ def ride(
 
     Arguments:
         responses: a response, or responses by name, all of one kind of vehicle.
-        channels: what to draw over time; the first one also as a spectrum.
+        channels: what to draw over time; the first one also as a spectrum. Left out, the acceleration of the body, the
+            first stroke and the first dynamic tyre load.
+        weighting: a frequency weighting of ISO 2631-1, such as "Wk": the spectrum weighted by it is drawn dotted, and
+            the legend adds the weighted RMS.
         window: part of the run to draw over time [s]; if left out, the whole run, or of a long one the 5 s around its
             largest first channel. The spectrum and the RMS are of the whole run.
         frequencies: range of the spectrum [Hz].
 
     Raises:
-        ValueError: no response, no channel or an unknown one, a window without samples.
+        ValueError: no response, no channel or an unknown one, an unknown weighting, a window without samples.
     """
     responses = {"": responses} if isinstance(responses, Response) else dict(responses)
-    if not responses or not channels:
+    if not responses or (channels is not None and not channels):
         _checks.refuse("responses", "hold at least one, with one channel to draw", f"{len(responses)}")
     first = next(iter(responses.values()))
+    channels = ride_channels(first) if channels is None else channels
     for channel in channels:
         _checks.one_of("channels", channel, first.units)
     start, stop = _window(first, channels[0]) if window is None else window
@@ -69,6 +73,12 @@ def ride(
         rms = float(metrics.rms(values[channels[0]]))
         label = f"{name + ': ' if name else ''}RMS {_style.short(rms)} {_unit(first, channels[0])}"
         frequency, density = _spectrum(values[channels[0]], time, frequencies)
+        if weighting is not None:
+            dt = float(time[1] - time[0])
+            felt = metrics.weighted_rms(values[channels[0]], dt, weighting, method="step", remove_mean=False)
+            label += f", {weighting} {_style.short(float(felt))}"
+            gain = np.asarray(metrics.weighting_factor(frequency, weighting))
+            spectrum.loglog(frequency, gain**2 * density, ":", color=style["color"], linewidth=1.1)
         handles += spectrum.loglog(frequency, density, linewidth=1.3, label=label, **style)
     for axes, channel in zip(rows, channels, strict=True):
         _style.dress(axes, "", _label(first, channel).replace("   ", "\n"))
@@ -79,11 +89,19 @@ def ride(
     rows[0].set_xlim(start, stop)
     title = _label(first, channels[0]).split(" [")[0]
     unit = _unit(first, channels[0])
-    _style.dress(spectrum, "frequency [Hz]", f"power spectral density [({unit})²/Hz]", f"Spectrum of the {title}")
+    words = f"Spectrum of the {title}" + (f", dotted: weighted by {weighting}" if weighting else "")
+    _style.dress(spectrum, "frequency [Hz]", f"power spectral density [({unit})²/Hz]", words)
     spectrum.grid(True, which="minor", color="0.95", linewidth=0.5)
     spectrum.set_xlim(*frequencies)
     _style.legend_above(figure, handles)
     return figure
+
+
+def ride_channels(response: Response) -> tuple[str, ...]:
+    """The channels that say most of a ride: body acceleration, first stroke, first dynamic tyre load."""
+    acceleration = next(m.channel for m in response.vehicle.ride_metrics if m.channel.endswith("acceleration"))
+    rest = [next((name for name in response.units if name.endswith(end)), None) for end in ("stroke", "tyre_load")]
+    return (acceleration, *[name for name in rest if name is not None])
 
 
 def _window(response: Response, channel: str) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """What a vehicle did on a road: motion, forces, channels with units, energy, ride metrics."""
 
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -24,6 +24,14 @@ STATISTICS = {
     "peak_to_peak": metrics.working_space_peak,
     "standard_deviation": jnp.std,
 }
+
+
+class Comfort(NamedTuple):
+    """An acceleration as ISO 2631-1 counts it: RMS and maximum in the unit of its channel, the dose times s^(1/4)."""
+
+    weighted_rms: Scalar
+    max_transient_value: Scalar
+    vibration_dose_value: Scalar
 
 
 def _middle(values: Array) -> Array:
@@ -74,6 +82,23 @@ class Response(eqx.Module):
     def metric_units(self) -> dict[str, str]:
         """Unit of each ride metric."""
         return {m.name: self.units[m.channel] for m in self.vehicle.ride_metrics}
+
+    @eqx.filter_jit
+    def comfort(self) -> dict[str, Comfort]:
+        """What of each acceleration of body, seats and places people feel, by ISO 2631-1.
+
+        Heights are weighted by Wk, angles by We, exactly for accelerations straight from sample to sample; the ride
+        starts from rest, so its mean counts. Differentiable but for the maximum.
+        """
+        channels, dt = self.channels, self.time[1] - self.time[0]
+        found = {}
+        for name in dict.fromkeys(m.channel for m in self.vehicle.ride_metrics if m.channel.endswith("_acceleration")):
+            weighting = "Wk" if self.units[name] == "m/s^2" else "We"
+            felt = metrics.weighted_signal(channels[name], dt, weighting, method="step", remove_mean=False)
+            transient = metrics.max_transient_value(felt, dt, None)
+            dose = metrics.vibration_dose_value(felt, dt, None)
+            found[name] = Comfort(metrics.rms(felt), transient, dose)
+        return found
 
     @eqx.filter_jit
     def energy_balance(self) -> dict[str, Scalar]:

@@ -3,7 +3,7 @@ import json
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner, Result
+from typer.testing import CliRunner
 
 from jaxdamp import identify
 from jaxdamp.bench import BenchSet
@@ -12,24 +12,11 @@ from jaxdamp.cli.findings import LAWS
 from jaxdamp.dampers import Bilinear
 from jaxdamp.export import from_json
 
-
-def jaxdamp(*words: str | Path, code: int = 0) -> Result:
-    result = CliRunner().invoke(app, [str(word) for word in words])
-    assert result.exit_code == code, result.output
-    return result
+from .invoking import jaxdamp, refused
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
-
-
-def _refused(folder: Path, *words: str | Path) -> str:
-    """The message of a command that must fail and leave nothing behind."""
-    before = sorted(folder.rglob("*"))
-    output = " ".join(jaxdamp(*words, code=2).output.split())
-    assert "Traceback" not in output
-    assert sorted(folder.rglob("*")) == before
-    return output
 
 
 # ---- help
@@ -141,12 +128,12 @@ def test_records_are_held_out_by_pattern_or_by_file(records: Path, tmp_path: Pat
 
 
 def test_a_missing_file_is_named_with_its_neighbours(records: Path, tmp_path: Path) -> None:
-    message = _refused(tmp_path, "fit", records / "10mm_5Hz.csv", "--law", "linear", "--out", tmp_path / "fit")
+    message = refused(tmp_path, "fit", records / "10mm_5Hz.csv", "--law", "linear", "--out", tmp_path / "fit")
     assert "Error: There is no file" in message and "Did you mean" in message
 
 
 def test_an_unknown_law_gets_a_suggestion(records: Path, tmp_path: Path) -> None:
-    message = _refused(tmp_path, "fit", records, "--law", "besingr", "--out", tmp_path / "fit")
+    message = refused(tmp_path, "fit", records, "--law", "besingr", "--out", tmp_path / "fit")
     assert "Did you mean 'besinger'?" in message
 
 
@@ -154,13 +141,13 @@ def test_a_missing_unit_is_asked_for(tmp_path: Path, runs: BenchSet) -> None:
     run = runs[0]
     rows = [f"{t},{x},{f}" for t, x, f in zip(run.time, run.stroke, run.force, strict=True)]
     (tmp_path / "run.csv").write_text("\n".join(["time [s],stroke,force [N]", *rows]))
-    message = _refused(tmp_path, "fit", tmp_path / "run.csv", "--law", "linear", "--out", tmp_path / "fit")
+    message = refused(tmp_path, "fit", tmp_path / "run.csv", "--law", "linear", "--out", tmp_path / "fit")
     assert "stroke" in message and "unit" in message
 
 
 def test_a_sign_that_contradicts_the_work_is_refused(lab_file: Path, tmp_path: Path) -> None:
     words = ("--law", "linear", "--force-sign", "opposite", "--out", tmp_path / "fit")
-    assert "contradicts the data" in _refused(tmp_path, "fit", lab_file, *words)
+    assert "contradicts the data" in refused(tmp_path, "fit", lab_file, *words)
 
 
 @pytest.mark.parametrize(
@@ -176,14 +163,14 @@ def test_a_sign_that_contradicts_the_work_is_refused(lab_file: Path, tmp_path: P
     ],
 )
 def test_wrong_options_are_refused(records: Path, tmp_path: Path, words: tuple[str, str], message: str) -> None:
-    said = _refused(tmp_path, "fit", records, "--law", "linear", *words, "--out", tmp_path / "fit")
+    said = refused(tmp_path, "fit", records, "--law", "linear", *words, "--out", tmp_path / "fit")
     assert message in said
 
 
 def test_a_folder_of_others_is_refused(records: Path, tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("keep")
-    message = _refused(tmp_path, "fit", records, "--law", "linear", "--out", tmp_path / "mine")
+    message = refused(tmp_path, "fit", records, "--law", "linear", "--out", tmp_path / "mine")
     assert "not written by jaxdamp" in message and "--force" in message
     jaxdamp("fit", records, "--law", "linear", "--out", tmp_path / "mine", "--force")
     assert (tmp_path / "mine" / "notes.txt").read_text() == "keep"

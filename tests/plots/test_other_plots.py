@@ -191,3 +191,29 @@ def test_nothing_of_matplotlib_is_loaded_before_a_plot_is_drawn() -> None:
         "assert 'matplotlib.figure' in sys.modules and 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
+# ---- what a ride makes a damper do
+
+
+def test_damper_use_shows_the_ride_over_the_law_and_where_the_energy_goes(responses: dict[str, Response]) -> None:
+    figure = plots.damper_use(responses)
+    trace, time_share, energy_share = figure.axes
+    soft = _line(trace, "soft")
+    np.testing.assert_allclose(soft[:, 1], 1500.0 * soft[:, 0], atol=1e-6)
+    for axes in (time_share, energy_share):
+        totals = [float(np.sum(np.asarray(line.get_ydata()))) for line in axes.get_lines()]
+        np.testing.assert_allclose(totals, 100.0, rtol=1e-6)
+    assert _legend(figure) == ["soft", "firm"]
+    with pytest.raises(ValueError, match="`damper` must be one of 'damper', but is 'front_damper'"):
+        plots.damper_use(responses, damper="front_damper")
+
+
+def test_ride_draws_the_weighted_spectrum(responses: dict[str, Response]) -> None:
+    figure = plots.ride(responses["soft"], weighting="Wk")
+    spectrum = figure.axes[-1]
+    weighted, plain = (np.asarray(line.get_xydata()) for line in spectrum.get_lines()[:2])
+    gain = np.asarray(metrics.weighting_factor(plain[:, 0], "Wk"))
+    np.testing.assert_allclose(weighted[:, 1], gain**2 * plain[:, 1], rtol=1e-9)
+    felt = responses["soft"].comfort()["sprung_acceleration"].weighted_rms
+    assert f"Wk {float(felt):.3g}" in _legend(figure)[0]

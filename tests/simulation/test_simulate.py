@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from jaxdamp import dampers, roads, simulate
+from jaxdamp import dampers, metrics, roads, simulate
 from jaxdamp.parameters import replace
 from jaxdamp.simulation.exponential import exponential_steps
 from jaxdamp.vehicles.presets import quarter_car_000
@@ -266,3 +266,17 @@ def test_responses_of_a_linear_car_add_up():
     one, two = BUMP.height(time), 0.01 * jnp.sin(20.0 * jnp.asarray(time))[:, None]
     runs = [simulate(car, roads.from_profile(time, h)).motion for h in (one, two, one - 3.0 * two)]
     np.testing.assert_allclose(runs[0] - 3.0 * runs[1], runs[2], atol=1e-13)
+
+
+def test_comfort_is_what_the_metrics_say_of_the_channel():
+    response = simulate(quarter_car_000(), roads.cosine_bump(0.05, start=0.1, duration=0.3), duration=2.0)
+    felt = response.comfort()["sprung_acceleration"]
+    record = np.asarray(response["sprung_acceleration"])
+    options = {"method": "step", "remove_mean": False}
+    weighted = metrics.weighted_signal(record, 1e-3, "Wk", **options)
+    np.testing.assert_allclose(felt.weighted_rms, metrics.rms(weighted), rtol=1e-9)
+    np.testing.assert_allclose(felt.vibration_dose_value, np.sum(np.asarray(weighted) ** 4 * 1e-3) ** 0.25, rtol=1e-9)
+    np.testing.assert_allclose(felt.max_transient_value, metrics.max_transient_value(weighted, 1e-3, None), rtol=1e-9)
+    # independently: the analogue filter over the spectrum of the record and zeros behind it
+    spectrum = metrics.weighted_rms(record, 1e-3, "Wk", remove_mean=False)
+    np.testing.assert_allclose(felt.weighted_rms, spectrum, rtol=1e-3)

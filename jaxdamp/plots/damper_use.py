@@ -1,0 +1,78 @@
+"""What a ride makes a damper do: force over velocity, and how long it spends at each velocity."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from jaxdamp import _checks, metrics
+from jaxdamp.plots import _style
+from jaxdamp.rig import quasi_static
+from jaxdamp.simulation import Response
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+
+_BINS, _POINTS = 41, 81
+
+
+def dampers_of(response: Response) -> tuple[str, ...]:
+    """Names of the dampers of a vehicle, such as "damper" or "front_damper"."""
+    names = response.vehicle.frame().element_names
+    return tuple(name for name in names if f"{name}_velocity" in response.units)
+
+
+def damper_use(
+    responses: Response | Mapping[str, Response], *, damper: str | None = None
+) -> "matplotlib.figure.Figure":
+    """Force over velocity during rides, each over its law at rest in velocity, and histograms of the velocity.
+
+    The histograms are the share of time, and the share of the dissipated energy, in ranges of equal width: what of the
+    curve matters on this road.
+
+    Arguments:
+        responses: a response, or responses by name, of one kind of vehicle.
+        damper: name of the damper, such as "front_damper"; the first if it is left out.
+
+    Raises:
+        ValueError: no response, an unknown damper, a vehicle without one.
+    """
+    responses = {"": responses} if isinstance(responses, Response) else dict(responses)
+    if not responses:
+        _checks.refuse("responses", "hold at least one", "empty")
+    known = dampers_of(next(iter(responses.values())))
+    if not known:
+        _checks.refuse("responses", "be of a vehicle with a damper", "of one without")
+    damper = known[0] if damper is None else damper
+    _checks.one_of("damper", damper, known)
+    figure = _style.new_figure(12.0, 4.6)
+    trace, time_share, energy_share = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.0))
+    records = {name: _record(response, damper) for name, response in responses.items()}
+    reach = 1.02 * max(float(np.max(np.abs(velocity))) for velocity, _ in records.values())
+    edges = np.linspace(-reach, reach, _BINS + 1)
+    middles, handles = 0.5 * (edges[1:] + edges[:-1]), []
+    for number, (name, (velocity, force)) in enumerate(records.items()):
+        style = _style.line_style(number)
+        law = responses[name].vehicle.elements()[responses[name].vehicle.frame().element_names.index(damper)]
+        held = np.linspace(velocity.min(), velocity.max(), _POINTS)
+        trace.plot(velocity, force, color=style["color"], linewidth=0.5, alpha=0.5)
+        handles += trace.plot(held, np.asarray(quasi_static(law, held)), linewidth=1.8, label=name or "law", **style)
+        shares = metrics.velocity_histogram(velocity, edges), metrics.dissipation_histogram(force, velocity, edges)
+        for axes, share in zip((time_share, energy_share), shares, strict=True):
+            axes.step(middles, 100.0 * np.asarray(share), where="mid", linewidth=1.4, **style)
+    words = f"{damper.replace('_', ' ')}: ride (thin), constant velocity (thick)"
+    _style.dress(trace, _style.VELOCITY, _style.FORCE, words)
+    _style.cross(trace)
+    _style.dress(time_share, "velocity [m/s]", "share of time [%]", f"Time, {reach / _BINS * 2:.2g} m/s a step")
+    _style.dress(energy_share, "velocity [m/s]", "share of dissipated energy [%]", "Energy")
+    if len(responses) > 1:
+        _style.legend_above(figure, handles)
+    return figure
+
+
+def _record(response: Response, damper: str) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity and force of a damper."""
+    channels = response.channels
+    return np.asarray(channels[f"{damper}_velocity"]), np.asarray(channels[f"{damper}_force"])

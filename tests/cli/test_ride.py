@@ -1,0 +1,86 @@
+"""`jaxdamp ride`: metrics beside a baseline, pictures, refusals that leave nothing behind."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jaxdamp import roads, simulate, vehicles
+from jaxdamp.cli.riding import comfort_table, metrics_table, parse_road, presets
+from jaxdamp.dampers import AbstractDamper, Bilinear, Linear
+from jaxdamp.export import to_json
+
+from .invoking import jaxdamp, refused
+
+
+@pytest.fixture
+def law(tmp_path: Path) -> Path:
+    return _written(Bilinear(2600.0, 1200.0), tmp_path / "law.json")
+
+
+def _written(law: AbstractDamper, path: Path) -> Path:
+    to_json(law, path)
+    return path
+
+
+def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
+    base, out = _written(Linear(1500.0), tmp_path / "base.json"), tmp_path / "ride"
+    words = ["--vehicle", "half_car_002", "--road", "bump:0.05:4", "--speed", "16", "--duration", "2", "--dt", "0.002"]
+    text = jaxdamp("ride", law, "--baseline", base, *words, "--out", out).output
+    assert "rms_pitch_acceleration" in text and "baseline" in text and "Comfort by ISO 2631-1" in text
+    rows = {row["metric"]: row for row in csv.DictReader((out / "metrics.csv").read_text().splitlines())}
+    car = vehicles.presets.half_car_002(Bilinear(2600.0, 1200.0))
+    bump = roads.cosine_bump(0.05, start=1.0, length=4.0, speed=16.0)
+    road = roads.delayed(bump, positions=car.axle_positions, speed=16.0)
+    expected = simulate(car, road, duration=2.0, dt=0.002).metrics()
+    row = rows["front_working_space_peak"]
+    assert float(row["law"]) == pytest.approx(float(expected["front_working_space_peak"]), rel=1e-9)
+    assert float(row["change [%]"]) == pytest.approx(100 * (float(row["law"]) / float(row["baseline"]) - 1))
+    pictures = {"ride.png", "front_damper.png", "rear_damper.png"}
+    tables = {"metrics.csv", "comfort.csv", "channels_law.csv", "channels_baseline.csv"}
+    files = {file.name for file in out.iterdir()}
+    assert files == pictures | tables | {"law.json", "baseline.json", "report.html", "manifest.json"}
+    assert (out / "law.json").read_text() == law.read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--vehicle", "half_car_02"], "Did you mean 'half_car_002'?"),
+        (["--road", "iso:K"], "`road_class` must be one of 'A'"),
+        (["--road", "bump:3"], "`road` must read like bump:HEIGHT:LENGTH"),
+        (["--road", "nothing.csv"], "a file that is there, but is 'nothing.csv'"),
+        (["--speed", "-3"], "`speed` must be positive"),
+    ],
+)
+def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], message: str) -> None:
+    assert message in refused(tmp_path, "ride", law, *words, "--out", tmp_path / "out")
+
+
+def test_roads_from_files_go_under_every_axle(tmp_path: Path) -> None:
+    car = vehicles.presets.half_car_002()
+    x = np.linspace(0.0, 20.0, 201)
+    file = tmp_path / "profile.csv"
+    file.write_text("x [m],z [m]\n" + "\n".join(f"{a},{0.01 * np.sin(a)}" for a in x))
+    road = parse_road(str(file), car, speed=5.0, duration=3.0, seed=0)
+    time = np.arange(301) / 100
+    front, rear = np.asarray(road.height(time)).T
+    np.testing.assert_allclose(front, 0.01 * np.sin(5.0 * time), atol=2e-5)
+    np.testing.assert_allclose(rear[50:], front[:-50], atol=1e-12)  # 2.5 m behind
+
+
+def test_every_preset_with_a_damper_takes_the_law() -> None:
+    assert {"quarter_car_000", "half_car_002", "full_car_jazar", "truck_001", "m113_003"} <= set(presets())
+    for make in presets().values():
+        laws = make(damper=Linear(1234.0)).elements()
+        assert any("1234.0" in repr(law) for law in laws)
+
+
+def test_tables_of_one_law_have_no_change() -> None:
+    car = vehicles.presets.quarter_car_000()
+    run = simulate(car, roads.cosine_bump(0.05, start=0.1, duration=0.2), duration=1.0, dt=0.002)
+    for table in (metrics_table({"law": run}), comfort_table({"law": run})):
+        assert [column.name for column in table.columns][1:] == ["unit", "law"]
+    units = {str(row[0]).rpartition("acceleration ")[2]: row[1] for row in comfort_table({"law": run}).rows}
+    assert units["vibration dose value"] == "m/s^1.75" and units["weighted rms"] == "m/s²"
