@@ -158,6 +158,7 @@ PACKAGES = sorted(
 ) + sorted(path.stem for path in ROOT.glob("*.py") if path.stem != "__init__")
 
 
+@pytest.mark.slow
 def test_each_part_can_be_imported_first():
     """Each in its own process; importing `jaxdamp.x` runs the front of the package, so that is replaced by a shell."""
     code = """

@@ -14,6 +14,8 @@ from jaxdamp.vehicles.presets import quarter_car_000
 from .test_contract import LAWS
 
 
+pytestmark = pytest.mark.slow
+
 STEPS = 200  # the same in all runs, so that each engine is compiled once a group
 NAMES = list(LAWS)
 GROUPS = [NAMES[i : i + 6] for i in range(0, len(NAMES), 6)]

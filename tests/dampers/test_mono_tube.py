@@ -234,6 +234,7 @@ def test_implicit_solver_on_the_rig():
     np.testing.assert_allclose(found[-800:], expected, atol=2e-5 * np.max(np.abs(expected)))
 
 
+@pytest.mark.slow
 def test_both_engines_in_a_quarter_car():
     """No cavities open here; with them (bumps of 5 cm) steps of 0.5 ms do as well."""
     car = QuarterCar(300.0, 40.0, 20e3, 200e3, LAW)
@@ -247,6 +248,7 @@ def test_both_engines_in_a_quarter_car():
     assert np.sqrt(np.mean((force - expected) ** 2)) < 0.005 * np.max(np.abs(expected))
 
 
+@pytest.mark.slow
 def test_valves_are_found_with_the_geometry_frozen():
     tests = [SineTest(amplitude, 8.0) for amplitude in (0.003, 0.014)]  # up to 0.15 and 0.7 m/s
     runs = VirtualDyno(LAW, force_noise=20.0, seed=3).run(tests)

@@ -8,6 +8,8 @@ import pytest
 from jaxdamp import metrics
 
 
+pytestmark = pytest.mark.slow
+
 DT = 0.01
 FREQUENCY = np.arange(1.0, 302.0)
 EDGES = np.array([-np.inf, -0.5, 0.5, np.inf])

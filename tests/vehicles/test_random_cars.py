@@ -1,6 +1,7 @@
 """Random cars on random roads against equations written by hand and integrated by SciPy."""
 
 import numpy as np
+import pytest
 import scipy.integrate
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
@@ -11,6 +12,8 @@ from jaxdamp.vehicles.presets import half_car_002
 
 from .fleet import bumps, full_quarter_car
 
+
+pytestmark = pytest.mark.slow
 
 GRAVITY = 9.80665
 TIME = np.linspace(0.0, 0.4, 1601)  # steps of 0.25 ms
