@@ -1,4 +1,8 @@
-"""Runs the examples of the README, of docs/ and of every docstring as tests."""
+"""Runs the examples of the README, of docs/ and of every docstring as tests.
+
+Examples that begin with `jaxdamp.configure()` run beside others in one process, which has started: there the call only
+switches on double precision. `tests/test_configuration.py` makes it in processes of its own.
+"""
 
 import jax
 import numpy as np
@@ -7,13 +11,22 @@ from sybil.parsers.doctest import DocTestParser
 from sybil.parsers.markdown import PythonCodeBlockParser, SkipParser
 
 
-def _double_precision(namespace: dict) -> None:
-    del namespace
+def _prepare(namespace: dict) -> None:
+    import jaxdamp
+
+    namespace["configure, as it is"] = jaxdamp.configure
+    jaxdamp.configure = lambda **_: None
     jax.config.update("jax_enable_x64", True)
     np.set_printoptions(precision=6, suppress=True)
 
 
+def _tidy(namespace: dict) -> None:
+    import jaxdamp
+
+    jaxdamp.configure = namespace["configure, as it is"]
+
+
 pytest_collect_file = (
-    Sybil(parsers=[PythonCodeBlockParser(), SkipParser()], patterns=["*.md"], setup=_double_precision)
-    + Sybil(parsers=[DocTestParser()], patterns=["jaxdamp/**/*.py", "jaxdamp/*.py"], setup=_double_precision)
+    Sybil(parsers=[PythonCodeBlockParser(), SkipParser()], patterns=["*.md"], setup=_prepare, teardown=_tidy)
+    + Sybil(parsers=[DocTestParser()], patterns=["jaxdamp/**/*.py", "jaxdamp/*.py"], setup=_prepare, teardown=_tidy)
 ).pytest()

@@ -1,46 +1,76 @@
-"""What all benchmarks share: warm timing, the machine they ran on, a table."""
+"""What all benchmarks share: warm timing, the machine they ran on, a table, a file."""
 
+import json
+import os
 import platform
 import time
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import jax
-import numpy as np
 
 
-def first_and_warm(work: Callable[[], Any], repeats: int = 15) -> tuple[float, float]:
-    """Seconds of the first call, which compiles, and the median of the following ones, results waited for."""
+RESULTS = Path(__file__).parent / "results"
+PACKAGES = ("jax", "equinox", "diffrax", "optimistix", "scipy", "numba", "casadi")
+
+
+def first_and_warm(work: Callable[[], Any], repeats: int = 9) -> tuple[float, float]:
+    """Seconds of the first call, which compiles, and of the best following one, results waited for.
+
+    The best, not the mean: whatever else the machine does only adds to it.
+    """
     samples = []
     for _ in range(repeats + 1):
         start = time.perf_counter()
         jax.block_until_ready(work())
         samples.append(time.perf_counter() - start)
-    return samples[0], float(np.median(samples[1:]))
+    return samples[0], min(samples[1:])
 
 
-def machine() -> str:
-    """Processor, cores and versions in one line."""
+def best(work: Callable[[], Any], repeats: int = 3) -> float:
+    """Seconds of the best call after a first one."""
+    return first_and_warm(work, repeats)[1]
+
+
+def machine() -> dict[str, Any]:
+    """Processor, cores, devices, load and versions."""
     cpu = platform.processor()
     info = Path("/proc/cpuinfo")
     if info.exists():
         names = [line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if "model name" in line]
         cpu = names[0] if names else cpu
-    packages = ", ".join(f"{name} {version(name)}" for name in ("jax", "equinox", "diffrax", "optimistix"))
-    devices = ", ".join(str(device) for device in jax.devices())
-    return f"{cpu}; {devices}; Python {platform.python_version()}, {packages}"
+    found = {}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return {
+        "cpu": cpu,
+        "cores": os.cpu_count(),
+        "devices": [str(device) for device in jax.devices()],
+        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+        "python": platform.python_version(),
+        **found,
+    }
 
 
-def show(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table."""
-    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
-    print(title)
-    print(machine())
-    for row in [head, ["-" * w for w in widths], *rows]:
-        print(
-            "  ".join(
-                cell.ljust(w) if i == 0 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))
-            )
-        )
+def report(question: str, title: str, head: Sequence[str], rows: Sequence[Sequence[Any]], digits: int = 3) -> None:
+    """Print a table and write it, with the machine, as `results/QUESTION.json`."""
+    on = machine()
+    texts = [[_text(cell, digits) for cell in row] for row in rows]
+    widths = [max(len(row[i]) for row in [head, *texts]) for i in range(len(head))]
+    print(f"\n{title}")
+    print(", ".join(f"{name} {value}" for name, value in on.items() if value != "not installed"))
+    for row in [head, ["-" * w for w in widths], *texts]:
+        cells = enumerate(zip(row, widths, strict=True))
+        print("  ".join(cell.rjust(w) if i else cell.ljust(w) for i, (cell, w) in cells), flush=True)
+    RESULTS.mkdir(exist_ok=True)
+    content = {"title": title, "machine": on, "columns": list(head), "rows": [list(row) for row in rows]}
+    (RESULTS / f"{question}.json").write_text(json.dumps(content, indent=1) + "\n")
+
+
+def _text(cell: Any, digits: int) -> str:
+    return f"{cell:.{digits}g}" if isinstance(cell, float) else str(cell)

@@ -9,16 +9,21 @@ differences need a step far above the error of the integration. "first" counts c
 
 import time
 from collections.abc import Sequence
+from typing import Any
 
-import jax
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from benchmarks._timing import first_and_warm, show
-from jaxdamp.bench import BenchRun, VirtualDyno, programmes
-from jaxdamp.dampers import Besinger, Linear, SeriesSpring
-from jaxdamp.identify import FitResult, default_ladder, fit
+from jaxdamp import configure
+
+
+configure(cache=False)
+
+from benchmarks._timing import first_and_warm, report  # noqa: E402
+from jaxdamp.bench import BenchRun, VirtualDyno, programmes  # noqa: E402
+from jaxdamp.dampers import Besinger, Linear, SeriesSpring  # noqa: E402
+from jaxdamp.identify import FitResult, default_ladder, fit  # noqa: E402
 
 
 LAWS = (
@@ -42,7 +47,7 @@ def peer(runs: Sequence[BenchRun]) -> np.ndarray:
         for run in runs:
             since, velocity = run.time - run.time[0], run.velocity
             solved = solve_ivp(
-                lambda t, force: stiffness * (np.interp(t, since, velocity) - force / rate),  # noqa: B023
+                lambda t, force: stiffness * (np.interp(t, since, velocity) - force / rate),
                 (0.0, since[-1]),
                 [rate * velocity[0]],
                 t_eval=since,
@@ -57,19 +62,16 @@ def peer(runs: Sequence[BenchRun]) -> np.ndarray:
 
 
 def main() -> None:
-    jax.config.update("jax_enable_x64", True)
     car = SeriesSpring(Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05), stiffness=1.5e6, cubic_stiffness=1.2e8)
     runs = list(VirtualDyno(car, force_noise=20.0, stroke_noise=1e-5).run(programmes.paper_000_table_1()))
-    rows = []
+    rows: list[list[Any]] = []
     for name, law in default_ladder(runs, LAWS).items():
         results: list[FitResult] = []
         first, warm = first_and_warm(lambda law=law, kept=results: kept.append(fit(law, runs)), repeats=5)
         free, steps, rmse = len(results[-1].parameters), results[-1].steps, results[-1].rmse
-        rows.append([name, f"{free}", f"{steps}", f"{first:.2f}", f"{warm:.3f}", f"{rmse:.2f}"])
-    samples = sum(map(len, runs))
-    show(
-        f"fit of {len(runs)} records, {samples} samples", ["law", "free", "steps", "first s", "warm s", "RMSE N"], rows
-    )
+        rows.append([name, free, steps, first, warm, rmse])
+    samples, head = sum(map(len, runs)), ["law", "free", "steps", "first, s", "warm, s", "RMSE, N"]
+    report("fit", f"Fit of {len(runs)} records, {samples} samples", head, rows)
 
     fast = [run for run in runs if run.frequency > PEER_LEAST]
     start = SeriesSpring(Linear(1000.0), stiffness=5e5)
@@ -78,9 +80,10 @@ def main() -> None:
     begin = time.perf_counter()
     found = peer(fast)
     theirs = time.perf_counter() - begin
-    print(f"\nlinear damper and series spring on {len(fast)} records, {sum(map(len, fast))} samples")
-    print(f"jaxdamp {ours:.3f} s warm, least_squares with solve_ivp {theirs:.2f} s: {theirs / ours:.0f} times")
-    print(f"c and k: {[round(e.value, 1) for e in results[-1].parameters]}, {np.round(found, 1).tolist()}")
+    own = [float(e.value) for e in results[-1].parameters]
+    rows = [["jaxdamp, warm", ours, *own], ["least_squares with solve_ivp", theirs, *map(float, found)]]
+    title = f"Linear damper and series spring on {len(fast)} records, {sum(map(len, fast))} samples"
+    report("fit_beside", f"{title}: {theirs / ours:.0f} times", ["by", "s", "c, N s/m", "k, N/m"], rows, 6)
 
 
 if __name__ == "__main__":

@@ -13,17 +13,17 @@ import pytest
 ROOT = Path(__file__).parents[1] / "jaxdamp"
 
 STOREYS = [
-    {"parameters"},  # and every private module `_*.py` at the top
+    {"parameters", "configuration"},  # and every private module `_*.py` at the top
     {"dampers", "roads", "metrics"},
     {"vehicles", "rig"},
     {"simulation", "bench"},
-    {"identify", "tune", "sweep"},
+    {"identify", "tune", "sweeps"},
     {"plots", "export"},
     {"cli", "report"},
 ]
 TOP = len(STOREYS) - 1
 # A result draws itself: `.plot()` loads the plots when it is called.
-DRAWS_ITSELF = {("identify", "plots"), ("tune", "plots"), ("sweep", "plots")}
+DRAWS_ITSELF = {("identify", "plots"), ("tune", "plots"), ("sweeps", "plots")}
 # Known only to someone who asks for them: importing the package loads none.
 LATE = ["matplotlib", "xarray", "pint", "typer", "rich", "pandas", "scipy.optimize", "scipy.signal", "scipy.io"]
 

@@ -92,10 +92,18 @@ class Screen:
 
 
 def prepare() -> None:
-    """Compute in float64, as a command may decide for its own process."""
-    import jax
+    """Double precision, all cores, fast loops, as a command may decide for its own process.
 
-    jax.config.update("jax_enable_x64", True)
+    Called from a Python that computes already, it takes devices and loops as they are.
+    """
+    from jaxdamp import configure
+
+    try:
+        configure()
+    except RuntimeError:
+        import jax
+
+        jax.config.update("jax_enable_x64", True)
 
 
 @contextmanager

@@ -240,7 +240,7 @@ def tuning_tables(tuned: TuneResult) -> tuple[Table, Table]:
             tuned.units[name].replace("^2", "²") or "–",
             before,
             tuned.after[name],
-            100 * (tuned.after[name] / before - 1),
+            100 * (tuned.after[name] / before - 1) if before else None,
             marks.get(name, ""),
         )
         for name, before in tuned.before.items()

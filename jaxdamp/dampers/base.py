@@ -49,6 +49,12 @@ class AbstractDamper(eqx.Module):
     ) -> State:
         """The states after a step dt [s] over which stroke and velocity go from (x0, v0) to (x1, v1)."""
 
+    def predict(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """What `advance` will give, or something near it that costs less, from which an engine predicts the force."""
+        return self.advance(x0, v0, x1, v1, state, dt)
+
     def __add__(self, other: "AbstractDamper") -> "AbstractDamper":
         """Two laws side by side: forces add."""
         if not isinstance(other, AbstractDamper):

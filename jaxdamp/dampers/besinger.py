@@ -3,6 +3,7 @@
 import warnings
 from typing import final
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -19,10 +20,10 @@ def transition_rate(
 
     C goes from C_c far in compression to C_e far in rebound. Paper 001 prints c₁ twice; the second is c₂.
     """
-    u = v / transition_velocity - 1.0
+    u = v * (1.0 / transition_velocity) - 1.0  # no quotient of v here and below: they are slow, in tangents too
     c1 = 0.5 * (rebound_rate - compression_rate)
     c2 = 0.5 * (rebound_rate + compression_rate)
-    return c1 * u / jnp.sqrt(1.0 + u * u) + c2
+    return c1 * u * jax.lax.rsqrt(1.0 + u * u) + c2
 
 
 @final

@@ -28,6 +28,7 @@ class Lag(AbstractDamper):
 
     preserves_linearity: ClassVar[bool] = True
     answers_at_once: ClassVar[bool] = False
+    smooth_state: ClassVar[bool] = True
 
     def initial_state(self) -> State:
         """No force; then the states of the law."""

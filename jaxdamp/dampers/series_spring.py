@@ -32,6 +32,7 @@ class SeriesSpring(AbstractDamper):
     cubic_stiffness: Number = parameter("N/m³", "k₂, cubic series stiffness", nonnegative, default=0.0)
 
     answers_at_once: ClassVar[bool] = False
+    smooth_state: ClassVar[bool] = True
 
     def __check_init__(self) -> None:
         refuse_late("law", self.law, "SeriesSpring")

@@ -19,6 +19,7 @@ signal gives NaN. Only what answers in words (`evaluation_method`, `comfort_reac
   `dissipation_histogram`, `temperature_rise`, `damper_temperature`.
 - Fatigue: `spectral_moments`, `spectral_damage`.
 - Road: `international_roughness_index`.
+- Gathered while a simulation runs: `STATISTICS`.
 
 >>> import jax
 >>> import jax.numpy as jnp
@@ -51,6 +52,7 @@ from jaxdamp.metrics.histogram import dissipation_histogram, velocity_histogram
 from jaxdamp.metrics.roughness_index import international_roughness_index
 from jaxdamp.metrics.running import max_transient_value, running_rms
 from jaxdamp.metrics.spectrum import power_spectral_density
+from jaxdamp.metrics.statistics import STATISTICS, Statistic, weighting_of
 from jaxdamp.metrics.transfer import coherence, transmissibility
 from jaxdamp.metrics.tyre_load import dynamic_load_coefficient, lift_off_fraction, road_stress_factor
 from jaxdamp.metrics.weighted import weighted_rms, weighted_signal
@@ -65,9 +67,11 @@ from jaxdamp.metrics.working_space import (
 
 __all__ = [
     "AXES",
+    "STATISTICS",
     "Evaluation",
     "ShockRatios",
     "StateSpace",
+    "Statistic",
     "aggregate_force",
     "aggregate_force_percentile",
     "coherence",
@@ -109,6 +113,7 @@ __all__ = [
     "weighted_rms",
     "weighted_signal",
     "weighting_factor",
+    "weighting_of",
     "weighting_response",
     "weighting_state_space",
     "working_space_exceedance",

@@ -180,3 +180,33 @@ def weighting_state_space(weighting: str) -> StateSpace:
     """
     check_weighting(weighting)
     return StateSpace(*(jnp.asarray(part, float) for part in cascade(weighting)))
+
+
+@functools.cache
+def discrete_weighting(weighting: str, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Φ, H₀, H₁ and C of w₁ = Φ w₀ + H₀ u₀ + H₁ (u₁ − u₀), y = C w: a weighting, exact for u straight over a step.
+
+    In the real basis of its modes, each a pair of states that turns and decays by itself: Φ holds blocks of 2 × 2, so
+    that a step takes half the products. The constants are NumPy arrays in double precision.
+    """
+    system = cascade(weighting)
+    values, vectors = map(np.asarray, np.linalg.eig(np.asarray(system.state_matrix)))
+    upper = np.flatnonzero(np.imag(values) > 0)  # all modes of all weightings oscillate
+    n = values.size
+    basis = np.empty((n, n))
+    basis[:, ::2], basis[:, 1::2] = np.real(vectors[:, upper]), -np.imag(vectors[:, upper])
+    inward, output = np.linalg.solve(basis, np.asarray(system.input_vector)), np.asarray(system.output_vector) @ basis
+    phi, held, ramp = np.zeros((n, n)), np.empty(n), np.empty(n)
+    for i, mode in enumerate(upper):
+        pair, z = slice(2 * i, 2 * i + 2), values[mode] * dt
+        first = np.expm1(z) / z
+        second = (first - 1.0) / z
+        for target, factor in ((held, first), (ramp, second)):
+            target[pair] = _turn(factor * dt) @ inward[pair]
+        phi[pair, pair] = _turn(np.exp(z))
+    return phi, held, ramp, output
+
+
+def _turn(factor: complex) -> np.ndarray:
+    """A complex factor as a matrix of real and imaginary part."""
+    return np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxdamp._types import Scalar, Signal, State
+from jaxdamp._types import Scalar, Signal
 from jaxdamp.simulation.exponential import road_rate
 from jaxdamp.vehicles import AbstractVehicle, Ports, rest_position
 from jaxdamp.vehicles.ports import States
@@ -26,7 +26,7 @@ def adaptive_steps(
     rtol: float,
     atol: float,
     start: Float[Array, " n"] | None = None,
-) -> tuple[Float[Array, "time n"], Float[Array, "time ports"], list[State], Any]:
+) -> tuple[Float[Array, "time n"], Float[Array, "time ports"], list[Float[Array, " _state"]], Any]:
     """Motion and forces at the instants of the road, linear between them; steps end where its slope changes."""
     form, laws = vehicle.port_form(), vehicle.elements()
     ports = Ports(laws)

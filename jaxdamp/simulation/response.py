@@ -1,5 +1,6 @@
 """What a vehicle did on a road: motion, forces, channels with units, energy, ride metrics."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, final
 
 import equinox as eqx
@@ -9,21 +10,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks, metrics
-from jaxdamp._types import Scalar, Signal, State
+from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.simulation.exponential import road_rate
-from jaxdamp.vehicles import AbstractVehicle, Instant
+from jaxdamp.vehicles import AbstractVehicle, Instant, RideMetric
 
 
 if TYPE_CHECKING:
     import xarray
-
-
-STATISTICS = {
-    "rms": metrics.rms,
-    "peak": metrics.peak,
-    "peak_to_peak": metrics.working_space_peak,
-    "standard_deviation": jnp.std,
-}
 
 
 class Comfort(NamedTuple):
@@ -51,7 +44,7 @@ class Response(eqx.Module):
     motion: Float[Array, "time n"]
     port_force: Float[Array, "time ports"]
     road: Float[Array, "time wheels"]
-    final_state: list[State]
+    final_state: list[Float[Array, " _state"]]
 
     @property
     def units(self) -> dict[str, str]:
@@ -73,28 +66,55 @@ class Response(eqx.Module):
         _checks.one_of("channel", channel, self.units)
         return self.channels[channel]
 
+    def metrics(self, names: Sequence[str] | None = None) -> dict[str, Scalar]:
+        """The vehicle's ride metrics by name, or those of these names, over the whole run.
+
+        Weighted ones take heights by Wk and angles by We, exactly for accelerations straight from sample to sample; the
+        ride starts from rest, so its mean counts. Differentiable but for peaks, which have the slope of one instant,
+        and counts, which have none.
+        """
+        known = {m.name: m for m in self.vehicle.ride_metrics}
+        for name in names or ():
+            _checks.one_of("names", name, known)
+        return self._metrics([known[name] for name in (known if names is None else names)], self._dt())
+
     @eqx.filter_jit
-    def metrics(self) -> dict[str, Scalar]:
-        """The vehicle's ride metrics by name, over the whole run."""
-        channels = self.channels
-        return {m.name: STATISTICS[m.statistic](channels[m.channel]) for m in self.vehicle.ride_metrics}
+    def _metrics(self, chosen: Sequence[RideMetric], dt: ScalarLike) -> dict[str, Scalar]:
+        channels, found = self.channels, {}
+        weighted = {m.channel for m in chosen if metrics.STATISTICS[m.statistic].weighted}
+        felt = {name: self._felt(channels[name], name, dt) for name in sorted(weighted)}
+        for m in chosen:
+            statistic = metrics.STATISTICS[m.statistic]
+            record = (felt if statistic.weighted else channels)[m.channel]
+            found[m.name] = statistic.of(record * channels[m.by] if m.by else record, dt)
+        return found
 
     def metric_units(self) -> dict[str, str]:
         """Unit of each ride metric."""
-        return {m.name: self.units[m.channel] for m in self.vehicle.ride_metrics}
+        return {m.name: m.unit(self.units) for m in self.vehicle.ride_metrics}
+
+    def _dt(self) -> ScalarLike:
+        """Spacing of the instants, as a plain number where it is known: then filters are made by NumPy."""
+        known = _checks.concrete(self.time)
+        return self.time[1] - self.time[0] if known is None else float(known[1] - known[0])
+
+    def _felt(self, acceleration: Signal, name: str, dt: ScalarLike) -> Signal:
+        """An acceleration weighted by ISO 2631-1."""
+        weighting = metrics.weighting_of(self.units[name])
+        return metrics.weighted_signal(acceleration, dt, weighting, method="step", remove_mean=False)
+
+    def comfort(self) -> dict[str, Comfort]:
+        """What of each acceleration of body, seats and places people feel, by ISO 2631-1, with the largest second.
+
+        Weighted as in `metrics`. Differentiable but for the maximum.
+        """
+        return self._comfort(self._dt())
 
     @eqx.filter_jit
-    def comfort(self) -> dict[str, Comfort]:
-        """What of each acceleration of body, seats and places people feel, by ISO 2631-1.
-
-        Heights are weighted by Wk, angles by We, exactly for accelerations straight from sample to sample; the ride
-        starts from rest, so its mean counts. Differentiable but for the maximum.
-        """
-        channels, dt = self.channels, self.time[1] - self.time[0]
-        found = {}
+    def _comfort(self, dt: ScalarLike) -> dict[str, Comfort]:
+        channels, found = self.channels, {}
         for name in dict.fromkeys(m.channel for m in self.vehicle.ride_metrics if m.channel.endswith("_acceleration")):
-            weighting = "Wk" if self.units[name] == "m/s^2" else "We"
-            felt = metrics.weighted_signal(channels[name], dt, weighting, method="step", remove_mean=False)
+            felt = self._felt(channels[name], name, dt)
             transient = metrics.max_transient_value(felt, dt, None)
             dose = metrics.vibration_dose_value(felt, dt, None)
             found[name] = Comfort(metrics.rms(felt), transient, dose)

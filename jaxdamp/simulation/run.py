@@ -8,10 +8,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._types import Signal
 from jaxdamp.dampers.coverage import coverage
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.exponential import exponential_steps
 from jaxdamp.simulation.response import Response
+from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.vehicles import AbstractVehicle, static_equilibrium
 from jaxdamp.vehicles.equilibrium import refuse_restless
 
@@ -30,6 +32,7 @@ def simulate(
     rtol: float = 1e-8,
     atol: float = 1e-10,
     start: Mapping[str, float] | None = None,
+    substeps: int | None = None,
 ) -> Response:
     """Drive a vehicle over a road.
 
@@ -42,12 +45,14 @@ def simulate(
             sides of it. A road with one track goes under all wheels together; `roads.delayed` sends it on from axle
             to axle.
         duration: length of the run [s]; the road's own if it has one and this is left out.
-        dt: spacing of the instants [s], for the exponential engine also its step (second order; 1 ms is right for
-            cars with memoryless laws).
+        dt: spacing of the instants [s], for the exponential engine also its step (third order, second where laws
+            have kinks or states; 1 ms is right for cars).
         method: `"exponential"`, the fixed-step engine; `"diffrax"`, adaptive Tsit5; or any diffrax solver, such as
             `diffrax.Kvaerno5()` for a stiff law.
         rtol: relative tolerance of the adaptive methods.
         atol: absolute tolerance of the adaptive methods, in the units of the states.
+        substeps: of the exponential engine between two instants; as many as the steepest law without states needs
+            (friction at standstill) if left out, so that every step is stable.
         start: coordinates [m, rad] at time zero that differ from the equilibrium, such as `{"pitch": 0.05}`; at rest.
 
     Returns:
@@ -63,22 +68,11 @@ def simulate(
     >>> round(float(response.metrics()["working_space_peak"]), 3)
     0.072
     """
-    duration = road.duration if duration is None else duration
-    if duration is None:
-        _checks.refuse("duration", "be given for a road without an end of its own", None, "Pass `duration=10.0`.")
-    _checks.positive("duration", duration)
-    _checks.positive("dt", dt)
-    if dt > duration:
-        _checks.refuse("dt", f"be shorter than the run of {duration:g} s", dt)
-    if road.grid is not None and dt > road.grid * (1 + 1e-9):
-        remedy = f"Pass `dt={road.grid:g}` or less, or make the road with a coarser grid."
-        _checks.refuse("dt", f"not be longer than the road's grid of {road.grid:g} s", dt, remedy)
-    count = round(duration / dt)
-    time = jnp.arange(count + 1, dtype=float) * dt
-    heights = _under_wheels(vehicle, road.height(time))
+    time, heights = sampled(vehicle, road, duration, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)
     if method == "exponential":
-        motion, forces, states = exponential_steps(vehicle, heights, jnp.asarray(dt, dtype=float), begin)
+        count = substeps_needed(vehicle, dt) if substeps is None else substeps
+        motion, forces, states = exponential_steps(vehicle, heights, jnp.asarray(dt, dtype=float), begin, count)
         remedy = f"Take a shorter step than {dt:g} s, or an implicit solver, `method=diffrax.Kvaerno5()`."
     else:
         import diffrax
@@ -97,6 +91,25 @@ def simulate(
         remedy = " ".join([*filter(None, map(coverage, vehicle.elements())), remedy])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
     return Response(vehicle, time, motion, forces, heights, states)
+
+
+def sampled(
+    vehicle: AbstractVehicle, road: AbstractRoad, duration: float | None, dt: float
+) -> tuple[Signal, Float[Array, "time wheels"]]:
+    """The instants of a run and the heights under the wheels, with the checks of `simulate`."""
+    duration = road.duration if duration is None else duration
+    if duration is None:
+        _checks.refuse("duration", "be given for a road without an end of its own", None, "Pass `duration=10.0`.")
+    _checks.positive("duration", duration)
+    _checks.positive("dt", dt)
+    if dt > duration:
+        _checks.refuse("dt", f"be shorter than the run of {duration:g} s", dt)
+    if road.grid is not None and dt > road.grid * (1 + 1e-9):
+        remedy = f"Pass `dt={road.grid:g}` or less, or make the road with a coarser grid."
+        _checks.refuse("dt", f"not be longer than the road's grid of {road.grid:g} s", dt, remedy)
+    count = round(duration / dt)
+    time = jnp.arange(count + 1, dtype=float) * dt
+    return time, _under_wheels(vehicle, road.height(time))
 
 
 def _under_wheels(vehicle: AbstractVehicle, heights: Float[Array, "time tracks"]) -> Float[Array, "time wheels"]:

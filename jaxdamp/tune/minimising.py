@@ -8,15 +8,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxdamp import _checks
+from jaxdamp import _checks, metrics
 from jaxdamp._progress import Progress
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Response, simulate
 from jaxdamp.simulation.exponential import exponential_steps
+from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.tune.result import Change, TuneResult, V
-from jaxdamp.vehicles import AbstractVehicle, stationary_rms
+from jaxdamp.vehicles import AbstractVehicle, RideMetric, linearise, stationary_rms, with_weightings
 
 
 INSIDE = 1e-6  # share of its start by which a parameter stays off the ends of its domain
@@ -69,12 +70,12 @@ def minimise(
     >>> round(float(result.vehicle.damper.rate), 1)
     4656.4
     """
-    ride = stationary_ride(road) if isinstance(road, WhiteRoad) else driven_ride(vehicle, road, duration, dt)
-    free = free_parameters(vehicle, over=over, freeze=freeze, bounds=bounds)
-    names = list(ride_names(vehicle, road))
     limits = dict(limits or {})
-    for name in (metric, *limits):
-        _checks.one_of("metric", name, names)
+    chosen = chosen_metrics(vehicle, road, (metric, *limits))
+    white = isinstance(road, WhiteRoad)
+    ride = stationary_ride(road, chosen) if white else driven_ride(vehicle, road, chosen, duration, dt)
+    free = free_parameters(vehicle, over=over, freeze=freeze, bounds=bounds)
+    names = [m.name for m in chosen]
     table = _Table(ride, free, names)
     before, _ = table.at(np.asarray(free.values))
     scale = np.array([abs(v) if v else 1.0 for v in np.asarray(free.values)])
@@ -99,7 +100,6 @@ def minimise(
     notes += [f"{c.name} ended at a bound, {c.after:.5g} {c.unit}." for c in changes if c.note]
     if not converged and not over_limit:
         notes.append(f"The search ended before an optimum ({message}); the scaled gradient left is {left:.1e}.")
-    metric_units = {m.name: vehicle.units[m.channel] for m in vehicle.ride_metrics}
     return TuneResult(
         free.build(jnp.asarray(values)),
         vehicle,
@@ -107,7 +107,7 @@ def minimise(
         changes,
         before,
         after,
-        {name: metric_units[name] for name in names},
+        {m.name: m.unit(vehicle.units) for m in chosen},
         limits,
         tuple(notes),
         converged,
@@ -115,31 +115,56 @@ def minimise(
     )
 
 
-def ride_names(vehicle: AbstractVehicle, road: AbstractRoad | WhiteRoad) -> tuple[str, ...]:
-    """The ride metrics that this kind of road can give: on a white road those without peaks."""
-    averages = ("rms", "standard_deviation")
-    known = vehicle.ride_metrics
-    return tuple(m.name for m in known if not isinstance(road, WhiteRoad) or m.statistic in averages)
+def chosen_metrics(vehicle: AbstractVehicle, road: AbstractRoad | WhiteRoad, wanted: Sequence[str]) -> list[RideMetric]:
+    """The ride metrics that are wanted, and all others that this kind of road gives without weighting or counting.
+
+    A white road gives what follows from an RMS, so no peaks.
+    """
+    white, kinds = isinstance(road, WhiteRoad), metrics.STATISTICS
+    known = [m for m in vehicle.ride_metrics if not white or kinds[m.statistic].of_rms]
+    for name in wanted:
+        _checks.one_of("metric", name, [m.name for m in known])
+    still = [m.name for m in known if not kinds[m.statistic].differentiable]
+    for name in wanted:
+        if name in still:
+            _checks.refuse("metric", "have a slope", f"{name!r}, a count", "Tune on the dynamic load coefficient.")
+    others = [m for m in known if m.name not in still and not kinds[m.statistic].weighted]
+    return [m for m in known if m in others or m.name in wanted]
 
 
-def stationary_ride(road: WhiteRoad) -> Ride:
+def stationary_ride(road: WhiteRoad, chosen: Sequence[RideMetric]) -> Ride:
     """Ride metrics of the linearised vehicle on a white road."""
+    weighted = list(dict.fromkeys(m.channel for m in chosen if metrics.STATISTICS[m.statistic].weighted))
 
     def ride(vehicle: AbstractVehicle) -> dict[str, Scalar]:
-        rms = stationary_rms(vehicle, road.velocity_psd, speed=road.speed)
-        return {m.name: rms[m.channel] for m in vehicle.ride_metrics if m.name in ride_names(vehicle, road)}
+        linear, units = linearise(vehicle), vehicle.units
+        if weighted:
+            linear = with_weightings(linear, [(name, metrics.weighting_of(units[name])) for name in weighted])
+        rms, found = stationary_rms(linear, road.velocity_psd, speed=road.speed), {}
+        for m in chosen:
+            statistic = metrics.STATISTICS[m.statistic]
+            assert statistic.of_rms is not None
+            found[m.name] = statistic.of_rms(rms[f"weighted_{m.channel}" if statistic.weighted else m.channel])
+        return found
 
     return ride
 
 
-def driven_ride(vehicle: AbstractVehicle, road: AbstractRoad, duration: float | None, dt: float) -> Ride:
+def driven_ride(
+    vehicle: AbstractVehicle,
+    road: AbstractRoad,
+    chosen: Sequence[RideMetric],
+    duration: float | None = None,
+    dt: float = 1e-3,
+) -> Ride:
     """Ride metrics of a simulated run; the road is sampled once, which also checks the arguments."""
     run = simulate(vehicle, road, duration=duration, dt=dt)
     time, heights, step = run.time, run.road, jnp.asarray(dt, dtype=float)
+    substeps, names = substeps_needed(vehicle, dt), [m.name for m in chosen]
 
     def ride(vehicle: AbstractVehicle) -> dict[str, Scalar]:
-        motion, forces, states = exponential_steps(vehicle, heights, step)
-        return Response(vehicle, time, motion, forces, heights, states).metrics()
+        motion, forces, states = exponential_steps(vehicle, heights, step, substeps=substeps)
+        return Response(vehicle, time, motion, forces, heights, states).metrics(names)
 
     return ride
 
@@ -152,12 +177,12 @@ class _Table:
 
         @eqx.filter_jit
         def evaluate(free: FreeParameters, values: Array) -> tuple[Array, Array]:
-            def metrics(values: Array) -> tuple[Array, Array]:
+            def measured(values: Array) -> tuple[Array, Array]:
                 found = ride(free.build(values))
                 stacked = jnp.stack([found[name] for name in self.names])
                 return stacked, stacked
 
-            slopes, found = jax.jacfwd(metrics, has_aux=True)(values)
+            slopes, found = jax.jacfwd(measured, has_aux=True)(values)
             return found, slopes
 
         self._evaluate = lambda values: evaluate(free, jnp.asarray(values))

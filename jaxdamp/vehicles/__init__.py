@@ -35,6 +35,7 @@ from jaxdamp.vehicles.stationary import lyapunov, stationary_rms
 from jaxdamp.vehicles.tandem import IndependentTandem, WalkingBeam
 from jaxdamp.vehicles.tandem_truck import TandemTruck
 from jaxdamp.vehicles.tracked_hull import PitchDecay, TrackedHull
+from jaxdamp.vehicles.weighted import with_weightings
 
 
 __all__ = [
@@ -80,4 +81,5 @@ __all__ = [
     "spectral_rms",
     "static_equilibrium",
     "stationary_rms",
+    "with_weightings",
 ]

@@ -1,11 +1,13 @@
 """What a test engineer would measure on a vehicle, by name: channels, their units and the ride metrics made of them."""
 
+from collections.abc import Mapping
 from typing import NamedTuple, final
 
 import equinox as eqx
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
+from jaxdamp.metrics import STATISTICS
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Link, Wheel, prefixed
 
@@ -23,11 +25,23 @@ class Instant(eqx.Module):
 
 
 class RideMetric(NamedTuple):
-    """A number that says how a vehicle rides: a statistic ("rms", "peak", "peak_to_peak") of a channel."""
+    """A number that says how a vehicle rides.
+
+    Arguments:
+        name: what it is called.
+        channel: what it is made of.
+        statistic: how, one of `metrics.STATISTICS`.
+        by: a second channel, which the first is multiplied with.
+    """
 
     name: str
     channel: str
     statistic: str
+    by: str = ""
+
+    def unit(self, units: Mapping[str, str]) -> str:
+        """Its unit, from those of the channels."""
+        return STATISTICS[self.statistic].unit(units[self.channel])
 
 
 def _acceleration(coordinate: str) -> str:
@@ -93,23 +107,32 @@ def channels_of(frame: Frame, instant: Instant) -> dict[str, Scalar]:
 
 
 def ride_metrics_of(frame: Frame) -> tuple[RideMetric, ...]:
-    """Accelerations of the bodies that are not wheels and of the places, working space, damper velocity, tyre loads."""
+    """Accelerations of the bodies that are not wheels and of the places, as they are and as people feel them.
+
+    Working space, damper velocity and the power that each element takes; tyre loads, and how often a wheel lifts off.
+    """
     on_wheels = {name for wheel in frame.wheels for name in wheel.point.terms}
     riding = [b for b in frame.bodies if b.name == frame.main_body.name or on_wheels.isdisjoint(b.masses)]
     channels = [_acceleration(name) for body in riding for name in body.masses]
     channels += [f"{place.name}_acceleration" for place in frame.places]
-    metrics = [m for c in channels for m in (RideMetric(f"rms_{c}", c, "rms"), RideMetric(f"peak_{c}", c, "peak"))]
+    of_acceleration = ("rms", "peak", "weighted_rms", "vibration_dose_value")
+    metrics = [RideMetric(f"{statistic}_{c}", c, statistic) for c in channels for statistic in of_acceleration]
     parts: list[Link | Wheel] = [*frame.links, *frame.wheels]
     for part in parts:
+        stroke, velocity = prefixed(part.name, "stroke"), prefixed(part.name, "damper_velocity")
         if part.elements:
-            stroke, velocity = prefixed(part.name, "stroke"), prefixed(part.name, "damper_velocity")
             metrics += [
                 RideMetric(prefixed(part.name, "working_space_rms"), stroke, "rms"),
                 RideMetric(prefixed(part.name, "working_space_peak"), stroke, "peak_to_peak"),
                 RideMetric(f"peak_{velocity}", velocity, "peak"),
             ]
+        for element in part.elements:
+            name = prefixed(part.name, element.name)
+            metrics.append(RideMetric(f"{name}_dissipated_power", f"{name}_force", "dissipated_power", velocity))
     for wheel in frame.wheels:
         load, relative = prefixed(wheel.name, "dynamic_tyre_load"), prefixed(wheel.name, "relative_tyre_load")
         coefficient = prefixed(wheel.name, "dynamic_load_coefficient")
         metrics += [RideMetric(f"rms_{load}", load, "rms"), RideMetric(coefficient, relative, "standard_deviation")]
+        of_load = ("road_stress_factor", "lift_off_fraction")
+        metrics += [RideMetric(prefixed(wheel.name, statistic), relative, statistic) for statistic in of_load]
     return tuple(metrics)

@@ -12,12 +12,14 @@ from jaxdamp.vehicles.presets import quarter_car_000
 
 
 def by_scipy(z):
-    """eᶻ, φ₁ and φ₂ from one exponential of the matrix augmented by a constant and a ramp."""
+    """eᶻ, φ₁, φ₂ and φ₃ from one exponential of the matrix augmented by a constant, a ramp and a parabola."""
     n = z.shape[0]
-    big = np.zeros((3 * n, 3 * n))
-    big[:n, :n], big[:n, n : 2 * n], big[n : 2 * n, 2 * n :] = z, np.eye(n), np.eye(n)
+    big = np.zeros((4 * n, 4 * n))
+    big[:n, :n] = z
+    for i in range(3):
+        big[i * n : (i + 1) * n, (i + 1) * n : (i + 2) * n] = np.eye(n)
     whole = scipy.linalg.expm(big)
-    return whole[:n, :n], whole[:n, n : 2 * n], whole[:n, 2 * n :]
+    return tuple(whole[:n, i * n : (i + 1) * n] for i in range(4))
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-9, 1e-3, 0.4, 0.6, 7.0, 300.0])
@@ -30,23 +32,25 @@ def test_phi_functions_are_those_of_scipy(size, rng):
 
 def test_phi_functions_of_a_defective_matrix():
     found = phi_functions(jnp.array([[0.0, 3.0], [0.0, 0.0]]))
-    for matrix, corner in zip(found, (3.0, 3.0 / 2, 3.0 / 6), strict=True):
+    for matrix, corner in zip(found, (3.0, 3.0 / 2, 3.0 / 6, 3.0 / 24), strict=True):
         assert float(matrix[0, 1]) == pytest.approx(corner, rel=1e-14)
 
 
 @pytest.mark.parametrize("dt", [1e-4, 1e-3, 0.02])
-def test_step_is_exact_for_forces_and_roads_linear_over_it(dt, rng):
-    """Two half steps along straight inputs are the whole step, with tyre damping; and the ramp moves the middle."""
+def test_step_is_exact_for_straight_roads_and_parabolic_forces(dt, rng):
+    """Two half steps along the same inputs are the whole step, with tyre damping."""
     form = replace(quarter_car_000(), {"tyre_damping": 300.0}).port_form()
     whole, half = Propagator.over(form, jnp.asarray(dt)), Propagator.over(form, jnp.asarray(dt / 2))
-    x, force, road = rng.normal(size=4), 1e3 * rng.normal(size=(3, 1)), 0.01 * rng.normal(size=(3, 1))
-    force[1], road[1] = (force[0] + force[2]) / 2, (road[0] + road[2]) / 2
+    x, parabola, line = rng.normal(size=4), 1e3 * rng.normal(size=3), 0.01 * rng.normal(size=2)
 
-    def step(p, x, i, j):
-        held = p.phi @ x + p.force_held @ force[i] + p.road_held @ road[i]
-        return held + p.force_ramp @ (force[j] - force[i]) + p.road_ramp @ (road[j] - road[i])
+    def step(p, x, begin, length):
+        before, now, after = (np.polyval(parabola, [t]) for t in (begin - length, begin, begin + length))
+        height, next_height = (np.polyval(line, [t]) for t in (begin, begin + length))
+        x = p.phi @ x + p.force_held @ now + p.force_ramp @ (after - now) + p.road_held @ height
+        return x + p.force_bend @ (after - 2.0 * now + before) + p.road_ramp @ (next_height - height)
 
-    np.testing.assert_allclose(step(half, step(half, x, 0, 1), 1, 2), step(whole, x, 0, 2), rtol=1e-11, atol=1e-12)
+    halves = step(half, step(half, x, 0.0, 0.5), 0.5, 0.5)
+    np.testing.assert_allclose(halves, step(whole, x, 0.0, 1.0), rtol=1e-11, atol=1e-12)
 
 
 def test_a_vehicle_at_rest_stays():

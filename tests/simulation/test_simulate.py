@@ -191,9 +191,17 @@ def test_metrics_are_those_of_the_channels():
         "rms_dynamic_tyre_load": np.sqrt(np.mean(load**2)),
         "dynamic_load_coefficient": np.std(load) / (1325.0 * 9.80665),
         "peak_damper_velocity": np.abs(response["damper_velocity"]).max(),
+        "damper_dissipated_power": response.absorbed_by()["damper"] / 5.0,
+        "road_stress_factor": np.mean((1.0 + load / (1325.0 * 9.80665)) ** 4),
+        "lift_off_fraction": np.mean(load <= -1325.0 * 9.80665),
     }
-    assert {k: float(v) for k, v in found.items()} == pytest.approx(expected, rel=1e-9)
-    assert set(response.metric_units()) == set(expected)
+    felt = response.comfort()["sprung_acceleration"]
+    expected["weighted_rms_sprung_acceleration"] = felt.weighted_rms
+    expected["vibration_dose_value_sprung_acceleration"] = felt.vibration_dose_value
+    assert set(found) == set(response.metric_units()) == set(expected)
+    for name, value in expected.items():
+        rel = 0.05 if name == "road_stress_factor" else 1e-9  # that is for a Gaussian load
+        assert float(found[name]) == pytest.approx(float(value), rel=rel), name
 
 
 def test_to_xarray_carries_units_and_time():
@@ -240,7 +248,7 @@ def test_refuses_runs_that_make_no_sense(change, message):
 def test_a_run_that_diverges_says_so():
     car = quarter_car_000(dampers.Linear(1e9))
     with pytest.raises(ValueError, match=r"must have a finite response.*shorter step than 0.001 s"):
-        simulate(car, BUMP, duration=2.0)
+        simulate(car, BUMP, duration=2.0, substeps=1)
 
 
 def test_unknown_channel_suggests_the_nearest():

@@ -36,6 +36,7 @@ def test_closed_form_optima_are_those_of_paper_000():
     assert pytest.approx(5536.5, abs=0.05) == BEST_TYRE
 
 
+@pytest.mark.slow
 def test_simulated_roads_find_the_optimum_within_their_sampling_error():
     """Roads that repeat after the run hold every wave whole times; their optima scatter little."""
     found = []
@@ -52,7 +53,7 @@ def test_simulated_roads_find_the_optimum_within_their_sampling_error():
 def test_gradient_through_the_simulation_agrees_with_differences():
     law = dampers.Bilinear(2600.0, 1400.0, knee_width=0.02)
     car = vehicles.presets.quarter_car_000(law)
-    ride = driven_ride(car, roads.iso8608("C", speed=20.0, seed=1), 3.0, 1e-3)
+    ride = driven_ride(car, roads.iso8608("C", speed=20.0, seed=1), car.ride_metrics[:1], 3.0, 1e-3)
 
     def metric(rates):
         changed = parameters.replace(
@@ -78,7 +79,7 @@ def test_hard_limit_is_met_and_active():
     assert result.converged, result
     assert result.after["working_space_peak"] == pytest.approx(top, rel=1e-5)
     assert result.after["rms_sprung_acceleration"] > free.after["rms_sprung_acceleration"]
-    again = simulate(result.vehicle, road, duration=2.0).metrics()
+    again = simulate(result.vehicle, road, duration=2.0).metrics(list(result.after))
     assert {k: float(v) for k, v in again.items()} == pytest.approx(result.after, rel=1e-9)
     assert "limit" in repr(result) and "working_space_peak" in repr(result)
 
@@ -156,3 +157,25 @@ def test_on_a_white_road_the_rear_axle_follows_the_front():
     together = vehicles.stationary_rms(car, road.velocity_psd)["pitch_acceleration"]
     assert float(result.before["rms_pitch_acceleration"]) == pytest.approx(float(expected), rel=1e-9)
     assert abs(float(together / expected) - 1.0) > 0.05
+
+
+def test_what_people_feel_can_be_tuned_on_both_kinds_of_road():
+    car, felt = vehicles.presets.quarter_car_000(dampers.Linear(2500.0)), "weighted_rms_sprung_acceleration"
+    white = roads.white("C", 20.0)
+    result = tune.minimise(felt, car, white)
+    assert result.converged, result
+    linear = vehicles.linearise(result.vehicle)
+    weighted = vehicles.with_weightings(linear, [("sprung_acceleration", "Wk")])
+    rms = vehicles.stationary_rms(weighted, white.velocity_psd)["weighted_sprung_acceleration"]
+    assert result.after[felt] == pytest.approx(float(rms), rel=1e-12)
+    assert not {m for m in result.after if "dose" in m}
+    plain = tune.minimise("rms_sprung_acceleration", car, white)
+    assert result.parameters[0].after != pytest.approx(plain.parameters[0].after, rel=0.01)
+    driven = tune.minimise(felt, car, roads.iso8608("C", 20.0, seed=1), duration=2.0)
+    assert driven.converged and driven.after[felt] < driven.before[felt]
+    assert driven.units[felt] == "m/s^2"
+
+
+def test_counts_have_no_slope_to_follow():
+    with pytest.raises(ValueError, match="must have a slope, but is 'lift_off_fraction', a count"):
+        tune.minimise("lift_off_fraction", CAR, roads.cosine_bump(0.06, start=0.2, duration=0.25), duration=1.0)

@@ -1,0 +1,30 @@
+"""All benchmarks, one process after the other: `python -m benchmarks`. A quarter of an hour on two idle cores."""
+
+import subprocess
+import sys
+
+
+QUESTIONS = (
+    ["first_result"],
+    ["one_car"],
+    ["one_car", "--plain"],
+    ["throughput"],
+    ["gradients"],
+    ["scaling"],
+    ["memory"],
+    ["work_precision"],
+    ["fit"],
+)
+
+
+def main() -> None:
+    failed = [
+        " ".join(words)
+        for words in QUESTIONS
+        if subprocess.run([sys.executable, "-m", f"benchmarks.{words[0]}", *words[1:]]).returncode
+    ]
+    sys.exit(f"failed: {', '.join(failed)}" if failed else 0)
+
+
+if __name__ == "__main__":
+    main()

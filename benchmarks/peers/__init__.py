@@ -1,0 +1,1 @@
+"""Peers of the speed benchmarks: the same work as others would write it, with its error."""

@@ -1,0 +1,140 @@
+"""`configure`: set up JAX for this work in one explicit call, before it starts."""
+
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import jax
+
+from jaxdamp import _checks
+
+
+# A loop whose body touches fewer bytes than the threshold is compiled as one function; XLA's own threshold is 1 kB.
+_FUSED = "xla_cpu_small_while_loop_byte_threshold=16777216"
+_WIDE = "--xla_cpu_prefer_vector_width=512"
+_WORTH_KEEPING = 0.2  # s: what compiles in less is not written to the cache
+
+
+class Configuration(NamedTuple):
+    """What `configure` has set, in force for this process."""
+
+    x64: bool
+    cpu_devices: int
+    fused_loops: bool
+    cache: Path | None
+
+    def __repr__(self) -> str:
+        bits = "64-bit" if self.x64 else "32-bit"
+        plural = "" if self.cpu_devices == 1 else "s"
+        loops = "compiled as one function" if self.fused_loops else "as JAX compiles them"
+        kept = f"kept in {self.cache}" if self.cache else "not kept"
+        return f"jaxdamp: {bits} floats, {self.cpu_devices} CPU device{plural}, loops {loops}, compiled code {kept}."
+
+
+def configure(
+    *,
+    x64: bool = True,
+    cpu_devices: int | None = None,
+    fused_loops: bool = True,
+    cache: bool | str | Path = True,
+) -> Configuration:
+    """Set up JAX for suspension work; call it first, before anything is computed.
+
+    Everything works without it, in single precision and more slowly. Importing jaxdamp changes nothing; this call
+    changes settings of the whole process:
+
+    - `x64`: numbers of 64 bits. Laws and vehicles made before keep their 32 bits.
+    - `cpu_devices`: the processor is shown to JAX as so many devices, which `sweep` uses side by side.
+    - `fused_loops`: XLA compiles every small loop over time as one function (XLA option
+      `xla_cpu_small_while_loop_byte_threshold`, 16 MiB) with vectors of 512 bits where the processor has them. One car
+      runs ten times as fast, a sweep three times.
+    - `cache`: compiled programs that took more than 0.2 s are kept in a folder, for the next process.
+
+    A second call with the same settings does nothing, so that a notebook cell can be run again.
+
+    Arguments:
+        x64: compute in double precision.
+        cpu_devices: number of CPU devices; one for each core if left out.
+        fused_loops: compile small loops as one function.
+        cache: whether to keep compiled programs, or the folder to keep them in; `~/.cache/jaxdamp` (under
+            `XDG_CACHE_HOME`) if True.
+
+    Returns:
+        What is in force; it prints as a sentence.
+
+    Raises:
+        ValueError: a number of devices below one.
+        RuntimeError: devices or loops would change, but JAX has started.
+    """
+    devices = _cores() if cpu_devices is None else cpu_devices
+    if devices < 1:
+        _checks.refuse("cpu_devices", "be one or more", devices)
+    if _started():
+        _refuse_change(devices, fused_loops)
+    else:
+        jax.config.update("jax_num_cpu_devices", devices)
+        os.environ["XLA_FLAGS"] = _with_option(os.environ.get("XLA_FLAGS", ""), fused_loops)
+    jax.config.update("jax_enable_x64", x64)
+    folder = _folder(cache)
+    jax.config.update("jax_compilation_cache_dir", str(folder) if folder else None)
+    if folder:
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", _WORTH_KEEPING)
+    return Configuration(x64, devices, fused_loops, folder)
+
+
+def fuses_loops() -> bool:
+    """Whether XLA has been told to compile loops over time as one function."""
+    return _FUSED in os.environ.get("XLA_FLAGS", "")
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _devices() -> int:
+    """The number of CPU devices that JAX has or will have; −1 if nobody has said one."""
+    return jax.config.jax_num_cpu_devices  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def _started() -> bool:
+    """Whether JAX has started its backend, after which it refuses another number of devices."""
+    now = _devices()
+    try:
+        jax.config.update("jax_num_cpu_devices", now + 1)
+    except RuntimeError:
+        return True
+    jax.config.update("jax_num_cpu_devices", now)
+    return False
+
+
+def _refuse_change(devices: int, fused_loops: bool) -> None:
+    """Devices and loops are fixed once JAX has started: refuse others than those in force."""
+    now = max(_devices(), 1)
+    wrong = [f"cpu_devices={devices} (now {now})"] * (devices != now)
+    wrong += [f"fused_loops={fused_loops} (now {fuses_loops()})"] * (fused_loops != fuses_loops())
+    if wrong:
+        raise RuntimeError(
+            f"`jaxdamp.configure` comes too late: JAX has started, and {' and '.join(wrong)} cannot be changed any "
+            "more. Restart Python (in a notebook: restart the kernel) and call it right after `import jaxdamp`, "
+            "before anything is computed."
+        )
+
+
+def _with_option(flags: str, fused_loops: bool) -> str:
+    """The flags of XLA with or without the options for loops; those of others stay."""
+    extra = "--xla_backend_extra_options="
+    kept = [flag for flag in flags.split() if flag != _WIDE]
+    backend = [part for flag in kept if flag.startswith(extra) for part in flag.removeprefix(extra).split(",")]
+    backend = [part for part in backend if part != _FUSED] + [_FUSED] * fused_loops
+    kept = [flag for flag in kept if not flag.startswith(extra)]
+    return " ".join(kept + [extra + ",".join(backend)] * bool(backend) + [_WIDE] * fused_loops)
+
+
+def _folder(cache: bool | str | Path) -> Path | None:
+    if cache is False:
+        return None
+    if cache is not True:
+        return Path(cache).expanduser()
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(home) / "jaxdamp"

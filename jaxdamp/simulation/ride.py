@@ -1,0 +1,137 @@
+"""`Ride`: a vehicle on a road as one function of its parameters, the metrics gathered while it drives."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias, final
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar
+from jaxdamp.configuration import fuses_loops
+from jaxdamp.parameters import parameters, replace
+from jaxdamp.roads import AbstractRoad
+from jaxdamp.simulation._vectors import scalars
+from jaxdamp.simulation.exponential import settled
+from jaxdamp.simulation.gauge import Gathered, Gauge
+from jaxdamp.simulation.run import sampled
+from jaxdamp.simulation.stability import substeps_needed
+from jaxdamp.simulation.stepper import Ground, Now, Stepper
+from jaxdamp.vehicles import AbstractVehicle, RideMetric
+
+
+Carry: TypeAlias = tuple[Now, Gathered, Ground, tuple[Array, Array]]
+FEW_STATES = 4  # up to which one car is best written number by number
+
+
+@final
+class Ride(eqx.Module):
+    """The ride metrics of a vehicle on a road as a pure function of its parameters: `ride({path: value})`.
+
+    The same numbers as `simulate(...).metrics()`, but gathered in the loop over time: nothing is kept of the run, so
+    that memory does not grow with its length, and many cars run side by side. `sweep`, `jax.jit`, `jax.jacfwd` and
+    `jax.grad` take it as it is (`side_by_side` is for `jax.vmap`); reverse derivatives keep about 2√n of n instants and
+    drive twice.
+
+    Arguments:
+        vehicle: where parameters that are not given come from.
+        road: as in `simulate`.
+        metrics: names among `vehicle.ride_metrics`; all of them if left out. Fewer are faster.
+        duration: as in `simulate`.
+        dt: as in `simulate`.
+        substeps: of the engine between two instants; as many as the laws need if left out.
+
+    Raises:
+        ValueError: an unknown metric or parameter; what `simulate` refuses.
+
+    >>> from jaxdamp import roads, vehicles
+    >>> car = vehicles.presets.quarter_car_000()
+    >>> bump = roads.cosine_bump(0.05, start=0.5, duration=0.25)
+    >>> ride = Ride(car, bump, metrics=["working_space_peak"], duration=3.0)
+    >>> {name: round(float(value), 3) for name, value in ride({"damper.rate": 2500.0}).items()}
+    {'working_space_peak': 0.072}
+    """
+
+    vehicle: AbstractVehicle
+    heights: Float[Array, "time wheels"]
+    dt: float = eqx.field(static=True)
+    substeps: int = eqx.field(static=True)
+    metrics: tuple[RideMetric, ...] = eqx.field(static=True)
+    many: bool
+
+    def __init__(
+        self,
+        vehicle: AbstractVehicle,
+        road: AbstractRoad,
+        *,
+        metrics: Sequence[str] | None = None,
+        duration: float | None = None,
+        dt: float = 1e-3,
+        substeps: int | None = None,
+    ) -> None:
+        known = {m.name: m for m in vehicle.ride_metrics}
+        for name in metrics or ():
+            _checks.one_of("metrics", name, known)
+        self.vehicle, self.dt, self.many = vehicle, dt, False
+        _, self.heights = sampled(vehicle, road, duration, dt)
+        self.substeps = substeps_needed(vehicle, dt) if substeps is None else substeps
+        self.metrics = tuple(known.values() if metrics is None else [known[name] for name in metrics])
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the metrics, and of the parameters by path and by its last part."""
+        channels = self.vehicle.units
+        by_path = {p.path: p.unit for p in parameters(self.vehicle)}
+        by_name = {path.rpartition(".")[2]: unit for path, unit in by_path.items()}
+        return by_name | by_path | {m.name: m.unit(channels) for m in self.metrics}
+
+    @property
+    def lanes(self) -> int:
+        """How many cars a CPU core drives best side by side: if loops are fused, what stays in its nearest cache."""
+        return 128 if fuses_loops() else 2048
+
+    def side_by_side(self) -> "Ride":
+        """The same, compiled for many cars at a time: for `jax.vmap`. `sweep` does it itself."""
+        return eqx.tree_at(lambda ride: ride.many, self, True)
+
+    def __call__(self, point: Mapping[str, Any] | None = None) -> dict[str, Scalar]:
+        """The metrics by name, with other values of the parameters at these paths."""
+        return _drive(self, dict(point or {}))
+
+
+@eqx.filter_jit
+def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
+    """The loop over time, in blocks of which only the beginnings are kept for reverse derivatives."""
+    vehicle, heights, dt = replace(ride.vehicle, point), ride.heights, ride.dt
+    apart = ride.many or 2 * len(vehicle.coordinates) <= FEW_STATES
+    stepper = Stepper(vehicle, jnp.asarray(dt / ride.substeps, dtype=float), apart=apart, many=ride.many)
+    gauge = Gauge(vehicle, ride.metrics, dt, apart=apart)
+    half_rate = jnp.asarray(0.5 / dt, dtype=heights.dtype)
+
+    def at(height: Array, rate: Array) -> Ground:
+        return Ground(scalars(height), scalars(rate)) if apart else Ground(height, rate)
+
+    def step(carry: Carry, ahead: Array) -> tuple[Carry, None]:
+        """To the next instant, with the height of the one after it, from which the rate at its end follows."""
+        now, gathered, begin, (height, coming) = carry
+        end = at(coming, half_rate * (ahead - height))
+        after = stepper.over(now, begin, end, ride.substeps)
+        return (after, gauge.add(gathered, after, end), end, (coming, ahead)), None
+
+    first = at(heights[0], 2.0 * half_rate * (heights[1] - heights[0]))
+    now = stepper.at_rest(settled(vehicle, heights[0]), first)
+    carry = now, gauge.begin(now, first), first, (heights[0], heights[1])
+    road = jnp.concatenate([heights[2:], 2.0 * heights[-1:] - heights[-2:-1]])  # it ends as straight as it came
+    count = road.shape[0]
+    block = max(1, math.isqrt(count))
+    whole = count // block * block
+
+    def blocks(carry: Carry, road: Array) -> tuple[Carry, None]:
+        return jax.lax.scan(step, carry, road)
+
+    carry, _ = jax.lax.scan(jax.checkpoint(blocks), carry, road[:whole].reshape(-1, block, *road.shape[1:]))
+    carry, _ = jax.lax.scan(step, carry, road[whole:])
+    return gauge.end(carry[1], count + 1)

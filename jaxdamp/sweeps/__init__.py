@@ -1,0 +1,7 @@
+"""One function over many points: `jaxdamp.sweep`, and samples to sweep over: `points`, `random`, `sobol`."""
+
+from jaxdamp.sweeps.axes import points, random, sobol
+from jaxdamp.sweeps.running import sweep
+
+
+__all__ = ["points", "random", "sobol", "sweep"]

@@ -1,0 +1,209 @@
+"""The points of a sweep: a grid, a list, a random or a Sobol sample over named axes."""
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, final
+
+import numpy as np
+
+from jaxdamp import _checks
+
+
+Columns = dict[str, np.ndarray]
+Ranges = Mapping[str, tuple[float, float]]
+POINT = "point"  # the dimension of a list of points
+PARAMETER = "parameter"  # the dimension of derivatives
+
+
+class AbstractPoints(ABC):
+    """Points in an order, as columns of numbers by the name of their axis."""
+
+    values: Columns
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the axes."""
+        return list(self.values)
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return int(np.prod(list(self.shape.values())))
+
+    @property
+    @abstractmethod
+    def shape(self) -> dict[str, int]:
+        """Dimensions of the results by name."""
+
+    @abstractmethod
+    def columns(self, indices: np.ndarray) -> Columns:
+        """The coordinates of some of the points."""
+
+    @property
+    @abstractmethod
+    def coordinates(self) -> dict[str, tuple[str, np.ndarray]]:
+        """The labels of the results, as xarray takes them."""
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class Grid(AbstractPoints):
+    """Every combination of the values of the axes; the last axis runs fastest."""
+
+    values: Columns
+
+    @property
+    def shape(self) -> dict[str, int]:
+        """One dimension for each axis."""
+        return {name: len(values) for name, values in self.values.items()}
+
+    def columns(self, indices: np.ndarray) -> Columns:
+        """The coordinates of some of the points."""
+        places = np.unravel_index(indices, tuple(self.shape.values()))
+        return {name: values[i] for (name, values), i in zip(self.values.items(), places, strict=True)}
+
+    @property
+    def coordinates(self) -> dict[str, tuple[str, np.ndarray]]:
+        """The values of each axis along itself."""
+        return {name: (name, values) for name, values in self.values.items()}
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class Points(AbstractPoints):
+    """Points one by one, along the dimension `point`."""
+
+    values: Columns
+
+    @property
+    def shape(self) -> dict[str, int]:
+        """The one dimension."""
+        return {POINT: len(next(iter(self.values.values())))}
+
+    def columns(self, indices: np.ndarray) -> Columns:
+        """The coordinates of some of the points."""
+        return {name: values[indices] for name, values in self.values.items()}
+
+    @property
+    def coordinates(self) -> dict[str, tuple[str, np.ndarray]]:
+        """The values of every axis along the dimension of the points."""
+        return {name: (POINT, values) for name, values in self.values.items()}
+
+
+def points(values: Mapping[str, Any]) -> Points:
+    """A list of points.
+
+    Arguments:
+        values: numbers for each axis, equally many; the first of each make the first point.
+
+    >>> points({"rate": [1000.0, 2000.0], "mass": [300.0, 250.0]}).count
+    2
+    """
+    found = Points(_columns("values", values))
+    lengths = {name: len(column) for name, column in found.values.items()}
+    if len(set(lengths.values())) > 1:
+        _checks.refuse("values", "have equally many numbers for each axis", lengths, "A mapping by itself is a grid.")
+    return found
+
+
+def random(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str] = False) -> Points:
+    """Points drawn independently and uniformly between limits.
+
+    Arguments:
+        ranges: lower and upper limit for each axis.
+        count: number of points.
+        seed: the same seed draws the same points.
+        log: axes whose logarithm is uniform: all of them if True, or their names.
+
+    >>> random({"rate": (1e3, 1e5)}, 100, log=True).count
+    100
+    """
+    _check_count(count)
+    return _stretch(ranges, np.random.default_rng(seed).random((count, len(ranges))), log)
+
+
+def sobol(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str] = False) -> Points:
+    """Points of a scrambled Sobol sequence, which fill the space between limits more evenly than random ones.
+
+    Its averages are best where the count is a power of two.
+
+    Arguments:
+        ranges: lower and upper limit for each axis.
+        count: number of points.
+        seed: of the scrambling; the same seed gives the same points.
+        log: axes whose logarithm is uniform: all of them if True, or their names.
+
+    >>> sobol({"rate": (1000.0, 2000.0), "mass": (200.0, 400.0)}, 64).count
+    64
+    """
+    from scipy.stats import qmc
+
+    _check_count(count)
+    _check_ranges(ranges)
+    scrambling: Any = {"seed": np.random.default_rng(seed)}  # SciPy 1.15 calls it `rng`, and still takes this name
+    unit = qmc.Sobol(len(ranges), **scrambling).random_base2((count - 1).bit_length())[:count]
+    return _stretch(ranges, unit, log)
+
+
+def as_points(over: Any) -> AbstractPoints:
+    """What `sweep` takes as `over`: points as they are, a mapping as a grid."""
+    if isinstance(over, AbstractPoints):
+        return over
+    if not isinstance(over, Mapping):
+        remedy = "Write {'damper.rate': [1000.0, 2000.0]}, or use `jaxdamp.sweeps.points`, `random` or `sobol`."
+        _checks.refuse("over", "be a mapping from names to values, or points", repr(over), remedy)
+    return Grid(_columns("over", over))
+
+
+def _columns(argument: str, values: Mapping[str, Any]) -> Columns:
+    """The numbers of each axis as float64, checked."""
+    if not values:
+        _checks.refuse(argument, "have at least one axis", values)
+    found = {}
+    for name, numbers in values.items():
+        _check_name(argument, name)
+        try:
+            column = np.asarray(numbers, dtype=np.float64)
+        except (TypeError, ValueError):
+            remedy = "Sweep over the index of a choice, and let the function pick by it (`jax.lax.switch`)."
+            _checks.refuse(f"{argument}[{name!r}]", "be numbers", repr(numbers), remedy)
+        if column.ndim != 1 or not column.size:
+            remedy = "Write [1.0, 2.0] or `numpy.linspace(1.0, 2.0, 11)`; one value alone is [1.0]."
+            _checks.refuse(f"{argument}[{name!r}]", "be a sequence of one or more numbers", repr(numbers), remedy)
+        _checks.finite(f"{argument}[{name!r}]", column)
+        found[name] = column
+    return found
+
+
+def _check_name(argument: str, name: Any) -> None:
+    if not isinstance(name, str) or not name or "/" in name or name in (POINT, PARAMETER):
+        must = f"have names without '/' as keys, other than {POINT!r} and {PARAMETER!r}"
+        _checks.refuse(argument, must, f"one with {name!r}")
+
+
+def _check_count(count: int) -> None:
+    if count < 1:
+        _checks.refuse("count", "be one or more", count)
+
+
+def _check_ranges(ranges: Ranges) -> None:
+    if not ranges:
+        _checks.refuse("ranges", "have at least one axis", ranges)
+    for name, pair in ranges.items():
+        if np.shape(pair) != (2,) or not np.all(np.isfinite(pair)) or not pair[0] < pair[1]:
+            _checks.refuse(f"ranges[{name!r}]", "be two finite numbers in increasing order", pair)
+
+
+def _stretch(ranges: Ranges, unit: np.ndarray, log: bool | Sequence[str]) -> Points:
+    """Points of the unit cube between the limits."""
+    _check_ranges(ranges)
+    chosen = list(ranges) if log is True else [] if log is False else [log] if isinstance(log, str) else list(log)
+    for name in chosen:
+        _checks.one_of("log", name, ranges)
+        _checks.positive(f"ranges[{name!r}]", ranges[name], "Zero and negative numbers have no logarithm.")
+    columns = {}
+    for (name, (low, high)), share in zip(ranges.items(), unit.T, strict=True):
+        spread = low * (high / low) ** share if name in chosen else low + (high - low) * share
+        columns[name] = np.clip(spread, low, high)
+    return Points(_columns("ranges", columns))

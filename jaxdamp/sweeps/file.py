@@ -1,0 +1,134 @@
+"""The file of a sweep: partial results, from which the same sweep goes on."""
+
+import json
+import os
+import time
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, final
+
+import jax
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.sweeps import processes
+from jaxdamp.sweeps.table import Table
+
+
+if TYPE_CHECKING:
+    import xarray
+
+
+INTERVAL = 10.0  # s between two writings
+LARGEST = 2**31 - 1  # bytes of one variable in a classic netCDF file
+MARK, AXES = "jaxdamp_sweep", "axes"  # attributes that hold the fingerprint of the function, and the axes in order
+
+
+@final
+class SweepFile:
+    """A netCDF file (classic format, 64-bit offsets) that is at any time the labelled results of what is done."""
+
+    def __init__(self, path: str | os.PathLike[str], table: Table) -> None:
+        self.path, self._table = Path(path).expanduser(), table
+        if self.path.suffix != ".nc":
+            _checks.refuse("file", "end in '.nc', for netCDF", repr(str(path)))
+        if not self.path.parent.is_dir():
+            _checks.refuse("file", "lie in a folder that exists", self.path, "Make the folder first.")
+        large = [name for name, values in table.values.items() if values.nbytes > LARGEST]
+        if large:
+            remedy = "Sweep in several parts, each into its own file."
+            _checks.refuse("file", "hold at most 2 GiB of each result", f"too small for {', '.join(large)}", remedy)
+        self._fingerprint = table.traced.fingerprint()
+        self._next, self._pause = time.monotonic() + INTERVAL, INTERVAL
+
+    def resume(self) -> None:
+        """Fill the table with what the file holds; all processes take it from the first."""
+        import xarray  # noqa: F401 so that no interrupt can hit it while it loads
+
+        refusal: Exception | None = None
+        if processes.is_first() and self.path.exists():
+            try:
+                self._load()
+            except Exception as error:
+                refusal = error
+        if processes.largest(refusal is not None)[0]:
+            raise refusal or ValueError(f"The first process refuses the file {self.path}: see its message.")
+        table = self._table
+        table.values, table.done, table.failed = processes.of_first((table.values, table.done, table.failed))
+
+    def _load(self) -> None:
+        import xarray
+
+        try:
+            kept = xarray.load_dataset(self.path, engine="scipy")
+        except Exception as error:
+            remedy = "Choose another name, or delete the file."
+            raise ValueError(f"Argument `file`: {self.path} cannot be read as a sweep ({error}). {remedy}") from error
+        differences = self._differences(kept)
+        if differences:
+            raise ValueError(
+                f"Argument `file`: {self.path} holds another sweep: {'; '.join(differences)}. Choose another name, or "
+                "delete the file to begin anew."
+            )
+        table = self._table
+        for name, values in table.values.items():
+            table.values[name] = np.array(kept[name].values, values.dtype).reshape(values.shape)
+        table.done = np.array(kept["done"].values, bool).ravel()
+        table.failed = np.array(kept["failed"].values, bool).ravel()
+
+    def _differences(self, kept: "xarray.Dataset") -> list[str]:
+        """What keeps the file from being a part of this sweep, in words."""
+        if MARK not in kept.attrs or "done" not in kept:
+            return ["it was not written by `jaxdamp.sweep`"]
+        mine, found = self._table.label(), []
+        axes = json.loads(kept.attrs[AXES])
+        if kept["failed"].dims != mine["failed"].dims or axes != self._table.points.names:
+            names, before = ", ".join(map(repr, self._table.points.names)), ", ".join(map(repr, axes))
+            over = f"along {', '.join(map(repr, kept['failed'].dims))}"
+            return [f"its axes are {before} {over}, not {names}"]
+        for name in axes:
+            old, new = kept[name].values, mine[name].values
+            if not np.array_equal(old, new):
+                old, new = (f"{len(v)} values from {v.min():.6g} to {v.max():.6g}" for v in (old, new))
+                found.append(f"the axis {name!r} has other values ({old}; now {new})")
+        results = set(kept.data_vars) - {"done"}
+        if results != set(mine.data_vars):
+            old, new = (", ".join(map(repr, sorted(map(str, names)))) for names in (results, mine.data_vars))
+            return [*found, f"its results are {old}, not {new}"]
+        for name in mine.data_vars:
+            if kept[name].dtype.newbyteorder("=") != mine[name].dtype or kept[name].shape != mine[name].shape:
+                old, new = (f"{v.dtype.newbyteorder('=')} {v.shape}" for v in (kept[name], mine[name]))
+                found.append(f"{name!r} is {old} there, now {new}")
+        if not found and kept.attrs[MARK] != self._fingerprint:
+            version = kept.attrs.get("jax_version")
+            other = f", which JAX {version} traced, and now JAX {jax.__version__}" if version != jax.__version__ else ""
+            found.append(f"the function computes something else, or from other numbers{other}")
+        return found
+
+    def save(self, *, now: bool = False) -> None:
+        """Write what is done if it is time, whole or not at all; what cannot be written stops no sweep."""
+        start = time.monotonic()
+        if not processes.is_first() or (start < self._next and not now):
+            return
+        try:
+            self._write()
+        except OSError as error:
+            warnings.warn(f"The sweep could not be written to {self.path}: {error}", stacklevel=4)
+        taken = time.monotonic() - start
+        self._pause = max(INTERVAL, 20 * taken)
+        self._next = time.monotonic() + self._pause
+
+    def _write(self) -> None:
+        data, done = self._table.label(), self._table.done
+        data["done"] = (data["failed"].dims, done.reshape(data["failed"].shape).astype(np.int8))
+        data.attrs |= {
+            MARK: self._fingerprint,
+            AXES: json.dumps(self._table.points.names),
+            "jax_version": jax.__version__,
+        }
+        draft = self.path.with_name(f".{self.path.name}.{os.getpid()}.draft")
+        try:
+            data.to_netcdf(draft, engine="scipy", format="NETCDF3_64BIT")
+            os.replace(draft, self.path)
+        finally:
+            draft.unlink(missing_ok=True)

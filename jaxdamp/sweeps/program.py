@@ -1,0 +1,187 @@
+"""The compiled program of a sweep: chunks of points side by side, chunk after chunk, on every device at once."""
+
+import dataclasses
+import functools
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple, final
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
+from jaxtyping import Array
+
+from jaxdamp import _checks
+from jaxdamp.sweeps import processes
+from jaxdamp.sweeps.axes import Columns
+from jaxdamp.sweeps.devices import choose_devices, free_memory
+from jaxdamp.sweeps.tracing import Traced, evaluate, number_type
+
+
+ON_CPU, ON_GPU = 256, 65536  # points side by side where nobody says how many
+BUFFER_POINTS = 2**15  # that one call can hand to one device
+BUFFER_BYTES = 2**28  # of their results
+SHARE = 0.5  # of the free memory that a sweep may take
+POINTS, ALL = PartitionSpec("points"), PartitionSpec()
+
+
+class Layout(NamedTuple):
+    """How points are laid out. Programs of equal layouts of equal functions are compiled once."""
+
+    mesh: Mesh
+    chunk: int  # points side by side on one device
+    rounds: int  # chunks that one call can hold for each device
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class Program:
+    """A compiled sweep, which takes any number of points up to what its layout holds."""
+
+    traced: Traced
+    layout: Layout
+    arrays: list[jax.Array]
+    run: Any
+
+    def capacity(self, rounds: int) -> int:
+        """Points of a call that runs so many chunks on each device."""
+        return rounds * self.layout.chunk * self.layout.mesh.size
+
+    def start(self, columns: Columns) -> dict[str, jax.Array]:
+        """Run some points; raises what the function raises on a device of this process."""
+        mesh, chunk, most = self.layout
+        size = len(next(iter(columns.values())))
+        rounds = -(-size // self.capacity(1))
+        spread = NamedSharding(mesh, POINTS)
+
+        def buffer(column: np.ndarray) -> jax.Array:
+            full = np.full((mesh.size, most * chunk), column[0], number_type())
+            padded = np.concatenate([column, np.full(self.capacity(rounds) - size, column[0])])
+            full[:, : rounds * chunk] = padded.reshape(mesh.size, -1)
+            return processes.put(full.ravel(), spread)
+
+        point = {name: buffer(column) for name, column in columns.items()}
+        count = processes.put(np.array(rounds, np.int32), NamedSharding(mesh, ALL))
+        return jax.block_until_ready(self.run(self.arrays, point, count))
+
+    def collect(self, found: dict[str, jax.Array], size: int) -> dict[str, np.ndarray]:
+        """The results of as many points as were given."""
+        mesh, chunk, _ = self.layout
+        rounds = -(-size // self.capacity(1))
+        collected = {}
+        for name, values in found.items():
+            by_device = processes.fetch(values).reshape(mesh.size, -1, *values.shape[1:])
+            collected[name] = by_device[:, : rounds * chunk].reshape(-1, *values.shape[1:])[:size]
+        return collected
+
+
+def prepare(traced: Traced, count: int, asked: int | None, devices: Any, lanes: int | None) -> Program:
+    """Choose devices and chunk, and compile; a chunk that nobody asked for is made to fit into the memory."""
+    mesh = Mesh(np.array(choose_devices(devices)), ("points",))
+    fixed = asked is not None
+    if asked is not None and asked < 1:
+        _checks.refuse("chunk", "be one or more points", asked)
+    wanted = asked or _side_by_side(traced, mesh, lanes)
+    each = -(-count // mesh.size)  # points of a device; the next power of two, so that few programs are compiled
+    chunk = min(wanted, each if fixed else 2 ** (each - 1).bit_length())
+    free = free_memory(mesh)
+    while True:
+        program = with_chunk(traced, mesh, chunk)
+        if fixed or chunk == 1:
+            return program
+        size = program.run.memory_analysis()
+        need = size.temp_size_in_bytes + size.output_size_in_bytes + size.argument_size_in_bytes if size else 0
+        shrink = processes.largest(need / free)[0]
+        if shrink <= SHARE:
+            return program
+        chunk = 2 ** max(int(np.log2(chunk * SHARE / shrink)), 0)
+
+
+def _side_by_side(traced: Traced, mesh: Mesh, lanes: int | None) -> int:
+    """Points side by side that a device likes best, as far as memory allows."""
+    if mesh.devices.flat[0].platform != "cpu":
+        return ON_GPU
+    lanes = lanes or ON_CPU
+    if traced.mode != "forward":
+        return lanes
+    # tangents are lanes too, and what a core works on at a time must stay in its nearest cache
+    share = lanes // (1 + len(traced.axes))
+    return min(lanes, max(2 ** max(share.bit_length() - 1, 0), 8))
+
+
+def with_chunk(traced: Traced, mesh: Mesh, chunk: int) -> Program:
+    """The program for a chunk, compiled."""
+    each = sum(int(np.prod(r.shape)) * r.dtype.itemsize for r in traced.results.values())
+    rounds = max(min(BUFFER_POINTS, BUFFER_BYTES // each) // chunk, 1)
+    layout = Layout(mesh, chunk, rounds)
+    arrays = [processes.put(array, NamedSharding(mesh, ALL)) for array in traced.arrays]
+    spread, everywhere = NamedSharding(mesh, POINTS), NamedSharding(mesh, ALL)
+    total = (mesh.size * rounds * chunk,)
+    point = dict.fromkeys(traced.axes, jax.ShapeDtypeStruct(total, number_type(), sharding=spread))
+    rounds_done = jax.ShapeDtypeStruct((), np.dtype(np.int32), sharding=everywhere)
+    static = _Static(traced._replace(arrays=[], fingerprint=str), layout)
+    return Program(traced, layout, arrays, _jitted(static).lower(arrays, point, rounds_done).compile())
+
+
+@final
+class _Static:
+    """What a program depends on apart from arrays, compared by what it computes."""
+
+    def __init__(self, traced: Traced, layout: Layout) -> None:
+        self.traced, self.layout = traced, layout
+        results = tuple((name, r.shape, str(r.dtype)) for name, r in traced.results.items())
+        self._key = (traced.frame, traced.axes, results, traced.mode, layout)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Static) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
+@functools.lru_cache(maxsize=16)
+def _jitted(static: _Static) -> Any:
+    """The program before it is compiled. Kept, because JAX then keeps what it compiles."""
+    traced, (mesh, chunk, rounds) = static.traced, static.layout
+
+    def on_device(arrays: list[Array], point: dict[str, Array], count: Array) -> dict[str, Array]:
+        rows = {name: column.reshape(rounds, chunk) for name, column in point.items()}
+
+        def one_chunk(i: Array, results: dict[str, Array]) -> dict[str, Array]:
+            lanes = {name: jax.lax.dynamic_index_in_dim(row, i, keepdims=False) for name, row in rows.items()}
+            found = evaluate(traced, arrays, lanes)
+            return {
+                name: jax.lax.dynamic_update_index_in_dim(results[name], found[name], i, 0) for name in traced.results
+            }
+
+        empty = {name: jnp.zeros((rounds, chunk, *r.shape), r.dtype) for name, r in traced.results.items()}
+        results = jax.lax.fori_loop(0, count, one_chunk, empty)
+        return {name: values.reshape(-1, *values.shape[2:]) for name, values in results.items()}
+
+    # what a function does inside says nothing about where it runs: its loops may start from the same value everywhere
+    specs: dict[str, Any] = {"in_specs": (ALL, POINTS, ALL), "out_specs": POINTS, "check_vma": False}
+    return jax.jit(jax.shard_map(on_device, mesh=mesh, **specs))
+
+
+def forget_errors(mesh: Mesh) -> None:
+    """Run a callback that does not raise: JAX keeps the last one of each device, and raises again when Python ends."""
+
+    def unharmed(zero: Array) -> Array:
+        return jax.pure_callback(np.asarray, jax.ShapeDtypeStruct(zero.shape, zero.dtype), zero)
+
+    specs: dict[str, Any] = {"in_specs": POINTS, "out_specs": POINTS, "check_vma": False}
+    zeros = processes.put(np.zeros(mesh.size, np.float32), NamedSharding(mesh, POINTS))
+    jax.block_until_ready(jax.jit(jax.shard_map(unharmed, mesh=mesh, **specs))(zeros))
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """What raises inside a program is counted and told at the end: JAX need not log each of them."""
+    logger = logging.getLogger("jax._src.callback")
+    before, logger.disabled = logger.disabled, True
+    try:
+        yield
+    finally:
+        logger.disabled = before

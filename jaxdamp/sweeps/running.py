@@ -1,0 +1,178 @@
+"""`sweep`: one function at many points."""
+
+import os
+import re
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, final
+
+import numpy as np
+from jaxtyping import Array
+
+from jaxdamp import _checks
+from jaxdamp._progress import Progress
+from jaxdamp._types import Scalar
+from jaxdamp.sweeps import processes
+from jaxdamp.sweeps.axes import AbstractPoints, as_points
+from jaxdamp.sweeps.file import SweepFile
+from jaxdamp.sweeps.program import Program, forget_errors, prepare, quiet, with_chunk
+from jaxdamp.sweeps.table import Table
+from jaxdamp.sweeps.tracing import trace
+
+
+if TYPE_CHECKING:
+    import xarray
+
+
+CALL = 0.3  # s that one call of the program should take
+BAR = 20  # characters
+
+
+def sweep(
+    function: Callable[[dict[str, Scalar]], Mapping[str, Array]],
+    over: Mapping[str, Any] | AbstractPoints,
+    *,
+    chunk: int | None = None,
+    devices: int | Sequence[Any] | None = None,
+    gradients: bool | Literal["forward", "reverse"] = False,
+    file: str | os.PathLike[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> "xarray.Dataset":
+    """Compute a function at every point of a grid, a list or a sample: all cores, or all GPUs, many points at a time.
+
+    A point at which a result is not finite, or at which the function raises while it runs (`equinox.error_if`), does
+    not stop the sweep: what is not finite becomes NaN, and a warning at the end says how many points failed and where.
+    The coordinate `failed` marks them, `attrs["failed_points"]` counts them.
+
+    A processor counts as one device until `jaxdamp.configure()` is called, before anything is computed. In several
+    processes joined by `jax.distributed`, every process makes the same call and gets all the results.
+
+    Arguments:
+        function: a pure JAX function from a point, a mapping from the names of the axes to scalars, to results by name:
+            numbers, or arrays of fixed shape. An equinox module that is called so is compiled once for all values of
+            its arrays; arrays that a plain function closes over are compiled in. If it has `units`, a mapping from
+            names of results and axes, they label the results; if it has `lanes`, so many points are computed side by
+            side on a CPU; what its `side_by_side()` gives is compiled in its place.
+        over: values for each axis, whose every combination is taken (the last axis runs fastest); or
+            `jaxdamp.sweeps.points`, `random` or `sobol`. The function gets them as floating numbers.
+        chunk: points computed side by side on one device; chosen to fit into the memory if left out.
+        devices: how many devices (of each process), or which; all of them if left out.
+        gradients: also the exact derivative of each scalar result `r` by each axis, as `d_r` along the dimension
+            `parameter`. True chooses between `"forward"`, for few axes, and `"reverse"`, for many, which needs more
+            memory.
+        file: a netCDF file (`.nc`) for the results, written every ten seconds or so. The same sweep goes on from it
+            after an interruption.
+        progress: called with the number of points done and of all points; a line in the terminal if it is left out.
+
+    Returns:
+        The results by name with the axes as dimensions (for a list, along `point`).
+
+    Raises:
+        ValueError: axes that are no numbers, a function that does not know an axis or returns no named numbers, a file
+            of another sweep.
+
+    >>> data = sweep(lambda p: {"product": p["a"] * p["b"]}, {"a": [1.0, 2.0], "b": [3.0, 4.0, 5.0]})
+    >>> float(data["product"].sel(a=2.0, b=5.0))
+    10.0
+    """
+    if gradients not in (False, True, "forward", "reverse"):
+        _checks.refuse("gradients", "be False, True, 'forward' or 'reverse'", repr(gradients))
+    points = as_points(over)
+    function = getattr(function, "side_by_side", lambda: function)()
+    traced = trace(function, points.names, gradients)
+    table = Table.empty(points, traced, getattr(function, "units", None) or {})
+    kept = None if file is None else SweepFile(file, table)
+    if kept is not None:
+        kept.resume()
+    left, first_error = np.flatnonzero(~table.done), ""
+    if left.size:
+        runner = _Runner(prepare(traced, len(left), chunk, devices, getattr(function, "lanes", None)), points)
+        with Progress("Sweeping") as shown, quiet():
+            try:
+                for indices, results in runner.results(left):
+                    table.fill(indices, results)
+                    if kept is not None:
+                        kept.save()
+                    _tell(progress, shown, int(table.done.sum()), points.count, runner.rate)
+            finally:
+                if kept is not None:
+                    kept.save(now=True)
+            runner.close()
+        first_error = runner.first_error
+    table.warn(first_error)
+    return table.label()
+
+
+def _tell(progress: Callable[[int, int], None] | None, shown: Progress, done: int, total: int, rate: float) -> None:
+    if progress is not None:
+        progress(done, total)
+    elif processes.is_first():
+        full = BAR * done // total
+        rest = (total - done) / rate
+        time_left = f"{rest:.0f} s" if rest < 120 else f"{rest / 60:.0f} min" if rest < 7200 else f"{rest / 3600:.1f} h"
+        shown(f"{'█' * full}{'·' * (BAR - full)} {100 * done // total} %, {done} of {total} points, {time_left} left")
+
+
+@final
+class _Runner:
+    """Takes points through a program, in calls of a useful length; points that raise are found by halving."""
+
+    def __init__(self, program: Program, points: AbstractPoints) -> None:
+        self._program, self._points = program, points
+        self._rounds = 1
+        self._raised = False
+        self.rate, self.first_error = 1.0, ""
+
+    def results(self, left: np.ndarray) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray] | None]]:
+        """The points in pieces with their results; None where the function raises."""
+        while left.size:
+            size = self._program.capacity(self._rounds)
+            pending, left = [left[:size]], left[size:]
+            while pending:
+                indices = pending.pop()
+                found, full = self._call(indices)
+                if found is None and full and self._program.layout.chunk > 1:  # out of memory
+                    pieces = max(-(-len(indices) // self._program.capacity(1)), 1)
+                    pending += np.array_split(indices, pieces)[::-1]
+                elif found is None and len(indices) > 1:
+                    pending += np.array_split(indices, 2)[::-1]
+                else:
+                    yield indices, found
+
+    def _call(self, indices: np.ndarray) -> tuple[dict[str, np.ndarray] | None, bool]:
+        """Results, or None and whether for want of memory, in which case the next calls take half the chunk."""
+        start, found, error = time.perf_counter(), {}, ""
+        try:
+            found = self._program.start(self._points.columns(indices))
+        except (RuntimeError, FloatingPointError) as raised:
+            error = str(raised) or repr(raised)
+        full = "RESOURCE_EXHAUSTED" in error
+        seconds, some_failed, some_full = processes.largest(time.perf_counter() - start, bool(error), full)
+        if not some_failed:
+            self._adapt(len(indices), float(seconds))
+            return self._program.collect(found, len(indices)), False
+        if some_full and self._program.layout.chunk > 1:
+            old = self._program
+            self._program = with_chunk(old.traced, old.layout.mesh, old.layout.chunk // 2)
+            self._rounds = 1
+        self._raised = True
+        self.first_error = self.first_error or _last_line(error)
+        return None, bool(some_full)
+
+    def close(self) -> None:
+        """Leave nothing behind that raises later."""
+        if self._raised:
+            forget_errors(self._program.layout.mesh)
+
+    def _adapt(self, size: int, seconds: float) -> None:
+        """Make the next call as long as it should be, but at most four times as long as this one."""
+        self.rate = size / seconds
+        rounds = -(-size // self._program.capacity(1))
+        self._rounds = min(max(int(rounds * min(CALL / seconds, 4.0)), 1), self._program.layout.rounds)
+
+
+def _last_line(error: str) -> str:
+    """What a user wrote into an error, out of the report of a callback that raised."""
+    lines = [line for line in error.splitlines() if re.match(r"\S*(Error|Exception)\S*: ", line)]
+    line = (lines or error.strip().splitlines() or [""])[-1]
+    return re.sub(r"^\S*Equinox\S*: ", "", line)

@@ -1,0 +1,40 @@
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxdamp
+from jaxdamp import roads, vehicles
+from jaxdamp.parameters import replace
+
+
+@pytest.mark.slow
+def test_a_simulated_quarter_car(tmp_path):
+    car, road = vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05)
+
+    def ride(point):
+        run = jaxdamp.simulate(replace(car, point), road, duration=0.3, dt=2e-3)
+        return {name: run.metrics()[name] for name in ("rms_sprung_acceleration", "working_space_rms")}
+
+    axes = {"damper.rate": [1000.0, 3000.0, 5000.0], "sprung_mass": [1000.0, 1200.0]}
+    data = jaxdamp.sweep(ride, axes, gradients=True, file=tmp_path / "ride.nc")
+    assert jaxdamp.sweep(ride, axes, gradients=True, file=tmp_path / "ride.nc").identical(data)
+    point = {"damper.rate": jnp.asarray(3000.0), "sprung_mass": jnp.asarray(1200.0)}
+    for name, value in ride(point).items():
+        np.testing.assert_allclose(data[name].sel({"damper.rate": 3000.0, "sprung_mass": 1200.0}), value, rtol=1e-11)
+    h = 1.0
+    near = [float(ride(point | {"damper.rate": jnp.asarray(3000.0 + s)})["working_space_rms"]) for s in (-h, h)]
+    slope = data["d_working_space_rms"].sel({"damper.rate": 3000.0, "sprung_mass": 1200.0, "parameter": "damper.rate"})
+    np.testing.assert_allclose(slope, (near[1] - near[0]) / (2 * h), rtol=1e-5)
+
+
+def test_a_ride_is_swept_with_its_units():
+    car, road = vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05)
+    ride = jaxdamp.Ride(car, road, metrics=["rms_sprung_acceleration", "working_space_rms"], duration=0.2, dt=2e-3)
+    data = jaxdamp.sweep(ride, {"rate": [1000.0, 3000.0], "sprung_mass": [1000.0, 1200.0, 1400.0]}, gradients=True)
+    assert data["rate"].attrs["units"] == "N s/m" and data["rms_sprung_acceleration"].attrs["units"] == "m/s^2"
+    alone = ride({"damper.rate": 3000.0, "sprung_mass": 1400.0})
+    for name, value in alone.items():  # other code is compiled for cars side by side
+        np.testing.assert_allclose(data[name].sel(rate=3000.0, sprung_mass=1400.0), value, rtol=1e-11)
+    backward = jaxdamp.sweep(ride, {"rate": [3000.0], "sprung_mass": [1400.0]}, gradients="reverse")
+    forward = data["d_working_space_rms"].sel(rate=3000.0, sprung_mass=1400.0)
+    np.testing.assert_allclose(forward, backward["d_working_space_rms"][0, 0], rtol=1e-9)
