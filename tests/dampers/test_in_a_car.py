@@ -38,4 +38,5 @@ def test_engines_agree(group):
         errors[every] = np.max(np.abs(found - exact[::every])) / size
     assert size > 1.0
     assert errors[2] < 0.02, f"errors {errors} at multiples of 0.5 ms"
-    assert errors[1] < 5e-3 and errors[1] < errors[4] / 4, f"errors {errors} at multiples of 0.5 ms"
+    # a steep law gets substeps where steps are long, which evens errors out
+    assert errors[1] < 5e-3 and errors[1] < errors[4] / 3, f"errors {errors} at multiples of 0.5 ms"

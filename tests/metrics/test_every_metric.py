@@ -68,11 +68,14 @@ METRICS = {
 OTHERS = {
     "AXES",
     "Evaluation",
+    "STATISTICS",
     "ShockRatios",
     "StateSpace",
+    "Statistic",
     "comfort_reaction",
     "evaluation_method",
     "weighting_factor",
+    "weighting_of",
     "weighting_response",
     "weighting_state_space",
 }

@@ -1,6 +1,7 @@
 /* The laws. Each has parameters p[..][lane] as prepared once per run from those of the table, a stroke x, a velocity v
-   and at most one state s, which is SMOOTH if it has no kink where the velocity has one. `memory` is what a law may
-   keep from one call to the next, such as the last root of a search. */
+   and at most one state s, which is SMOOTH if it has no kink where the velocity has one; if not, `predict` gives the
+   state at the end of a step roughly. `memory` is what a law may keep from one call to the next, such as the last root
+   of a search. */
 #ifndef LAWS_H
 #define LAWS_H
 
@@ -42,6 +43,7 @@ static inline void besinger_prepare(const double *from, Row *p, int i, double dt
 
 static inline double besinger_force(LAW_ARGUMENTS) { return besinger(p, i, v); }
 static inline double besinger_rate(LAW_ARGUMENTS, double *memory) { return 0.0; }
+static inline double besinger_predict(LAW_ARGUMENTS, double v0, double dt, double *memory) { return 0.0; }
 static inline double besinger_advance(LAW_ARGUMENTS, double v0, double dt, double *memory) { return 0.0; }
 
 /* Lag: Besinger behind a first-order lag; 1/tau, then what carries the force over a step. The state is the force. */
@@ -145,36 +147,57 @@ static inline double bouc_wen_rate(LAW_ARGUMENTS, double *memory)
     return u * (1.0 - (1.0 - shape) * size * flat) - shape * fabs(u) * s * flat;
 }
 
+static inline double below_one(double size)
+{
+    const double most = 1.0 - 8.0 * 2.220446049250313e-16;
+    return size < most ? size : most;
+}
+
 /* (1 - w^n) / (1 - w^2), which tends to n/2. */
-static inline double loading_factor(double w, double to_the_n, double n)
+static inline double loading_factor(double w, double to_the_n)
 {
-    double rest = 1.0 - w * w;
-    return rest > 1e-7 ? (1.0 - to_the_n) / rest : 0.5 * n;
+    double inside = below_one(w);
+    return (1.0 - to_the_n) / ((1.0 - inside) * (1.0 + inside));
 }
 
-/* (w + t) / (1 + w t) with t = tanh(stretch), by one exponential. */
-static inline double loaded(double w, double stretch)
-{
-    double e = exp(fmin(2.0 * stretch, 600.0)), up = e + 1.0, down = e - 1.0;
-    return (w * up + down) / (up + w * down);
-}
-
-/* One step along the net travel u: unloading by the midpoint rule, loading by a step that cannot pass one. The power
-   of the old state serves either way. */
+/* One step along the net travel u: unloading by the midpoint rule, loading by w <- (w + t)/(1 + w t), which cannot pass
+   one, with t = tanh(r u), to midway something like it. The power of the old state serves either way. */
 static inline double bouc_wen_advance(LAW_ARGUMENTS, double v0, double dt, double *memory)
 {
     double travel = 0.5 * dt * (v0 + v) * p[3][i], n = p[5][i], beyond = 2.0 * p[4][i] - 1.0;
     double way = travel >= 0.0 ? 1.0 : -1.0, u = way * travel, w = way * s;
-    double old = power(fabs(s), n), held = w < 0.0 ? -w : 0.0;
+    double old = power(below_one(fabs(s)), n), held = w < 0.0 ? -w : 0.0;
     double steep = 1.0 + (w < 0.0 ? beyond * old : 0.0);
     double midway = fmax(held - 0.5 * u * steep, 0.5 * held);
-    steep = 1.0 + beyond * power(midway, n);
+    steep = 1.0 + (midway > 0.0 ? beyond * power(below_one(midway), n) : 0.0);
     double left = fmax(u - held / steep, 0.0);
-    double factor = w > 0.0 ? loading_factor(w, old, n) : 1.0;
+    double half = 0.5 * left * loading_factor(w > 0.0 ? w : 0.0, w > 0.0 ? old : 0.0);
     w = w > 0.0 ? w : 0.0;
-    double middle = loaded(w, 0.5 * left * factor);
-    factor = loading_factor(middle, power(middle, n), n);
-    return way * (loaded(w, left * factor) - fmax(held - u * steep, 0.0));
+    double t = half / sqrt(1.0 + half * half);
+    double middle = (w + t) / (1.0 + w * t);
+    double stretch = left * loading_factor(middle, middle > 0.0 ? power(below_one(middle), n) : 0.0);
+    double e = exp(fmin(2.0 * stretch, 600.0)), up = e + 1.0, down = e - 1.0;
+    return way * ((w * up + down) / (up + w * down) - fmax(held - u * steep, 0.0));
+}
+
+/* Heun's step, kept between -1 and 1, half as dear. */
+static inline double bouc_wen_moved(const Row *p, int i, double travel, double z)
+{
+    double to_the_n = power(below_one(fabs(z)), p[5][i]);
+    return travel * (travel * z > 0.0 ? 1.0 - to_the_n : 1.0 + (2.0 * p[4][i] - 1.0) * to_the_n);
+}
+
+static inline double within_one(double z)
+{
+    return fmin(fmax(z, -1.0), 1.0);
+}
+
+static inline double bouc_wen_predict(LAW_ARGUMENTS, double v0, double dt, double *memory)
+{
+    double travel = 0.5 * dt * (v0 + v) * p[3][i];
+    double first = bouc_wen_moved(p, i, travel, s);
+    double second = bouc_wen_moved(p, i, travel, within_one(s + first));
+    return within_one(s + 0.5 * (first + second));
 }
 
 #endif

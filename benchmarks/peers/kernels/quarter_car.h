@@ -62,14 +62,13 @@ static inline void LAW_(_exponential_step)(LAW_(_Block) *restrict b, Row *restri
         double h1 = d1 + m[4] * zs + m[5] * zu + m[6] * vs + m[7] * vu + m[21] * g + m[17] * f;
         double h2 = d2 + m[8] * zs + m[9] * zu + m[10] * vs + m[11] * vu + m[22] * g + m[18] * f;
         double h3 = d3 + m[12] * zs + m[13] * zu + m[14] * vs + m[15] * vu + m[23] * g + m[19] * f;
-        double next;
-        if (LAW_(_SMOOTH)) {
-            next = 3.0 * (s - b->before[0][i]) + b->before[1][i];
-            b->before[1][i] = b->before[0][i];
-            b->before[0][i] = s;
-        } else {
-            next = LAW_(_advance)(p, i, h0 - h1, h2 - h3, s, vs - vu, dt, &b->memory[0][i]);
-        }
+#if LAW_(_SMOOTH)
+        double next = 3.0 * (s - b->before[0][i]) + b->before[1][i];
+        b->before[1][i] = b->before[0][i];
+        b->before[0][i] = s;
+#else
+        double next = LAW_(_predict)(p, i, h0 - h1, h2 - h3, s, vs - vu, dt, &b->memory[0][i]);
+#endif
         double bend = LAW_(_force)(p, i, h0 - h1, h2 - h3, next) - 2.0 * f + g;
         h0 += m[24] * bend;
         h1 += m[25] * bend;
