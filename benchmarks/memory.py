@@ -43,7 +43,7 @@ def main() -> None:
 
     def everything(heights: Array, rate: Array) -> Array:
         changed = replace(ride.vehicle, {path: rate})
-        return exponential_steps(changed, heights, jnp.asarray(DT))[0]
+        return exponential_steps(changed, heights, jnp.asarray(DT)).motion
 
     rows: list[list[Any]] = []
     for seconds in (10, 60, 600, 3600):

@@ -6,7 +6,9 @@ Interpreted by CasADi's virtual machine, as it comes, or turned into C and compi
 import functools
 import importlib
 import importlib.util
+import os
 import shutil
+import tempfile
 from typing import Any
 
 import numpy as np
@@ -79,7 +81,9 @@ def _options(compiled: bool) -> dict[str, Any]:
         return {}
     if not available(compiled=True):
         raise RuntimeError("gcc was not found: CasADi cannot compile its functions. Install gcc or leave this out.")
-    return {"jit": True, "compiler": "shell", "jit_options": {"compiler": "gcc", "flags": FLAGS, "verbose": False}}
+    folder = tempfile.gettempdir() + os.sep  # not where the user stands: files stay if the process is stopped
+    options = {"compiler": "gcc", "flags": FLAGS, "verbose": False, "directory": folder}
+    return {"jit": True, "compiler": "shell", "jit_options": options}
 
 
 @functools.cache

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar, Signal
-from jaxdamp.simulation.exponential import road_rate
+from jaxdamp.simulation.exponential import Saved, road_rate
 from jaxdamp.vehicles import AbstractVehicle, Ports, rest_position
 from jaxdamp.vehicles.ports import States
 
@@ -26,8 +26,12 @@ def adaptive_steps(
     rtol: float,
     atol: float,
     start: Float[Array, " n"] | None = None,
-) -> tuple[Float[Array, "time n"], Float[Array, "time ports"], list[Float[Array, " _state"]], Any]:
-    """Motion and forces at the instants of the road, linear between them; steps end where its slope changes."""
+    every: int = 1,
+) -> tuple[Saved, diffrax.RESULTS]:
+    """The run, and how it ended, at every so many-th instant of the road, linear between them.
+
+    Steps end where the slope of the road changes.
+    """
     form, laws = vehicle.port_form(), vehicle.elements()
     ports = Ports(laws)
     q = form.mass.shape[0]
@@ -61,7 +65,7 @@ def adaptive_steps(
         time[-1],
         0.1 * dt,
         (start, ports.initial()),
-        saveat=diffrax.SaveAt(ts=time),
+        saveat=diffrax.SaveAt(ts=time[::every]),
         stepsize_controller=diffrax.ClipStepSizeController(
             diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=time[1:-1]
         ),
@@ -71,5 +75,6 @@ def adaptive_steps(
     )
     assert solution.ys is not None
     motion, states = solution.ys
-    places = jax.vmap(at_ports)(motion, heights, road_rate(heights, dt))
-    return motion, jax.vmap(ports.force)(*places, states), ports.by_port([s[-1] for s in states]), solution.result
+    slopes, heights = road_rate(heights, dt)[::every], heights[::every]
+    forces = jax.vmap(ports.force)(*jax.vmap(at_ports)(motion, heights, slopes), states)
+    return Saved(motion, forces, heights, slopes, ports.by_port([s[-1] for s in states])), solution.result

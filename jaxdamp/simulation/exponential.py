@@ -1,9 +1,11 @@
-"""The fixed-step engine, every instant saved.
+"""The fixed-step engine, instants saved.
 
 XLA compiles a loop on a CPU into one function, ten times as fast, if its body touches few bytes: 1 kB unless told
 otherwise (`jaxdamp.configure`). A quarter car with most memoryless laws stays below that because the step is written in
 small arrays and saves no more than it must.
 """
+
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -15,6 +17,16 @@ from jaxdamp.simulation.stepper import Ground, Now, Stepper
 from jaxdamp.vehicles import AbstractVehicle, rest_position
 
 
+class Saved(NamedTuple):
+    """What an engine saves of a run, at the instants that are saved; the states of the laws at the end."""
+
+    motion: Float[Array, "time n"]
+    port_force: Float[Array, "time ports"]
+    road: Float[Array, "time wheels"]
+    road_rate: Float[Array, "time wheels"]
+    final_state: list[Float[Array, " _state"]]
+
+
 @eqx.filter_jit
 def exponential_steps(
     vehicle: AbstractVehicle,
@@ -22,8 +34,9 @@ def exponential_steps(
     dt: Scalar,
     start: Float[Array, " n"] | None = None,
     substeps: int = 1,
-) -> tuple[Float[Array, "time n"], Float[Array, "time ports"], list[Float[Array, " _state"]]]:
-    """Motion (q, q̇) and element forces at every instant of the road, and the laws' states at the end.
+    every: int = 1,
+) -> Saved:
+    """Motion (q, q̇) and element forces at every instant of the road, or every so many-th.
 
     From `start`, or settled and at rest on the road's first height. Elements that stand on the road take its rate as
     the mean of the slopes before and after an instant.
@@ -32,22 +45,27 @@ def exponential_steps(
     stepper = Stepper(vehicle, dt / substeps, apart=False)
     if start is None:
         start = settled(vehicle, heights[0])
-    slopes = None if form.port_road is None else road_rate(heights, dt)
+    slopes = road_rate(heights, dt)
+    ground = Ground(heights, None if form.port_road is None else slopes)
 
-    def step(now: Now, road: tuple) -> tuple:
-        after = stepper.over(now, Ground(road[0], road[1]), Ground(road[2], road[3]), substeps)
+    def step(now: Now, ends: tuple[Ground, Ground]) -> tuple[Now, None]:
+        return stepper.over(now, *ends, substeps), None
+
+    def saving(now: Now, ends: tuple[Ground, Ground]) -> tuple:
+        after, _ = step(now, ends) if every == 1 else jax.lax.scan(step, now, ends)
         return after, (after.motion, after.states)
 
-    ground = Ground(heights, slopes)
     first = stepper.at_rest(start, jax.tree.map(lambda a: a[0], ground))
-    ends = *jax.tree.map(lambda a: a[:-1], ground), *jax.tree.map(lambda a: a[1:], ground)
-    last, saved = jax.lax.scan(step, first, ends)
+    ends = jax.tree.map(lambda a: a[:-1], ground), jax.tree.map(lambda a: a[1:], ground)
+    if every > 1:
+        ends = jax.tree.map(lambda a: a.reshape(-1, every, *a.shape[1:]), ends)
+    last, saved = jax.lax.scan(saving, first, ends)
     motion, states = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), (first.motion, first.states), saved)
     # Saving the states and taking the forces from them here keeps the loop's body small: see the module's docstring.
+    heights, slopes = heights[::every], slopes[::every]
     position, rate = jnp.split(motion, 2, axis=1)
-    still = jnp.zeros_like(heights) if slopes is None else slopes
-    forces = jax.vmap(stepper.ports.force)(form.at_ports(position, heights), form.at_ports(rate, still), states)
-    return motion, forces, stepper.ports.by_port(last.states)
+    forces = jax.vmap(stepper.ports.force)(form.at_ports(position, heights), form.at_ports(rate, slopes), states)
+    return Saved(motion, forces, heights, slopes, stepper.ports.by_port(last.states))
 
 
 def settled(vehicle: AbstractVehicle, road: Float[Array, " wheels"]) -> Float[Array, " n"]:

@@ -11,7 +11,6 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks, metrics
 from jaxdamp._types import Scalar, ScalarLike, Signal
-from jaxdamp.simulation.exponential import road_rate
 from jaxdamp.vehicles import AbstractVehicle, Instant, RideMetric
 
 
@@ -36,6 +35,8 @@ def _middle(values: Array) -> Array:
 class Response(eqx.Module):
     """The response of a vehicle to a road, at uniformly spaced instants.
 
+    The road's rate is the mean of its slopes before and after an instant.
+
     `response["sprung_acceleration"]` is a channel; `response.units` and `response.channels` say which there are.
     """
 
@@ -44,6 +45,7 @@ class Response(eqx.Module):
     motion: Float[Array, "time n"]
     port_force: Float[Array, "time ports"]
     road: Float[Array, "time wheels"]
+    road_rate: Float[Array, "time wheels"]
     final_state: list[Float[Array, " _state"]]
 
     @property
@@ -54,12 +56,11 @@ class Response(eqx.Module):
     @property
     @eqx.filter_jit
     def channels(self) -> dict[str, Signal]:
-        """All channels by name; the road's rate is the mean of the slopes before and after an instant."""
+        """All channels by name."""
         system, n = self.vehicle.port_form().first_order(), len(self.vehicle.coordinates)
-        rate = road_rate(self.road, self.time[1] - self.time[0])
         forces = self.port_force @ system.port_input.T + self.road @ system.road_input.T
-        change = self.motion @ system.state_matrix.T + forces + rate @ system.road_rate_input.T
-        parts = (self.motion[:, :n], self.motion[:, n:], change[:, n:], self.road, rate, self.port_force)
+        change = self.motion @ system.state_matrix.T + forces + self.road_rate @ system.road_rate_input.T
+        parts = (self.motion[:, :n], self.motion[:, n:], change[:, n:], self.road, self.road_rate, self.port_force)
         return jax.vmap(lambda *instant: self.vehicle.channels(Instant(*instant)))(*parts)
 
     def __getitem__(self, channel: str) -> Signal:

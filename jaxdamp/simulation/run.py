@@ -33,6 +33,7 @@ def simulate(
     atol: float = 1e-10,
     start: Mapping[str, float] | None = None,
     substeps: int | None = None,
+    every: int = 1,
 ) -> Response:
     """Drive a vehicle over a road.
 
@@ -54,13 +55,16 @@ def simulate(
         substeps: of the exponential engine between two instants; as many as the steepest law without states needs
             (friction at standstill) if left out, so that every step is stable.
         start: coordinates [m, rad] at time zero that differ from the equilibrium, such as `{"pitch": 0.05}`; at rest.
+        every: save every so many-th instant only, of long runs. The motion is the same, but metrics and the energy
+            balance then know no more than what is saved; `Ride` gathers metrics at every instant and saves none.
 
     Returns:
-        The response at `round(duration/dt) + 1` instants.
+        The response at `round(duration/dt) + 1` instants, or one in `every` of them and the first.
 
     Raises:
         ValueError: a step longer than the spacing of a sampled road, no duration, a road of other tracks than wheels,
-            an unknown coordinate, a vehicle without equilibrium, a run that diverged.
+            an unknown coordinate, a vehicle without equilibrium, instants that cannot be divided by `every`, a run that
+            diverged.
 
     >>> from jaxdamp import roads, vehicles
     >>> car = vehicles.presets.quarter_car_000()
@@ -69,10 +73,11 @@ def simulate(
     0.072
     """
     time, heights = sampled(vehicle, road, duration, dt)
+    _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)
     if method == "exponential":
         count = substeps_needed(vehicle, dt) if substeps is None else substeps
-        motion, forces, states = exponential_steps(vehicle, heights, jnp.asarray(dt, dtype=float), begin, count)
+        saved = exponential_steps(vehicle, heights, jnp.asarray(dt, dtype=float), begin, count, every)
         remedy = f"Take a shorter step than {dt:g} s, or an implicit solver, `method=diffrax.Kvaerno5()`."
     else:
         import diffrax
@@ -82,15 +87,24 @@ def simulate(
         if isinstance(method, str):
             _checks.one_of("method", method, ["exponential", "diffrax"])
             method = diffrax.Tsit5()
-        motion, forces, states, result = adaptive_steps(vehicle, time, heights, method, rtol, atol, begin)
+        saved, result = adaptive_steps(vehicle, time, heights, method, rtol, atol, begin, every)
         remedy = f"The solver says: {diffrax.RESULTS[result] or 'finished'} Fast laws need `method=diffrax.Kvaerno5()`."
-    last = _checks.concrete(motion[-1])
+    last = _checks.concrete(saved.motion[-1])
     if last is not None and not np.all(np.isfinite(last)):
-        if not np.all(np.isfinite(np.asarray(motion[0]))):
+        if not np.all(np.isfinite(np.asarray(saved.motion[0]))):
             refuse_restless(vehicle)
         remedy = " ".join([*filter(None, map(coverage, vehicle.elements())), remedy])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
-    return Response(vehicle, time, motion, forces, heights, states)
+    return Response(vehicle, time[::every], *saved)
+
+
+def _strides(count: int, every: int, dt: float) -> None:
+    """Whether so many steps are whole strides."""
+    if every < 1 or every != int(every):
+        _checks.refuse("every", "be a whole number of instants, 1 or more", every)
+    if count % every:
+        remedy = f"Pass `duration={count // every * every * dt:g}` or `duration={-(-count // every) * every * dt:g}`."
+        _checks.refuse("every", f"divide the {count} steps of the run", every, remedy)
 
 
 def sampled(

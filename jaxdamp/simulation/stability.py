@@ -46,12 +46,18 @@ def substeps_needed(vehicle: AbstractVehicle, dt: float) -> int:
     if count > MOST:
         name = vehicle.frame().element_names[int(shares.argmax())]
         remedy = (
-            f"Pass `dt={dt / math.ceil(count / MOST):.1g}` or less, widen the velocity over which its force changes "
+            f"Pass `dt={_rounded_down(dt * MOST / count):g}` or less, widen the velocity over which its force changes "
             "sign, or take an implicit solver, `method=diffrax.Kvaerno5()`."
         )
         must = f"have a slope that {MOST} steps in {dt:g} s can follow"
-        _checks.refuse(f"element {name!r}", must, f"{max(slopes):.3g} N s/m steep at some velocity", remedy)
+        _checks.refuse(name, must, f"{max(slopes):.3g} N s/m steep at some velocity", remedy)
     return count
+
+
+def _rounded_down(value: float) -> float:
+    """To one digit."""
+    unit = 10.0 ** math.floor(math.log10(value))
+    return math.floor(value / unit) * unit
 
 
 def _steepest(law: AbstractDamper, dt: float) -> float:

@@ -13,15 +13,13 @@ from jaxdamp._progress import Progress
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import Response, simulate
-from jaxdamp.simulation.exponential import exponential_steps
-from jaxdamp.simulation.stability import substeps_needed
+from jaxdamp.simulation import Ride
 from jaxdamp.tune.result import Change, TuneResult, V
 from jaxdamp.vehicles import AbstractVehicle, RideMetric, linearise, stationary_rms, with_weightings
 
 
 INSIDE = 1e-6  # share of its start by which a parameter stays off the ends of its domain
-Ride = Callable[[AbstractVehicle], dict[str, Scalar]]
+Measured = Callable[[AbstractVehicle], dict[str, Scalar]]
 
 
 def minimise(
@@ -78,6 +76,9 @@ def minimise(
     names = [m.name for m in chosen]
     table = _Table(ride, free, names)
     before, _ = table.at(np.asarray(free.values))
+    if not np.all(np.isfinite(list(before.values()))):
+        remedy = "`simulate` it on this road, which says what the step or the law lacks."
+        _checks.refuse("vehicle", "have finite metrics to start from", f"{metric} = {before[metric]}", remedy)
     scale = np.array([abs(v) if v else 1.0 for v in np.asarray(free.values)])
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {metric} {value:.5g}"))
@@ -132,7 +133,7 @@ def chosen_metrics(vehicle: AbstractVehicle, road: AbstractRoad | WhiteRoad, wan
     return [m for m in known if m in others or m.name in wanted]
 
 
-def stationary_ride(road: WhiteRoad, chosen: Sequence[RideMetric]) -> Ride:
+def stationary_ride(road: WhiteRoad, chosen: Sequence[RideMetric]) -> Measured:
     """Ride metrics of the linearised vehicle on a white road."""
     weighted = list(dict.fromkeys(m.channel for m in chosen if metrics.STATISTICS[m.statistic].weighted))
 
@@ -156,23 +157,16 @@ def driven_ride(
     chosen: Sequence[RideMetric],
     duration: float | None = None,
     dt: float = 1e-3,
-) -> Ride:
-    """Ride metrics of a simulated run; the road is sampled once, which also checks the arguments."""
-    run = simulate(vehicle, road, duration=duration, dt=dt)
-    time, heights, step = run.time, run.road, jnp.asarray(dt, dtype=float)
-    substeps, names = substeps_needed(vehicle, dt), [m.name for m in chosen]
-
-    def ride(vehicle: AbstractVehicle) -> dict[str, Scalar]:
-        motion, forces, states = exponential_steps(vehicle, heights, step, substeps=substeps)
-        return Response(vehicle, time, motion, forces, heights, states).metrics(names)
-
-    return ride
+) -> Measured:
+    """Ride metrics of a run; the road is sampled once, which also checks the arguments."""
+    driven = Ride(vehicle, road, metrics=[m.name for m in chosen], duration=duration, dt=dt)
+    return lambda vehicle: eqx.tree_at(lambda ride: ride.vehicle, driven, vehicle)()
 
 
 class _Table:
     """Metrics and their slopes at a point, computed together and kept for the last point asked for."""
 
-    def __init__(self, ride: Ride, free: FreeParameters, names: Sequence[str]) -> None:
+    def __init__(self, ride: Measured, free: FreeParameters, names: Sequence[str]) -> None:
         self.names = list(names)
 
         @eqx.filter_jit

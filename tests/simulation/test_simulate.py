@@ -169,8 +169,8 @@ def test_batches_equal_loops_and_both_modes_of_differentiation_agree():
 
     @jax.jit
     def square(force):
-        motion, _, _ = exponential_steps(replace(car, {"damper.compression_force": force}), heights, jnp.asarray(1e-3))
-        return jnp.mean(motion[:, 2] ** 2)
+        run = exponential_steps(replace(car, {"damper.compression_force": force}), heights, jnp.asarray(1e-3))
+        return jnp.mean(run.motion[:, 2] ** 2)
 
     np.testing.assert_allclose(jax.vmap(square)(forces), [square(f) for f in forces], rtol=1e-12)
     forward, reverse = jax.jacfwd(square)(forces[1]), jax.grad(square)(forces[1])
@@ -226,6 +226,8 @@ def test_duration_of_the_road_is_used():
         ),
         ({"duration": -1.0}, r"`duration` must be positive and finite, but is -1"),
         ({"dt": 0.0}, r"`dt` must be positive"),
+        ({"every": 0}, r"`every` must be a whole number of instants, 1 or more, but is 0"),
+        ({"every": 7}, r"`every` must divide the 200 steps.*Pass `duration=0.98` or `duration=1.015`"),
         ({"dt": 2.0}, r"`dt` must be shorter than the run"),
         ({"method": "exponental"}, r"`method` must be one of.*Did you mean 'exponential'"),
         (
@@ -243,6 +245,21 @@ def test_refuses_runs_that_make_no_sense(change, message):
     arguments = {"road": sampled, "duration": 1.0, "dt": 5e-3} | change
     with pytest.raises(ValueError, match=message):
         simulate(quarter_car_000(), **arguments)
+
+
+@pytest.mark.parametrize("method", ["exponential", "diffrax"])
+def test_a_run_saved_with_stride_is_every_so_many_th_instant_of_the_run(method):
+    """Tyre damping included: what it hears of the road is the slope at the instant, not over the stride."""
+    car = replace(quarter_car_000(LAWS["lag"]), {"tyre_damping": 300.0})
+    whole, tenth = (simulate(car, BUMP, duration=0.6, dt=2e-3, method=method, every=every) for every in (1, 10))
+    assert tenth.time.shape == (31,) and float(tenth.time[-1]) == pytest.approx(0.6)
+    for name, channel in whole.channels.items():
+        size = float(jnp.max(jnp.abs(channel)))
+        np.testing.assert_allclose(tenth[name], channel[::10], atol=1e-12 * size, err_msg=name)
+    for here, there in zip(tenth.final_state, whole.final_state, strict=True):
+        np.testing.assert_allclose(here, there, rtol=1e-12)
+    parts = tenth.energy_balance()
+    assert abs(float(parts["error"])) < 0.05 * float(parts["road_work"])
 
 
 def test_a_run_that_diverges_says_so():

@@ -25,7 +25,7 @@ def table(response):
 
 
 def assert_slopes(found, expected, level, message=""):
-    """Relative slopes agree; those of powers relative to the largest, as what only stores dissipates next to nothing."""
+    """Relative slopes agree; powers relative to the largest, as what only stores dissipates next to nothing."""
     largest = max(float(v) for name, v in level.items() if name.endswith("_dissipated_power"))
     sizes = {name: largest if name.endswith("_dissipated_power") else float(v) for name, v in level.items()}
     assert all(size > 0.0 for size in sizes.values())
@@ -53,7 +53,8 @@ def difference(function, direction, step=2e-5):
     """Central, of fourth order."""
     ends = [[function(sign * h * direction) for sign in (1.0, -1.0)] for h in (step, 2.0 * step)]
     near, far = (
-        jax.tree.map(lambda a, b, h=h: (a - b) / (2.0 * h), *pair) for h, pair in zip((step, 2 * step), ends, strict=True)
+        jax.tree.map(lambda a, b, h=h: (a - b) / (2.0 * h), *pair)
+        for h, pair in zip((step, 2 * step), ends, strict=True)
     )
     return jax.tree.map(lambda a, b: (4.0 * a - b) / 3.0, near, far)
 
