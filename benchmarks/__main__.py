@@ -5,6 +5,7 @@ import sys
 
 
 QUESTIONS = (
+    ["functions"],
     ["first_result"],
     ["one_car"],
     ["one_car", "--plain"],

@@ -35,12 +35,13 @@ def best(work: Callable[[], Any], repeats: int = 3) -> float:
 
 
 def machine() -> dict[str, Any]:
-    """Processor, cores, devices, load and versions."""
-    cpu = platform.processor()
-    info = Path("/proc/cpuinfo")
+    """Processor and its widest vectors, cores, devices, load and versions."""
+    cpu, vectors, info = platform.processor(), "unknown", Path("/proc/cpuinfo")
     if info.exists():
-        names = [line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if "model name" in line]
+        text = info.read_text()
+        names = [line.split(":", 1)[1].strip() for line in text.splitlines() if "model name" in line]
         cpu = names[0] if names else cpu
+        vectors = next((name for name in ("avx512f", "avx2") if name in text), vectors)
     found = {}
     for name in PACKAGES:
         try:
@@ -49,6 +50,7 @@ def machine() -> dict[str, Any]:
             found[name] = "not installed"
     return {
         "cpu": cpu,
+        "vectors": vectors,
         "cores": os.cpu_count(),
         "devices": [str(device) for device in jax.devices()],
         "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,

@@ -3,10 +3,10 @@
 import warnings
 from typing import final
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxdamp._elementary import reciprocal_root
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import secant_rate
 from jaxdamp.dampers.base import AbstractMemoryless
@@ -23,7 +23,7 @@ def transition_rate(
     u = v * (1.0 / transition_velocity) - 1.0  # no quotient of v here and below: they are slow, in tangents too
     c1 = 0.5 * (rebound_rate - compression_rate)
     c2 = 0.5 * (rebound_rate + compression_rate)
-    return c1 * u * jax.lax.rsqrt(1.0 + u * u) + c2
+    return c1 * u * reciprocal_root(1.0 + u * u) + c2
 
 
 @final

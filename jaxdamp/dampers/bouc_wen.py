@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import final
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxdamp._elementary import power, reciprocal_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import sliding_fit
 from jaxdamp.dampers._hysteresis import direction, own_states
@@ -14,21 +14,16 @@ from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.parameters import interval, nonnegative, parameter, positive, real
 
 
-def _power(size: ScalarLike, exponent: ScalarLike) -> Scalar:
-    """size^exponent for size ≥ 0, with finite derivatives at zero."""
-    return jnp.exp(exponent * jnp.log(jnp.maximum(size, 1e-30)))
-
-
 def hysteresis_rate(travel_rate: ScalarLike, z: ScalarLike, shape: ScalarLike, exponent: ScalarLike) -> Scalar:
     """ż [1/s] = u̇ − γ̂ |u̇| z|z|ⁿ⁻¹ − (1 − γ̂) u̇ |z|ⁿ, with the travel u counted in yield displacements."""
     size = jnp.abs(z)
-    flat = _power(size, exponent - 1.0)
+    flat = power(size, exponent - 1.0)
     return travel_rate * (1.0 - (1.0 - shape) * size * flat) - shape * jnp.abs(travel_rate) * z * flat
 
 
 def _room(size: ScalarLike, exponent: ScalarLike) -> Scalar:
-    """1 − sizeⁿ for size from 0 to 1, exact near 1; it stays above zero, so that quotients of it are finite."""
-    return -jnp.expm1(exponent * jnp.log(jnp.maximum(_below_one(size), 1e-30)))
+    """1 − sizeⁿ for size from 0 to 1; it stays above zero, so that quotients of it are finite."""
+    return 1.0 - power(_below_one(size), exponent)
 
 
 def _below_one(size: ScalarLike) -> Scalar:
@@ -62,7 +57,7 @@ def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, expone
 
     w = jnp.maximum(w, 0.0)
     half = 0.5 * left * _rate_factor(w, jnp.where(w > 0, room, 1.0))
-    t = half * jax.lax.rsqrt(1.0 + half * half)
+    t = half * reciprocal_root(1.0 + half * half)
     middle = (w + t) / (1.0 + w * t)
     t = jnp.tanh(left * _rate_factor(middle, jnp.where(middle > 0, _room(middle, exponent), 1.0)))
     return way * ((w + t) / (1.0 + w * t) - jnp.maximum(held - u * steep, 0.0))

@@ -5,6 +5,7 @@ from typing import NamedTuple, final
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
+from jaxdamp._elementary import reciprocal_root
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractMemoryless
@@ -13,7 +14,7 @@ from jaxdamp.parameters import nonnegative, parameter, positive, setting
 
 def orifice_root(drop: ScalarLike, transition: ScalarLike) -> Scalar:
     """S = Δp/(Δp² + ε²)^¼ [√Pa] of a pressure drop: the signed square root, with the slope 1/√ε at zero."""
-    return drop / jnp.sqrt(jnp.sqrt(drop * drop + transition * transition))
+    return drop * reciprocal_root(jnp.sqrt(drop * drop + transition * transition))
 
 
 def orifice_drop(root: ScalarLike, transition: ScalarLike) -> Scalar:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._elementary import reciprocal_root
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._knee_scan import knee_scan
 from jaxdamp.dampers.base import AbstractMemoryless
@@ -23,7 +24,7 @@ def _arctan(u: Numbers) -> Numbers:
 
 
 def _algebraic(u: Numbers) -> Numbers:
-    return u / jnp.sqrt(1.0 + u * u)
+    return u * reciprocal_root(1.0 + u * u)
 
 
 @final

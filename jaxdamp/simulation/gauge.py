@@ -6,6 +6,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.ad_checkpoint import checkpoint_name
 from jaxtyping import Array
 
 from jaxdamp._types import Scalar
@@ -13,7 +14,7 @@ from jaxdamp.metrics import STATISTICS
 from jaxdamp.metrics.statistics import Kept, weighting_of
 from jaxdamp.metrics.weighting import discrete_weighting
 from jaxdamp.simulation._vectors import Matrix, Vector, plus, rows, scalars, times
-from jaxdamp.simulation.stepper import Ground, Now
+from jaxdamp.simulation.stepper import FOR_REVERSE, Ground, Now
 from jaxdamp.vehicles import AbstractVehicle, Instant, RideMetric
 
 
@@ -48,7 +49,7 @@ class Outputs(NamedTuple):
         if ground.rate is not None:
             given = plus(given, times(self.road_rate, ground.rate))
         values = plus(given, times(self.motion, now.motion), times(self.force, now.force))
-        return values if isinstance(values, tuple) else scalars(values)
+        return checkpoint_name(values if isinstance(values, tuple) else scalars(values), FOR_REVERSE)
 
 
 class Filter(NamedTuple):

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, final
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.ad_checkpoint import checkpoint_name
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
@@ -19,6 +20,9 @@ from jaxdamp.simulation._vectors import Matrix, Vector, between, minus, once, pl
 from jaxdamp.simulation.propagator import Propagator
 from jaxdamp.vehicles import AbstractVehicle, Ports
 from jaxdamp.vehicles.ports import Earlier, States
+
+
+FOR_REVERSE = "needed by reverse derivatives"  # the rest of a step is cheap to repeat, or linear and not needed
 
 
 class Ground(NamedTuple):
@@ -84,9 +88,10 @@ class Stepper(eqx.Module):
         """Deflections of the elements [m] and their rates [m/s]."""
         n = len(x) // 2
         deflection, rate = times(self.deflection, x[:n]), times(self.deflection, x[n:])
-        if self.standing is None or ground.rate is None:
-            return deflection, rate
-        return minus(deflection, times(self.standing, ground.height)), minus(rate, times(self.standing, ground.rate))
+        if self.standing is not None and ground.rate is not None:
+            deflection = minus(deflection, times(self.standing, ground.height))
+            rate = minus(rate, times(self.standing, ground.rate))
+        return checkpoint_name((deflection, rate), FOR_REVERSE)
 
     def __call__(self, now: Now, begin: Ground, end: Ground) -> Now:
         """A step later."""

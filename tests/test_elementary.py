@@ -1,0 +1,52 @@
+"""Functions of the loops against NumPy, and their derivatives."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxdamp import _elementary
+from jaxdamp._elementary import logarithm, power, reciprocal_root
+
+
+def test_logarithm_is_that_of_numpy(rng):
+    x = np.concatenate([
+        np.exp(rng.uniform(-700.0, 700.0, 20_000)),
+        1.0 + rng.uniform(-0.5, 1.0, 20_000) * 10.0 ** rng.uniform(-15.0, 0.0, 20_000),
+        2.0 ** np.arange(-1022.0, 1024.0),
+        np.sqrt(2.0) * 2.0 ** np.arange(-1000.0, 1000.0),
+        [np.finfo(float).tiny, np.finfo(float).max, 1.0],
+    ])  # fmt: skip
+    np.testing.assert_allclose(jax.vmap(logarithm)(jnp.asarray(x)), np.log(x), rtol=5e-16, atol=1e-300)
+    single = jnp.asarray(x[:20_000] ** 0.1, dtype=jnp.float32)
+    np.testing.assert_allclose(jax.vmap(logarithm)(single), np.log(np.asarray(single)), rtol=1e-6, atol=1e-6)
+
+
+def test_power_is_that_of_numpy(rng):
+    base, exponent = 10.0 ** rng.uniform(-12.0, 6.0, 20_000), rng.uniform(-3.0, 20.0, 20_000)
+    with np.errstate(over="ignore", under="ignore"):
+        np.testing.assert_allclose(
+            jax.vmap(power)(jnp.asarray(base), jnp.asarray(exponent)), base**exponent, rtol=2e-13
+        )
+    assert float(power(0.0, 0.5)) == pytest.approx(0.0, abs=1e-14)
+
+
+def test_reciprocal_root_is_that_of_numpy_whatever_the_processor(rng, monkeypatch):
+    x = jnp.asarray(np.exp(rng.uniform(-300.0, 300.0, 20_000)))
+    for device_has_it in (True, False):
+        monkeypatch.setattr(_elementary, "_has_reciprocal_roots", lambda known=device_has_it: known)
+        np.testing.assert_allclose(jax.vmap(lambda x: reciprocal_root(x))(x), 1.0 / np.sqrt(x), rtol=5e-16)
+        for mode in (jax.jacfwd, jax.jacrev):
+            assert float(mode(reciprocal_root)(jnp.asarray(0.3))) == pytest.approx(-0.5 * 0.3**-1.5, rel=1e-14)
+            assert float(mode(mode(reciprocal_root))(jnp.asarray(0.3))) == pytest.approx(0.75 * 0.3**-2.5, rel=1e-14)
+
+
+def test_derivatives_in_both_modes_to_second_order():
+    for mode in (jax.jacfwd, jax.jacrev):
+        assert float(mode(logarithm)(jnp.asarray(0.3))) == pytest.approx(1.0 / 0.3, rel=1e-15)
+        assert float(mode(mode(logarithm))(jnp.asarray(0.3))) == pytest.approx(-1.0 / 0.09, rel=1e-14)
+        slope = mode(power, argnums=(0, 1))(jnp.asarray(0.3), jnp.asarray(1.7))
+        expected = 1.7 * 0.3**0.7, np.log(0.3) * 0.3**1.7
+        np.testing.assert_allclose(slope, expected, rtol=1e-14)
+    at_zero = jax.grad(power, argnums=(0, 1))(jnp.asarray(0.0), jnp.asarray(0.5))
+    assert np.all(np.isfinite(at_zero))
