@@ -11,12 +11,12 @@ from jaxtyping import Array
 
 Mode = Literal["forward", "reverse"]
 Results = dict[str, Array]
-FORWARD_UP_TO = 16  # inputs: with more of them, reverse is taken where nothing is said
+INPUTS_FOR_A_RESULT = 2  # each costs about a run more forward, each result about three reverse
 
 
-def choose_mode(inputs: int) -> Mode:
-    """Forward for few inputs, which needs no memory of the steps taken; reverse for many."""
-    return "forward" if inputs <= FORWARD_UP_TO else "reverse"
+def choose_mode(inputs: int, results: int) -> Mode:
+    """Forward for few inputs, which needs no memory of the steps taken; reverse for more than twice the results."""
+    return "forward" if inputs <= INPUTS_FOR_A_RESULT * results else "reverse"
 
 
 def value_and_jacobian(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import _elementary
-from jaxdamp._elementary import logarithm, power, reciprocal_root
+from jaxdamp._elementary import exponential, logarithm, power, reciprocal_root
 
 
 def test_logarithm_is_that_of_numpy(rng):
@@ -17,9 +17,20 @@ def test_logarithm_is_that_of_numpy(rng):
         np.sqrt(2.0) * 2.0 ** np.arange(-1000.0, 1000.0),
         [np.finfo(float).tiny, np.finfo(float).max, 1.0],
     ])  # fmt: skip
-    np.testing.assert_allclose(jax.vmap(logarithm)(jnp.asarray(x)), np.log(x), rtol=5e-16, atol=1e-300)
+    for compiled in (jax.vmap(logarithm), jax.jit(jax.vmap(logarithm))):
+        np.testing.assert_allclose(compiled(jnp.asarray(x)), np.log(x), rtol=6e-16, atol=1e-300)
     single = jnp.asarray(x[:20_000] ** 0.1, dtype=jnp.float32)
     np.testing.assert_allclose(jax.vmap(logarithm)(single), np.log(np.asarray(single)), rtol=1e-6, atol=1e-6)
+
+
+def test_exponential_is_that_of_numpy(rng):
+    x = np.concatenate(
+        [rng.uniform(-700.0, 700.0, 20_000), rng.uniform(-1e-3, 1e-3, 1000), np.log(2.0) * np.arange(-9, 10)]
+    )
+    for compiled in (jax.vmap(exponential), jax.jit(jax.vmap(exponential))):  # compilers may reorder sums
+        np.testing.assert_allclose(compiled(jnp.asarray(x)), np.exp(x), rtol=6e-16)
+    single = jnp.asarray(x[:20_000] * 0.1, dtype=jnp.float32)
+    np.testing.assert_allclose(jax.vmap(exponential)(single), np.exp(np.asarray(single)), rtol=2e-6)
 
 
 def test_power_is_that_of_numpy(rng):
@@ -43,6 +54,7 @@ def test_reciprocal_root_is_that_of_numpy_whatever_the_processor(rng, monkeypatc
 
 def test_derivatives_in_both_modes_to_second_order():
     for mode in (jax.jacfwd, jax.jacrev):
+        assert float(mode(mode(exponential))(jnp.asarray(0.3))) == pytest.approx(np.exp(0.3), rel=1e-15)
         assert float(mode(logarithm)(jnp.asarray(0.3))) == pytest.approx(1.0 / 0.3, rel=1e-15)
         assert float(mode(mode(logarithm))(jnp.asarray(0.3))) == pytest.approx(-1.0 / 0.09, rel=1e-14)
         slope = mode(power, argnums=(0, 1))(jnp.asarray(0.3), jnp.asarray(1.7))

@@ -84,7 +84,13 @@ def series_step(
     """
 
     def stage(
-        stroke: ScalarLike, free: Scalar, begun: Deflections, inner_stroke: Scalar, state: State, guess: Scalar
+        stroke: ScalarLike,
+        free: Scalar,
+        begun: Deflections,
+        inner_stroke: Scalar,
+        state: State,
+        guess: Scalar,
+        likely: int,
     ) -> tuple[Scalar, Deflections, State]:
         def law_states(w: Scalar) -> State:
             return law.advance(inner_stroke, w, stroke - free + duration * w, w, state, duration)
@@ -98,18 +104,20 @@ def series_step(
 
         at_rest = jnp.abs(law.force(stroke - free, jnp.zeros_like(free), law_states(jnp.zeros_like(free))))
         limit = (jnp.abs(free) + springs.reach(at_rest, begun)) / duration + jnp.finfo(free.dtype).tiny
-        w = increasing_root(surplus, jnp.clip(guess, -limit, limit), -limit, limit)
+        w = increasing_root(surplus, jnp.clip(guess, -limit, limit), -limit, limit, likely=likely)
         return w, deflections(w), law_states(w)
 
     duration = GAMMA * dt
     total = sum(own[1:], own[0])
-    moved_first = duration * (v0 + GAMMA * (v1 - v0))
-    moved = 0.5 * dt * (v0 + v1)
+    v0, gained = jnp.asarray(v0, total.dtype), jnp.asarray(v1 - v0, total.dtype)
+    moved_first = duration * (v0 + GAMMA * gained)
+    moved = dt * (v0 + 0.5 * gained)
     stroke = x0 - total
-    w1, first, _ = stage(x0 + moved_first, total + moved_first, own, stroke, inner, jnp.asarray(v0, total.dtype))
+    w1, first, _ = stage(x0 + moved_first, total + moved_first, own, stroke, inner, v0, likely=3)
     second = (1.0 - GAMMA) * dt  # taken at the rates of the first stage, the rest at those of the second
     begun = tuple(old + (second / duration) * (new - old) for old, new in zip(own, first, strict=True))
     stroke_second = stroke + second * w1
     inner = law.advance(stroke, w1, stroke_second, w1, inner, second)
-    _, after, inner = stage(x0 + moved, total + moved - second * w1, begun, stroke_second, inner, w1)
+    ahead = w1 + (1.0 - GAMMA) * gained
+    _, after, inner = stage(x0 + moved, total + moved - second * w1, begun, stroke_second, inner, ahead, likely=2)
     return jnp.concatenate([jnp.stack(after), inner])

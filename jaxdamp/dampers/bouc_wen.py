@@ -21,19 +21,19 @@ def hysteresis_rate(travel_rate: ScalarLike, z: ScalarLike, shape: ScalarLike, e
     return travel_rate * (1.0 - (1.0 - shape) * size * flat) - shape * jnp.abs(travel_rate) * z * flat
 
 
-def _room(size: ScalarLike, exponent: ScalarLike) -> Scalar:
-    """1 − sizeⁿ for size from 0 to 1; it stays above zero, so that quotients of it are finite."""
-    return 1.0 - power(_below_one(size), exponent)
-
-
 def _below_one(size: ScalarLike) -> Scalar:
     return jnp.minimum(size, 1.0 - 8.0 * jnp.finfo(jnp.result_type(size)).eps)
 
 
-def _rate_factor(size: ScalarLike, room: ScalarLike) -> Scalar:
+def _to_the(exponent: ScalarLike, size: ScalarLike) -> Scalar:
+    """sizeⁿ for size from 0 to 1; it stays below one, so that quotients of 1 − sizeⁿ are finite."""
+    return power(_below_one(size), exponent)
+
+
+def _rate_factor(size: ScalarLike, to_the_n: ScalarLike) -> Scalar:
     """(1 − wⁿ)/(1 − w²), n/2 at w = 1."""
     inside = _below_one(size)
-    return room / ((1.0 - inside) * (1.0 + inside))
+    return (1.0 - to_the_n) / ((1.0 - inside) * (1.0 + inside))
 
 
 def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, exponent: ScalarLike) -> Scalar:
@@ -43,32 +43,35 @@ def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, expone
     first is never stiff and takes a midpoint step. The second is carried on by w ← (w + t)/(1 + w t), t = tanh(r u),
     r = (1 − wⁿ)/(1 − w²) at midway: exact for n = 2, and w tends to 1 without passing it however long the travel. To
     midway s/√(1 + s²) stands for tanh s, which costs less and has the same first two orders.
+
+    Powers cost most: midway of what unloads altogether, |w|/2, needs none of its own, so that there are two in all.
     """
     way = direction(travel)
-    u, w = way * travel, way * z
-    curve = 2.0 * shape - 1.0
-    room = _room(jnp.abs(z), exponent)
+    u, w, curve = way * travel, way * z, 2.0 * shape - 1.0
+    begin = _to_the(exponent, jnp.abs(z))
+    held, loaded = jnp.maximum(-w, 0.0), jnp.maximum(w, 0.0)
 
-    held = jnp.maximum(-w, 0.0)  # still to be unloaded
-    steep = 1.0 + curve * jnp.where(w < 0, 1.0 - room, 0.0)
-    midway = jnp.maximum(held - 0.5 * u * steep, 0.5 * held)
-    steep = 1.0 + curve * jnp.where(midway > 0, 1.0 - _room(midway, exponent), 0.0)
+    unloading = held - 0.5 * u * (1.0 + curve * begin)
+    stays = unloading > 0.5 * held  # held by a lesser force at the end of the travel; else it loads the other way
+    steep = 1.0 + curve * jnp.where(w < 0, begin * power(0.5, exponent), 0.0)
     left = jnp.maximum(u - held / steep, 0.0)
-
-    w = jnp.maximum(w, 0.0)
-    half = 0.5 * left * _rate_factor(w, jnp.where(w > 0, room, 1.0))
+    half = 0.5 * left * _rate_factor(loaded, jnp.where(w > 0, begin, 0.0))
     t = half * reciprocal_root(1.0 + half * half)
-    middle = (w + t) / (1.0 + w * t)
-    t = jnp.tanh(left * _rate_factor(middle, jnp.where(middle > 0, _room(middle, exponent), 1.0)))
-    return way * ((w + t) / (1.0 + w * t) - jnp.maximum(held - u * steep, 0.0))
+    loading = (loaded + t) / (1.0 + loaded * t)
+
+    midway = _to_the(exponent, jnp.where(stays, unloading, loading))
+    steep = jnp.where(stays, 1.0 + curve * midway, steep)
+    left = jnp.maximum(u - held / steep, 0.0)
+    t = jnp.tanh(left * jnp.where(stays, 1.0, _rate_factor(loading, midway)))
+    return way * ((loaded + t) / (1.0 + loaded * t) - jnp.maximum(held - u * steep, 0.0))
 
 
 def hysteresis_estimate(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, exponent: ScalarLike) -> Scalar:
     """The state after a travel by Heun's step kept between −1 and 1, half as dear: what a predictor needs."""
 
     def moved(z: ScalarLike) -> Scalar:
-        room = _room(jnp.abs(z), exponent)
-        return travel * jnp.where(travel * z > 0, room, 1.0 + (2.0 * shape - 1.0) * (1.0 - room))
+        to_the_n = _to_the(exponent, jnp.abs(z))
+        return travel * jnp.where(travel * z > 0, 1.0 - to_the_n, 1.0 + (2.0 * shape - 1.0) * to_the_n)
 
     first = moved(z)
     second = moved(jnp.clip(z + first, -1.0, 1.0))

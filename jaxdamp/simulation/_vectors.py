@@ -8,6 +8,7 @@ import operator
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -57,6 +58,23 @@ def once(vector: Vector, unit: Scalar | None) -> Vector:
     value the compiler must not know. That doubles the rate of many cars side by side; one car does better without.
     """
     return tuple(entry / unit for entry in vector) if unit is not None else vector
+
+
+def once_in_derivatives(vector: Vector, unit: Scalar | None) -> Vector:
+    """The same, its tangents and cotangents to be computed once: many cars then go back half as long again as fast."""
+    return tuple(_divided_in_derivatives(entry, unit) for entry in vector) if unit is not None else vector
+
+
+@jax.custom_jvp
+def _divided_in_derivatives(entry: Scalar, unit: Scalar) -> Scalar:
+    del unit
+    return entry
+
+
+@_divided_in_derivatives.defjvp
+def _divide(primals: tuple[Scalar, Scalar], tangents: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+    (entry, unit), (change, _) = primals, tangents
+    return entry, change / unit
 
 
 def between(one: Vector, other: Vector, share: ScalarLike) -> Vector:

@@ -16,7 +16,18 @@ from jax.ad_checkpoint import checkpoint_name
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
-from jaxdamp.simulation._vectors import Matrix, Vector, between, minus, once, plus, rows, scalars, times
+from jaxdamp.simulation._vectors import (
+    Matrix,
+    Vector,
+    between,
+    minus,
+    once,
+    once_in_derivatives,
+    plus,
+    rows,
+    scalars,
+    times,
+)
 from jaxdamp.simulation.propagator import Propagator
 from jaxdamp.vehicles import AbstractVehicle, Ports
 from jaxdamp.vehicles.ports import Earlier, States
@@ -99,13 +110,17 @@ class Stepper(eqx.Module):
         driven = plus(times(self.road_held, begin.height), times(self.road_ramp, rise), times(self.phi, now.motion))
         driven = plus(driven, times(self.earlier_input, now.earlier_force))
         ahead = plus(driven, times(self.force_input, now.force))  # last, as this force is known last
-        old, new = self.at_ports(now.motion, begin), self.at_ports(ahead, end)
+        old, new = self.at_ports(now.motion, begin), self._reached(ahead, end)
         predicted = ports.force(*new, ports.predict(*old, *new, now.states, now.earlier, self.dt))
         missed = once(plus(minus(predicted, now.force), minus(now.earlier_force, now.force)), self.unit)
         motion = plus(ahead, times(self.correction, missed))
-        new = self.at_ports(motion, end)
+        new = self._reached(motion, end)
         states = ports.advance(*old, *new, now.states, self.dt)
         return Now(motion, states, ports.force(*new, states), now.force, ports.next_earlier(now.states, now.earlier))
+
+    def _reached(self, x: Vector, ground: Ground) -> tuple[Vector, Vector]:
+        deflection, rate = self.at_ports(x, ground)
+        return once_in_derivatives(deflection, self.unit), once_in_derivatives(rate, self.unit)
 
     def over(self, now: Now, begin: Ground, end: Ground, substeps: int) -> Now:
         """So many equal steps later, over which the road is straight."""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, final
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.extend.core import ClosedJaxpr, Jaxpr, Literal
+from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal
 from jaxtyping import Array
 
 from jaxdamp import _checks
@@ -101,7 +101,9 @@ def trace(function: Callable[[dict[str, Array]], Any], axes: list[str], gradient
     shapes = {name: shapes[name] for name in order}
     smooth = [name for name, s in shapes.items() if s.shape == () and jnp.issubdtype(s.dtype, jnp.floating)]
     slopes = {name: f"d_{name}" for name in smooth} if gradients else {}
-    mode = None if not gradients else choose_mode(len(axes)) if gradients is True else gradients
+    mode = None if not gradients else gradients if gradients is not True else choose_mode(len(axes), len(slopes))
+    if gradients is True and mode == "reverse" and _loops_without_end(jaxpr):
+        mode = "forward"
     results = {name: jax.ShapeDtypeStruct(s.shape, _stored(s.dtype)) for name, s in shapes.items()}
     for name, slope in slopes.items():
         if slope in results or slope in axes:
@@ -165,6 +167,13 @@ def _warn_of_unused(jaxpr: Jaxpr, axes: list[str]) -> None:
         warnings.warn(message, stacklevel=4)
 
 
+def _loops_without_end(jaxpr: ClosedJaxpr | Jaxpr) -> bool:
+    """Whether it has `while` loops, which cannot be differentiated in reverse unless a rule of their own says how."""
+    plain = jaxpr.jaxpr if isinstance(jaxpr, ClosedJaxpr) else jaxpr
+    eqns = [eqn for eqn in plain.eqns if not eqn.primitive.name.startswith("custom_")]
+    return any(eqn.primitive.name == "while" or any(map(_loops_without_end, _inside(eqn))) for eqn in eqns)
+
+
 def _fingerprint(jaxpr: ClosedJaxpr, arrays: list[Any]) -> str:
     """A hash of what the function computes, which is the same in every process."""
     digest = hashlib.sha256(re.sub(r"0x[0-9a-f]+", "", str(jaxpr)).encode())
@@ -183,7 +192,12 @@ def _constants(jaxpr: ClosedJaxpr | Jaxpr) -> Iterator[Any]:
         jaxpr = jaxpr.jaxpr
     for eqn in jaxpr.eqns:
         yield from (v.val for v in eqn.invars if isinstance(v, Literal))
-        for value in eqn.params.values():
-            for inner in value if isinstance(value, tuple | list) else (value,):
-                if isinstance(inner, ClosedJaxpr | Jaxpr):
-                    yield from _constants(inner)
+        for inner in _inside(eqn):
+            yield from _constants(inner)
+
+
+def _inside(eqn: JaxprEqn) -> Iterator[ClosedJaxpr | Jaxpr]:
+    """The programs that an operation calls."""
+    for value in eqn.params.values():
+        values = value if isinstance(value, tuple | list) else (value,)
+        yield from (inner for inner in values if isinstance(inner, ClosedJaxpr | Jaxpr))

@@ -5,7 +5,8 @@ import pytest
 import xarray
 
 import jaxdamp
-from jaxdamp._jacobian import FORWARD_UP_TO, choose_mode, value_and_jacobian
+from jaxdamp._jacobian import choose_mode, value_and_jacobian
+from jaxdamp.sweeps.tracing import trace
 
 from .cases import AXES, decay
 
@@ -72,5 +73,18 @@ def test_the_function_is_computed_once_for_all_tangents():
     assert [eqn.outvars[0].aval.shape for eqn in exponentials] == [(32,)]
 
 
-def test_mode_by_the_number_of_inputs():
-    assert choose_mode(FORWARD_UP_TO) == "forward" and choose_mode(FORWARD_UP_TO + 1) == "reverse"
+def test_mode_by_the_number_of_inputs_and_results():
+    assert choose_mode(2, 1) == choose_mode(12, 6) == "forward" and choose_mode(3, 1) == choose_mode(13, 6) == "reverse"
+
+
+@pytest.mark.parametrize(("steps", "mode"), [(lambda a: 3, "reverse"), (lambda a: jnp.int32(a) + 3, "forward")])
+def test_loops_of_unknown_length_are_differentiated_forward(steps, mode):
+    """A loop whose length depends on the point has no reverse derivative."""
+
+    def function(p):
+        total = p["a"] + 2.0 * p["b"] + 3.0 * p["c"]
+        return {"y": jax.lax.fori_loop(0, steps(p["a"]), lambda _, y: 2.0 * y, total)}
+
+    assert trace(function, ["a", "b", "c"], True).mode == mode
+    data = jaxdamp.sweep(function, {"a": [0.5], "b": [0.1], "c": [0.2]}, gradients=True)
+    np.testing.assert_allclose(data["d_y"].values.ravel(), [8.0, 16.0, 24.0], rtol=1e-14)

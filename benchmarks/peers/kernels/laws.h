@@ -124,7 +124,7 @@ static inline double series_spring_advance(LAW_ARGUMENTS, double v0, double dt, 
     return series_spring_stage(p, i, s + 0.5 * dt * (v0 + v) - spent, h, &memory[LANES]);
 }
 
-/* Bouc-Wen: c0, k0, F_y, 1/x_y, shape, exponent. The state is z. */
+/* Bouc-Wen: c0, k0, F_y, 1/x_y, shape, exponent; then a half to the exponent. The state is z. */
 
 #define bouc_wen_PARAMETERS 6
 #define bouc_wen_SMOOTH 0
@@ -133,6 +133,7 @@ static inline void bouc_wen_prepare(const double *from, Row *p, int i, double dt
     for (int k = 0; k < 6; k++)
         p[k][i] = from[k];
     p[3][i] = 1.0 / from[3];
+    p[6][i] = pow(0.5, from[5]);
 }
 
 static inline double power(double size, double exponent)
@@ -161,23 +162,25 @@ static inline double loading_factor(double w, double to_the_n)
 }
 
 /* One step along the net travel u: unloading by the midpoint rule, loading by w <- (w + t)/(1 + w t), which cannot pass
-   one, with t = tanh(r u), to midway something like it. The power of the old state serves either way. */
+   one, with t = tanh(r u), to midway something like it. The power of the old state serves either way, and that of half
+   of it, where all of it unloads. */
 static inline double bouc_wen_advance(LAW_ARGUMENTS, double v0, double dt, double *memory)
 {
     double travel = 0.5 * dt * (v0 + v) * p[3][i], n = p[5][i], beyond = 2.0 * p[4][i] - 1.0;
     double way = travel >= 0.0 ? 1.0 : -1.0, u = way * travel, w = way * s;
-    double old = power(below_one(fabs(s)), n), held = w < 0.0 ? -w : 0.0;
-    double steep = 1.0 + (w < 0.0 ? beyond * old : 0.0);
-    double midway = fmax(held - 0.5 * u * steep, 0.5 * held);
-    steep = 1.0 + (midway > 0.0 ? beyond * power(below_one(midway), n) : 0.0);
+    double begin = power(below_one(fabs(s)), n), held = w < 0.0 ? -w : 0.0, loaded = w > 0.0 ? w : 0.0;
+    double unloading = held - 0.5 * u * (1.0 + beyond * begin);
+    int stays = unloading > 0.5 * held;
+    double steep = 1.0 + beyond * (w < 0.0 ? begin * p[6][i] : 0.0);
     double left = fmax(u - held / steep, 0.0);
-    double half = 0.5 * left * loading_factor(w > 0.0 ? w : 0.0, w > 0.0 ? old : 0.0);
-    w = w > 0.0 ? w : 0.0;
-    double t = half / sqrt(1.0 + half * half);
-    double middle = (w + t) / (1.0 + w * t);
-    double stretch = left * loading_factor(middle, middle > 0.0 ? power(below_one(middle), n) : 0.0);
+    double half = 0.5 * left * loading_factor(loaded, w > 0.0 ? begin : 0.0), t = half / sqrt(1.0 + half * half);
+    double loading = (loaded + t) / (1.0 + loaded * t);
+    double midway = power(below_one(stays ? unloading : loading), n);
+    steep = stays ? 1.0 + beyond * midway : steep;
+    left = fmax(u - held / steep, 0.0);
+    double stretch = left * (stays ? 1.0 : loading_factor(loading, midway));
     double e = exp(fmin(2.0 * stretch, 600.0)), up = e + 1.0, down = e - 1.0;
-    return way * ((w * up + down) / (up + w * down) - fmax(held - u * steep, 0.0));
+    return way * ((loaded * up + down) / (up + loaded * down) - fmax(held - u * steep, 0.0));
 }
 
 /* Heun's step, kept between -1 and 1, half as dear. */
