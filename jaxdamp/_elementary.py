@@ -12,9 +12,12 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
-from jaxdamp._types import Scalar, ScalarLike
+from jaxdamp._types import ScalarLike
 
+
+Numbers = Float[Array, "..."]
 
 _MANTISSA_BITS = 52
 _ONE, _SQUARE_ROOT_OF_HALF = np.array([1.0, math.sqrt(0.5)]).view(np.int64)
@@ -23,14 +26,13 @@ _WHOLE = 1.5 * 2.0**52  # added to a whole number, it leaves it in the last bits
 _LN2, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10  # their sum; whole multiples of the first are exact
 
 
-def power(base: ScalarLike, exponent: ScalarLike) -> Scalar:
+def power(base: ScalarLike, exponent: ScalarLike) -> Numbers:
     """baseⁿ for base ≥ 0, with finite derivatives at zero."""
-    base = jnp.asarray(base)
-    return exponential(exponent * logarithm(jnp.maximum(base, 1e-30)))
+    return exponential(exponent * logarithm(jnp.maximum(jnp.asarray(base), 1e-30)))
 
 
 @jax.custom_jvp
-def exponential(x: Scalar) -> Scalar:
+def exponential(x: Numbers) -> Numbers:
     """eˣ to a few roundings, from e⁻⁷⁰⁰ to e⁷⁰⁰: 2ᵏ eʳ, |r| ≤ ½ ln 2."""
     if x.dtype != jnp.float64:
         return jnp.exp(x)
@@ -46,13 +48,13 @@ def exponential(x: Scalar) -> Scalar:
 
 
 @exponential.defjvp
-def _exponential_slope(primals: tuple[Scalar], tangents: tuple[Scalar]) -> tuple[Scalar, Scalar]:
+def _exponential_slope(primals: tuple[Numbers], tangents: tuple[Numbers]) -> tuple[Numbers, Numbers]:
     y = exponential(primals[0])
     return y, y * tangents[0]
 
 
 @jax.custom_jvp
-def logarithm(x: Scalar) -> Scalar:
+def logarithm(x: Numbers) -> Numbers:
     """Ln x of positive normal numbers, to a few roundings: k ln 2 + 2 artanh((m − 1)/(m + 1)), x = 2ᵏ m, ½ ≤ m² < 2."""
     if x.dtype != jnp.float64:
         return jnp.log(x)
@@ -67,19 +69,19 @@ def logarithm(x: Scalar) -> Scalar:
 
 
 @logarithm.defjvp
-def _logarithm_slope(primals: tuple[Scalar], tangents: tuple[Scalar]) -> tuple[Scalar, Scalar]:
+def _logarithm_slope(primals: tuple[Numbers], tangents: tuple[Numbers]) -> tuple[Numbers, Numbers]:
     (x,), (change,) = primals, tangents
     return logarithm(x), change / x
 
 
 @jax.custom_jvp
-def reciprocal_root(x: Scalar) -> Scalar:
+def reciprocal_root(x: Numbers) -> Numbers:
     """1/√x of positive numbers; its derivative, −½ x^(−3/2), takes neither a root nor a quotient."""
     return jax.lax.rsqrt(x) if _has_reciprocal_roots() else jnp.sqrt(x) / x
 
 
 @reciprocal_root.defjvp
-def _reciprocal_root_slope(primals: tuple[Scalar], tangents: tuple[Scalar]) -> tuple[Scalar, Scalar]:
+def _reciprocal_root_slope(primals: tuple[Numbers], tangents: tuple[Numbers]) -> tuple[Numbers, Numbers]:
     (x,), (change,) = primals, tangents
     root = reciprocal_root(x)
     return root, (-0.5 * root * root * root) * change

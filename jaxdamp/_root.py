@@ -11,24 +11,22 @@ from jaxdamp._types import Scalar
 from jaxdamp.configuration import fuses_loops
 
 
-_CLOSE = 1e-4  # relative movement of a Newton step after which what is left is about its square
-
-
 def increasing_root(
     function: Callable[[Scalar], Scalar],
     guess: Scalar,
     lower: Scalar,
     upper: Scalar,
     steps: int = 12,
-    likely: int = 3,
+    likely: int = 0,
+    close: float = 1e-7,
 ) -> Scalar:
     """Solve function(w) = 0 by Newton steps kept inside a shrinking bracket.
 
-    Newton lands exactly on piecewise-linear functions and converges quadratically on smooth ones. The likely steps are
-    taken as they are. Where the last of them moves any lane of a batch by more than 1e-4 of itself, safe ones follow
-    until none does, so that the error is about 1e-8: where Newton would leave the bracket, or has not halved the
-    residual in two steps (as when it cycles about a kink), they take the middle of the bracket. A dozen reach rounding
-    for power laws, friction and kinked laws in series with springs of 1e5 to 1.5e7 N/m at 1 ms, from any guess.
+    Newton lands exactly on piecewise-linear functions and converges quadratically on smooth ones. Steps that are likely
+    to do are taken as they are. Where the last of them moves any lane of a batch too far, safe ones follow: where it
+    would leave the bracket, or has not halved the residual in two steps (as when it cycles about a kink), they take the
+    middle of the bracket. A dozen reach rounding for power laws, friction and kinked laws in series with springs of 1e5
+    to 1.5e7 N/m at 1 ms, from any guess.
     Derivatives, forward and reverse, come from the implicit function theorem and do not pass through the steps.
 
     Arguments:
@@ -37,7 +35,8 @@ def increasing_root(
         lower: where the function is not positive.
         upper: where the function is not negative.
         steps: number of safe steps, at most.
-        likely: number of Newton steps that the guess is likely to need.
+        likely: number of plain Newton steps that a good guess is likely to need; none to be safe from the first.
+        close: relative length of a step that is the last: what is left is about its square.
     """
 
     def solve(f: Callable[[Scalar], Scalar], w: Scalar) -> Scalar:
@@ -62,7 +61,7 @@ def increasing_root(
         near = 1e-16 * (high - low)
 
         def moved(old: Scalar, new: Scalar) -> Bool[Array, ""]:
-            return jnp.abs(new - old) > _CLOSE * jnp.abs(new) + near
+            return jnp.abs(new - old) > close * jnp.abs(new) + near
 
         def going(now: tuple[Any, ...]) -> Bool[Array, ""]:
             count, still_moving, _ = now
@@ -73,10 +72,11 @@ def increasing_root(
             after = narrow(state)
             return count + 1, moved(state[0], after[0]), after
 
-        before = w
-        for _ in range(likely if fuses_loops() else 1):  # written out they are fast, but take longer to compile
+        start = jnp.ones_like(w, bool)
+        for _ in range(likely if fuses_loops() else 0):  # written out they are fast, but take longer to compile
             before, w = w, jnp.clip(newton(w)[2], low, high)
-        return jax.lax.while_loop(going, again, (0, moved(before, w), (w, low, high, never, never)))[2][0]
+            start = moved(before, w)
+        return jax.lax.while_loop(going, again, (0, start, (w, low, high, never, never)))[2][0]
 
     def tangent_solve(linear: Callable[[Scalar], Scalar], value: Scalar) -> Scalar:
         return value * (1.0 / linear(jnp.ones_like(value)))  # no quotient for each of many tangents

@@ -104,7 +104,7 @@ def series_step(
 
         at_rest = jnp.abs(law.force(stroke - free, jnp.zeros_like(free), law_states(jnp.zeros_like(free))))
         limit = (jnp.abs(free) + springs.reach(at_rest, begun)) / duration + jnp.finfo(free.dtype).tiny
-        w = increasing_root(surplus, jnp.clip(guess, -limit, limit), -limit, limit, likely=likely)
+        w = increasing_root(surplus, jnp.clip(guess, -limit, limit), -limit, limit, likely=likely, close=1e-4)
         return w, deflections(w), law_states(w)
 
     duration = GAMMA * dt

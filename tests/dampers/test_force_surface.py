@@ -139,6 +139,7 @@ def test_outside_is_refused_at_once_where_known_and_nan_in_compiled_code(x, v):
     assert np.all(np.isfinite(forces(law, [STROKE[0], STROKE[1]], [VELOCITY[0], VELOCITY[1]])))
 
 
+@pytest.mark.slow
 def test_everything_that_runs_it_refuses_in_words():
     law, t = surface(), np.arange(500) / 500
     with pytest.raises(ValueError, match="`law` must give a finite force over the whole motion.* samples. " + COVERED):

@@ -14,6 +14,7 @@ from .motions import last_cycle
 from .single_precision import single_precision_error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("voltage", [0.0, 2.25])
 def test_printed_equations_with_the_prototype(voltage):
     """States y and z [m], all numbers as published."""
@@ -77,5 +78,6 @@ def test_stable_at_a_step_far_too_long():
     assert np.all(np.abs(force) < 1.2 * bound)
 
 
+@pytest.mark.slow
 def test_single_precision():
     assert single_precision_error(lambda: ModifiedBoucWen.prototype(1.5)) < 1e-3

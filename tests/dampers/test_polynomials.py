@@ -42,6 +42,7 @@ def segment_of(v):
     return int(np.searchsorted([-0.6, -0.15, 0.0, 0.2], v))
 
 
+@pytest.mark.slow
 def test_the_21_coefficients_of_the_paper(rng):
     for _ in range(3):
         law = random_law(rng)

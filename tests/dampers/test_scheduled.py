@@ -96,6 +96,7 @@ def runs():
     return BenchSet(found)
 
 
+@pytest.mark.slow
 def test_records_at_several_commands_are_one_law(runs):
     start = Lag(Scheduled((Bilinear(1000.0, 1000.0), Bilinear(2000.0, 2000.0)), [0.0, 1.0], 0.0), 0.002)
     result = identify.fit(start, runs)

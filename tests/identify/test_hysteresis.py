@@ -25,6 +25,7 @@ def check_car(result, car):
     assert len(result.warnings) == 1
 
 
+@pytest.mark.slow
 def test_thirty_records_give_the_car_damper_back(car, car_runs):
     starts = {
         "data": default_ladder(car_runs, ["besinger_series_spring"])["besinger_series_spring"],
@@ -89,6 +90,7 @@ def test_slow_records_are_averaged_and_predicted_at_every_sample(maxwell_runs):
     assert np.max(np.abs(force - fine.force)) < 2e-3 * np.max(fine.force)
 
 
+@pytest.mark.slow
 def test_measured_damper(mr_runs):
     """The plain laws leave the hysteresis, a lag or a series spring takes most of it."""
     ladder = default_ladder(mr_runs, ["linear", "linear_friction", "linear_friction_lag"])

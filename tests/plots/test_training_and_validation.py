@@ -8,6 +8,7 @@ from jaxdamp.bench import BenchSet
 from jaxdamp.dampers import BoucWen, Lag, Linear, PiecewiseLinear, SeriesSpring
 
 
+@pytest.mark.slow
 def test_training_history(runs: BenchSet) -> None:
     result = identify.train(Lag(Linear(1500.0), 0.002), runs[0], held_out=runs[1], steps=50)
     (axes,) = result.plot().axes
@@ -18,6 +19,7 @@ def test_training_history(runs: BenchSet) -> None:
     assert axes.get_title(loc="left") == "after all 50 steps"
 
 
+@pytest.mark.slow
 def test_cross_validation(runs: BenchSet) -> None:
     laws = {"linear": Linear, "slopes": PiecewiseLinear}
     result = identify.cross_validate(laws, runs[:4], by=lambda run: "slow" if run.frequency < 2.5 else "fast")

@@ -144,6 +144,7 @@ def test_derivative_of_a_linear_car_is_that_of_the_closed_form():
     assert float(jax.jit(jax.jacfwd(level))(2500.0)) == pytest.approx(float(slope), rel=1e-10)
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_run():
     ride = Ride(quarter_car_000(BESINGER), ROUGH, duration=1.0, metrics=["rms_sprung_acceleration"])
 

@@ -16,6 +16,8 @@ from .fleet import bumps, tracks, vehicles
 FLEET = vehicles()
 GRAVITY = 9.80665
 IN_OTHERS = ("quarter car", "half car", "roll car", "golden car")  # a part of others: not driven here
+LONG = ("full car", "walking beam", "independent tandem with cab")  # to compile
+DRIVEN = [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in FLEET if name not in IN_OTHERS]
 
 
 class Ride(NamedTuple):
@@ -34,7 +36,7 @@ def said(run):
     return run.channels, run.metrics(), run.energy_balance(), run.absorbed_by()
 
 
-@pytest.fixture(scope="module", params=[name for name in FLEET if name not in IN_OTHERS])
+@pytest.fixture(scope="module", params=DRIVEN)
 def driven(request):
     vehicle = FLEET[request.param]
     delays = np.asarray(vehicle.axle_positions)[np.array(vehicle.frame().axles)] / 15.0

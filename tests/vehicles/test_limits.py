@@ -28,6 +28,7 @@ def full(front, rear, anti_roll, pitch_inertia, roll_inertia=MASS * WIDTH**2 / 4
     return FullCar(MASS, pitch_inertia, roll_inertia, AHEAD, BEHIND, *axles)
 
 
+@pytest.mark.slow
 def test_four_quarter_cars():
     """J_θ = m l_a l_b and J_φ = m (w/2)², no bars: the corners do not know of each other.
 
@@ -42,6 +43,7 @@ def test_four_quarter_cars():
         compare(response, name, simulate(alone, tracks(heights[:, i : i + 1])))
 
 
+@pytest.mark.slow
 def test_two_half_cars():
     """The same road on both sides, axles that differ: each side is half of the car."""
     car = full(CORNER, OTHER, 9e3, 1500.0)

@@ -98,6 +98,7 @@ def test_two_tracks_apart_roll_the_car_and_one_track_does_not():
 PARAMETERS = ["front.spring_rate", "front_distance", "pitch_inertia", "rear.damper.rate", "sprung_mass"]
 
 
+@pytest.mark.slow
 def test_gradients_of_the_stationary_response_agree_with_differences():
     """With an axle delay, in geometry, masses, springs, dampers and speed."""
     car = half_car_002()

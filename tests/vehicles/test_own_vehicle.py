@@ -107,6 +107,7 @@ def test_tracks_of_the_axles_go_under_both_sides():
     assert float(tilted["roll"][160]) > 0  # left side up
 
 
+@pytest.mark.slow
 def test_gradients_of_ridden_metrics_agree_with_differences():
     """In geometry, mass and damper of a half car on a bump with delay, forward and in reverse."""
     names = ["front_distance", "sprung_mass", "rear.damper.rate"]

@@ -17,6 +17,7 @@ def test_weighted_rms_on_a_white_road_is_the_integral_over_frequency():
     assert float(found) ** 2 == pytest.approx(np.trapezoid(density, f), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_every_channel_keeps_its_own_weighting_with_the_delay_of_the_axle():
     car = half_car_002()
     pairs = [("pitch_acceleration", "We"), ("sprung_acceleration", "Wk")]
