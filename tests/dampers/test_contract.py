@@ -168,7 +168,7 @@ LAWS = {
     ),
 }
 
-# Further examples of a kind that is held to the contract anyway, and those that compile for long, run with the slow tests.
+# These run with the slow tests: further examples of a kind that is held to the contract anyway; what compiles for long.
 FURTHER = {
     "Besinger, narrow",
     "series spring, stiff",
