@@ -23,7 +23,7 @@ from jaxdamp.vehicles import AbstractVehicle, RideMetric
 
 
 Carry: TypeAlias = tuple[Now, Gathered, Ground, tuple[Array, Array]]
-FEW_STATES = 4  # up to which one car is best written number by number
+FEW_STATES = 4  # up to which one car is best written number by number, if loops are fused
 BLOCK = 16_384  # instants, of which reverse derivatives keep what they need; longer runs are driven twice
 
 
@@ -106,7 +106,7 @@ class Ride(eqx.Module):
 def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     """The loop over time; of a long run reverse derivatives keep the beginnings of blocks only."""
     vehicle, heights, dt = replace(ride.vehicle, point), ride.heights, ride.dt
-    apart = ride.many or 2 * len(vehicle.coordinates) <= FEW_STATES
+    apart = ride.many or (fuses_loops() and 2 * len(vehicle.coordinates) <= FEW_STATES)
     stepper = Stepper(vehicle, jnp.asarray(dt / ride.substeps, dtype=float), apart=apart, many=ride.many)
     gauge = Gauge(vehicle, ride.metrics, dt, apart=apart)
     half_rate = jnp.asarray(0.5 / dt, dtype=heights.dtype)

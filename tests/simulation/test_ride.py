@@ -11,6 +11,7 @@ import scipy.linalg
 
 from jaxdamp import Ride, dampers, metrics, roads, simulate, vehicles
 from jaxdamp.metrics.weighting import discrete_weighting
+from jaxdamp.simulation import ride as riding
 from jaxdamp.simulation.gauge import Filter
 from jaxdamp.vehicles import Body, Frame, Link, LumpedVehicle, Wheel
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
@@ -107,6 +108,18 @@ def test_derivatives_forward_reverse_and_by_differences():
     np.testing.assert_allclose(forward, differences, rtol=1e-6)
     batch = jnp.stack([at, 1.1 * at])
     np.testing.assert_allclose(jax.jit(jax.vmap(jax.grad(level)))(batch)[0], reverse, rtol=1e-9)
+
+
+def test_a_run_of_several_blocks_is_the_same_run_and_has_the_same_derivatives(monkeypatch):
+    """Reverse derivatives of long runs drive each block again from its beginning; the last one is shorter."""
+    monkeypatch.setattr(riding, "BLOCK", 64)
+    car, metric = quarter_car_000(dampers.Lag(BESINGER, 0.004)), "rms_sprung_acceleration"
+    ride = Ride(car, ROUGH, duration=0.73, metrics=[metric])
+    level = lambda rate: ride({"damper.law.rebound_rate": rate})[metric]  # noqa: E731
+    expected = simulate(car, ROUGH, duration=0.73).metrics([metric])[metric]
+    assert float(level(4200.0)) == pytest.approx(float(expected), rel=1e-12)
+    forward, reverse = jax.jacfwd(level)(4200.0), jax.grad(level)(4200.0)
+    assert float(forward) == pytest.approx(float(reverse), rel=1e-10)
 
 
 def test_derivative_of_a_linear_car_is_that_of_the_closed_form():
