@@ -12,7 +12,7 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp._types import ScalarLike
 
@@ -74,16 +74,20 @@ def _logarithm_slope(primals: tuple[Numbers], tangents: tuple[Numbers]) -> tuple
     return logarithm(x), change / x
 
 
-@jax.custom_jvp
-def reciprocal_root(x: Numbers) -> Numbers:
+def reciprocal_root(x: Float[ArrayLike, "..."]) -> Numbers:
     """1/√x of positive numbers; its derivative, −½ x^(−3/2), takes neither a root nor a quotient."""
+    return _reciprocal_root(jnp.asarray(x))
+
+
+@jax.custom_jvp
+def _reciprocal_root(x: Numbers) -> Numbers:
     return jax.lax.rsqrt(x) if _has_reciprocal_roots() else jnp.sqrt(x) / x
 
 
-@reciprocal_root.defjvp
+@_reciprocal_root.defjvp
 def _reciprocal_root_slope(primals: tuple[Numbers], tangents: tuple[Numbers]) -> tuple[Numbers, Numbers]:
     (x,), (change,) = primals, tangents
-    root = reciprocal_root(x)
+    root = _reciprocal_root(x)
     return root, (-0.5 * root * root * root) * change
 
 

@@ -24,7 +24,7 @@ def _arctan(u: Numbers) -> Numbers:
 
 
 def _algebraic(u: Numbers) -> Numbers:
-    return u * reciprocal_root(jnp.asarray(1.0 + u * u))
+    return u * reciprocal_root(1.0 + u * u)
 
 
 @final

@@ -100,8 +100,8 @@ def simulate(
 
 def _strides(count: int, every: int, dt: float) -> None:
     """Whether so many steps are whole strides."""
-    if every < 1 or every != int(every):
-        _checks.refuse("every", "be a whole number of instants, 1 or more", every)
+    if not isinstance(every, int | np.integer) or every < 1:
+        _checks.refuse("every", "be a whole number of instants, 1 or more", repr(every))
     if count % every:
         remedy = f"Pass `duration={count // every * every * dt:g}` or `duration={-(-count // every) * every * dt:g}`."
         _checks.refuse("every", f"divide the {count} steps of the run", every, remedy)
