@@ -59,12 +59,17 @@ def library(lanes: int = 32) -> ctypes.CDLL:
         raise RuntimeError("gcc was not found: the peers in C cannot be compiled. Install gcc or leave them out.")
     source = Path(__file__).parent / "kernels" / "kernels.c"
     with tempfile.TemporaryDirectory() as folder:
-        built = Path(folder) / "kernels.so"
-        command = ["gcc", *FLAGS, f"-DLANES={lanes}", "-shared", "-fPIC", str(source), "-o", str(built), "-lm"]
-        done = subprocess.run(command, capture_output=True, text=True)
-        if done.returncode:
-            raise RuntimeError(f"gcc could not compile the peers in C:\n{done.stderr}")
-        return ctypes.CDLL(str(built))
+        compiled, built = str(Path(folder) / "kernels.o"), str(Path(folder) / "kernels.so")
+        # Linked without -ffast-math, which would make the whole process take the smallest numbers for zero.
+        _gcc(*FLAGS, f"-DLANES={lanes}", "-fPIC", "-c", str(source), "-o", compiled)
+        _gcc("-shared", "-fopenmp", compiled, "-o", built, "-lm")
+        return ctypes.CDLL(built)
+
+
+def _gcc(*arguments: str) -> None:
+    done = subprocess.run(["gcc", *arguments], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"gcc could not compile the peers in C:\n{done.stderr}")
 
 
 def rk4(

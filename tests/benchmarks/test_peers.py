@@ -71,6 +71,13 @@ def test_laws_of_a_table_have_a_leaf_for_each_column(case: str):
 
 
 @needs_gcc
+def test_the_compiled_library_leaves_the_smallest_numbers_alone():
+    """Linked with -ffast-math, it would flush them to zero in the whole process."""
+    c.library()
+    assert np.finfo(float).tiny / np.float64(4.0) > 0.0
+
+
+@needs_gcc
 @pytest.mark.parametrize("case", ALL)
 def test_exponential_step_in_c_is_that_of_jaxdamp(case: str):
     parameters, road = some(case, cars=2)
