@@ -1,4 +1,4 @@
-"""All benchmarks, one process after the other: `python -m benchmarks`. A quarter of an hour on two idle cores."""
+"""All benchmarks, one process after the other: `python -m benchmarks`. Half an hour on two cores."""
 
 import subprocess
 import sys
