@@ -55,7 +55,10 @@ def _exponential_slope(primals: tuple[Numbers], tangents: tuple[Numbers]) -> tup
 
 @jax.custom_jvp
 def logarithm(x: Numbers) -> Numbers:
-    """Ln x of positive normal numbers, to a few roundings: k ln 2 + 2 artanh((m − 1)/(m + 1)), x = 2ᵏ m, ½ ≤ m² < 2."""
+    """Natural logarithm of positive normal numbers, to a few roundings.
+
+    k ln 2 + 2 artanh((m − 1)/(m + 1)) with x = 2ᵏ m, ½ ≤ m² < 2.
+    """
     if x.dtype != jnp.float64:
         return jnp.log(x)
     bits = jax.lax.bitcast_convert_type(x, jnp.int64)

@@ -61,7 +61,7 @@ def once(vector: Vector, unit: Scalar | None) -> Vector:
 
 
 def once_in_derivatives(vector: Vector, unit: Scalar | None) -> Vector:
-    """The same, its tangents and cotangents to be computed once: many cars then go back half as long again as fast."""
+    """The same, its tangents and cotangents to be computed once: a quarter to a third less for many cars in reverse."""
     return tuple(_divided_in_derivatives(entry, unit) for entry in vector) if unit is not None else vector
 
 
