@@ -23,10 +23,10 @@ def increasing_root(
     """Solve function(w) = 0 by Newton steps kept inside a shrinking bracket.
 
     Newton lands exactly on piecewise-linear functions and converges quadratically on smooth ones. Steps that are likely
-    to do are taken as they are. Where the last of them moves any lane of a batch too far, safe ones follow: they take
-    the middle of the bracket where Newton would leave it, or has not halved the residual in two steps (as when it cycles
-    about a kink). With the default `close`, a dozen reach rounding for power laws, friction and kinked laws in series
-    with springs of 1e5 to 1.5e7 N/m at 1 ms, from any guess.
+    to do are taken as they are. Where the last of them moves any lane of a batch too far, safe ones follow, which take
+    the middle of the bracket where Newton would leave it, or has not halved the residual in two steps (as when it
+    cycles about a kink). With the default `close`, a dozen reach rounding for power laws, friction and kinked laws in
+    series with springs of 1e5 to 1.5e7 N/m at 1 ms, from any guess.
     Derivatives, forward and reverse, come from the implicit function theorem and do not pass through the steps.
 
     Arguments:
