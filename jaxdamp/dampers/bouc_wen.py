@@ -21,19 +21,11 @@ def hysteresis_rate(travel_rate: ScalarLike, z: ScalarLike, shape: ScalarLike, e
     return travel_rate * (1.0 - (1.0 - shape) * size * flat) - shape * jnp.abs(travel_rate) * z * flat
 
 
-def _below_one(size: ScalarLike) -> Scalar:
-    return jnp.minimum(size, 1.0 - 8.0 * jnp.finfo(jnp.result_type(size)).eps)
-
-
-def _to_the(exponent: ScalarLike, size: ScalarLike) -> Scalar:
-    """sizeⁿ for size from 0 to 1; it stays below one, so that quotients of 1 − sizeⁿ are finite."""
-    return power(_below_one(size), exponent)
-
-
-def _rate_factor(size: ScalarLike, to_the_n: ScalarLike) -> Scalar:
-    """(1 − wⁿ)/(1 − w²), n/2 at w = 1."""
-    inside = _below_one(size)
-    return (1.0 - to_the_n) / ((1.0 - inside) * (1.0 + inside))
+def _rate_factor(size: ScalarLike, to_the_n: ScalarLike, exponent: ScalarLike) -> Scalar:
+    """(1 − wⁿ)/(1 − w²), and n/2 next to w = 1, where a quotient of small differences has rounding for a slope."""
+    near = 8.0 * jnp.finfo(jnp.result_type(size)).eps ** 0.5
+    inside = jnp.minimum(size, 1.0 - near)
+    return jnp.maximum(1.0 - to_the_n, exponent * near) / ((1.0 - inside) * (1.0 + inside))
 
 
 def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, exponent: ScalarLike) -> Scalar:
@@ -48,21 +40,21 @@ def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, expone
     """
     way = direction(travel)
     u, w, curve = way * travel, way * z, 2.0 * shape - 1.0
-    begin = _to_the(exponent, jnp.abs(z))
+    begin = power(jnp.abs(z), exponent)
     held, loaded = jnp.maximum(-w, 0.0), jnp.maximum(w, 0.0)
 
     unloading = held - 0.5 * u * (1.0 + curve * begin)
     stays = unloading > 0.5 * held  # held by a lesser force at the end of the travel; else it loads the other way
     steep = 1.0 + curve * jnp.where(w < 0, begin * power(0.5, exponent), 0.0)
     left = jnp.maximum(u - held / steep, 0.0)
-    half = 0.5 * left * _rate_factor(loaded, jnp.where(w > 0, begin, 0.0))
+    half = 0.5 * left * _rate_factor(loaded, jnp.where(w > 0, begin, 0.0), exponent)
     t = half * reciprocal_root(1.0 + half * half)
     loading = (loaded + t) / (1.0 + loaded * t)
 
-    midway = _to_the(exponent, jnp.where(stays, unloading, loading))
+    midway = power(jnp.where(stays, unloading, loading), exponent)
     steep = jnp.where(stays, 1.0 + curve * midway, steep)
     left = jnp.maximum(u - held / steep, 0.0)
-    t = jnp.tanh(left * jnp.where(stays, 1.0, _rate_factor(loading, midway)))
+    t = jnp.tanh(left * jnp.where(stays, 1.0, _rate_factor(loading, midway, exponent)))
     return way * ((loaded + t) / (1.0 + loaded * t) - jnp.maximum(held - u * steep, 0.0))
 
 
@@ -70,7 +62,7 @@ def hysteresis_estimate(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, ex
     """The state after a travel by Heun's step kept between −1 and 1, half as dear: what a predictor needs."""
 
     def moved(z: ScalarLike) -> Scalar:
-        to_the_n = _to_the(exponent, jnp.abs(z))
+        to_the_n = power(jnp.abs(z), exponent)
         return travel * jnp.where(travel * z > 0, 1.0 - to_the_n, 1.0 + (2.0 * shape - 1.0) * to_the_n)
 
     first = moved(z)

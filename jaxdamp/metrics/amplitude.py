@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxdamp import _checks
+from jaxdamp._largest import largest
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.metrics._signals import as_signal, root
 
@@ -29,7 +30,7 @@ def rms(signal: SignalLike) -> Scalar:
 def peak(signal: SignalLike) -> Scalar:
     """Largest magnitude, max |x|, in the unit of the signal.
 
-    Only the sample that holds the peak has a gradient; it jumps where two samples compete, and ties share it equally.
+    Only the sample that holds the peak has a gradient, of equal ones the first; it jumps where two samples compete.
     Tune on `smooth_peak` instead.
 
     >>> import jax.numpy as jnp
@@ -42,7 +43,7 @@ def peak(signal: SignalLike) -> Scalar:
     Raises:
         ValueError: If the signal is empty or has more than one axis.
     """
-    return jnp.max(jnp.abs(as_signal("signal", signal)))
+    return largest(jnp.abs(as_signal("signal", signal)))
 
 
 def smooth_peak(signal: SignalLike, order: ScalarLike | int = 16) -> Scalar:

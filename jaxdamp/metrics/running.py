@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxdamp import _checks
+from jaxdamp._largest import largest
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.metrics._linear_system import quotient, respond_as_lag
 from jaxdamp.metrics._signals import as_signal, check_interval, root
@@ -102,4 +103,4 @@ def max_transient_value(
     Source: ISO 2631-1, running r.m.s. method, tau = 1 s.
     """
     signal = as_weighted(acceleration, dt, weighting)
-    return jnp.max(running_rms(signal, dt, time_constant, averaging=averaging))
+    return largest(running_rms(signal, dt, time_constant, averaging=averaging))

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jax.scipy.special import erfc
 
 from jaxdamp import _checks
+from jaxdamp._largest import largest
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.metrics._signals import as_numbers, as_signal
 from jaxdamp.metrics.amplitude import rms
@@ -49,7 +50,7 @@ def working_space_peak(deflection: SignalLike) -> Scalar:
         ValueError: If the signal is empty or has more than one axis.
     """
     deflection = as_signal("deflection", deflection)
-    return jnp.max(deflection) - jnp.min(deflection)
+    return largest(deflection) + largest(-deflection)
 
 
 def _check_range(lower: ScalarLike | int, upper: ScalarLike | int) -> None:

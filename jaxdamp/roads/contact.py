@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._largest import largest
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.roads._composed import AbstractOnOneRoad
 from jaxdamp.roads.base import AbstractRoad
@@ -53,7 +54,7 @@ class RollingDisc(AbstractOnOneRoad):
         angle = jnp.linspace(-0.5 * jnp.pi, 0.5 * jnp.pi, self.points)
         around = heights_around(self.road, time, self.radius * jnp.sin(angle) / self.speed)
         rise = self.radius * (1.0 - jnp.cos(angle))
-        return jnp.max(around - rise[:, None, None], axis=0)
+        return largest(around - rise[:, None, None])
 
 
 def contact_patch(

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._largest import largest
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.roads._sampled import SampledRoad
 from jaxdamp.roads._seed import random_key
@@ -78,7 +79,7 @@ def band_limited(
         scale: Scalar = jnp.asarray(rms, float) / math.sqrt(0.5 * phase.size)
     else:
         _checks.positive("peak_to_peak", peak_to_peak)
-        scale = jnp.asarray(peak_to_peak, float) / (jnp.max(shape) - jnp.min(shape))
+        scale = jnp.asarray(peak_to_peak, float) / (largest(shape) + largest(-shape))
     return SampledRoad(samples=(scale * shape)[:, None], speed=None, spacing=float(dt), periodic=True, ramp=float(ramp))
 
 

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from jaxdamp import respond
 from jaxdamp.dampers import BoucWen
+from jaxdamp.dampers.bouc_wen import hysteresis_step
 
 from .motions import last_cycle, work
 from .single_precision import single_precision_error
@@ -113,6 +114,26 @@ def test_derivatives_at_rest_are_those_of_the_elastic_branch():
     np.testing.assert_allclose(jax.grad(force)(0.0), 0.5 * 1e-3 * 300.0 / 1e-3, rtol=1e-9)
     jacobian = jax.jit(jax.jacfwd(lambda z: law.state_rate(0.0, 0.2, z)))(jnp.zeros(1))
     np.testing.assert_allclose(jacobian, [[-0.2 / 1e-3]], rtol=1e-9)
+
+
+@pytest.mark.parametrize("n", [1.0, 1.5, 2.0, 4.0, 20.0])
+def test_derivatives_of_a_step_stay_right_up_to_the_yield_force(n, rng):
+    """Where a quotient of rounding errors would be anything, up to 1e9, and differ between both modes."""
+    size = 1.0 - np.concatenate([[0.0], 10.0 ** rng.uniform(-16.0, -3.0, 400)])
+    travel = 10.0 ** rng.uniform(-3.0, 1.0, size.size)
+
+    def step(travel, z, shape, exponent):
+        return hysteresis_step(travel, z, shape, exponent)
+
+    given = jnp.asarray(travel), jnp.asarray(size), 0.75, n
+    forward, reverse = (
+        np.stack(jax.jit(jax.vmap(mode(step, (0, 1, 2, 3)), (0, 0, None, None)))(*given))
+        for mode in (jax.jacfwd, jax.grad)
+    )
+    np.testing.assert_allclose(forward, reverse, atol=1e-7)
+    near = size > 1.0 - 1e-9  # there all loops are that of dw/du = (1 - w^2) n/2
+    tanh = np.tanh(0.5 * n * travel[near])
+    np.testing.assert_allclose(forward[1, near], (1.0 - tanh**2) / (1.0 + size[near] * tanh) ** 2, rtol=0.0, atol=1e-6)
 
 
 def test_static_force_is_a_spring_relaxed_elsewhere():

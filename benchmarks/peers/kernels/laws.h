@@ -148,17 +148,12 @@ static inline double bouc_wen_rate(LAW_ARGUMENTS, double *memory)
     return u * (1.0 - (1.0 - shape) * size * flat) - shape * fabs(u) * s * flat;
 }
 
-static inline double below_one(double size)
-{
-    const double most = 1.0 - 8.0 * 2.220446049250313e-16;
-    return size < most ? size : most;
-}
-
 /* (1 - w^n) / (1 - w^2), which tends to n/2. */
-static inline double loading_factor(double w, double to_the_n)
+static inline double loading_factor(double w, double to_the_n, double n)
 {
-    double inside = below_one(w);
-    return (1.0 - to_the_n) / ((1.0 - inside) * (1.0 + inside));
+    const double near = 8.0 * 1.4901161193847656e-08; /* the root of the rounding of doubles */
+    double inside = fmin(w, 1.0 - near);
+    return fmax(1.0 - to_the_n, n * near) / ((1.0 - inside) * (1.0 + inside));
 }
 
 /* One step along the net travel u: unloading by the midpoint rule, loading by w <- (w + t)/(1 + w t), which cannot pass
@@ -168,17 +163,17 @@ static inline double bouc_wen_advance(LAW_ARGUMENTS, double v0, double dt, doubl
 {
     double travel = 0.5 * dt * (v0 + v) * p[3][i], n = p[5][i], beyond = 2.0 * p[4][i] - 1.0;
     double way = travel >= 0.0 ? 1.0 : -1.0, u = way * travel, w = way * s;
-    double begin = power(below_one(fabs(s)), n), held = w < 0.0 ? -w : 0.0, loaded = w > 0.0 ? w : 0.0;
+    double begin = power(fabs(s), n), held = w < 0.0 ? -w : 0.0, loaded = w > 0.0 ? w : 0.0;
     double unloading = held - 0.5 * u * (1.0 + beyond * begin);
     int stays = unloading > 0.5 * held;
     double steep = 1.0 + beyond * (w < 0.0 ? begin * p[6][i] : 0.0);
     double left = fmax(u - held / steep, 0.0);
-    double half = 0.5 * left * loading_factor(loaded, w > 0.0 ? begin : 0.0), t = half / sqrt(1.0 + half * half);
+    double half = 0.5 * left * loading_factor(loaded, w > 0.0 ? begin : 0.0, n), t = half / sqrt(1.0 + half * half);
     double loading = (loaded + t) / (1.0 + loaded * t);
-    double midway = power(below_one(stays ? unloading : loading), n);
+    double midway = power(stays ? unloading : loading, n);
     steep = stays ? 1.0 + beyond * midway : steep;
     left = fmax(u - held / steep, 0.0);
-    double stretch = left * (stays ? 1.0 : loading_factor(loading, midway));
+    double stretch = left * (stays ? 1.0 : loading_factor(loading, midway, n));
     double e = exp(fmin(2.0 * stretch, 600.0)), up = e + 1.0, down = e - 1.0;
     return way * ((loaded * up + down) / (up + loaded * down) - fmax(held - u * steep, 0.0));
 }
@@ -186,7 +181,7 @@ static inline double bouc_wen_advance(LAW_ARGUMENTS, double v0, double dt, doubl
 /* Heun's step, kept between -1 and 1, half as dear. */
 static inline double bouc_wen_moved(const Row *p, int i, double travel, double z)
 {
-    double to_the_n = power(below_one(fabs(z)), p[5][i]);
+    double to_the_n = power(fabs(z), p[5][i]);
     return travel * (travel * z > 0.0 ? 1.0 - to_the_n : 1.0 + (2.0 * p[4][i] - 1.0) * to_the_n);
 }
 
