@@ -12,7 +12,7 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 os.environ.setdefault("MPLBACKEND", "Agg")
-# Most of the time goes into compiling, once for each test: compile quickly instead of for speed. With XLA_FLAGS set,
+# Most of the time goes into compiling, once for each test: compile quickly instead of for speed. With the variable set,
 # even to nothing, tests run what users run.
 OLD_EMITTERS = ["--xla_cpu_use_fusion_emitters=false"] * (jax.__version_info__ < (0, 11))
 os.environ.setdefault("XLA_FLAGS", " ".join(["--xla_backend_optimization_level=0", *OLD_EMITTERS]))
