@@ -12,12 +12,11 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import ArrayLike, Float
 
+from jaxdamp._limits import Numbers, at_least
 from jaxdamp._types import ScalarLike
 
-
-Numbers = Float[Array, "..."]
 
 _MANTISSA_BITS = 52
 _ONE, _SQUARE_ROOT_OF_HALF = np.array([1.0, math.sqrt(0.5)]).view(np.int64)
@@ -28,7 +27,7 @@ _LN2, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10  # their sum; whole 
 
 def power(base: ScalarLike, exponent: ScalarLike) -> Numbers:
     """baseⁿ for base ≥ 0, with finite derivatives at zero."""
-    return exponential(exponent * logarithm(jnp.maximum(jnp.asarray(base), 1e-30)))
+    return exponential(exponent * logarithm(at_least(base, 1e-30)))
 
 
 @jax.custom_jvp

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from jaxdamp._limits import at_least
 from jaxdamp._types import ScalarLike
 
 
@@ -20,6 +21,6 @@ def ramp(v: Float[ArrayLike, "..."], width: ScalarLike) -> Float[Array, "..."]:
     The error is largest at the knee, w ln 2.
     """
     v = jnp.asarray(v)
-    exact = jnp.maximum(v, 0.0)
+    exact = at_least(v, 0.0)
     safe = jnp.where(width > 0, width, 1.0)
     return jnp.where(width > 0, safe * jax.nn.softplus(v / safe), exact)

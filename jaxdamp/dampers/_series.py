@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import within
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Scalar, ScalarLike, State
 from jaxdamp.dampers.base import AbstractDamper, parts
@@ -62,7 +63,7 @@ def series_rate(
     def surplus(w: Scalar) -> Scalar:
         return law.force(x, w, inner) - force
 
-    guess = jnp.clip(jnp.asarray(v, dtype=inner.dtype), -limit, limit)
+    guess = within(jnp.asarray(v, dtype=inner.dtype), -limit, limit)
     velocity = increasing_root(surplus, guess, -limit, limit, steps=60)
     return jnp.concatenate([(v - velocity)[None], law.state_rate(x, velocity, inner)])
 
@@ -104,7 +105,7 @@ def series_step(
 
         at_rest = jnp.abs(law.force(stroke - free, jnp.zeros_like(free), law_states(jnp.zeros_like(free))))
         limit = (jnp.abs(free) + springs.reach(at_rest, begun)) / duration + jnp.finfo(free.dtype).tiny
-        w = increasing_root(surplus, jnp.clip(guess, -limit, limit), -limit, limit, likely=likely, close=1e-4)
+        w = increasing_root(surplus, within(guess, -limit, limit), -limit, limit, likely=likely, close=1e-4)
         return w, deflections(w), law_states(w)
 
     duration = GAMMA * dt

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import within
 from jaxdamp._types import Matrix, Scalar, ScalarLike, Vector
 
 
@@ -27,7 +28,7 @@ class Axis(NamedTuple):
 
     def held(self) -> Scalar:
         """The value, or the nearest edge."""
-        return jnp.clip(self.value, self.reach[0], self.reach[1])
+        return within(self.value, self.reach[0], self.reach[1])
 
     def beyond(self) -> Scalar:
         """How far the value is beyond the nearest edge; zero inside."""

@@ -3,10 +3,10 @@
 import warnings
 from typing import final
 
-import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._elementary import reciprocal_root
+from jaxdamp._limits import at_least, at_most
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import secant_rate
 from jaxdamp.dampers.base import AbstractMemoryless
@@ -51,9 +51,9 @@ class Besinger(AbstractMemoryless):
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
-        closed = jnp.minimum(v, self.limit_velocity)
+        closed = at_most(v, self.limit_velocity)
         rate = transition_rate(closed, self.compression_rate, self.rebound_rate, self.transition_velocity)
-        return rate * closed + self.blow_off_rate * jnp.maximum(v - self.limit_velocity, 0.0)
+        return rate * closed + self.blow_off_rate * at_least(v - self.limit_velocity, 0.0)
 
     def opening_velocity(self) -> Scalar:
         """v_open [m/s], where the blow-off line meets the line C_e v."""

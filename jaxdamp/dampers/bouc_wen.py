@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._elementary import power, reciprocal_root
+from jaxdamp._limits import at_least, within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import sliding_fit
 from jaxdamp.dampers._hysteresis import direction, own_states
@@ -22,10 +23,12 @@ def hysteresis_rate(travel_rate: ScalarLike, z: ScalarLike, shape: ScalarLike, e
 
 
 def _rate_factor(size: ScalarLike, to_the_n: ScalarLike, exponent: ScalarLike) -> Scalar:
-    """(1 − wⁿ)/(1 − w²), and n/2 next to w = 1, where a quotient of small differences has rounding for a slope."""
-    near = 8.0 * jnp.finfo(jnp.result_type(size)).eps ** 0.5
-    inside = jnp.minimum(size, 1.0 - near)
-    return jnp.maximum(1.0 - to_the_n, exponent * near) / ((1.0 - inside) * (1.0 + inside))
+    """(1 − wⁿ)/(1 − w²), and its series next to w = 1, where the quotient of small differences has no right slope."""
+    left = 1.0 - size
+    near = left < jnp.finfo(jnp.result_type(size)).eps ** 0.25
+    series = 0.5 * exponent * (1.0 - (exponent - 2.0) * left * (0.5 - (2.0 * exponent - 5.0) / 12.0 * left))
+    inside = jnp.where(near, 0.0, size)
+    return jnp.where(near, series, (1.0 - to_the_n) / ((1.0 - inside) * (1.0 + inside)))
 
 
 def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, exponent: ScalarLike) -> Scalar:
@@ -41,21 +44,21 @@ def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, expone
     way = direction(travel)
     u, w, curve = way * travel, way * z, 2.0 * shape - 1.0
     begin = power(jnp.abs(z), exponent)
-    held, loaded = jnp.maximum(-w, 0.0), jnp.maximum(w, 0.0)
+    held, loaded = at_least(-w, 0.0), at_least(w, 0.0)
 
     unloading = held - 0.5 * u * (1.0 + curve * begin)
     stays = unloading > 0.5 * held  # held by a lesser force at the end of the travel; else it loads the other way
     steep = 1.0 + curve * jnp.where(w < 0, begin * power(0.5, exponent), 0.0)
-    left = jnp.maximum(u - held / steep, 0.0)
+    left = at_least(u - held / steep, 0.0)
     half = 0.5 * left * _rate_factor(loaded, jnp.where(w > 0, begin, 0.0), exponent)
     t = half * reciprocal_root(1.0 + half * half)
     loading = (loaded + t) / (1.0 + loaded * t)
 
     midway = power(jnp.where(stays, unloading, loading), exponent)
     steep = jnp.where(stays, 1.0 + curve * midway, steep)
-    left = jnp.maximum(u - held / steep, 0.0)
+    left = at_least(u - held / steep, 0.0)
     t = jnp.tanh(left * jnp.where(stays, 1.0, _rate_factor(loading, midway, exponent)))
-    return way * ((loaded + t) / (1.0 + loaded * t) - jnp.maximum(held - u * steep, 0.0))
+    return way * ((loaded + t) / (1.0 + loaded * t) - at_least(held - u * steep, 0.0))
 
 
 def hysteresis_estimate(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, exponent: ScalarLike) -> Scalar:
@@ -66,8 +69,8 @@ def hysteresis_estimate(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, ex
         return travel * jnp.where(travel * z > 0, 1.0 - to_the_n, 1.0 + (2.0 * shape - 1.0) * to_the_n)
 
     first = moved(z)
-    second = moved(jnp.clip(z + first, -1.0, 1.0))
-    return jnp.clip(z + 0.5 * (first + second), -1.0, 1.0)
+    second = moved(within(z + first, -1.0, 1.0))
+    return within(z + 0.5 * (first + second), -1.0, 1.0)
 
 
 @final

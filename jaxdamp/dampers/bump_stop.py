@@ -6,6 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxdamp import _checks
+from jaxdamp._limits import at_least, within
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractStateless
 from jaxdamp.parameters import nonnegative, parameter, positive, setting
@@ -16,7 +17,7 @@ def penetration(travel: ScalarLike, width: ScalarLike) -> tuple[Scalar, Scalar]:
 
     d = 0 for u < 0, u²/(2w) up to w, u − w/2 beyond. The slope g rises from 0 to 1 over the width.
     """
-    share = jnp.clip(travel / width, 0.0, 1.0)
+    share = within(travel / width, 0.0, 1.0)
     return share * (travel - 0.5 * width * share), share
 
 
@@ -56,7 +57,7 @@ class BumpStop(AbstractStateless):
     def _push(self, outward: ScalarLike, speed: ScalarLike) -> Scalar:
         """Force of a stop [N] ≥ 0 at a stroke towards it [m] and the velocity towards it [m/s]."""
         d, gate = penetration(outward - self.clearance, self.engagement_width)
-        return jnp.maximum((self.stiffness + self.cubic_stiffness * d * d) * d + self.damping * gate * speed, 0.0)
+        return at_least((self.stiffness + self.cubic_stiffness * d * d) * d + self.damping * gate * speed, 0.0)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m] and velocity v [m/s]."""

@@ -4,6 +4,7 @@ from typing import ClassVar, final
 
 import jax.numpy as jnp
 
+from jaxdamp._limits import at_least, within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._first_order import follow
 from jaxdamp.dampers._hysteresis import own_states
@@ -57,7 +58,7 @@ class FrequencySelective(AbstractDamper):
 
     def settled_force(self, x: ScalarLike, v: ScalarLike, filtered_velocity: ScalarLike) -> Scalar:
         """Force [N] that the response lag heads for."""
-        slow = jnp.clip(filtered_velocity, 0.0, jnp.maximum(v, 0.0))
+        slow = within(filtered_velocity, 0.0, at_least(v, 0.0))
         high, low = self.high, self.low
         return high.force(x, v, high.initial_state()) + low.force(x, slow, low.initial_state())
 

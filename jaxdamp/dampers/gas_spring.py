@@ -3,8 +3,8 @@
 from typing import final
 
 import equinox as eqx
-import jax.numpy as jnp
 
+from jaxdamp._limits import at_least
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractStateless
 from jaxdamp.parameters import parameter, positive, setting
@@ -20,7 +20,7 @@ def gas_pressure(x: ScalarLike, pressure: ScalarLike, volume: ScalarLike, area: 
     instead of to the pole at V₀ + A x = 0: value and slope are finite and continuous at every stroke.
     """
     share = 1.0 + area * x / volume
-    kept = jnp.maximum(share, LEAST_SHARE)
+    kept = at_least(share, LEAST_SHARE)
     return pressure * kept**-n * (1.0 - n * (share - kept) / kept)
 
 

@@ -5,6 +5,7 @@ from typing import ClassVar, final
 import jax.numpy as jnp
 import numpy as np
 
+from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import TYPICAL_GIVE, sliding_fit
 from jaxdamp.dampers._hysteresis import own_states
@@ -17,7 +18,7 @@ from jaxdamp.parameters import nonnegative, parameter, positive
 
 def dead_zone(deflection: ScalarLike, clearance: ScalarLike) -> Scalar:
     """max(x_k − δ, 0) − max(−x_k − δ, 0) [m], the part of a deflection beyond a clearance of ±δ."""
-    return deflection - jnp.clip(deflection, -clearance, clearance)
+    return deflection - within(deflection, -clearance, clearance)
 
 
 @final

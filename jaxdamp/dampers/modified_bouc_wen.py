@@ -6,6 +6,7 @@ from typing import final
 import jax.numpy as jnp
 import numpy as np
 
+from jaxdamp._limits import at_least
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import sliding_fit
@@ -93,7 +94,7 @@ class ModifiedBoucWen(AbstractDamper):
             ahead, z_ahead = self._after(w, stroke, z, duration)
             return viscous * w + self.stiffness * ahead + level * z_ahead - series * (v - w)
 
-        held = self.stiffness * jnp.abs(stroke) + level * jnp.maximum(jnp.abs(z), 1.0)
+        held = self.stiffness * jnp.abs(stroke) + level * at_least(jnp.abs(z), 1.0)
         limit = (series * jnp.abs(v) + held) / (viscous + series)
         return increasing_root(surplus, jnp.zeros_like(limit), -limit, limit, steps=20)
 

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._limits import at_least, at_most
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._hysteresis import own_states
@@ -84,14 +85,14 @@ class MonoTube(AbstractDamper):
     def pressures(self, x: ScalarLike, deflection: ScalarLike) -> tuple[Scalar, Scalar]:
         """p_r and p_c [Pa, absolute] at stroke x [m] and deflection e [m]."""
         gas = self.gas
-        above = jnp.maximum(gas.pressure + self._stiffness(x) * deflection, self.cavitation_pressure)
+        above = at_least(gas.pressure + self._stiffness(x) * deflection, self.cavitation_pressure)
         below = gas_pressure(self._gas_stroke(x, deflection), gas.pressure, gas.volume, gas.rod_area, gas.exponent)
         return above, below
 
     def _stiffness(self, x: ScalarLike) -> Scalar:
         """Rise of p_r with the deflection [Pa/m]."""
         area, volume = self.piston.area, self.rebound_volume
-        return self.bulk_modulus * area / jnp.maximum(volume - area * x, LEAST_SHARE * volume)
+        return self.bulk_modulus * area / at_least(volume - area * x, LEAST_SHARE * volume)
 
     def _gas_stroke(self, x: ScalarLike, deflection: ScalarLike) -> Scalar:
         """Stroke [m] at which the rod alone would leave the gas the volume that it has."""
@@ -130,7 +131,7 @@ class MonoTube(AbstractDamper):
         # The flow lowers the drop that drives it: S lies between zero and that of a piston without openings.
         most = self.piston.root(above - below)
         zero = jnp.zeros_like(most)
-        lower, upper = jnp.minimum(most, zero), jnp.maximum(most, zero)
+        lower, upper = at_most(most, zero), at_least(most, zero)
         return self.piston.flow_velocity(increasing_root(surplus, most, lower, upper, steps=20), valve)
 
     def advance(

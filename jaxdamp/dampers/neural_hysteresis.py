@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from jaxdamp import _checks
+from jaxdamp._limits import at_least
 from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers._hysteresis import own_states
 from jaxdamp.dampers.base import AbstractDamper
@@ -95,7 +96,7 @@ class NeuralHysteresis(AbstractDamper):
         """The forces after a time at constant rates and velocity, exactly."""
         z = rates * dt
         tiny = jnp.finfo(z.dtype).tiny
-        return jnp.exp(-z) * forces + self.stiffness * v * dt * (-jnp.expm1(-z) / jnp.maximum(z, tiny))
+        return jnp.exp(-z) * forces + self.stiffness * v * dt * (-jnp.expm1(-z) / at_least(z, tiny))
 
     @classmethod
     def random(

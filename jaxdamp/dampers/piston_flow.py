@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
 from jaxdamp._elementary import reciprocal_root
+from jaxdamp._limits import at_least, at_most
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractMemoryless
@@ -32,7 +33,7 @@ class Valve(NamedTuple):
 
     def open_area(self, drop: ScalarLike) -> Scalar:
         """A_max tanh((Δp − p_o)/(k A_max)) [m²] at a pressure drop Δp [Pa]; closed below p_o."""
-        return self.largest * jnp.tanh(jnp.maximum(drop - self.opening, 0.0) / (self.stiffness * self.largest))
+        return self.largest * jnp.tanh(at_least(drop - self.opening, 0.0) / (self.stiffness * self.largest))
 
 
 @final
@@ -104,10 +105,10 @@ class PistonFlow(AbstractMemoryless):
         most = speed / self._per_root(self.bleed_area)  # through the bleed alone
         # A guess that is right in the leading digit: all through the valve, part open or open, or through the leak.
         cube = speed * valve.stiffness / self._per_root(1.0)
-        guess = jnp.sqrt(valve.opening + jnp.minimum(cube / jnp.sqrt(valve.opening), jnp.cbrt(cube) ** 2))
-        guess = jnp.maximum(guess, speed / self._per_root(self.bleed_area + valve.largest))
-        leak_alone = jnp.sqrt(speed * self.area / jnp.maximum(self.leak, jnp.finfo(self.leak.dtype).tiny))
-        guess = jnp.minimum(guess, jnp.minimum(leak_alone, most))
+        guess = jnp.sqrt(valve.opening + at_most(cube / jnp.sqrt(valve.opening), jnp.cbrt(cube) ** 2))
+        guess = at_least(guess, speed / self._per_root(self.bleed_area + valve.largest))
+        leak_alone = jnp.sqrt(speed * self.area / at_least(self.leak, jnp.finfo(self.leak.dtype).tiny))
+        guess = at_most(guess, at_most(leak_alone, most))
         zero = jnp.zeros_like(most)
         lower, upper = jnp.where(v >= 0, zero, -most), jnp.where(v >= 0, most, zero)
         guess = jnp.where(v >= 0, guess, -guess)

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._limits import within
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers.base import AbstractMemoryless
 from jaxdamp.parameters import around_zero, as_float, parameter, setting
@@ -44,7 +45,7 @@ class Polynomial(AbstractMemoryless):
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
-        inside = jnp.clip(v, self.velocity_range[0], self.velocity_range[1])
+        inside = within(v, self.velocity_range[0], self.velocity_range[1])
         ascending = jnp.concatenate([jnp.zeros(1, self.coefficients.dtype), self.coefficients])
         value = jnp.polyval(ascending[::-1], inside)
         slope = jnp.polyval((ascending[1:] * jnp.arange(1.0, ascending.size))[::-1], inside)

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.parameters import increasing, setting
@@ -61,7 +62,7 @@ class Scheduled(AbstractDamper):
 
     def shares(self) -> Float[Array, " laws"]:
         """How much of each law's numbers is taken; the sum is one."""
-        climbed = jnp.clip((self.command - self.levels[:-1]) / jnp.diff(self.levels), 0.0, 1.0)
+        climbed = within((self.command - self.levels[:-1]) / jnp.diff(self.levels), 0.0, 1.0)
         edges = jnp.concatenate([jnp.ones(1, climbed.dtype), climbed, jnp.zeros(1, climbed.dtype)])
         return edges[:-1] - edges[1:]
 

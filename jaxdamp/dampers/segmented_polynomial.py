@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import at_least, at_most, within
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers.base import AbstractMemoryless
 from jaxdamp.parameters import around_zero, as_float, increasing_negative, parameter, positive, setting
@@ -65,20 +66,20 @@ class SegmentedPolynomial(AbstractMemoryless):
 
     def _segments(self, v: ScalarLike) -> Scalar:
         v1, v2, v4 = self.compression_knots[0], self.compression_knots[1], self.rebound_knot
-        high_c = _poly(self.shares_high_compression, jnp.minimum(v - v1, 0.0) / -v1)
-        mid_c = _poly(self.shares_mid_compression, (jnp.clip(v, v1, v2) - v2) / (v2 - v1))
-        low_c = _poly(self.shares_low_compression, jnp.clip(v, v2, 0.0) / -v2)
-        low_r = _poly(self.shares_low_rebound, jnp.clip(v, 0.0, v4) / v4)
-        high_r = _poly(self.shares_high_rebound, jnp.maximum(v - v4, 0.0) / v4)
+        high_c = _poly(self.shares_high_compression, at_most(v - v1, 0.0) / -v1)
+        mid_c = _poly(self.shares_mid_compression, (within(v, v1, v2) - v2) / (v2 - v1))
+        low_c = _poly(self.shares_low_compression, within(v, v2, 0.0) / -v2)
+        low_r = _poly(self.shares_low_rebound, within(v, 0.0, v4) / v4)
+        high_r = _poly(self.shares_high_rebound, at_least(v - v4, 0.0) / v4)
         return high_c + mid_c + low_c + low_r + high_r
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
         low, high = self.velocity_range[0], self.velocity_range[1]
-        inside = jnp.clip(v, low, high)
+        inside = within(v, low, high)
         _, tangent_low = jax.jvp(self._segments, (low,), (jnp.ones_like(low),))
         _, tangent_high = jax.jvp(self._segments, (high,), (jnp.ones_like(high),))
-        beyond = tangent_low * jnp.minimum(v - low, 0.0) + tangent_high * jnp.maximum(v - high, 0.0)
+        beyond = tangent_low * at_most(v - low, 0.0) + tangent_high * at_least(v - high, 0.0)
         return self._segments(inside) + beyond
 
     def coefficients(self) -> dict[str, np.ndarray]:

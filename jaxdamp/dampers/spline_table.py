@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import at_least, at_most, within
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers._points import check_points
 from jaxdamp.dampers.base import AbstractMemoryless
@@ -32,7 +33,7 @@ def monotone_slopes(gaps: Float[Array, " gaps"], secants: Float[Array, " gaps"])
 
     def end(gap: Scalar, next_gap: Scalar, secant: Scalar, next_secant: Scalar) -> Scalar:
         parabola = ((2.0 * gap + next_gap) * secant - gap * next_secant) / (gap + next_gap)
-        return jnp.clip(parabola, jnp.minimum(3.0 * secant, 0.0), jnp.maximum(3.0 * secant, 0.0))
+        return within(parabola, at_most(3.0 * secant, 0.0), at_least(3.0 * secant, 0.0))
 
     first = end(gaps[0], gaps[1], secants[0], secants[1])
     last = end(gaps[-1], gaps[-2], secants[-1], secants[-2])
@@ -79,10 +80,10 @@ class SplineTable(AbstractMemoryless):
         slopes = monotone_slopes(gaps, rises / gaps)
         left, right = gaps * slopes[:-1], gaps * slopes[1:]
         # What each segment adds, from its beginning to v or to its end: a sum without a search, fast inside loops.
-        u = jnp.clip((v - self.velocity[:-1]) / gaps, 0.0, 1.0)
+        u = within((v - self.velocity[:-1]) / gaps, 0.0, 1.0)
         added = u * (left + u * (3.0 * rises - 2.0 * left - right + u * (left + right - 2.0 * rises)))
-        below = slopes[0] * jnp.minimum(v - self.velocity[0], 0.0)
-        above = slopes[-1] * jnp.maximum(v - self.velocity[-1], 0.0)
+        below = slopes[0] * at_most(v - self.velocity[0], 0.0)
+        above = slopes[-1] * at_least(v - self.velocity[-1], 0.0)
         return self.force_points[0] + below + jnp.sum(added) + above
 
     @classmethod

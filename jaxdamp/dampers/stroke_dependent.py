@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import within
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers.base import AbstractDamper, AbstractStateless, refuse_states
 from jaxdamp.dampers.table import Table
@@ -63,7 +64,7 @@ class StrokeDependent(AbstractStateless):
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m] and velocity v [m/s]."""
         forces = _forces(self.laws, x, v)
-        shares = jnp.clip((x - self.stroke[:-1]) / jnp.diff(self.stroke), 0.0, 1.0)
+        shares = within((x - self.stroke[:-1]) / jnp.diff(self.stroke), 0.0, 1.0)
         return forces[0] + jnp.sum(shares * jnp.diff(forces))
 
     @classmethod

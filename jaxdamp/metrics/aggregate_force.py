@@ -5,6 +5,7 @@ from jax.scipy.special import ndtri
 from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import at_least
 from jaxdamp._types import Scalar, ScalarLike, SignalLike, VectorLike
 from jaxdamp.metrics._signals import as_numbers, as_signal, check_interval, root
 
@@ -69,7 +70,7 @@ def aggregate_force(
         load = row[whole : whole + places]
         if shift > whole:
             load = load + (shift - whole) * (row[whole + 1 : whole + 1 + places] - load)
-        rows.append(jnp.maximum(load, 0.0) ** jnp.asarray(exponent, loads.dtype))
+        rows.append(at_least(load, 0.0) ** jnp.asarray(exponent, loads.dtype))
     return jnp.sum(jnp.stack(rows), axis=0)
 
 

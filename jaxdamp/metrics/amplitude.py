@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxdamp import _checks
-from jaxdamp._largest import largest
+from jaxdamp._limits import largest
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.metrics._signals import as_signal, root
 

@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 
 from jaxdamp import _checks
+from jaxdamp._limits import at_most
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.metrics._signals import as_numbers, root
 from jaxdamp.metrics.weighted import as_weighted
@@ -104,4 +105,4 @@ def motion_sickness_percentage(dose: ScalarLike, factor: ScalarLike = 1.0 / 3.0)
     _checks.nonnegative("dose", dose, "It is the result of `motion_sickness_dose` in m/s^1.5.")
     _checks.nonnegative("factor", factor)
     value, share = as_numbers(dose, factor)
-    return jnp.minimum(share * value, 100.0)
+    return at_most(share * value, 100.0)

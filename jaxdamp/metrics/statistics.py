@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 
+from jaxdamp._limits import at_least, at_most
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.metrics._signals import root
 from jaxdamp.metrics.amplitude import peak, rms
@@ -97,13 +98,13 @@ STATISTICS: dict[str, Statistic] = {
     "peak": Statistic(
         lambda record, _: peak(record),
         lambda y: (jnp.abs(y),),
-        lambda kept, y: (jnp.maximum(kept[0], jnp.abs(y)),),
+        lambda kept, y: (at_least(kept[0], jnp.abs(y)),),
         lambda kept, *_: kept[0],
     ),
     "peak_to_peak": Statistic(
         lambda record, _: working_space_peak(record),
         lambda y: (y, y),
-        lambda kept, y: (jnp.minimum(kept[0], y), jnp.maximum(kept[1], y)),
+        lambda kept, y: (at_most(kept[0], y), at_least(kept[1], y)),
         lambda kept, *_: kept[1] - kept[0],
     ),
     "standard_deviation": Statistic(

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jax.scipy.special import erfc
 
 from jaxdamp import _checks
-from jaxdamp._largest import largest
+from jaxdamp._limits import largest
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.metrics._signals import as_numbers, as_signal
 from jaxdamp.metrics.amplitude import rms

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import at_least, at_most
 from jaxdamp._types import Scalar, ScalarLike, SignalLike, VectorLike
 from jaxdamp.roads._composed import AbstractOnOneRoad
 from jaxdamp.roads.base import AbstractRoad
@@ -24,8 +25,8 @@ class Delayed(AbstractOnOneRoad):
         """The height [m] under each wheel at each `time` [s]: all wheels of the first axle, then of the second, ..."""
         time = jnp.asarray(time, self.delay.dtype)
         # a record is level before its first sample; times before it that were asked for are left for it to refuse
-        begin = jnp.minimum(time, self.road.span[0])
-        passed = jnp.maximum(time[None, :] - self.delay[:, None], begin[None, :])
+        begin = at_most(time, self.road.span[0])
+        passed = at_least(time[None, :] - self.delay[:, None], begin[None, :])
         heights = self.road.height(passed.reshape(-1)).reshape(self.delay.size, time.size, self.road.wheels)
         return jnp.moveaxis(heights, 0, 1).reshape(time.size, self.wheels)
 

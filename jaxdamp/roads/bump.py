@@ -8,6 +8,7 @@ from jax.tree_util import Partial
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import within
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.roads._crossing import given_in_time
 from jaxdamp.roads._fade import quintic_step
@@ -55,7 +56,7 @@ def place(
 
 def haversine(fraction: Signal) -> Signal:
     """f(s) = (1 - cos(2 pi s))/2 for 0 <= s <= 1, else zero; the slope is continuous, the curvature is not."""
-    return 0.5 * (1.0 - jnp.cos(2.0 * jnp.pi * jnp.clip(fraction, 0.0, 1.0)))
+    return 0.5 * (1.0 - jnp.cos(2.0 * jnp.pi * within(fraction, 0.0, 1.0)))
 
 
 def quintic_bump(fraction: Signal) -> Signal:

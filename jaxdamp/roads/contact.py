@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._largest import largest
+from jaxdamp._limits import at_least, at_most, largest, within
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.roads._composed import AbstractOnOneRoad
 from jaxdamp.roads.base import AbstractRoad
@@ -21,7 +21,7 @@ def heights_around(
     time = jnp.asarray(time, offset.dtype)
     first, last = road.span
     around = time[None, :] + offset[:, None]
-    around = jnp.clip(around, jnp.minimum(time, first)[None, :], jnp.maximum(time, last)[None, :])
+    around = within(around, at_most(time, first)[None, :], at_least(time, last)[None, :])
     return road.height(around.reshape(-1)).reshape(offset.size, time.size, road.wheels)
 
 

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 from jax.tree_util import Partial
 
 from jaxdamp import _checks
+from jaxdamp._limits import at_least, within
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.roads.bump import Bump, place
 
@@ -19,15 +20,15 @@ def rounded_corner(s: Signal, reach: Scalar) -> Signal:
     the corner it is r (1/4 - 1/pi^2) = 0.149 r too high.
     """
     safe = jnp.where(reach > 0.0, reach, 1.0)
-    u = jnp.clip(s / safe, -1.0, 1.0)
+    u = within(s / safe, -1.0, 1.0)
     rounded = safe * ((1.0 + u) ** 2 / 4.0 - (1.0 + jnp.cos(jnp.pi * u)) / (2.0 * jnp.pi**2))
-    sharp = jnp.maximum(s, 0.0)
+    sharp = at_least(s, 0.0)
     return jnp.where((reach > 0.0) & (jnp.abs(s) < reach), rounded, sharp)
 
 
 def half_sine(fraction: Signal, rounding: Scalar) -> Signal:
     """f(s) = max(sin(pi s), 0) over one arch, its two corners rounded within +-`rounding` of each end."""
-    arch = jnp.sin(jnp.pi * jnp.clip(fraction, -0.5, 1.5))
+    arch = jnp.sin(jnp.pi * within(fraction, -0.5, 1.5))
     return rounded_corner(arch, jnp.sin(jnp.pi * rounding))
 
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._largest import largest
+from jaxdamp._limits import largest
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.roads._sampled import SampledRoad
 from jaxdamp.roads._seed import random_key

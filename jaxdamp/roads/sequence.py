@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import at_least, at_most
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.roads._composed import least
 from jaxdamp.roads.base import AbstractRoad
@@ -23,8 +24,8 @@ class Joined(AbstractRoad):
     def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] at each `time` [s]; see `joined`."""
         time = jnp.asarray(time, self.at.dtype)
-        before = self.first.height(jnp.minimum(time, self.at))
-        after = self.second.height(jnp.maximum(time - self.at, 0.0))
+        before = self.first.height(at_most(time, self.at))
+        after = self.second.height(at_least(time - self.at, 0.0))
         return before + after - self.second.height(jnp.zeros(1, time.dtype))
 
     @property

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import within
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.roads._fade import fade_in
 from jaxdamp.roads.base import AbstractRoad
@@ -43,10 +44,10 @@ class SweepSine(AbstractRoad):
     def height(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see `sweep_sine`."""
         time = jnp.asarray(time, self.size.dtype)
-        within = jnp.clip(time, 0.0, self.period)
-        frequency, cycles = _SWEEPS[self.sweep](within, self.start, self.stop, self.period)
+        inside = within(time, 0.0, self.period)
+        frequency, cycles = _SWEEPS[self.sweep](inside, self.start, self.stop, self.period)
         amplitude = self.size / (2.0 * jnp.pi * frequency) if self.of_velocity else self.size
-        wave = amplitude * jnp.sin(2.0 * jnp.pi * (cycles + frequency * (time - within)))
+        wave = amplitude * jnp.sin(2.0 * jnp.pi * (cycles + frequency * (time - inside)))
         return (fade_in(time, self.ramp) * wave)[:, None]
 
     @property

@@ -34,7 +34,7 @@ class Ride(eqx.Module):
     The same numbers as `simulate(...).metrics()`, but gathered in the loop over time: nothing is kept of the run, so
     that memory does not grow with its length, and many cars run side by side. `sweep`, `jax.jit`, `jax.jacfwd` and
     `jax.grad` take it as it is (`side_by_side` is for `jax.vmap`). Forward derivatives keep nothing of the run; reverse
-    ones keep four numbers of each element and the channels of up to 16 384 instants, and drive longer runs twice.
+    ones keep up to four numbers of each element and the channels of up to 16 384 instants, and drive longer runs twice.
 
     Arguments:
         vehicle: where parameters that are not given come from.

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import at_least
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.frequency_response import root
@@ -88,5 +89,5 @@ def _mean_squares(linear: LinearVehicle, delays: Float[Array, " wheels"]) -> Flo
         held = -jnp.sum(static[:, i:], axis=1)  # wheels still to come stand on the road that the front axle has left
         total = total + seen(covariance) + 2.0 * held * mean + held**2 * gap
         state = after + pushes[:, i]
-    total = jnp.maximum(total + seen(lyapunov(a, jnp.outer(state, state))), 0.0)
+    total = at_least(total + seen(lyapunov(a, jnp.outer(state, state))), 0.0)
     return jnp.where(jnp.any(linear.feed_through != 0, axis=1), jnp.inf, total)

@@ -148,12 +148,12 @@ static inline double bouc_wen_rate(LAW_ARGUMENTS, double *memory)
     return u * (1.0 - (1.0 - shape) * size * flat) - shape * fabs(u) * s * flat;
 }
 
-/* (1 - w^n) / (1 - w^2), which tends to n/2. */
+/* (1 - w^n) / (1 - w^2), and its series next to w = 1. */
 static inline double loading_factor(double w, double to_the_n, double n)
 {
-    const double near = 8.0 * 1.4901161193847656e-08; /* the root of the rounding of doubles */
-    double inside = fmin(w, 1.0 - near);
-    return fmax(1.0 - to_the_n, n * near) / ((1.0 - inside) * (1.0 + inside));
+    double left = 1.0 - w;
+    double series = 0.5 * n * (1.0 - (n - 2.0) * left * (0.5 - (2.0 * n - 5.0) / 12.0 * left));
+    return left < 1.220703125e-4 ? series : (1.0 - to_the_n) / (left * (1.0 + w));
 }
 
 /* One step along the net travel u: unloading by the midpoint rule, loading by w <- (w + t)/(1 + w t), which cannot pass

@@ -1,10 +1,19 @@
-"""The maximum and its derivative, of numbers that compilers compute twice."""
+"""Limits, maxima and their derivatives, of numbers that compilers compute twice."""
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxdamp._largest import largest
+from jaxdamp._limits import at_least, at_most, largest, within
+
+
+def test_equal_numbers_share_the_derivative_of_a_limit():
+    numbers = jnp.array([-2.0, 1.0, 3.0])
+    np.testing.assert_array_equal(at_least(numbers, 1.0), [1.0, 1.0, 3.0])
+    np.testing.assert_array_equal(at_most(numbers, 1.0), [-2.0, 1.0, 1.0])
+    np.testing.assert_array_equal(within(numbers, -1.0, 2.0), [-1.0, 1.0, 2.0])
+    np.testing.assert_array_equal(jax.vmap(jax.grad(at_least), (0, None))(numbers, 1.0), [0.0, 0.5, 1.0])
+    np.testing.assert_array_equal(jax.vmap(jax.grad(at_most), (0, None))(numbers, 1.0), [1.0, 0.5, 0.0])
 
 
 def test_is_the_maximum_along_an_axis(rng):
