@@ -1,4 +1,4 @@
-"""Limits, maxima and who has their derivatives; `tests/roads/test_contact.py` has a maximum that `jnp.max` got wrong."""
+"""Limits, maxima and who has their derivatives; `tests/roads/test_contact.py` has one that `jnp.max` got wrong."""
 
 import jax
 import jax.numpy as jnp
