@@ -19,25 +19,57 @@ def concrete(value: Any) -> np.ndarray | None:
     return None if isinstance(value, Tracer) else np.asarray(value)
 
 
+def _numbers(argument: str, value: Any) -> np.ndarray | None:
+    """`concrete`, but refusing what is no number."""
+    array = concrete(value)
+    if array is not None and array.dtype.kind not in "biufc":
+        refuse(argument, "be a number", described(value))
+    return array
+
+
 def finite(argument: str, value: Any, remedy: str = "Look for NaN or a division by zero where it was made.") -> None:
     """Refuse NaN and infinity."""
-    array = concrete(value)
+    array = _numbers(argument, value)
     if array is not None and not np.all(np.isfinite(array)):
         refuse(argument, "be finite", array, remedy)
 
 
 def positive(argument: str, value: Any, remedy: str = "") -> None:
     """Refuse anything that is not finite and greater than zero."""
-    array = concrete(value)
+    array = _numbers(argument, value)
     if array is not None and not (np.all(np.isfinite(array)) and np.all(array > 0)):
         refuse(argument, "be positive and finite", array, remedy)
 
 
 def nonnegative(argument: str, value: Any, remedy: str = "") -> None:
     """Refuse anything that is not finite and at least zero."""
-    array = concrete(value)
+    array = _numbers(argument, value)
     if array is not None and not (np.all(np.isfinite(array)) and np.all(array >= 0)):
         refuse(argument, "be finite and not negative", array, remedy)
+
+
+def described(value: Any) -> str:
+    """A value in a few words, with its type: "the text 'linear'", "the number 1500.0", "a HalfCar"."""
+    if value is None:
+        return "None"
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    if isinstance(value, str):
+        return f"the text {value!r}"
+    if isinstance(value, bool | int | float | complex | np.number):
+        return f"the number {value}"
+    name = type(value).__name__
+    name = "array" if isinstance(value, np.ndarray) or hasattr(value, "aval") else name
+    article = "an" if name[0] in "AEIOUaeiou" else "a"
+    if isinstance(value, list | tuple | set | dict):
+        return f"{article} {name} of {len(value)}"
+    return f"{article} {name}" + (f" of shape {np.shape(value)}" if hasattr(value, "shape") else "")
+
+
+def instance(argument: str, value: Any, kinds: type | tuple[type, ...], must: str, remedy: str = "") -> None:
+    """Refuse an object of another kind, such as a road where a vehicle belongs."""
+    if not isinstance(value, kinds):
+        refuse(argument, must, described(value), remedy)
 
 
 def one_of(argument: str, value: str, choices: Iterable[str]) -> None:

@@ -33,6 +33,7 @@ from jaxdamp._domains import (
     real,
     weight,
 )
+from jaxdamp._field_types import check_field_types
 
 
 __all__ = [
@@ -62,11 +63,22 @@ __all__ = [
 ]
 
 
-def as_float(value: Any) -> Array:
-    """A JAX array of the default float type; arrays that are floating already keep their type."""
+def as_float(value: Any, name: str = "value") -> Array:
+    """A JAX array of the default float type; arrays that are floating already keep their type.
+
+    Raises:
+        ValueError: something that is no number, under the name of its argument.
+    """
     if isinstance(value, jax.Array) and jnp.issubdtype(value.dtype, jnp.floating):
         return value
-    return jnp.asarray(value, dtype=float)
+    if value is None or isinstance(value, str | bytes | type | eqx.Module):
+        _checks.refuse(name, "be a number", _checks.described(value))
+    try:
+        return jnp.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        if isinstance(value, list | tuple | dict | set | np.ndarray):
+            raise ValueError(f"Argument `{name}` must be numbers, but is {value!r}: {error}") from error
+        raise
 
 
 def parameter(
@@ -81,8 +93,7 @@ def parameter(
         linear: the law's force is linear in all its parameters marked so, so that a fit has a closed form.
         field: passed on to `equinox.field`, such as `default=0.0`.
     """
-    metadata = {"unit": unit, "meaning": meaning, "domain": domain, "linear": linear}
-    return eqx.field(converter=as_float, metadata={"parameter": metadata}, **field)
+    return _number("parameter", {"unit": unit, "meaning": meaning, "domain": domain, "linear": linear}, field)
 
 
 def setting(unit: str, meaning: str, domain: Domain = real, *, command: bool = False, **field: Any) -> Any:
@@ -90,8 +101,17 @@ def setting(unit: str, meaning: str, domain: Domain = real, *, command: bool = F
 
     A `command` is set from outside, run by run, such as a coil current (`dampers.with_command`).
     """
-    metadata = {"unit": unit, "meaning": meaning, "domain": domain, "command": command}
-    return eqx.field(converter=as_float, metadata={"setting": metadata}, **field)
+    return _number("setting", {"unit": unit, "meaning": meaning, "domain": domain, "command": command}, field)
+
+
+def _number(kind: str, declared: dict[str, Any], options: dict[str, Any]) -> Any:
+    """A field that makes arrays of numbers, and names itself where it is given something else."""
+
+    def convert(value: Any) -> Array:
+        return as_float(value, made.name)
+
+    made = eqx.field(converter=convert, metadata={kind: declared}, **options)
+    return made
 
 
 class Parameter(eqx.Module):
@@ -134,7 +154,11 @@ def parameters(tree: Any, prefix: str = "") -> list[Parameter]:
 
 
 def check_parameters(module: eqx.Module) -> None:
-    """Refuse values outside their domain; called by modules in `__check_init__` (traced values pass)."""
+    """Refuse fields of another kind than their annotation and values outside their domain (traced values pass).
+
+    Modules call it in `__check_init__`.
+    """
+    check_field_types(module)
     for field in dataclasses.fields(module):
         declared = field.metadata.get("parameter") or field.metadata.get("setting")
         value = _checks.concrete(getattr(module, field.name)) if declared else None

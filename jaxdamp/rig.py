@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal, SignalLike
 from jaxdamp.dampers import AbstractDamper, Sum
 from jaxdamp.dampers.coverage import refuse_gaps
@@ -66,6 +67,7 @@ def respond(
     >>> round(float(force[0]), 6)
     120.0
     """
+    check_module("law", law, (AbstractDamper,), "respond(law, time, stroke, velocity)")
     instants = _checks.concrete(time)
     time, stroke = as_float(time), as_float(stroke)
     if time.ndim != 1 or time.size < 2 or stroke.shape != time.shape:
@@ -154,6 +156,7 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     >>> quasi_static(SeriesSpring(Linear(2000.0), stiffness=1e6), np.array([-0.5, 0.0, 0.5]))
     Array([-1000.,     0.,  1000.], dtype=float64)
     """
+    check_module("law", law, (AbstractDamper,), "quasi_static(law, velocities)")
     velocities = as_float(velocities)
     if velocities.ndim != 1 or velocities.size == 0:
         _checks.refuse("velocities", "be one or more in one dimension", f"of shape {velocities.shape}")

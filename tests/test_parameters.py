@@ -129,7 +129,7 @@ def test_parameters_of_a_composition():
         "positive",
         "positive",
         "positive",
-        "real",
+        "not negative",
         "positive",
     ]
     assert [p.linear for p in found] == [False, True, True, False, False, False]

@@ -7,7 +7,7 @@ from jaxdamp.bench import programmes
 from jaxdamp.bench.programmes import RandomTest, SineTest
 from jaxdamp.bench.read import read
 from jaxdamp.bench.runs import BenchRun
-from jaxdamp.bench.sets import BenchSet
+from jaxdamp.bench.sets import BenchSet, as_runs
 from jaxdamp.bench.velocity import estimate_velocity
 from jaxdamp.bench.virtual_dyno import VirtualDyno
 
@@ -18,6 +18,7 @@ __all__ = [
     "RandomTest",
     "SineTest",
     "VirtualDyno",
+    "as_runs",
     "estimate_velocity",
     "programmes",
     "read",

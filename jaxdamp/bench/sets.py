@@ -1,7 +1,7 @@
 """Several records of a test bench."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
@@ -35,7 +35,7 @@ class BenchSet:
     runs: tuple[BenchRun, ...]
 
     def __init__(self, runs: Iterable[BenchRun] = ()) -> None:
-        runs = tuple(runs)
+        runs = as_runs(runs)
         names = [run.name for run in runs]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
@@ -143,3 +143,26 @@ class BenchSet:
 def _file_name(name: str) -> str:
     """The name with what file systems do not like replaced."""
     return "".join("_" if c in '/\\:*?"<>|' or ord(c) < 32 else c for c in name).strip(" .") or "record"
+
+
+def as_runs(runs: Any, argument: str = "runs", call: str = "") -> tuple[BenchRun, ...]:
+    """One record or many as a tuple.
+
+    Arguments:
+        runs: a record, or any collection of records.
+        argument: its name in messages.
+        call: how the function is called, for arguments in the wrong order.
+
+    Raises:
+        ValueError: anything that is no record.
+    """
+    remedy = "Read files with `bench.read(paths)`; `BenchRun.from_arrays` makes a record of arrays."
+    remedy = f"The call is `{call}`. {remedy}" if call else remedy
+    if isinstance(runs, BenchRun):
+        return (runs,)
+    if isinstance(runs, str | os.PathLike | Mapping) or not isinstance(runs, Iterable):
+        _checks.refuse(argument, "be a record or records", _checks.described(runs), remedy)
+    runs = tuple(runs)
+    for index, run in enumerate(runs):
+        _checks.instance(f"{argument}[{index}]", run, BenchRun, "be a record", remedy)
+    return runs

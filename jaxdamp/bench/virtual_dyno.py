@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.programmes import Excitation
 from jaxdamp.bench.runs import BenchRun
@@ -74,6 +75,7 @@ class VirtualDyno:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        check_module("law", self.law, (AbstractDamper,), "VirtualDyno(law, force_noise=20.0)")
         for argument in ("sampling_rate", "mains_frequency", "friction_velocity"):
             _checks.positive(argument, getattr(self, argument))
         for argument in ("force_noise", "stroke_noise", "force_delay", "mains_ripple", "stroke_ripple", "friction"):
@@ -101,7 +103,9 @@ class VirtualDyno:
         programme = list(tests) if isinstance(tests, Iterable) else [tests]
         if not programme:
             _checks.refuse("tests", "hold at least one test", "empty")
-        for test in programme:
+        for index, test in enumerate(programme):
+            must, remedy = "be a test", "Take `bench.SineTest(amplitude=0.02, frequency=2.0)` or `bench.programmes`."
+            _checks.instance(f"tests[{index}]", test, Excitation, must, remedy)
             self._check(test)
         names = [test.name for test in programme]
         if len(set(names)) < len(names):

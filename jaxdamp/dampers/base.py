@@ -10,11 +10,12 @@ from typing import Any, ClassVar, final
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.parameters import check_parameters, parameter, readable
+from jaxdamp.parameters import check_parameters, nonnegative, parameter, readable, real
 
 
 class AbstractDamper(eqx.Module):
@@ -200,10 +201,23 @@ class Sum(AbstractDamper):
 
 @final
 class Scaled(AbstractDamper):
-    """A law whose force is multiplied by a factor, F = factor · F_law; made by `2.0 * law`."""
+    """A law whose force is multiplied by a factor, F = factor · F_law; made by `2.0 * law`.
+
+    Arguments:
+        law: the law.
+        factor: not negative: it would turn a damper into a drive, F v ≤ 0.
+        allow_active: accept a negative factor, as in studies of stability: `Scaled(law, -2.0, allow_active=True)`.
+    """
 
     law: AbstractDamper
-    factor: Number = parameter("", "factor on the force")
+    factor: Number = parameter("", "factor on the force", lambda law: real if law.allow_active else nonnegative)
+    allow_active: bool = eqx.field(static=True, default=False)
+
+    def __check_init__(self) -> None:
+        factor = _checks.concrete(self.factor)
+        if factor is not None and np.any(factor < 0) and not self.allow_active:
+            remedy = "It makes the law drive the motion. If that is meant: `Scaled(law, factor, allow_active=True)`."
+            _checks.refuse("factor", "not be negative", factor, remedy)
 
     preserves_linearity: ClassVar[bool] = True
 

@@ -6,6 +6,7 @@ from typing import Any
 import equinox as eqx
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp._types import ScalarLike
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.parameters import as_float, check_parameters, get
@@ -41,6 +42,7 @@ def with_command(law: AbstractDamper, command: ScalarLike) -> AbstractDamper:
     Raises:
         ValueError: a law without a command; a command outside its domain.
     """
+    check_module("law", law, (AbstractDamper,), "with_command(law, command)")
     paths = _paths(law)
     if not paths:
         remedy = "`ModifiedBoucWen` takes a voltage; `Scheduled` makes any law depend on a command."

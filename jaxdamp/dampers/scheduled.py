@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_field_types
 from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers.base import AbstractDamper
@@ -46,6 +47,7 @@ class Scheduled(AbstractDamper):
     preserves_linearity: ClassVar[bool] = True
 
     def __check_init__(self) -> None:
+        check_field_types(self)
         if len(self.laws) < 2 or self.levels.shape != (len(self.laws),):
             must = "hold two laws or more, and a level for each"
             _checks.refuse("laws", must, f"{len(self.laws)} laws and levels of shape {self.levels.shape}")

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most, within
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
-from jaxdamp.dampers._points import check_points
+from jaxdamp.dampers._points import check_points, refuse_active
 from jaxdamp.dampers.base import AbstractMemoryless
 from jaxdamp.dampers.table import Table
 from jaxdamp.parameters import as_float, increasing, parameter, setting
@@ -52,9 +52,11 @@ class SplineTable(AbstractMemoryless):
     Arguments:
         velocity: strictly increasing velocities [m/s], shape (k,), k ≥ 2. Fixed: a fit changes the forces.
         force: forces [N] at these velocities, shape (k,).
+        allow_active: accept points whose force drives the motion instead of resisting it.
 
     Raises:
-        ValueError: fewer than two points, shapes that differ, velocities that do not increase.
+        ValueError: fewer than two points, shapes that differ, velocities that do not increase; points that drive the
+            motion, unless `allow_active`. What a fit makes of the forces is not refused, but its result says so.
 
     >>> law = SplineTable(velocity=[-1.0, 0.0, 0.2, 1.0], force=[-900.0, 0.0, 500.0, 1900.0])
     >>> [round(float(law.force_velocity(v)), 3) for v in (0.0, 0.1, 0.2, 1.2)]
@@ -64,9 +66,12 @@ class SplineTable(AbstractMemoryless):
     velocity: Vector = setting("m/s", "velocities of the points", increasing)
     force_points: Vector = parameter("N", "forces at the points")
 
-    def __init__(self, velocity: VectorLike, force: VectorLike) -> None:
-        self.velocity = as_float(velocity)
-        self.force_points = as_float(force)
+    def __init__(self, velocity: VectorLike, force: VectorLike, *, allow_active: bool = False) -> None:
+        self.velocity = as_float(velocity, "velocity")
+        self.force_points = as_float(force, "force")
+        check_points(self.velocity, self.force_points)
+        if not allow_active:
+            refuse_active(self.velocity, self.force_points)
 
     def __check_init__(self) -> None:
         check_points(self.velocity, self.force_points)
@@ -95,8 +100,9 @@ class SplineTable(AbstractMemoryless):
         """
         velocity, force = np.asarray(velocity, dtype=float), np.asarray(force, dtype=float)
         start = Table.guess(velocity, force, points_a_side)
-        law = cls(start.velocity, start.force_points)
+        law = cls(start.velocity, start.force_points, allow_active=True)
         for _ in range(3):
             missed = force - np.asarray(jax.vmap(law.force_velocity)(jnp.asarray(velocity)))
-            law = cls(law.velocity, law.force_points + Table.guess(velocity, missed, points_a_side).force_points)
+            forces = law.force_points + Table.guess(velocity, missed, points_a_side).force_points
+            law = cls(law.velocity, forces, allow_active=True)
         return law

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_field_types
 from jaxdamp._limits import within
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers.base import AbstractDamper, AbstractStateless, refuse_states
@@ -55,6 +56,7 @@ class StrokeDependent(AbstractStateless):
     preserves_linearity: ClassVar[bool] = True
 
     def __check_init__(self) -> None:
+        check_field_types(self)
         if self.stroke.ndim != 1 or self.stroke.size != len(self.laws) or not self.laws:
             must = "hold one stroke or more, one for each law"
             _checks.refuse("stroke", must, f"of shape {self.stroke.shape} for {len(self.laws)} laws")
@@ -68,10 +70,13 @@ class StrokeDependent(AbstractStateless):
         return forces[0] + jnp.sum(shares * jnp.diff(forces))
 
     @classmethod
-    def from_grid(cls, stroke: VectorLike, velocity: VectorLike, force: Grid) -> "StrokeDependent":
+    def from_grid(
+        cls, stroke: VectorLike, velocity: VectorLike, force: Grid, *, allow_active: bool = False
+    ) -> "StrokeDependent":
         """Bilinear interpolation of forces [N], shape (strokes, velocities), on a grid, uniform or not.
 
         Beyond the first and last velocity the slopes there go on, beyond the first and last stroke nothing changes.
+        Rows whose force drives the motion are refused, unless `allow_active` (see `Table`).
 
         >>> force = [[-400.0, 0.0, 900.0], [-600.0, 0.0, 1300.0]]
         >>> law = StrokeDependent.from_grid([0.0, 0.1], [-1.0, 0.0, 1.0], force)
@@ -83,4 +88,4 @@ class StrokeDependent(AbstractStateless):
             must = "have one row for each stroke and one column for each velocity"
             expected = f"of shape {rows.shape} for {np.size(stroke)} strokes and {np.size(velocity)} velocities"
             _checks.refuse("force", must, expected)
-        return cls(tuple(Table(velocity, row) for row in rows), stroke)
+        return cls(tuple(Table(velocity, row, allow_active=allow_active) for row in rows), stroke)

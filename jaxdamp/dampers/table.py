@@ -8,7 +8,7 @@ import numpy as np
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers._guesses import velocity_grid
 from jaxdamp.dampers._hinges import hinges
-from jaxdamp.dampers._points import check_points
+from jaxdamp.dampers._points import check_points, refuse_active
 from jaxdamp.dampers.base import AbstractMemoryless
 from jaxdamp.parameters import as_float, increasing, parameter, setting
 
@@ -20,6 +20,11 @@ class Table(AbstractMemoryless):
     Arguments:
         velocity: strictly increasing velocities [m/s], shape (k,), k ≥ 2. Fixed: a fit changes the forces.
         force: forces [N] at these velocities, shape (k,).
+        allow_active: accept points whose force drives the motion instead of resisting it.
+
+    Raises:
+        ValueError: fewer than two points, shapes that differ, velocities that do not increase; points that drive the
+            motion, unless `allow_active`. What a fit makes of the forces is not refused, but its result says so.
 
     >>> law = Table(velocity=[-1.0, 0.0, 0.2, 1.0], force=[-900.0, 0.0, 700.0, 1900.0])
     >>> [round(float(law.force_velocity(v)), 6) for v in (0.1, 0.6, 1.2)]
@@ -29,9 +34,12 @@ class Table(AbstractMemoryless):
     velocity: Vector = setting("m/s", "velocities of the points", increasing)
     force_points: Vector = parameter("N", "forces at the points", linear=True)
 
-    def __init__(self, velocity: VectorLike, force: VectorLike) -> None:
-        self.velocity = as_float(velocity)
-        self.force_points = as_float(force)
+    def __init__(self, velocity: VectorLike, force: VectorLike, *, allow_active: bool = False) -> None:
+        self.velocity = as_float(velocity, "velocity")
+        self.force_points = as_float(force, "force")
+        check_points(self.velocity, self.force_points)
+        if not allow_active:
+            refuse_active(self.velocity, self.force_points)
 
     def __check_init__(self) -> None:
         check_points(self.velocity, self.force_points)
@@ -48,4 +56,4 @@ class Table(AbstractMemoryless):
         """Points from measured data by least squares, closer together towards zero velocity."""
         grid = velocity_grid(np.asarray(velocity), points_a_side)
         hats = np.stack([np.interp(velocity, grid, unit) for unit in np.eye(grid.size)], axis=1)
-        return cls(grid, np.linalg.lstsq(hats, np.asarray(force), rcond=None)[0])
+        return cls(grid, np.linalg.lstsq(hats, np.asarray(force), rcond=None)[0], allow_active=True)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp._types import VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._write import write_whole
@@ -29,6 +30,7 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
     Raises:
         ValueError: velocities that do not increase, a folder that does not exist, a law that does not settle.
     """
+    check_module("law", law, (AbstractDamper,), "to_csv(law, path, velocities)")
     velocity = np.asarray(velocities, dtype=float)
     _checks.finite("velocities", velocity)
     if velocity.ndim != 1 or velocity.size == 0 or np.any(np.diff(velocity) <= 0):

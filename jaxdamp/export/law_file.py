@@ -176,6 +176,8 @@ def _law(plain: Any, where: str) -> AbstractDamper:
         hint = f"Did you mean {near[0]!r}? " if near else ""
         _checks.refuse(where, "be a law that is known", f"{name!r}", f"{hint}Import the module of your own laws first.")
     fields = dataclasses.fields(kind)
+    # options that a class was given after the file was written have their default
+    plain = {f.name: f.default for f in fields if _declared(f) is None and isinstance(f.default, bool)} | plain
     _same_names(name, ["class"] + [field.name for field in fields], plain)
     law = object.__new__(kind)
     for field in fields:

@@ -4,10 +4,9 @@ import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
-from jaxdamp import _checks
 from jaxdamp._progress import Progress
-from jaxdamp.bench import BenchRun
-from jaxdamp.identify.fitting import Start, fit
+from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.identify.fitting import Start, check_starts, fit
 from jaxdamp.identify.result import FitResult
 
 
@@ -82,9 +81,9 @@ def compare(
     >>> compare({"linear": dampers.Linear, "bilinear": dampers.Bilinear}, runs).best.name
     'bilinear'
     """
-    if not laws:
-        _checks.refuse("laws", "hold at least one law", "empty", "Take `default_ladder(runs)`.")
-    runs, held_out, rungs = tuple(runs), tuple(held_out), []
+    call = "compare(laws, runs)"
+    check_starts(laws, call)
+    runs, held_out, rungs = as_runs(runs, call=call), as_runs(held_out, "held_out"), []
     with Progress("Fitting") as shown:
         for number, (name, start) in enumerate(laws.items(), 1):
             if progress is None:

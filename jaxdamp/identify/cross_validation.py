@@ -8,8 +8,8 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
-from jaxdamp.bench import BenchRun
-from jaxdamp.identify.fitting import Start, fit
+from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.identify.fitting import Start, check_starts, fit
 from jaxdamp.identify.result import FitResult, score
 from jaxdamp.identify.training import Training
 
@@ -122,10 +122,10 @@ def cross_validate(
     >>> cross_validate({"linear": dampers.Linear, "bilinear": dampers.Bilinear}, runs).best
     'bilinear'
     """
-    if not laws:
-        _checks.refuse("laws", "hold at least one law", "empty")
+    call = "cross_validate(laws, runs)"
+    check_starts(laws, call)
     groups: dict[Hashable, list[BenchRun]] = {}
-    for run in runs:
+    for run in as_runs(runs, call=call):
         groups.setdefault(None if by is None else by(run), []).append(run)
     for group, members in groups.items():
         if len(members) < 2:

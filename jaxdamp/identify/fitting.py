@@ -3,14 +3,16 @@
 import inspect
 import warnings as python_warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import scipy.optimize
 from jaxtyping import Bool, Float
 
-from jaxdamp import _checks
-from jaxdamp.bench import BenchRun
+from jaxdamp import _checks, dampers
+from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, AbstractStateless
 from jaxdamp.dampers.base import parts
 from jaxdamp.dampers.coverage import coverage
@@ -76,7 +78,7 @@ def fit(
     >>> abs(result["rebound_rate"].value - 2600.0) < 4 * result["rebound_rate"].standard_error
     True
     """
-    runs = (runs,) if isinstance(runs, BenchRun) else tuple(runs)
+    runs = as_runs(runs, call="fit(law, runs)")
     _check(runs, force_noise, max_steps)
     sigma = weights(weighting, runs)
     fitted_to = np.isfinite(sigma)
@@ -115,8 +117,40 @@ def _check(runs: Sequence[BenchRun], force_noise: float | None, max_steps: int) 
         _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
 
 
+def check_start(argument: str, law: Any) -> None:
+    """Refuse anything that no fit can start from."""
+    if isinstance(law, AbstractDamper) or (isinstance(law, type) and issubclass(law, AbstractDamper)):
+        return
+    if isinstance(law, str):
+        known = next((name for name in dampers.__all__ if name.lower() == law.lower().replace("_", "")), None)
+        remedy = f"Write `dampers.{known}`." if known else f"Write `default_ladder(runs, [{law!r}])[{law!r}]`."
+    elif callable(law) and not isinstance(law, type | BenchRun | eqx.Module):
+        return
+    else:
+        remedy = (
+            "The calls are `fit(law, runs)` and `compare(laws, runs)`, with `dampers.Besinger` for instance as law."
+        )
+    must = "be a law, a class of laws, or a function that makes a law of velocities and forces"
+    _checks.refuse(argument, must, _checks.described(law), remedy)
+
+
+def check_starts(laws: Any, call: str) -> None:
+    """Refuse anything that is not laws by name."""
+    example = "{'linear': dampers.Linear, 'besinger': dampers.Besinger}"
+    if not isinstance(laws, Mapping):
+        names = isinstance(laws, list | tuple) and all(isinstance(name, str) for name in laws)
+        ladder = f"`default_ladder(runs, {list(laws)})`" if names and laws else "`default_ladder(runs)`"
+        remedy = f"The call is `{call}`; write {ladder} or {example}."
+        _checks.refuse("laws", "be laws by name", _checks.described(laws), remedy)
+    if not laws:
+        _checks.refuse("laws", "hold at least one law", "empty", f"Take `default_ladder(runs)` or {example}.")
+    for name, law in laws.items():
+        check_start(f"laws[{name!r}]", law)
+
+
 def started(law: Start, runs: Sequence[BenchRun]) -> AbstractDamper:
     """An instance to start from."""
+    check_start("law", law)
     if isinstance(law, AbstractDamper):
         return law
     guess = getattr(law, "guess", None) if isinstance(law, type) else law

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp.bench import BenchRun
+from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import (
     AbstractDamper,
     AbstractMemoryless,
@@ -75,7 +75,8 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dic
     Raises:
         ValueError: an unknown name.
     """
-    runs = list(runs)
+    runs = as_runs(runs, call="default_ladder(runs, names)")
+    names = [names] if isinstance(names, str) else names
     velocity = np.concatenate([run.velocity for run in runs])
     force = np.concatenate([run.force for run in runs])
     lag = lag_time(runs)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp.bench import BenchRun
+from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.traces import is_memoryless, predict_runs, used_samples
 
@@ -110,11 +110,11 @@ class FitResult:
 
     def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
         """Force [N] of the fitted law at every sample of records, old or new."""
-        return predict_runs(self.law, [runs] if isinstance(runs, BenchRun) else list(runs))
+        return predict_runs(self.law, as_runs(runs))
 
     def score(self, runs: Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
         """Fit percent, RMSE [N] and the scores by record, on other records."""
-        return score(self.law, list(runs))
+        return score(self.law, as_runs(runs))
 
     def plot(self, runs: Iterable[BenchRun] | None = None, **options: Any) -> "Figure":
         """Loops of force over velocity and over stroke, measured and fitted, with residuals."""

@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
-from jaxdamp.bench import BenchRun
+from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.fitting import Start, started, weights
 from jaxdamp.identify.result import Score, score
@@ -125,7 +125,7 @@ def train(
     >>> trained.held_out_fit_percent > 90.0
     True
     """
-    runs, held_out = (tuple([r] if isinstance(r, BenchRun) else r) for r in (runs, held_out))
+    runs, held_out = as_runs(runs, call="train(law, runs, held_out=...)"), as_runs(held_out, "held_out")
     _check(runs, held_out, steps, patience)
     _checks.positive("learning_rate", learning_rate)
     sigma = weights([1.0] * len(runs) if weighting is None else weighting, runs)

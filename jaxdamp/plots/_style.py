@@ -1,8 +1,9 @@
 """What all pictures share: figure, colours, labels with unit and sign, legends beside the axes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
+from jaxdamp import _checks
 from jaxdamp.dampers import AbstractDamper, Sum
 
 
@@ -20,6 +21,7 @@ GREY = "#7F7F7F"
 VELOCITY = "velocity [m/s]   (+ rebound, − compression)"
 STROKE = "stroke [mm]   (+ rebound, − compression)"
 FORCE = "force [N]   (+ resists extension)"
+SIMULATE = "Take what `jaxdamp.simulate(vehicle, road)` gives, or several by name: {'before': ..., 'after': ...}."
 
 
 def new_figure(width: float, height: float) -> "matplotlib.figure.Figure":
@@ -81,6 +83,29 @@ def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[Any], col
     figure.legend(
         handles=list(handles), loc="outside upper center", frameon=False, ncols=min(columns, max(len(handles), 1))
     )
+
+
+def by_name(argument: str, given: Any, kind: type, words: str, remedy: str, alone: str = "") -> dict[str, Any]:
+    """One object to draw, or several by name, as a dictionary; `alone` names a single one.
+
+    Arguments:
+        argument: its name in messages.
+        given: an object, or objects by name.
+        kind: their class.
+        words: the class in words, such as "a damper law".
+        remedy: what to write.
+        alone: the name of a single object.
+
+    Raises:
+        ValueError: none, or objects of another kind.
+    """
+    found = dict(given) if isinstance(given, Mapping) else {alone: given}
+    if not found:
+        _checks.refuse(argument, "hold at least one", "empty", remedy)
+    for name, item in found.items():
+        label = f"{argument}[{name!r}]" if isinstance(given, Mapping) else argument
+        _checks.instance(label, item, kind, f"be {words}", remedy)
+    return found
 
 
 def law_name(law: AbstractDamper) -> str:

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.plots import _style
@@ -73,6 +74,7 @@ def law_card(
         frequencies: of the sines [Hz].
         title: above the picture; the classes of the law if it is left out.
     """
+    check_module("law", law, (AbstractDamper,), "law_card(law)")
     _checks.positive("amplitude", amplitude)
     _checks.positive("frequencies", np.asarray(frequencies))
     loops = _loops(law, float(amplitude), frequencies)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import equinox as eqx
 import numpy as np
 
+from jaxdamp import _checks
 from jaxdamp._types import VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style
@@ -25,6 +26,8 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
         velocities: where to draw the laws [m/s]; a little beyond the fastest damper motion of the ride, if the vehicle
             reports it as `peak_damper_velocity`, or −1 to 1 m/s, if left out.
     """
+    remedy = "The call is `tuning(result)` with the result of `tune.minimise`."
+    _checks.instance("result", result, TuneResult, "be the result of a tuning", remedy)
     if velocities is None:
         peaks = [table.get("peak_damper_velocity", 0.0) for table in (result.before, result.after)]
         reach = 1.1 * max(peaks) or 1.0

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._types import VectorLike
-from jaxdamp.bench import BenchRun
+from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style
 from jaxdamp.plots.loops import last_cycle
@@ -40,10 +40,11 @@ def force_velocity(
     Raises:
         ValueError: no law, or a baseline that is not among the laws.
     """
-    laws = {_style.law_name(laws): laws} if isinstance(laws, AbstractDamper) else dict(laws)
-    runs = () if runs is None else (runs,) if isinstance(runs, BenchRun) else tuple(runs)
-    if not laws:
-        _checks.refuse("laws", "hold at least one law", "empty")
+    alone = _style.law_name(laws) if isinstance(laws, AbstractDamper) else ""
+    laws = _style.by_name(
+        "laws", laws, AbstractDamper, "a damper law", "Take `result.law` of a fit, or laws by name.", alone
+    )
+    runs = () if runs is None else as_runs(runs)
     if baseline is not None:
         _checks.one_of("baseline", baseline, laws)
     if velocities is None:

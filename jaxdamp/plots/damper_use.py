@@ -39,9 +39,7 @@ def damper_use(
     Raises:
         ValueError: no response, an unknown damper, a vehicle without one.
     """
-    responses = {"": responses} if isinstance(responses, Response) else dict(responses)
-    if not responses:
-        _checks.refuse("responses", "hold at least one", "empty")
+    responses = _style.by_name("responses", responses, Response, "a response", _style.SIMULATE)
     known = dampers_of(next(iter(responses.values())))
     if not known:
         _checks.refuse("responses", "be of a vehicle with a damper", "of one without")

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp.bench import BenchRun
+from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.bench.motion import cycle_instants
 from jaxdamp.identify import FitResult
 from jaxdamp.plots import _style
@@ -41,7 +41,9 @@ def fit_loops(
     """
     from matplotlib.lines import Line2D
 
-    runs = result.runs if runs is None else (runs,) if isinstance(runs, BenchRun) else tuple(runs)
+    remedy = "The call is `fit_loops(result, runs)` with the result of `identify.fit`."
+    _checks.instance("result", result, FitResult, "be the result of a fit", remedy)
+    runs = result.runs if runs is None else as_runs(runs)
     if not runs:
         _checks.refuse("runs", "hold at least one record", "empty")
     shown = spread(runs, most)

@@ -47,9 +47,9 @@ def ride(
     Raises:
         ValueError: no response, no channel or an unknown one, an unknown weighting, a window without samples.
     """
-    responses = {"": responses} if isinstance(responses, Response) else dict(responses)
-    if not responses or (channels is not None and not channels):
-        _checks.refuse("responses", "hold at least one, with one channel to draw", f"{len(responses)}")
+    responses = _style.by_name("responses", responses, Response, "a response", _style.SIMULATE)
+    if channels is not None and not channels:
+        _checks.refuse("channels", "hold at least one channel to draw", "empty")
     first = next(iter(responses.values()))
     channels = ride_channels(first) if channels is None else channels
     for channel in channels:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp._limits import at_least, at_most
 from jaxdamp._types import Scalar, ScalarLike, SignalLike, VectorLike
 from jaxdamp.roads._composed import AbstractOnOneRoad
@@ -74,6 +75,7 @@ def delayed(
         ValueError: If not exactly one of `delays` and `positions` is given, if one is negative or there is none, if
             `speed` is missing, not positive, given with `delays`, or not the one the road was made with.
     """
+    check_module("road", road, (AbstractRoad,), "delayed(road, positions=vehicle.axle_positions, speed=20.0)")
     if (delays is None) == (positions is None):
         both = "neither was given" if delays is None else f"{delays} s, and positions {positions} m as well"
         _checks.refuse("delays", "be given, or `positions` with `speed`, but not both", both, "Give exactly one.")

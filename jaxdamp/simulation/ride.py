@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp._types import Scalar
 from jaxdamp.configuration import fuses_loops
 from jaxdamp.parameters import parameters, replace
@@ -72,6 +73,8 @@ class Ride(eqx.Module):
         dt: float = 1e-3,
         substeps: int | None = None,
     ) -> None:
+        check_module("vehicle", vehicle, (AbstractVehicle,), "Ride(vehicle, road)")
+        check_module("road", road, (AbstractRoad,), "Ride(vehicle, road)")
         known = {m.name: m for m in vehicle.ride_metrics}
         for name in metrics or ():
             _checks.one_of("metrics", name, known)

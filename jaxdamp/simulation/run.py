@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal
 from jaxdamp.dampers.coverage import coverage
 from jaxdamp.roads import AbstractRoad
@@ -72,6 +73,8 @@ def simulate(
     >>> round(float(response.metrics()["working_space_peak"]), 3)
     0.072
     """
+    check_module("vehicle", vehicle, (AbstractVehicle,), "simulate(vehicle, road)")
+    check_module("road", road, (AbstractRoad,), "simulate(vehicle, road)")
     time, heights = sampled(vehicle, road, duration, dt)
     _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)

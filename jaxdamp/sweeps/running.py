@@ -75,6 +75,9 @@ def sweep(
     >>> float(data["product"].sel(a=2.0, b=5.0))
     10.0
     """
+    if not callable(function):
+        remedy = "The call is `sweep(function, over)`, such as `sweep(Ride(car, road), {'damper.rate': [1e3, 2e3]})`."
+        _checks.refuse("function", "be a function of a point", _checks.described(function), remedy)
     if gradients not in (False, True, "forward", "reverse"):
         _checks.refuse("gradients", "be False, True, 'forward' or 'reverse'", repr(gradients))
     points = as_points(over)

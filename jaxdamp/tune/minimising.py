@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks, metrics
+from jaxdamp._field_types import check_module
 from jaxdamp._progress import Progress
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters, free_parameters
@@ -68,6 +69,10 @@ def minimise(
     >>> round(float(result.vehicle.damper.rate), 1)
     4656.4
     """
+    call = "minimise(metric, vehicle, road)"
+    _checks.instance("metric", metric, str, "be the name of a ride metric", f"The call is `{call}`.")
+    check_module("vehicle", vehicle, (AbstractVehicle,), call)
+    check_module("road", road, (AbstractRoad, WhiteRoad), call)
     limits = dict(limits or {})
     chosen = chosen_metrics(vehicle, road, (metric, *limits))
     white = isinstance(road, WhiteRoad)

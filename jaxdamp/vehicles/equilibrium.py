@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.dampers.coverage import coverage
 from jaxdamp.vehicles.base import AbstractVehicle
@@ -89,6 +90,7 @@ def static_equilibrium(vehicle: AbstractVehicle, road: Any = None) -> dict[str, 
     >>> round(1e3 * float(static_equilibrium(car)["z_sprung"]), 2)  # mm
     9.3
     """
+    check_module("vehicle", vehicle, (AbstractVehicle,), "static_equilibrium(vehicle)")
     wheels = len(vehicle.wheel_names)
     heights = jnp.zeros(wheels) if road is None else jnp.asarray(road, dtype=float)
     if heights.shape != (wheels,):

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp._types import ScalarLike
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.channels import Instant
@@ -81,6 +82,7 @@ def linearise(vehicle: AbstractVehicle, *, amplitude: Any = None, frequency: Any
     >>> round(float(-1200.0 * linear.state_matrix[2, 2]))  # equivalent damping [N s/m]
     3355
     """
+    check_module("vehicle", vehicle, (AbstractVehicle,), "linearise(vehicle)")
     if (amplitude is None) != (frequency is None):
         missing = "frequency" if frequency is None else "amplitude"
         _checks.refuse(missing, "be given with the other of the two", None, "Pass `amplitude=0.02, frequency=1.2`.")
@@ -137,4 +139,5 @@ def _linearise(vehicle: AbstractVehicle, amplitude: Array | None, frequency: Arr
 
 def as_linear(vehicle: AbstractVehicle | LinearVehicle) -> LinearVehicle:
     """The vehicle linearised about rest, if it is not linear yet."""
+    check_module("vehicle", vehicle, (AbstractVehicle, LinearVehicle))
     return vehicle if isinstance(vehicle, LinearVehicle) else linearise(vehicle)

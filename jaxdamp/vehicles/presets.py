@@ -1,5 +1,6 @@
 """Published parameter sets; each function names its source and what had to be assumed."""
 
+from jaxdamp._field_types import check_module
 from jaxdamp.dampers import AbstractDamper, Besinger, Linear
 from jaxdamp.vehicles.axle import Axle
 from jaxdamp.vehicles.corner import Corner
@@ -69,6 +70,7 @@ def truck_001(*, walking_beam: bool = True, damper: AbstractDamper | None = None
     2.2 m; 40 kN s/m for the friction of the tandem's leaves; beams whose inertia sits in the axles.
     """
     shock = Besinger(14.4e3, 15.6e3, 3.6e3, 0.125, 0.7) if damper is None else damper
+    check_module("damper", shock, (AbstractDamper,))
     front = Corner(700.0, 2 * 252e3, 2 * 1100e3, 2.0 * shock, 2 * 500.0)
     axle_mass, spread, wheelbase, leaves = 1100.0, 1.3, 4.5, 2 * 1195e3
     if walking_beam:

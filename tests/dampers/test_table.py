@@ -3,7 +3,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxdamp.dampers import Table
+from jaxdamp.dampers import SplineTable, Table
 
 
 VELOCITY = [-1.1, -0.4, -0.1, 0.0, 0.05, 0.3, 1.0]
@@ -45,3 +45,15 @@ def test_guess_goes_through_its_data():
 def test_refusals(velocity, force, message):
     with pytest.raises(ValueError, match=message):
         Table(velocity, force)
+
+
+@pytest.mark.parametrize("law", [Table, SplineTable])
+def test_points_that_drive_the_motion_are_refused(law):
+    with pytest.raises(ValueError, match=r"`force` must resist the motion.*900 N at -1 m/s, 1 of 3 points"):
+        law([-1.0, 0.0, 1.0], [900.0, 0.0, 900.0])
+    assert float(law([-1.0, 0.0, 1.0], [900.0, 0.0, 900.0], allow_active=True).force_velocity(-1.0)) == 900.0
+
+
+def test_gas_force_and_scatter_near_rest_are_not_active():
+    Table([-1.0, 0.0, 1.0], [-900.0, -200.0, 700.0])
+    Table([-1.0, -0.01, 0.0, 1.0], [-900.0, 20.0, 0.0, 900.0])

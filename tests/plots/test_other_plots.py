@@ -75,7 +75,7 @@ def test_peak_points_are_the_force_at_the_largest_velocities(runs: BenchSet) -> 
 
 
 def test_no_law_is_refused() -> None:
-    with pytest.raises(ValueError, match="`laws` must hold at least one law"):
+    with pytest.raises(ValueError, match="`laws` must hold at least one"):
         plots.force_velocity({})
 
 
