@@ -24,8 +24,8 @@ def presets() -> dict[str, Callable[..., AbstractVehicle]]:
     return {name: make for name, make in known if "damper" in inspect.signature(make).parameters}
 
 
-def parse_road(text: str, vehicle: AbstractVehicle, *, speed: float, duration: float, seed: int) -> AbstractRoad:
-    """The road that a word on the command line means, under every axle of the vehicle.
+def parse_road(text: str, *, speed: float, duration: float, seed: int) -> AbstractRoad:
+    """The road that a word on the command line means.
 
     "iso:C" is an ISO 8608 class, "bump:0.06:5" a cosine bump of height and length in metres that begins after a second,
     anything else a file: OpenCRG (*.crg), or text with positions [m] and heights [m].
@@ -44,8 +44,7 @@ def parse_road(text: str, vehicle: AbstractVehicle, *, speed: float, duration: f
     else:
         remedy = 'Examples: "iso:C", "bump:0.06:5", "profile.csv", "course.crg".'
         _checks.refuse("road", "be iso:CLASS, bump:HEIGHT:LENGTH or a file that is there", repr(text), remedy)
-    several = len(vehicle.axle_positions) > 1
-    return roads.delayed(road, positions=vehicle.axle_positions, speed=speed) if several else road
+    return road
 
 
 def run_ride(
@@ -73,12 +72,15 @@ def run_ride(
             for done, (name, found) in enumerate(laws.items()):
                 advance(name, done)
                 car = make(damper=found)
-                under = parse_road(road, car, speed=speed, duration=duration or USUAL, seed=seed)
+                under = parse_road(road, speed=speed, duration=duration or USUAL, seed=seed)
                 responses[name] = simulate(car, under, duration=duration or under.duration or USUAL, dt=dt)
             tables = [metrics_table(responses), comfort_table(responses)]
         for table in tables:
             screen.table(table)
         title = f"{vehicle} on {road} at {speed:g} m/s"
+        timing = next(iter(responses.values())).axle_timing
+        if timing.kind != "one axle":
+            screen.say(f"Axles: {timing}.")
         with screen.stage("Pictures and tables"):
             _write(folder, title, laws, responses, tables)
         names = written(folder)
@@ -129,6 +131,9 @@ def _write(
     folder: Path, title: str, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response], tables: list[Table]
 ) -> None:
     report = Report(title)
+    timing = next(iter(responses.values())).axle_timing
+    if timing.kind != "one axle":
+        report.text(f"Axles: {timing}.")
     for name, law in laws.items():
         report.text(f"{name}: {law!r}")
         export.to_json(law, folder / f"{name}.json")

@@ -8,8 +8,8 @@ an array of shape [time, wheels]. A road with a single track has one column.
 - Random roads: `iso8608` and `iso8608_filtered` (a roughness class at a vehicle speed), `band_limited` (a flat spectrum
   between two frequencies).
 - Measured roads: `from_profile`, `read_profile` (text files), `read_crg` (OpenCRG).
-- Several wheels: `two_track` puts tracks beside each other, `delayed` axles behind each other; do it in this order, and
-  the wheels are front-left, front-right, rear-left, rear-right.
+- Several wheels: `two_track` puts tracks beside each other. Simulations send a road on from axle to axle by its speed
+  and the vehicle's own axle positions; `delayed` does it with other delays, `in_phase` moves all axles at once.
 - From roads make roads: `joined`, `superposed`, and for the tyre `contact_patch` and `rolling_disc`.
 - How rough is it? `assess_roughness`, `class_limits`, `road_class`; `coherency` of two tracks.
 - For stationary responses: `white`, a road known by its spectrum alone.
@@ -35,8 +35,8 @@ Two roads through the same corner of a village, first a speed hump and then a po
 """
 
 from jaxdamp.roads.assessment import RoughnessAssessment, assess_roughness
-from jaxdamp.roads.axles import delayed
-from jaxdamp.roads.base import AbstractRoad
+from jaxdamp.roads.axles import delayed, in_phase
+from jaxdamp.roads.base import AbstractRoad, Columns
 from jaxdamp.roads.bump import cosine_bump
 from jaxdamp.roads.coherency import coherency
 from jaxdamp.roads.contact import contact_patch, rolling_disc
@@ -60,6 +60,7 @@ from jaxdamp.roads.white import WhiteRoad, white
 
 __all__ = [
     "AbstractRoad",
+    "Columns",
     "RoughnessAssessment",
     "WhiteRoad",
     "assess_roughness",
@@ -71,6 +72,7 @@ __all__ = [
     "delayed",
     "from_profile",
     "half_sine_bump",
+    "in_phase",
     "iso8608",
     "iso8608_filtered",
     "joined",

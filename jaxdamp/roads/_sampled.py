@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, Signal, SignalLike
 from jaxdamp.roads._fade import fade_in
-from jaxdamp.roads.base import AbstractRoad
+from jaxdamp.roads.base import AbstractRoad, Columns
 
 
 # How far outside the record a time may lie before it is refused, in samples: rounding must not count.
@@ -39,7 +39,7 @@ class SampledRoad(AbstractRoad):
     """Samples at equal spacing in time, or in distance when there is a `speed`."""
 
     samples: Float[Array, "samples wheels"]
-    speed: Scalar | None
+    driven_at: Scalar | None
     spacing: float = eqx.field(static=True)  # [s], or [m] with a speed
     periodic: bool = eqx.field(static=True)
     ramp: float = eqx.field(static=True)
@@ -60,9 +60,19 @@ class SampledRoad(AbstractRoad):
         return height * jnp.reshape(fade_in(time, self.ramp), (-1, 1))
 
     @property
+    def speed(self) -> Scalar | None:
+        """The speed [m/s] that the road was made for."""
+        return self.driven_at
+
+    @property
     def wheels(self) -> int:
         """The number of tracks."""
         return self.samples.shape[1]
+
+    @property
+    def columns(self) -> Columns:
+        """Tracks side by side; without a speed several columns are the motions of the wheels, each its own."""
+        return Columns("by wheel" if self.speed is None and self.wheels > 1 else "road", self.wheels)
 
     @property
     def grid(self) -> float | None:

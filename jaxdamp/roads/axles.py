@@ -4,15 +4,14 @@ from collections.abc import Sequence
 from typing import final
 
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._limits import at_least, at_most
 from jaxdamp._types import Scalar, ScalarLike, SignalLike, VectorLike
-from jaxdamp.roads._composed import AbstractOnOneRoad
-from jaxdamp.roads.base import AbstractRoad
+from jaxdamp.roads._composed import AbstractOnOneRoad, agreed_speed
+from jaxdamp.roads.base import AbstractRoad, Columns
 
 
 @final
@@ -21,6 +20,12 @@ class Delayed(AbstractOnOneRoad):
 
     road: AbstractRoad
     delay: Float[Array, " axles"]
+    driven_at: Scalar | None
+
+    @property
+    def speed(self) -> Scalar | None:
+        """The speed [m/s] that the road was made for."""
+        return self.driven_at
 
     def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] under each wheel at each `time` [s]: all wheels of the first axle, then of the second, ..."""
@@ -35,6 +40,58 @@ class Delayed(AbstractOnOneRoad):
     def wheels(self) -> int:
         """The number of axles times the number of tracks."""
         return self.delay.size * self.road.wheels
+
+    @property
+    def columns(self) -> Columns:
+        """The tracks of the road for each axle."""
+        within = self.road.columns
+        delays = self.delay if within.delays is None else (self.delay[:, None] + within.delays[None, :]).reshape(-1)
+        return Columns("delayed", within.tracks, delays)
+
+
+@final
+class InPhase(AbstractOnOneRoad):
+    """A road that reaches all axles at the same time; made by `in_phase`."""
+
+    road: AbstractRoad
+
+    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
+        """The height [m] of each track at each `time` [s]."""
+        return self.road.height(time)
+
+    @property
+    def speed(self) -> Scalar | None:
+        """That of the road [m/s]."""
+        return self.road.speed
+
+    @property
+    def columns(self) -> Columns:
+        """The tracks of the road, under all axles at once."""
+        return Columns("in phase", self.road.wheels)
+
+
+def in_phase(road: AbstractRoad) -> InPhase:
+    """The road under all axles at the same time, as platforms move a vehicle on a test rig.
+
+    A vehicle of several axles goes over a road one axle after the other. For excitation in phase, and for roads over
+    time alone, which have no speed to delay them by, ask for it:
+
+    >>> import jax.numpy as jnp
+    >>> from jaxdamp.roads import sine
+    >>> platforms = in_phase(sine(0.01, frequency=2.0))
+    >>> platforms.height(jnp.array([0.0, 0.125]))[:, 0].round(6)
+    Array([0.  , 0.01], dtype=float64)
+
+    Arguments:
+        road: any road with one track or several side by side.
+
+    Raises:
+        ValueError: the road is delayed from axle to axle.
+    """
+    check_module("road", road, (AbstractRoad,), "in_phase(road)")
+    if road.columns.kind == "delayed":
+        _checks.refuse("road", "not be delayed from axle to axle", road.columns, "Leave out `delayed`.")
+    return InPhase(road)
 
 
 def delayed(
@@ -73,9 +130,12 @@ def delayed(
 
     Raises:
         ValueError: If not exactly one of `delays` and `positions` is given, if one is negative or there is none, if
-            `speed` is missing, not positive, given with `delays`, or not the one the road was made with.
+            `speed` is missing, not positive, given with `delays`, or not the one the road was made with, or if the
+            road is one of `in_phase`.
     """
     check_module("road", road, (AbstractRoad,), "delayed(road, positions=vehicle.axle_positions, speed=20.0)")
+    if road.columns.kind == "in phase":
+        _checks.refuse("road", "not be in phase under all axles", "made by `in_phase`", "Use one of the two.")
     if (delays is None) == (positions is None):
         both = "neither was given" if delays is None else f"{delays} s, and positions {positions} m as well"
         _checks.refuse("delays", "be given, or `positions` with `speed`, but not both", both, "Give exactly one.")
@@ -88,19 +148,6 @@ def delayed(
     if positions is None:
         if speed is not None:
             _checks.refuse("speed", "be left out when `delays` is given", speed, "Give `positions` and `speed`.")
-        return Delayed(road, values)
-    return Delayed(road, values / _speed(road, speed))
-
-
-def _speed(road: AbstractRoad, speed: ScalarLike | int | None) -> Scalar:
-    """The speed given, or that of the road; they must agree where both are known."""
-    own = getattr(road, "speed", None)
-    if speed is None and own is None:
-        _checks.refuse("speed", "be given with `positions`", speed, "Give the speed of the vehicle in m/s.")
-    if speed is None:
-        return jnp.asarray(own, float)
-    _checks.positive("speed", speed, "Roads are driven forwards.")
-    mine, its = _checks.concrete(speed), None if own is None else _checks.concrete(own)
-    if mine is not None and its is not None and not np.allclose(mine, its, rtol=1e-6, atol=0.0):
-        _checks.refuse("speed", f"be that of the road, {its} m/s", f"{mine} m/s", "Leave it out, or remake the road.")
-    return jnp.asarray(speed, float)
+        return Delayed(road, values, road.speed)
+    driven = agreed_speed(road, speed, "positions")
+    return Delayed(road, values / driven, driven)

@@ -24,12 +24,19 @@ class Bump(AbstractRoad):
         peak: H [m], negative for a hole.
         start: t0 [s].
         width: T [s].
+        driven_at: V [m/s], if the width was given as a length.
     """
 
     shape: Partial
     peak: Scalar
     start: Scalar
     width: Scalar
+    driven_at: Scalar | None
+
+    @property
+    def speed(self) -> Scalar | None:
+        """The speed [m/s] that the road was made for."""
+        return self.driven_at
 
     @eqx.filter_jit
     def height(self, time: SignalLike) -> Float[Array, "time 1"]:
@@ -50,8 +57,9 @@ def place(
     _checks.finite("height", height)
     _checks.finite("start", start)
     in_time = given_in_time("duration", duration, "s", "length", length, speed)
-    width = jnp.asarray(duration, float) if in_time else jnp.asarray(length, float) / jnp.asarray(speed, float)
-    return Bump(shape, peak=jnp.asarray(height, float), start=jnp.asarray(start, float), width=width)
+    driven = None if in_time else jnp.asarray(speed, float)
+    width = jnp.asarray(duration, float) if driven is None else jnp.asarray(length, float) / driven
+    return Bump(shape, jnp.asarray(height, float), jnp.asarray(start, float), width, driven)
 
 
 def haversine(fraction: Signal) -> Signal:

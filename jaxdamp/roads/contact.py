@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most, largest, within
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
-from jaxdamp.roads._composed import AbstractOnOneRoad
+from jaxdamp.roads._composed import AbstractOnOneRoad, agreed_speed
 from jaxdamp.roads.base import AbstractRoad
 
 
@@ -31,7 +31,13 @@ class ContactPatch(AbstractOnOneRoad):
 
     road: AbstractRoad
     passing_time: Scalar  # contact length over speed [s]
+    driven_at: Scalar
     points: int = eqx.field(static=True)
+
+    @property
+    def speed(self) -> Scalar:
+        """The speed [m/s] that the road was made for."""
+        return self.driven_at
 
     def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The mean height [m] under each wheel at each `time` [s]; see `contact_patch`."""
@@ -46,8 +52,13 @@ class RollingDisc(AbstractOnOneRoad):
 
     road: AbstractRoad
     radius: Scalar
-    speed: Scalar
+    driven_at: Scalar
     points: int = eqx.field(static=True)
+
+    @property
+    def speed(self) -> Scalar:
+        """The speed [m/s] that the road was made for."""
+        return self.driven_at
 
     def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] of each disc at each `time` [s]; see `rolling_disc`."""
@@ -84,12 +95,12 @@ def contact_patch(
         points: The number of points of the quadrature.
 
     Raises:
-        ValueError: If `length`, `speed` or `points` is not positive.
+        ValueError: If `length`, `speed` or `points` is not positive, or if the road was made for another speed.
     """
     _checks.positive("length", length)
-    _checks.positive("speed", speed, "Roads are driven forwards.")
+    speed = agreed_speed(road, speed, "length")
     _checks.positive("points", points)
-    return ContactPatch(road, jnp.asarray(length, float) / jnp.asarray(speed, float), int(points))
+    return ContactPatch(road, jnp.asarray(length, float) / speed, speed, int(points))
 
 
 def rolling_disc(
@@ -122,10 +133,11 @@ def rolling_disc(
         points: The number of points on the lower half of the disc, odd so that its lowest one is among them.
 
     Raises:
-        ValueError: If `radius` or `speed` is not positive, or if `points` is not odd or below 3.
+        ValueError: If `radius` or `speed` is not positive, if the road was made for another speed, or if `points` is
+            not odd or below 3.
     """
     _checks.positive("radius", radius)
-    _checks.positive("speed", speed, "Roads are driven forwards.")
+    speed = agreed_speed(road, speed, "radius")
     if points < 3 or points % 2 == 0:
         _checks.refuse("points", "be odd and at least 3", points, "Its middle point is the lowest one of the disc.")
-    return RollingDisc(road, jnp.asarray(radius, float), jnp.asarray(speed, float), points)
+    return RollingDisc(road, jnp.asarray(radius, float), speed, points)

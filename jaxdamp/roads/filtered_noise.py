@@ -86,7 +86,7 @@ def iso8608_filtered(
     shape = autoregressive(noise, jnp.asarray(jnp.exp(-2.0 * math.pi * spacing * jnp.asarray(cutoff, float))))
     return SampledRoad(
         samples=(jnp.sqrt(filtered_noise_variance(density, cutoff)) * shape)[:, None],
-        speed=jnp.asarray(speed, float),
+        driven_at=jnp.asarray(speed, float),
         spacing=float(spacing),
         periodic=False,
         ramp=float(ramp),

@@ -19,7 +19,13 @@ class Sine(AbstractRoad):
 
     amplitude: Scalar
     frequency: Scalar
+    driven_at: Scalar | None
     ramp: float = eqx.field(static=True)
+
+    @property
+    def speed(self) -> Scalar | None:
+        """The speed [m/s] that the road was made for."""
+        return self.driven_at
 
     @eqx.filter_jit
     def height(self, time: SignalLike) -> Float[Array, "time 1"]:
@@ -62,8 +68,9 @@ def sine(
     _checks.finite("amplitude", amplitude)
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
     in_time = given_in_time("frequency", frequency, "Hz", "wavelength", wavelength, speed)
-    frequency = jnp.asarray(frequency, float) if in_time else jnp.asarray(speed, float) / jnp.asarray(wavelength, float)
-    return Sine(amplitude=jnp.asarray(amplitude, float), frequency=frequency, ramp=float(ramp))
+    driven = None if in_time else jnp.asarray(speed, float)
+    frequency = jnp.asarray(frequency, float) if driven is None else driven / jnp.asarray(wavelength, float)
+    return Sine(jnp.asarray(amplitude, float), frequency, driven, float(ramp))
 
 
 def wave_course(

@@ -28,7 +28,7 @@ class Iso8608(AbstractRoad):
 
     roughness_psd: Scalar
     waviness: Scalar
-    speed: Scalar
+    driven_at: Scalar
     phase: Float[Array, " lines"]
     length: float = eqx.field(static=True)
     band: tuple[float, float] = eqx.field(static=True)
@@ -41,6 +41,11 @@ class Iso8608(AbstractRoad):
         cycles = self.speed * time / self.length
         wave = cosine_sum(cycles, self.amplitude, self.phase, first=_first_and_last(self.band, self.length)[0])
         return (fade_in(time, self.ramp) * wave)[:, None]
+
+    @property
+    def speed(self) -> Scalar:
+        """The speed [m/s] that the road was made for."""
+        return self.driven_at
 
     @property
     def spatial_frequency(self) -> Float[Array, " lines"]:
@@ -142,7 +147,7 @@ def iso8608(
     return Iso8608(
         roughness_psd=jnp.asarray(density, float),
         waviness=jnp.asarray(waviness, float),
-        speed=jnp.asarray(speed, float),
+        driven_at=jnp.asarray(speed, float),
         phase=jax.random.uniform(random_key(seed), (last - first + 1,), float, maxval=2.0 * math.pi),
         length=length,
         band=band,

@@ -69,7 +69,7 @@ def from_profile(
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
     return SampledRoad(
         samples=heights[:, None] if heights.ndim == 1 else heights,
-        speed=None if speed is None else jnp.asarray(speed, float),
+        driven_at=None if speed is None else jnp.asarray(speed, float),
         spacing=spacing,
         periodic=periodic,
         ramp=float(ramp),

@@ -80,7 +80,9 @@ def band_limited(
     else:
         _checks.positive("peak_to_peak", peak_to_peak)
         scale = jnp.asarray(peak_to_peak, float) / (largest(shape) + largest(-shape))
-    return SampledRoad(samples=(scale * shape)[:, None], speed=None, spacing=float(dt), periodic=True, ramp=float(ramp))
+    return SampledRoad(
+        samples=(scale * shape)[:, None], driven_at=None, spacing=float(dt), periodic=True, ramp=float(ramp)
+    )
 
 
 def _lines(low: float, high: float, duration: float, dt: float) -> tuple[int, int, int]:

@@ -9,8 +9,8 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
-from jaxdamp.roads._composed import least
-from jaxdamp.roads.base import AbstractRoad
+from jaxdamp.roads._composed import common_speed, least, same_columns
+from jaxdamp.roads.base import AbstractRoad, Columns
 
 
 @final
@@ -32,6 +32,16 @@ class Joined(AbstractRoad):
     def wheels(self) -> int:
         """That of both roads."""
         return self.first.wheels
+
+    @property
+    def columns(self) -> Columns:
+        """That of both roads."""
+        return self.first.columns
+
+    @property
+    def speed(self) -> Scalar | None:
+        """The speed [m/s] that the roads have in common."""
+        return common_speed((self.first, self.second))
 
     @property
     def grid(self) -> float | None:
@@ -72,12 +82,13 @@ def joined(first: AbstractRoad, second: AbstractRoad, *, at: ScalarLike | int | 
         at: t1 [s]; by default the time at which the first road ends or repeats.
 
     Raises:
-        ValueError: If the roads have different numbers of tracks, if `at` is negative or beyond the end of the first
-            road, or if it is left out where the first road has no end.
+        ValueError: If the roads have different numbers of tracks or tracks of different wheels, if `at` is negative or
+            beyond the end of the first road, or if it is left out where the first road has no end.
     """
     if first.wheels != second.wheels:
         remedy = "Join single tracks first and use `two_track` and `delayed` on the result."
         _checks.refuse("second", f"have {first.wheels} tracks, as `first` has", second.wheels, remedy)
+    same_columns("second", (first, second))
     if at is None:
         at = first.duration
     if at is None:

@@ -6,8 +6,8 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import SignalLike
-from jaxdamp.roads._composed import AbstractOnSeveralRoads
-from jaxdamp.roads.base import AbstractRoad
+from jaxdamp.roads._composed import AbstractOnSeveralRoads, same_columns
+from jaxdamp.roads.base import AbstractRoad, Columns
 
 
 @final
@@ -28,6 +28,11 @@ class Superposed(AbstractOnSeveralRoads):
         """That of all the roads."""
         return self.roads[0].wheels
 
+    @property
+    def columns(self) -> Columns:
+        """That of all the roads."""
+        return self.roads[0].columns
+
 
 def superposed(*roads: AbstractRoad) -> Superposed:
     """The sum of roads: a bump on a rough surface, a measured profile on a long swell.
@@ -42,11 +47,12 @@ def superposed(*roads: AbstractRoad) -> Superposed:
         roads: At least one road, all with the same number of tracks.
 
     Raises:
-        ValueError: If there is no road, or if their numbers of tracks differ.
+        ValueError: If there is no road, or if their numbers of tracks differ or stand for different wheels.
     """
     if not roads:
         _checks.refuse("roads", "hold at least one road", "empty")
     counts = [road.wheels for road in roads]
     if len(set(counts)) > 1:
         _checks.refuse("roads", "have equal numbers of tracks", counts, "Use `two_track` on the ones with one track.")
+    same_columns("roads", roads)
     return Superposed(roads)

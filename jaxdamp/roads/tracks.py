@@ -9,9 +9,9 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import ScalarLike, SignalLike
-from jaxdamp.roads._composed import AbstractOnSeveralRoads
+from jaxdamp.roads._composed import AbstractOnSeveralRoads, same_columns
 from jaxdamp.roads._seed import random_key
-from jaxdamp.roads.base import AbstractRoad
+from jaxdamp.roads.base import AbstractRoad, Columns
 from jaxdamp.roads.coherency import coherency
 from jaxdamp.roads.iso_roughness import Iso8608
 
@@ -30,6 +30,12 @@ class TwoTrack(AbstractOnSeveralRoads):
     def wheels(self) -> int:
         """Left and right."""
         return 2
+
+    @property
+    def columns(self) -> Columns:
+        """Two tracks side by side, in phase if they are."""
+        in_phase = self.roads[0].columns.kind == "in phase"
+        return Columns("in phase" if in_phase else "road", 2)
 
 
 def two_track(
@@ -84,6 +90,7 @@ def two_track(
             _checks.refuse(
                 "seed", "be left out when `right` is given", seed, "It is for a track made by `track_width`."
             )
+        same_columns("right", (left, right))
         return TwoTrack((left, right))
     if not isinstance(left, Iso8608):
         remedy = "Give the second track as `right`."

@@ -3,6 +3,7 @@
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride
 from jaxdamp.simulation.run import simulate
+from jaxdamp.simulation.wheels import AxleTiming, moves_axles
 
 
-__all__ = ["Response", "Ride", "simulate"]
+__all__ = ["AxleTiming", "Response", "Ride", "moves_axles", "simulate"]

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks, metrics
 from jaxdamp._types import Scalar, ScalarLike, Signal
+from jaxdamp.simulation.wheels import AxleTiming
 from jaxdamp.vehicles import AbstractVehicle, Instant, RideMetric
 
 
@@ -35,7 +36,8 @@ def _middle(values: Array) -> Array:
 class Response(eqx.Module):
     """The response of a vehicle to a road, at uniformly spaced instants.
 
-    The road's rate is the mean of its slopes before and after an instant.
+    The road's rate is the mean of its slopes before and after an instant. `axle_timing`, printed with the response,
+    says when each axle met the road.
 
     `response["sprung_acceleration"]` is a channel; `response.units` and `response.channels` say which there are.
     """
@@ -47,6 +49,13 @@ class Response(eqx.Module):
     road: Float[Array, "time wheels"]
     road_rate: Float[Array, "time wheels"]
     final_state: list[Float[Array, " _state"]]
+    axle_timing: AxleTiming
+
+    def __repr__(self) -> str:
+        name, time = type(self.vehicle).__name__, _checks.concrete(self.time)
+        several = "" if self.axle_timing.kind == "one axle" else f"; {self.axle_timing}"
+        length = "" if time is None or time.ndim != 1 else f" over {time[-1]:g} s, {time.size} instants"
+        return f"Response of a {name}{length}, {len(self.units)} channels{several}"
 
     @property
     def units(self) -> dict[str, str]:
@@ -171,4 +180,5 @@ class Response(eqx.Module):
         channels = {
             name: ("time", np.asarray(values), {"units": self.units[name]}) for name, values in self.channels.items()
         }
-        return xarray.Dataset(channels, {"time": ("time", np.asarray(self.time), {"units": "s"})})
+        times = {"time": ("time", np.asarray(self.time), {"units": "s"})}
+        return xarray.Dataset(channels, times, {"axles": str(self.axle_timing)})

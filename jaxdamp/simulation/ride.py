@@ -20,6 +20,7 @@ from jaxdamp.simulation.gauge import Gathered, Gauge
 from jaxdamp.simulation.run import sampled
 from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.stepper import FOR_REVERSE, Ground, Now, Stepper
+from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
 from jaxdamp.vehicles import AbstractVehicle, RideMetric
 
 
@@ -36,6 +37,9 @@ class Ride(eqx.Module):
     that memory does not grow with its length, and many cars run side by side. `sweep`, `jax.jit`, `jax.jacfwd` and
     `jax.grad` take it as it is (`side_by_side` is for `jax.vmap`). Forward derivatives keep nothing of the run; reverse
     ones keep up to four numbers of each element and the channels of up to 16 384 instants, and drive longer runs twice.
+
+    Where the road reaches the rear axles by the vehicle's own axle positions, parameters that move an axle take part:
+    its road is then computed anew.
 
     Arguments:
         vehicle: where parameters that are not given come from.
@@ -58,6 +62,7 @@ class Ride(eqx.Module):
 
     vehicle: AbstractVehicle
     heights: Float[Array, "time wheels"]
+    road: AbstractRoad | None  # where the delay of its axles follows from the vehicle
     dt: float = eqx.field(static=True)
     substeps: int = eqx.field(static=True)
     metrics: tuple[RideMetric, ...] = eqx.field(static=True)
@@ -80,6 +85,7 @@ class Ride(eqx.Module):
             _checks.one_of("metrics", name, known)
         self.vehicle, self.dt, self.many = vehicle, dt, False
         _, self.heights = sampled(vehicle, road, duration, dt)
+        self.road = road if delays_by_itself(vehicle, road) else None
         self.substeps = substeps_needed(vehicle, dt) if substeps is None else substeps
         self.metrics = tuple(known.values() if metrics is None else [known[name] for name in metrics])
 
@@ -96,6 +102,14 @@ class Ride(eqx.Module):
         """How many cars a CPU core drives best side by side: if loops are fused, what stays in its nearest cache."""
         return 128 if fuses_loops() else 2048
 
+    def on_axles_of(self, vehicle: AbstractVehicle) -> "Ride":
+        """The same ride of another vehicle, with the road under its axles wherever they are."""
+        ride = eqx.tree_at(lambda ride: ride.vehicle, self, vehicle)
+        if self.road is None:
+            return ride
+        time = self.dt * jnp.arange(self.heights.shape[0], dtype=float)
+        return eqx.tree_at(lambda ride: ride.heights, ride, heights_under_wheels(vehicle, self.road, time))
+
     def side_by_side(self) -> "Ride":
         """The same, compiled for many cars at a time: for `jax.vmap`. `sweep` does it itself."""
         return eqx.tree_at(lambda ride: ride.many, self, True)
@@ -108,7 +122,10 @@ class Ride(eqx.Module):
 @eqx.filter_jit
 def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     """The loop over time; of a long run reverse derivatives keep the beginnings of blocks only."""
-    vehicle, heights, dt = replace(ride.vehicle, point), ride.heights, ride.dt
+    vehicle = replace(ride.vehicle, point)
+    if ride.road is not None and point and moves_axles(lambda point: replace(ride.vehicle, point), point):
+        ride = ride.on_axles_of(vehicle)
+    heights, dt = ride.heights, ride.dt
     apart = ride.many or (fuses_loops() and 2 * len(vehicle.coordinates) <= FEW_STATES)
     stepper = Stepper(vehicle, jnp.asarray(dt / ride.substeps, dtype=float), apart=apart, many=ride.many)
     gauge = Gauge(vehicle, ride.metrics, dt, apart=apart)

@@ -15,6 +15,7 @@ from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.exponential import exponential_steps
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.stability import substeps_needed
+from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
 from jaxdamp.vehicles import AbstractVehicle, static_equilibrium
 from jaxdamp.vehicles.equilibrium import refuse_restless
 
@@ -43,9 +44,9 @@ def simulate(
 
     Arguments:
         vehicle: any vehicle, with its laws.
-        road: heights under its wheels over time, a track for each (`vehicle.wheel_names`) or for each axle, under both
-            sides of it. A road with one track goes under all wheels together; `roads.delayed` sends it on from axle
-            to axle.
+        road: heights under its wheels over time: one track, or a left-hand and a right-hand one. It reaches one axle
+            after the other, delayed by `vehicle.axle_positions` and the road's speed; `roads.delayed` has other
+            delays, `roads.in_phase` none. Motions over time alone have a column for each of `vehicle.wheel_names`.
         duration: length of the run [s]; the road's own if it has one and this is left out.
         dt: spacing of the instants [s], for the exponential engine also its step (third order, second where laws
             have kinks or states; 1 ms is right for cars).
@@ -64,8 +65,8 @@ def simulate(
 
     Raises:
         ValueError: a step longer than the spacing of a sampled road, no duration, a road of other tracks than wheels,
-            an unknown coordinate, a vehicle without equilibrium, instants that cannot be divided by `every`, a run that
-            diverged.
+            a road without a speed under several axles, an unknown coordinate, a vehicle without equilibrium, instants
+            that cannot be divided by `every`, a run that diverged.
 
     >>> from jaxdamp import roads, vehicles
     >>> car = vehicles.presets.quarter_car_000()
@@ -98,7 +99,7 @@ def simulate(
             refuse_restless(vehicle)
         remedy = " ".join([*filter(None, map(coverage, vehicle.elements())), remedy])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
-    return Response(vehicle, time[::every], *saved)
+    return Response(vehicle, time[::every], *saved, axle_timing(vehicle, road))
 
 
 def _strides(count: int, every: int, dt: float) -> None:
@@ -126,22 +127,7 @@ def sampled(
         _checks.refuse("dt", f"not be longer than the road's grid of {road.grid:g} s", dt, remedy)
     count = round(duration / dt)
     time = jnp.arange(count + 1, dtype=float) * dt
-    return time, _under_wheels(vehicle, road.height(time))
-
-
-def _under_wheels(vehicle: AbstractVehicle, heights: Float[Array, "time tracks"]) -> Float[Array, "time wheels"]:
-    """A track for each wheel: those of the road; its tracks by axle under both sides; or its only one under all."""
-    names, axles, tracks = vehicle.wheel_names, vehicle.frame().axles, heights.shape[1]
-    if tracks == len(names):
-        return heights
-    if tracks == 1:
-        return jnp.broadcast_to(heights, (heights.shape[0], len(names)))
-    if tracks == max(axles) + 1:
-        return heights[:, np.array(axles)]
-    called = f" ({', '.join(names)})" if any(names) else ""
-    must = f"have a track for each of {len(names)} wheel(s){called} or of {max(axles) + 1} axle(s), or one for all"
-    remedy = "`roads.delayed(road, positions=vehicle.axle_positions, speed=...)` makes one for each axle."
-    _checks.refuse("road", must, f"a road of {tracks} tracks", remedy)
+    return time, heights_under_wheels(vehicle, road, time)
 
 
 def _displaced(

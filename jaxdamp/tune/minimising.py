@@ -14,7 +14,7 @@ from jaxdamp._progress import Progress
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import Ride
+from jaxdamp.simulation import Ride, moves_axles
 from jaxdamp.tune.result import Change, TuneResult, V
 from jaxdamp.vehicles import AbstractVehicle, RideMetric, linearise, stationary_rms, with_weightings
 
@@ -76,8 +76,8 @@ def minimise(
     limits = dict(limits or {})
     chosen = chosen_metrics(vehicle, road, (metric, *limits))
     white = isinstance(road, WhiteRoad)
-    ride = stationary_ride(road, chosen) if white else driven_ride(vehicle, road, chosen, duration, dt)
     free = free_parameters(vehicle, over=over, freeze=freeze, bounds=bounds)
+    ride = stationary_ride(road, chosen) if white else driven_ride(vehicle, road, chosen, duration, dt, free)
     names = [m.name for m in chosen]
     table = _Table(ride, free, names)
     before, _ = table.at(np.asarray(free.values))
@@ -162,9 +162,12 @@ def driven_ride(
     chosen: Sequence[RideMetric],
     duration: float | None = None,
     dt: float = 1e-3,
+    free: FreeParameters | None = None,
 ) -> Measured:
-    """Ride metrics of a run; the road is sampled once, which also checks the arguments."""
+    """Ride metrics of a run; the road is sampled once, which also checks the arguments, or for axles that move."""
     driven = Ride(vehicle, road, metrics=[m.name for m in chosen], duration=duration, dt=dt)
+    if driven.road is not None and free is not None and moves_axles(free.build, free.values):
+        return lambda vehicle: driven.on_axles_of(vehicle)()
     return lambda vehicle: eqx.tree_at(lambda ride: ride.vehicle, driven, vehicle)()
 
 

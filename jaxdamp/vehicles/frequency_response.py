@@ -14,17 +14,23 @@ from jaxdamp.vehicles.linear import LinearVehicle, as_linear
 
 
 def frequency_response(
-    vehicle: AbstractVehicle | LinearVehicle, frequency: Any, *, speed: Any = None, by_wheel: bool = False
+    vehicle: AbstractVehicle | LinearVehicle,
+    frequency: Any,
+    *,
+    speed: Any = None,
+    in_phase: bool = False,
+    by_wheel: bool = False,
 ) -> dict[str, Complex[Array, "..."]]:
     """Complex gain from road height to every channel, H(ω) = C (iω − A)⁻¹ (B + iω E) + D + iω F.
 
-    The road goes under all wheels: together, or at a `speed` one axle after the other, Σ_w H_w exp(−iω τ_w) with the
-    delay τ_w of wheel w behind the front axle. Differentiable in every parameter and in the speed.
+    The road goes under all wheels: at a `speed` one axle after the other, Σ_w H_w exp(−iω τ_w) with the delay τ_w of
+    wheel w behind the front axle, or `in_phase`. Differentiable in every parameter and in the speed.
 
     Arguments:
         vehicle: a vehicle, linearised about rest, or what `linearise` made of it.
         frequency: [Hz], shape (frequencies,).
-        speed: of the vehicle [m/s]; left out, all wheels go over the road together.
+        speed: of the vehicle [m/s]; not needed for a single axle.
+        in_phase: the road is under all axles at once, instead of a speed.
         by_wheel: give the gain from the height under each wheel instead of their sum.
 
     Returns:
@@ -32,7 +38,7 @@ def frequency_response(
 
     Raises:
         ValueError: frequencies that are not a row of numbers ≥ 0, a speed that is not positive or comes with
-            `by_wheel`.
+            `by_wheel` or `in_phase`, several axles with none of the three.
 
     >>> from jaxdamp.vehicles.presets import quarter_car_000
     >>> gain = frequency_response(quarter_car_000(), [0.0, 1.0])["z_sprung"]
@@ -48,7 +54,7 @@ def frequency_response(
     linear = as_linear(vehicle)
     gains = gains_by_wheel(linear, points)
     if not by_wheel:
-        gains = jnp.sum(gains * turning(points, linear.delays(speed))[:, None], axis=2)
+        gains = jnp.sum(gains * turning(points, linear.delays(speed, in_phase))[:, None], axis=2)
     return {name: gains[:, i] for i, name in enumerate(linear.channels)}
 
 
@@ -90,6 +96,7 @@ def spectral_rms(
     density: Any,
     *,
     speed: Any = None,
+    in_phase: bool = False,
     coherence: Any = None,
 ) -> dict[str, Scalar]:
     """RMS of every channel of the linearised vehicle on a random road of any spectrum, √∫ |H(f)|² S(f) df.
@@ -103,13 +110,14 @@ def spectral_rms(
         frequency: increasing frequencies [Hz], shape (frequencies,).
         density: one-sided power spectral density of the height of each track there [m²/Hz]; of an ISO 8608 road
             G_d(f/V)/V.
-        speed: of the vehicle [m/s]; left out, all axles go over the road together.
+        speed: of the vehicle [m/s]; not needed for a single axle.
+        in_phase: the road is under all axles at once, instead of a speed.
         coherence: γ(f) in −1 … 1, cross spectrum of left and right track divided by S; one and the same track if left
             out. Needs wheels on both sides.
 
     Raises:
         ValueError: frequencies that do not increase, a density or coherence of another shape, a coherence for a vehicle
-            whose wheels stand for both sides.
+            whose wheels stand for both sides, several axles with neither `speed` nor `in_phase`.
 
     >>> import numpy as np
     >>> from jaxdamp.vehicles.presets import quarter_car_000
@@ -129,7 +137,7 @@ def spectral_rms(
     if levels.shape != points.shape:
         _checks.refuse("density", f"have the shape {points.shape} of `frequency`", f"of shape {levels.shape}")
     linear = as_linear(vehicle)
-    gains, turned = gains_by_wheel(linear, points), turning(points, linear.delays(speed))
+    gains, turned = gains_by_wheel(linear, points), turning(points, linear.delays(speed, in_phase))
     shared = sides = None
     if coherence is not None:
         shared = jnp.asarray(coherence, dtype=float)

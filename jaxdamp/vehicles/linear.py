@@ -34,6 +34,7 @@ class LinearVehicle(eqx.Module):
         left: distance of each wheel to the left of the middle [m].
         coordinates: names of q.
         channels: names of the channels.
+        axles: how many axles the wheels are on.
     """
 
     state_matrix: Float[Array, "n n"]
@@ -46,16 +47,26 @@ class LinearVehicle(eqx.Module):
     left: Float[Array, " wheels"]
     coordinates: tuple[str, ...] = eqx.field(static=True)
     channels: tuple[str, ...] = eqx.field(static=True)
+    axles: int = eqx.field(static=True)
 
     def settled(self) -> Float[Array, "n wheels"]:
         """−A⁻¹ B: where the vehicle comes to rest on unit road heights."""
         return -jnp.linalg.solve(self.state_matrix, self.road_input)
 
-    def delays(self, speed: ScalarLike | int | None) -> Float[Array, " wheels"]:
-        """Delay of each wheel [s] behind the front axle at a speed [m/s]; none without a speed."""
+    def delays(self, speed: ScalarLike | int | None, in_phase: bool = False) -> Float[Array, " wheels"]:
+        """Delay of each wheel [s] behind the front axle at a speed [m/s]; none in phase.
+
+        Raises:
+            ValueError: a speed that is not positive or comes with `in_phase`; several axles and neither of the two.
+        """
+        if in_phase and speed is not None:
+            _checks.refuse("speed", "be left out with `in_phase`", speed, "The road is then under all axles at once.")
         if speed is None:
+            if self.axles > 1 and not in_phase:
+                must = f"be given for a vehicle of {self.axles} axles, which the road reaches one after the other"
+                _checks.refuse("speed", must, None, "Pass `speed=20.0` [m/s], or `in_phase=True` for all at once.")
             return jnp.zeros_like(self.behind)
-        _checks.positive("speed", speed, "Leave it out for a road that goes under all wheels together.")
+        _checks.positive("speed", speed)
         return self.behind / speed
 
 
@@ -132,9 +143,9 @@ def _linearise(vehicle: AbstractVehicle, amplitude: Array | None, frequency: Arr
 
     slopes = jax.jacfwd(everything)(jnp.concatenate([rest_state, level, level]))
     (a, b, e), (c, d, f) = (jnp.split(part, [size, size + wheels], axis=1) for part in jnp.split(slopes, [size]))
-    tyres = vehicle.frame().wheels
-    behind, left = jnp.stack([wheel.behind for wheel in tyres]), jnp.stack([wheel.left for wheel in tyres])
-    return LinearVehicle(a, b, e, c, d, f, behind, left, vehicle.coordinates, names)
+    frame = vehicle.frame()
+    behind, left = (jnp.stack(values) for values in zip(*((w.behind, w.left) for w in frame.wheels), strict=True))
+    return LinearVehicle(a, b, e, c, d, f, behind, left, vehicle.coordinates, names, max(frame.axles) + 1)
 
 
 def as_linear(vehicle: AbstractVehicle | LinearVehicle) -> LinearVehicle:

@@ -23,11 +23,15 @@ def lyapunov(a: Float[Array, "n n"], q: Float[Array, "n n"]) -> Float[Array, "n 
 
 
 def stationary_rms(
-    vehicle: AbstractVehicle | LinearVehicle, velocity_psd: ScalarLike = 1.0, *, speed: ScalarLike | int | None = None
+    vehicle: AbstractVehicle | LinearVehicle,
+    velocity_psd: ScalarLike = 1.0,
+    *,
+    speed: ScalarLike | int | None = None,
+    in_phase: bool = False,
 ) -> dict[str, Scalar]:
     """RMS of every channel of the linearised vehicle when the road's rate of height is white noise.
 
-    One road goes under all wheels: together, or at a `speed` one axle after the other, which correlates what they do.
+    One road goes under all wheels: at a `speed` one axle after the other, which correlates what they do, or `in_phase`.
     A channel is then y(t) = ∫ k(s) u(t − s) ds with the white rate u of the road, and its mean square S ∫ k² ds is
     summed exactly from axle to axle: over a stretch in which no wheel meets the impulse, k is a row times the matrix
     exponential of the state, plus a constant. Behind the last axle A X + X Aᵀ + x xᵀ = 0 gives the rest. Differentiable
@@ -40,13 +44,15 @@ def stationary_rms(
         vehicle: a vehicle, linearised about rest, or what `linearise` made of it.
         velocity_psd: two-sided power spectral density S of the rate of height [(m/s)²/Hz]; of an ISO 8608 road of
             waviness 2, 2π² G_d(n₀) n₀² V (`roads.white`).
-        speed: of the vehicle [m/s]; left out, all wheels go over the road together.
+        speed: of the vehicle [m/s]; not needed for a single axle.
+        in_phase: the road is under all axles at once, instead of a speed.
 
     Returns:
         RMS by channel name, in the units of the vehicle's channels.
 
     Raises:
-        ValueError: a density or a speed that is not positive; a vehicle that does not come to rest.
+        ValueError: a density or a speed that is not positive, several axles with neither `speed` nor `in_phase`, or
+            with both; a vehicle that does not come to rest.
 
     Source: for the quarter car, closed forms exist (see the tests).
 
@@ -63,7 +69,7 @@ def stationary_rms(
             "`linearise(vehicle, amplitude=0.02, frequency=1.2)`."
         )
         _checks.refuse("vehicle", "come to rest when linearised", "one that does not", remedy)
-    found = root(velocity_psd * _mean_squares(linear, linear.delays(speed)))
+    found = root(velocity_psd * _mean_squares(linear, linear.delays(speed, in_phase)))
     return {name: found[i] for i, name in enumerate(linear.channels)}
 
 

@@ -54,4 +54,5 @@ def with_weightings(linear: LinearVehicle, weightings: Sequence[tuple[str, str]]
         linear.left,
         linear.coordinates,
         (*linear.channels, *[f"weighted_{name}" for name, _ in weightings]),
+        linear.axles,
     )
