@@ -8,6 +8,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from jaxdamp import _checks
 from jaxdamp._limits import at_least
+from jaxdamp._random import normal
 from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers._hysteresis import own_states
 from jaxdamp.dampers.base import AbstractDamper
@@ -126,9 +127,9 @@ class NeuralHysteresis(AbstractDamper):
         hidden, output = jax.random.split(key)
         return cls(
             jnp.asarray(first) * (1.0 / 3.0) ** jnp.arange(float(elements)),
-            jax.random.normal(hidden, (width, elements + 1)),
+            normal(hidden, (width, elements + 1)),
             jnp.zeros(width),
-            0.3 * jax.random.normal(output, (2 * elements, width)),
+            0.3 * normal(output, (2 * elements, width)),
             jnp.zeros(2 * elements),
             velocity_scale,
             force_scale,

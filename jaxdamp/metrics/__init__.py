@@ -18,7 +18,7 @@ signal gives NaN. Only what answers in words (`evaluation_method`, `comfort_reac
 - Damper: `dissipated_energy`, `dissipated_power`, `equivalent_damping`, `velocity_histogram`,
   `dissipation_histogram`, `temperature_rise`, `damper_temperature`.
 - Fatigue: `spectral_moments`, `spectral_damage`.
-- Road: `international_roughness_index`.
+- Road: `international_roughness_index`, `international_roughness_by_segment`.
 - Gathered while a simulation runs: `STATISTICS`.
 
 >>> import jax
@@ -49,7 +49,11 @@ from jaxdamp.metrics.evaluation import Evaluation, ShockRatios, evaluation_metho
 from jaxdamp.metrics.fatigue import spectral_damage, spectral_moments
 from jaxdamp.metrics.heat import damper_temperature, temperature_rise
 from jaxdamp.metrics.histogram import dissipation_histogram, velocity_histogram
-from jaxdamp.metrics.roughness_index import international_roughness_index
+from jaxdamp.metrics.roughness_index import (
+    RoughnessBySegment,
+    international_roughness_by_segment,
+    international_roughness_index,
+)
 from jaxdamp.metrics.running import max_transient_value, running_rms
 from jaxdamp.metrics.spectrum import power_spectral_density
 from jaxdamp.metrics.statistics import STATISTICS, Statistic, weighting_of
@@ -69,6 +73,7 @@ __all__ = [
     "AXES",
     "STATISTICS",
     "Evaluation",
+    "RoughnessBySegment",
     "ShockRatios",
     "StateSpace",
     "Statistic",
@@ -87,6 +92,7 @@ __all__ = [
     "estimated_vibration_dose_value",
     "evaluation_method",
     "gaussian_exceedance",
+    "international_roughness_by_segment",
     "international_roughness_index",
     "lift_off_fraction",
     "logarithmic_decrement",

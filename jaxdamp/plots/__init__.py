@@ -12,6 +12,7 @@ from jaxdamp.plots.errors import ladder
 from jaxdamp.plots.history import training_history
 from jaxdamp.plots.loops import fit_loops
 from jaxdamp.plots.rides import ride
+from jaxdamp.plots.roughness import roughness_by_segment
 from jaxdamp.plots.validation import cross_validation
 
 
@@ -23,6 +24,7 @@ __all__ = [
     "ladder",
     "law_card",
     "ride",
+    "roughness_by_segment",
     "training_history",
     "tuning",
 ]

@@ -7,9 +7,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._random import normal
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.roads._sampled import SampledRoad
-from jaxdamp.roads._seed import random_key
 from jaxdamp.roads.iso_classes import LOWEST_SPATIAL_FREQUENCY, REFERENCE_SPATIAL_FREQUENCY, roughness
 
 
@@ -82,7 +82,7 @@ def iso8608_filtered(
     _checks.positive("spacing", spacing)
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
     samples = math.ceil(_length(speed, duration, length) / spacing - 1e-9) + 1
-    noise = jax.random.normal(random_key(seed), (samples,), float)
+    noise = normal(seed, (samples,))
     shape = autoregressive(noise, jnp.asarray(jnp.exp(-2.0 * math.pi * spacing * jnp.asarray(cutoff, float))))
     return SampledRoad(
         samples=(jnp.sqrt(filtered_noise_variance(density, cutoff)) * shape)[:, None],

@@ -4,15 +4,14 @@ import math
 from typing import final
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._random import uniform
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.roads._cosine_sum import cosine_sum
 from jaxdamp.roads._fade import fade_in
-from jaxdamp.roads._seed import random_key
 from jaxdamp.roads.base import AbstractRoad
 from jaxdamp.roads.iso_classes import (
     HIGHEST_SPATIAL_FREQUENCY,
@@ -148,7 +147,7 @@ def iso8608(
         roughness_psd=jnp.asarray(density, float),
         waviness=jnp.asarray(waviness, float),
         driven_at=jnp.asarray(speed, float),
-        phase=jax.random.uniform(random_key(seed), (last - first + 1,), float, maxval=2.0 * math.pi),
+        phase=uniform(seed, (last - first + 1,), 2.0 * math.pi),
         length=length,
         band=band,
         ramp=float(ramp),

@@ -8,9 +8,9 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import largest
+from jaxdamp._random import uniform
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.roads._sampled import SampledRoad
-from jaxdamp.roads._seed import random_key
 
 
 @jax.jit(static_argnames=("first", "size"))
@@ -39,8 +39,7 @@ def band_limited(
     hundreds of lines its heights are close to a Gaussian distribution. It repeats after `duration` without a jump,
     and is linear between its samples.
 
-    `rms` or `peak_to_peak` holds for one full period as sampled, before the fade-in. Differentiable in both. The same
-    seed gives the same road in the same floating-point precision.
+    `rms` or `peak_to_peak` holds for one full period as sampled, before the fade-in. Differentiable in both.
 
     >>> road = band_limited(peak_to_peak=0.01, duration=20.0, dt=0.002, seed=0, ramp=0.0)
     >>> import jax.numpy as jnp
@@ -72,7 +71,7 @@ def band_limited(
     if (rms is None) == (peak_to_peak is None):
         both = "neither was given" if rms is None else f"{rms} m, and peak_to_peak {peak_to_peak} m was given as well"
         _checks.refuse("rms", "be given, or `peak_to_peak`, but not both", both, "Give exactly one of them.")
-    phase = jax.random.uniform(random_key(seed), (last - first + 1,), float, maxval=2.0 * math.pi)
+    phase = uniform(seed, (last - first + 1,), 2.0 * math.pi)
     shape = flat_band(phase, first, size)
     if rms is not None:
         _checks.positive("rms", rms)

@@ -3,14 +3,13 @@
 from typing import final
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._random import sign
 from jaxdamp._types import ScalarLike, SignalLike
 from jaxdamp.roads._composed import AbstractOnSeveralRoads, same_columns
-from jaxdamp.roads._seed import random_key
 from jaxdamp.roads.base import AbstractRoad, Columns
 from jaxdamp.roads.coherency import coherency
 from jaxdamp.roads.iso_roughness import Iso8608
@@ -101,5 +100,5 @@ def two_track(
     gamma = coherency(left.spatial_frequency, track_width, left.waviness)
     # at 1, which gamma reaches only for a vanishing track, arccos has no slope
     shift = jnp.arccos(jnp.minimum(gamma, 1.0 - 4.0 * float(jnp.finfo(gamma.dtype).eps)))
-    side = jax.random.rademacher(random_key(seed), gamma.shape, gamma.dtype)
+    side = sign(seed, gamma.shape)
     return TwoTrack((left, eqx.tree_at(lambda road: road.phase, left, left.phase + side * shift)))

@@ -63,11 +63,16 @@ METRICS = {
     "spectral_moments": (of_power(lambda f, g: metrics.spectral_moments(f, g)[2]), 2),
     "spectral_damage": (of_power(lambda f, g: metrics.spectral_damage(f, g, 4)), 4),
     "international_roughness_index": (lambda x: metrics.international_roughness_index(x, 0.05), 1),
+    "international_roughness_by_segment": (
+        lambda x: metrics.international_roughness_by_segment(x, 0.05, segment=5.0).segments[-1],
+        1,
+    ),
 }
 # Numbers of frequencies, words, tables and types.
 OTHERS = {
     "AXES",
     "Evaluation",
+    "RoughnessBySegment",
     "STATISTICS",
     "ShockRatios",
     "StateSpace",

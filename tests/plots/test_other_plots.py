@@ -217,3 +217,17 @@ def test_ride_draws_the_weighted_spectrum(responses: dict[str, Response]) -> Non
     np.testing.assert_allclose(weighted[:, 1], gain**2 * plain[:, 1], rtol=1e-9)
     felt = responses["soft"].comfort()["sprung_acceleration"].weighted_rms
     assert f"Wk {float(felt):.3g}" in _legend(figure)[0]
+
+
+# ---- roads
+
+
+def test_roughness_by_segment_draws_each_one_and_the_whole() -> None:
+    heights = 0.005 * np.sin(np.arange(1000) * 0.7) * np.linspace(0.2, 1.0, 1000)
+    roughness = metrics.international_roughness_by_segment(heights, 0.25)
+    figure = roughness.plot()
+    (axes,) = figure.axes
+    np.testing.assert_allclose([bar.get_height() for bar in axes.patches], 1e3 * np.asarray(roughness.segments))
+    np.testing.assert_allclose([bar.get_x() for bar in axes.patches], [0.0, 100.0, 200.0])
+    assert axes.patches[-1].get_width() == pytest.approx(49.75)
+    assert _legend(figure) == ["segment", f"in all, {1e3 * float(roughness.whole):.3g} m/km"]

@@ -127,7 +127,7 @@ def test_gradient_in_speed_equals_difference():
     road = iso8608("C", 20.0, seed=1)
 
     def roughness(speed):
-        return jnp.sum(eqx.tree_at(lambda r: r.speed, road, jnp.asarray(speed)).height(time) ** 2)
+        return jnp.sum(eqx.tree_at(lambda r: r.driven_at, road, jnp.asarray(speed)).height(time) ** 2)
 
     def through_constructor(speed):
         return jnp.sum(iso8608("C", speed, seed=1).height(time) ** 2)

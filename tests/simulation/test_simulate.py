@@ -236,7 +236,7 @@ def test_duration_of_the_road_is_used():
         ),
         (
             {"road": roads.from_profile(np.arange(400) * 5e-3, np.zeros((400, 2)))},
-            r"`road` must have a track for each of 1",
+            r"`road` must have a column for each of 1",
         ),
     ],
 )

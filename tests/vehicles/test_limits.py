@@ -47,7 +47,7 @@ def test_four_quarter_cars():
 def test_two_half_cars():
     """The same road on both sides, axles that differ: each side is half of the car."""
     car = full(CORNER, OTHER, 9e3, 1500.0)
-    response = simulate(car, tracks(HEIGHTS[:, [0, 2]]))  # a track for each axle
+    response = simulate(car, tracks(HEIGHTS[:, [0, 0, 2, 2]]))  # both sides of an axle alike
     half = simulate(HalfCar(MASS / 2, 750.0, AHEAD, BEHIND, CORNER, OTHER), tracks(HEIGHTS[:, [0, 2]]))
     for end in ("front", "rear"):
         for side in ("left", "right"):

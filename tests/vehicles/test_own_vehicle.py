@@ -83,9 +83,11 @@ def test_two_masses_of_a_seat_isolate_and_say_so():
 
 def test_a_road_of_other_tracks_is_refused_with_the_way_out():
     road = roads.from_profile(np.arange(200) * 5e-3, np.zeros((200, 3)))
-    with pytest.raises(ValueError, match=r"`road` must have a track for each of 2 wheel\(s\) \(front, rear\).*delayed"):
+    with pytest.raises(
+        ValueError, match=r"`road` must have a column for each of 2 wheel\(s\) \(front, rear\).*delayed"
+    ):
         simulate(half_car_002(), road)
-    with pytest.raises(ValueError, match=r"4 wheel\(s\) .*2 axle\(s\), or one for all.*3 tracks"):
+    with pytest.raises(ValueError, match=r"each of 4 wheel\(s\) \(front_left, .*3 columns over time without a speed"):
         simulate(full_car_jazar(), road)
     with pytest.raises(ValueError, match=r"`start` must be one of .*Did you mean 'pitch'"):
         simulate(half_car_002(), BUMP, duration=0.2, start={"pich": 0.1})

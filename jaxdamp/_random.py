@@ -1,0 +1,90 @@
+"""Random numbers that depend on the seed alone: the same in single and double precision, one by one or in a batch.
+
+JAX draws other bits for other floating-point types. Here 64 bits are drawn for every number, by the generator that is
+JAX's default (Threefry-2x32, the same on every device), and converted to the precision in use. In double precision the
+numbers are those of `jax.random`.
+"""
+
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.extend.random import threefry_2x32
+from jaxtyping import Array, Float, UInt32
+
+from jaxdamp import _checks
+
+
+_MASK = 0xFFFFFFFF
+_FEWEST = 2.0**-54  # probability taken for zero, where the normal distribution has no finite value
+
+
+def uniform(seed: int | Array, shape: tuple[int, ...], high: float = 1.0) -> Float[Array, "..."]:
+    """Numbers between 0 and `high`, with 52 random bits, rounded to the precision in use.
+
+    Arguments:
+        seed: a whole number, or a JAX random key.
+        shape: of the result.
+        high: the upper end.
+
+    Raises:
+        ValueError: a seed that is neither.
+    """
+    return high * _fraction(*_bits(seed, shape))
+
+
+def normal(seed: int | Array, shape: tuple[int, ...]) -> Float[Array, "..."]:
+    """Numbers of the standard normal distribution; arguments as those of `uniform`."""
+    upper, lower = _bits(seed, shape)
+    if jnp.asarray(0.0, float).dtype == jnp.float64:
+        least = np.nextafter(-1.0, 0.0)
+        return math.sqrt(2.0) * jax.lax.erf_inv(jnp.maximum(2.0 * _fraction(upper, lower) + least, least))
+    # in single precision the tails need the probability that is left, not one that is nearly 1
+    negative = upper >> 31 == 0
+    carried = lower >> 12 == 0
+    left = _fraction(~upper + carried.astype(jnp.uint32), (~(lower >> 12) + 1) << 12)
+    probability = jnp.where(negative, _fraction(upper, lower), left)
+    size = -jax.scipy.special.ndtri(jnp.maximum(probability, _FEWEST))
+    return jnp.where(negative, -size, size)
+
+
+def sign(seed: int | Array, shape: tuple[int, ...]) -> Float[Array, "..."]:
+    """1 or −1, alike in probability; arguments as those of `uniform`."""
+    return jnp.where(_bits(seed, shape)[0] >> 31 == 0, 1.0, -1.0).astype(float)
+
+
+def _fraction(upper: UInt32[Array, "..."], lower: UInt32[Array, "..."]) -> Float[Array, "..."]:
+    """The first 52 of 64 bits as a number from 0 to 1."""
+    return upper.astype(float) * 2.0**-32 + (lower >> 12).astype(float) * 2.0**-52
+
+
+def _bits(seed: int | Array, shape: tuple[int, ...]) -> tuple[UInt32[Array, "..."], UInt32[Array, "..."]]:
+    """64 random bits for each number, as the upper and the lower half."""
+    size = math.prod(shape)
+    place = np.arange(size, dtype=np.uint32)
+    drawn = threefry_2x32(_words(seed), jnp.asarray(np.concatenate([np.zeros_like(place), place])))
+    return drawn[:size].reshape(shape), drawn[size:].reshape(shape)
+
+
+def _words(seed: int | Array) -> UInt32[Array, "2"]:
+    """The two words of the key of `jax.random.key(seed)`, or of a key, also one of the old kind (two words)."""
+    if isinstance(seed, jax.Array):
+        if jnp.issubdtype(seed.dtype, jax.dtypes.prng_key):
+            words = jax.random.key_data(seed)
+            return words if words.shape == (2,) else jax.random.bits(seed, (2,), "uint32")
+        if seed.shape == (2,):
+            return seed.astype(jnp.uint32)
+    known = _checks.concrete(seed)
+    kind = seed.dtype if known is None and isinstance(seed, jax.Array) else np.asarray(known).dtype
+    if np.ndim(seed) or not jnp.issubdtype(kind, jnp.integer):
+        _checks.refuse("seed", "be a whole number or a JAX random key", repr(seed), "Pass `seed=1`.")
+    if known is not None:
+        number = int(known)
+        return jnp.asarray(np.array([number >> 32 & _MASK, number & _MASK], dtype=np.uint32))
+    traced = jnp.asarray(seed)
+    if traced.dtype.itemsize == 8:
+        upper = (traced >> 32).astype(jnp.uint32)
+    else:
+        upper = jnp.where(traced < 0, jnp.uint32(_MASK), jnp.uint32(0))
+    return jnp.stack([upper, traced.astype(jnp.uint32)])
