@@ -23,7 +23,7 @@ STOREYS = [
 ]
 TOP = len(STOREYS) - 1
 # A result draws itself: `.plot()` loads the plots when it is called.
-DRAWS_ITSELF = {("identify", "plots"), ("tune", "plots"), ("sweeps", "plots")}
+DRAWS_ITSELF = {("metrics", "plots"), ("identify", "plots"), ("tune", "plots"), ("sweeps", "plots")}
 # Known only to someone who asks for them: importing the package loads none.
 LATE = ["matplotlib", "xarray", "pint", "typer", "rich", "pandas", "scipy.optimize", "scipy.signal", "scipy.io"]
 

@@ -142,10 +142,10 @@ def international_roughness_by_segment(
     >>> rough = jnp.where(x < 100.0, 0.001, 0.004) * jnp.sin(2.0 * jnp.pi * x / 5.0)
     >>> print(international_roughness_by_segment(rough, 0.1))
       from [m]    to [m]  IRI [m/km]
-             0       100       0.917
-           100       200       3.654
-           200     249.6       3.710  the last 49.6 m only
-             0     249.6       2.569  in all
+             0       100       0.928
+           100       200       3.716
+           200     249.7       3.706  the last 49.7 m only
+             0     249.7       2.597  in all
 
     Arguments:
         profile: height of one wheel track [m], shape [samples], longer than 11.25 m.

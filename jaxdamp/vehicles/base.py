@@ -65,12 +65,12 @@ class AbstractVehicle(eqx.Module):
 
     @property
     def wheel_names(self) -> tuple[str, ...]:
-        """Names of the wheels, in the order of the tracks that a road must have."""
+        """Names of the wheels, in the order of the columns that motions given wheel by wheel must have."""
         return tuple(wheel.name for wheel in self.frame().wheels)
 
     @property
     def axle_positions(self) -> Float[Array, " axles"]:
-        """Distance of each axle behind the front axle [m]: `roads.delayed(road, positions=..., speed=...)` takes it."""
+        """Distance of each axle behind the front axle [m], by which it meets the road later."""
         return jnp.stack([wheel.behind for wheel in self.frame().wheels if not wheel.beside])
 
     @property

@@ -20,7 +20,7 @@ class FullCar(AbstractVehicle):
     with corner i x_i ahead and y_i left of the centre of gravity, at z + x_i θ + y_i φ, and the moments M of the
     anti-roll bars (`Axle`). Left and right are alike; a `LumpedVehicle` need not be.
 
-    The road has four tracks: front left, front right, rear left, rear right.
+    The wheels are front left, front right, rear left, rear right.
 
     Arguments:
         front: axle at `front_distance`.

@@ -22,8 +22,8 @@ class HalfCar(AbstractVehicle):
     asymmetric and the vehicle unstable. Here the matrices come from the geometry. With J = m l_a l_b the ends move
     independently, as two quarter cars of sprung masses m l_b/(l_a + l_b) and m l_a/(l_a + l_b).
 
-    Masses and rates are those of one side of the car. The road has two tracks, front and rear:
-    `roads.delayed` makes the rear follow the front.
+    Masses and rates are those of one side of the car. The wheels are front and rear, each for both sides; the rear one
+    meets the road later.
 
     Arguments:
         front: corner at l_a.

@@ -18,7 +18,7 @@ class RollCar(AbstractVehicle):
         m z̈ = −F_l − F_r,   J φ̈ = −(w/2)(F_l − F_r) − M,   m_u z̈_ul = F_l − F_tl + M/w,  m_u z̈_ur = F_r − F_tr − M/w,
         M = k_R (φ − (z_ul − z_ur)/w).
 
-    The road has two tracks, left and right.
+    The wheels are left and right.
 
     Arguments:
         axle: the two corners and the bar between them.

@@ -20,7 +20,7 @@ class TandemTruck(AbstractVehicle):
         m z̈ = −F_f − P,   J θ̈ = −l_f F_f + l_t P,
 
     l_f ahead of and l_t behind the centre of gravity, P the force of the tandem. Masses and rates are those of both
-    sides together. The road has three tracks: front, first and second axle of the tandem.
+    sides together. The wheels are front, first and second axle of the tandem.
 
     Arguments:
         front: the front axle.

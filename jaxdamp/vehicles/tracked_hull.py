@@ -31,7 +31,7 @@ class TrackedHull(AbstractVehicle):
         m z̈ = −2 Σ F_i,   J θ̈ = −2 Σ l_i F_i,   F_i = C e_i + damper(e_i, ė_i),  e_i = z + l_i θ − z_ri,
 
     for wheels i on each side, l_i ahead of the centre of gravity; both sides together. The mass of the road wheels is
-    left out, as in paper 003. The road has a track for each wheel of a side.
+    left out, as in paper 003. Each wheel of the list stands for both sides, and meets the road in its turn.
 
     For free pitch without heave, J θ̈ + 2 μ Σ_d l² θ̇ + 2 C Σ l² θ = 0, with one sum over the damped wheels and one over
     all: θ decays by exp(2πn/√(ω² − n²)) a cycle, n = μ Σ_d l²/J, ω² = 2 C Σ l²/J (paper 003, equations 8 to 13).

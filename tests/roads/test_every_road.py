@@ -4,6 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from jaxdamp import roads
 
@@ -82,3 +83,62 @@ def test_names():
     )
     assert set(roads.__all__) >= set(of_the_design.split())
     assert all(hasattr(roads, name) for name in roads.__all__)
+
+
+SPEEDS = {"cosine_bump": 10.0, "pothole": 10.0, "profile": 10.0, "delayed": 10.0, "contact_patch": 10.0}
+SPEEDS |= dict.fromkeys(["iso8608", "iso8608_filtered", "two_track", "car", "joined"], 20.0)
+
+
+def test_says_its_speed_and_what_its_columns_are(request, make):
+    road = make(0.02)
+    columns, wanted = road.columns, SPEEDS.get(request.node.callspec.params["make"])
+    assert columns.tracks * (1 if columns.delays is None else columns.delays.size) == road.wheels
+    np.testing.assert_array_equal(road.speed, wanted)
+
+
+SURFACE = roads.iso8608("C", 20.0, seed=3, length=200.0)
+EVENT = roads.cosine_bump(0.05, duration=0.2)
+PLATFORMS = roads.from_profile(np.arange(100) * 0.01, np.zeros((100, 3)))
+WRAPPERS = {
+    "contact_patch": lambda road: roads.contact_patch(road, length=0.15, speed=20.0),
+    "rolling_disc": lambda road: roads.rolling_disc(road, radius=0.3, speed=20.0, points=5),
+    "superposed": lambda road: roads.superposed(road, road),
+    "joined": lambda road: roads.joined(road, road, at=0.5),
+}
+
+
+@pytest.mark.parametrize("name", WRAPPERS)
+def test_what_is_made_of_roads_passes_their_speed_and_columns_on(name):
+    wrap = WRAPPERS[name]
+    two = roads.two_track(SURFACE, SURFACE)
+    for road in (SURFACE, two, roads.in_phase(two), roads.delayed(two, positions=[0.0, 2.0]), PLATFORMS):
+        found, wanted = wrap(road), road.columns
+        assert (found.columns.kind, found.columns.tracks, found.wheels) == (wanted.kind, wanted.tracks, road.wheels)
+        if road.speed is not None:
+            np.testing.assert_array_equal(found.speed, 20.0)
+    kinds = [r.columns.kind for r in (SURFACE, roads.in_phase(two), PLATFORMS, roads.delayed(two, delays=[0.0, 1.0]))]
+    assert kinds == ["road", "in phase", "by wheel", "delayed"]
+
+
+def test_the_speed_is_that_of_the_roads_that_have_one():
+    slower = roads.iso8608("C", 10.0, seed=3, length=200.0)
+    for road in (roads.superposed(EVENT, SURFACE), roads.joined(SURFACE, EVENT, at=1.0)):
+        np.testing.assert_array_equal(road.speed, 20.0)
+    assert roads.superposed(EVENT, EVENT).speed is None
+    assert roads.superposed(SURFACE, slower).speed is None and roads.joined(SURFACE, slower, at=1.0).speed is None
+    for call in (WRAPPERS["contact_patch"], WRAPPERS["rolling_disc"]):
+        with pytest.raises(ValueError, match=r"`speed` must be that of the road, 10.0 m/s, but is 20.0 m/s"):
+            call(slower)
+    traced = jax.jit(lambda v: roads.superposed(EVENT, roads.iso8608("C", v, seed=3, length=200.0)).speed)
+    assert float(traced(17.0)) == 17.0
+
+
+def test_columns_of_different_wheels_do_not_go_together():
+    two, moved = roads.two_track(SURFACE, SURFACE), roads.from_profile(np.arange(100) * 0.01, np.zeros((100, 2)))
+    with pytest.raises(ValueError, match=r"`roads` must have columns alike: two tracks .*, but is 2 columns over time"):
+        roads.superposed(two, moved)
+    with pytest.raises(ValueError, match=r"`second` must have columns alike: one track, but is one track, in phase"):
+        roads.joined(SURFACE, roads.in_phase(SURFACE), at=1.0)
+    with pytest.raises(ValueError, match=r"`right` must have columns alike"):
+        roads.two_track(SURFACE, roads.in_phase(SURFACE))
+    assert roads.two_track(roads.in_phase(SURFACE), roads.in_phase(SURFACE)).columns.kind == "in phase"

@@ -90,7 +90,7 @@ def test_a_road_of_other_tracks_is_refused_with_the_way_out():
     with pytest.raises(ValueError, match=r"each of 4 wheel\(s\) \(front_left, .*3 columns over time without a speed"):
         simulate(full_car_jazar(), road)
     with pytest.raises(ValueError, match=r"`start` must be one of .*Did you mean 'pitch'"):
-        simulate(half_car_002(), BUMP, duration=0.2, start={"pich": 0.1})
+        simulate(half_car_002(), roads.in_phase(BUMP), duration=0.2, start={"pich": 0.1})
 
 
 def test_tracks_of_the_axles_go_under_both_sides():
