@@ -1,17 +1,94 @@
 """Checks of arguments. Every message names the argument, shows its value and says what to do instead."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, NoReturn
 
 import numpy as np
+from jax import Array
 from jax.core import Tracer
 
 
-def refuse(argument: str, must: str, value: Any, remedy: str = "") -> NoReturn:
-    """Raise the `ValueError` that all checks share."""
+MOST_SHOWN = 8  # numbers of an array that a message shows
+
+
+class ArgumentError(ValueError):
+    """A value that an argument must not have.
+
+    `str(error)` speaks of Python's arguments. Its parts are kept apart, so that the command line can speak of options.
+
+    Attributes:
+        argument: name of the argument at fault; empty if a file is at fault.
+        settings: the arguments with values that the message mentions, each as `str(setting)`.
+    """
+
+    def __init__(self, message: str, *settings: "Setting", argument: str = "") -> None:
+        super().__init__(message)
+        self.argument = argument
+        self.settings = settings
+
+
+@dataclass(frozen=True)
+class Setting:
+    """An argument with its value as a message writes it.
+
+    Attributes:
+        argument: name of the argument.
+        value: its value, which may be a mapping; an ellipsis stands for what the user must fill in.
+
+    >>> str(Setting("sign", "rebound-positive")), str(Setting("columns", {"time": None, "stroke": ...}))
+    ('sign="rebound-positive"', 'columns={"time": None, "stroke": ...}')
+    """
+
+    argument: str
+    value: Any = ...
+
+    def __str__(self) -> str:
+        return f"{self.argument}={_literal(self.value)}"
+
+
+def _literal(value: Any) -> str:
+    """A value as Python source, with double quotes."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_literal(key)}: {_literal(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, str) and '"' not in value:
+        return f'"{value}"'
+    if isinstance(value, float):
+        return f"{value:g}"
+    return "..." if value is ... else repr(value)
+
+
+def refuse(argument: str, must: str, value: Any, remedy: str = "", *settings: Setting) -> NoReturn:
+    """Raise the error that all checks share; settings that the remedy mentions follow it."""
     remedy = f" {remedy}" if remedy else ""
-    raise ValueError(f"Argument `{argument}` must {must}, but is {value}.{remedy}")
+    message = f"Argument `{argument}` must {must}, but is {summary(value)}.{remedy}"
+    raise ArgumentError(message, *settings, argument=argument)
+
+
+def summary(value: Any, wrong: Any = None) -> Any:
+    """A value as a message shows it: of more than a few numbers only how many there are, and one that is wrong.
+
+    Arguments:
+        value: any value.
+        wrong: for an array, which of its numbers are wrong.
+
+    >>> summary(np.linspace(0.0, 1.0, 101))
+    '101 numbers from 0 to 1'
+    >>> summary(np.array([1.0, -2.0] * 10), np.array([False, True] * 10))
+    '20 numbers, 10 of them wrong, the first -2 at index 1'
+    """
+    if not isinstance(value, np.ndarray | Array) or value.size <= MOST_SHOWN:
+        return value
+    array = np.asarray(value)
+    shape = "" if array.ndim == 1 else f" in shape {array.shape}"
+    if wrong is None or not np.any(wrong):
+        spread = f" from {array.min():.6g} to {array.max():.6g}" if np.issubdtype(array.dtype, np.number) else ""
+        return f"{array.size} numbers{shape}{spread}"
+    first = np.argwhere(wrong)[0].tolist()
+    index = first[0] if len(first) == 1 else tuple(first)
+    count = np.count_nonzero(wrong)
+    return f"{array.size} numbers{shape}, {count} of them wrong, the first {array[tuple(first)]:.6g} at index {index}"
 
 
 def concrete(value: Any) -> np.ndarray | None:
@@ -31,21 +108,22 @@ def finite(argument: str, value: Any, remedy: str = "Look for NaN or a division 
     """Refuse NaN and infinity."""
     array = _numbers(argument, value)
     if array is not None and not np.all(np.isfinite(array)):
-        refuse(argument, "be finite", array, remedy)
+        refuse(argument, "be finite", summary(array, ~np.isfinite(array)), remedy)
 
 
 def positive(argument: str, value: Any, remedy: str = "") -> None:
     """Refuse anything that is not finite and greater than zero."""
     array = _numbers(argument, value)
     if array is not None and not (np.all(np.isfinite(array)) and np.all(array > 0)):
-        refuse(argument, "be positive and finite", array, remedy)
+        refuse(argument, "be positive and finite", summary(array, ~(np.isfinite(array) & (array > 0))), remedy)
 
 
 def nonnegative(argument: str, value: Any, remedy: str = "") -> None:
     """Refuse anything that is not finite and at least zero."""
     array = _numbers(argument, value)
     if array is not None and not (np.all(np.isfinite(array)) and np.all(array >= 0)):
-        refuse(argument, "be finite and not negative", array, remedy)
+        wrong = ~(np.isfinite(array) & (array >= 0))
+        refuse(argument, "be finite and not negative", summary(array, wrong), remedy)
 
 
 def described(value: Any) -> str:

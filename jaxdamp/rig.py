@@ -1,18 +1,18 @@
 """The bench: the force of a law under a prescribed stroke, and at constant velocity."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal, SignalLike
 from jaxdamp.dampers import AbstractDamper, Sum
-from jaxdamp.dampers.coverage import refuse_gaps
+from jaxdamp.dampers.coverage import coverage, refuse_gaps
 from jaxdamp.parameters import as_float
 
 
@@ -139,21 +139,47 @@ def _solve(
     return jax.vmap(law.force)(stroke, velocity, states)
 
 
-def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.ndarray) -> Float[Array, " points"]:
+class QuasiStatic(NamedTuple):
+    """Forces of a law at constant velocity, and where it has none.
+
+    Attributes:
+        velocity: the velocities asked for [m/s], shape (points,).
+        force: settled force [N], NaN where the law does not settle or has no finite force, shape (points,).
+        settled: which points have a force, shape (points,).
+        note: how many points have none, where and why, in words; empty if all have one.
+    """
+
+    velocity: Float[Array, " points"]
+    force: Float[Array, " points"]
+    settled: Bool[np.ndarray, " points"]
+    note: str
+
+
+LONGEST_HOLD = 64  # s at constant velocity
+STEADY = 1e-4  # change of a force while the time held doubles, relative to the scale of the forces: settled
+STILL = {"float64": 1e-9, "float32": 1e-3}  # the same, at which no longer hold can improve the curve
+
+
+def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.ndarray) -> QuasiStatic:
     """Force [N] of a law at constant velocity, its states settled: the curve without hysteresis.
 
-    The velocity is held at stroke zero until the force stands still; a memoryless law answers at once.
+    Each velocity is held at stroke zero for 1, 2, 4 ... up to 64 s, until no force changes any more; a memoryless law
+    answers at once. A point is settled if its force changed, over the last doubling of the time, by no more than 1e-4
+    of itself or of the largest settled force. Friction that acts through a bristle needs longer the slower it moves, and
+    a law that heats up or drifts never settles: such points are left without a force, and the note says so.
 
     Arguments:
         law: the damper law.
         velocities: velocities [m/s], shape (points,).
 
+    Returns:
+        The forces, NaN at points without one, with a flag for each point and a note in words.
+
     Raises:
-        ValueError: velocities that are not finite numbers in one dimension; a force that does not settle in 64 s; a
-            force that is not finite, as beyond the data that a law was made from.
+        ValueError: velocities that are not finite numbers in one dimension.
 
     >>> from jaxdamp.dampers import Linear, SeriesSpring
-    >>> quasi_static(SeriesSpring(Linear(2000.0), stiffness=1e6), np.array([-0.5, 0.0, 0.5]))
+    >>> quasi_static(SeriesSpring(Linear(2000.0), stiffness=1e6), np.array([-0.5, 0.0, 0.5])).force
     Array([-1000.,     0.,  1000.], dtype=float64)
     """
     check_module("law", law, (AbstractDamper,), "quasi_static(law, velocities)")
@@ -161,30 +187,52 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     if velocities.ndim != 1 or velocities.size == 0:
         _checks.refuse("velocities", "be one or more in one dimension", f"of shape {velocities.shape}")
     _checks.finite("velocities", velocities)
-    force = _hold(law, velocities, jnp.asarray(0))
+    states = jnp.broadcast_to(law.initial_state(), (velocities.size, law.initial_state().size))
+    states, force = _hold(law, velocities, states, jnp.asarray(0))
     if law.initial_state().size == 0:
-        refuse_gaps(law, force, "at these velocities")
-        return force
-    tolerance = 1e-3 if force.dtype == jnp.float32 else 1e-9
-    for seconds in (1, 2, 4, 8, 16, 32, 64):
-        before, force = force, _hold(law, velocities, jnp.asarray(1000 * seconds))
-        if np.max(np.abs(force - before)) <= tolerance * np.max(np.abs(force)):
-            return force
-    refuse_gaps(law, force, "at these velocities")
-    remedy = "Its force depends on how long it has moved: take `respond` with the motion that you mean."
-    _checks.refuse("law", "settle at constant velocity", f"{law} with forces {before} N, then {force} N", remedy)
+        settled = np.isfinite(force)
+        return QuasiStatic(velocities, force, settled, _gaps(law, np.asarray(velocities), np.asarray(force), settled))
+    seconds, change = 0, np.full(velocities.shape, np.inf)
+    while seconds < LONGEST_HOLD:
+        longer = max(2 * seconds, 1)
+        before, (states, force) = force, _hold(law, velocities, states, jnp.asarray(1000 * (longer - seconds)))
+        seconds, change = longer, np.abs(np.asarray(force) - np.asarray(before))
+        if np.all(change <= STILL[str(force.dtype)] * np.max(np.abs(force))):
+            break
+    size = np.abs(np.asarray(force))
+    limit = STEADY if force.dtype == jnp.float64 else STILL["float32"]
+    alone = change <= limit * size
+    settled = np.isfinite(size) & (alone | (change <= limit * np.max(size, where=alone, initial=0.0)))
+    note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
+    return QuasiStatic(velocities, jnp.where(settled, force, jnp.nan), settled, note)
+
+
+def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled: np.ndarray) -> str:
+    """Where a law has no settled force, and why."""
+    finite = np.isfinite(force)
+    reasons = (
+        (~finite, f"the law gives no finite force. {coverage(law)}".strip()),
+        (finite & ~settled, f"the force still changes after {LONGEST_HOLD} s of constant velocity."),
+    )
+    notes = [
+        f"No force at {np.count_nonzero(at)} of {at.size} velocities, from {velocity[at].min():.3g} to "
+        f"{velocity[at].max():.3g} m/s: {why}"
+        for at, why in reasons
+        if at.any()
+    ]
+    return " ".join(notes)
 
 
 @eqx.filter_jit
-def _hold(law: AbstractDamper, velocities: Array, count: Int[Array, ""]) -> Array:
+def _hold(law: AbstractDamper, velocities: Array, states: Array, count: Int[Array, ""]) -> tuple[Array, Array]:
+    """States and forces after so many more milliseconds at constant velocities."""
     zero, dt = jnp.zeros((), velocities.dtype), jnp.asarray(1e-3, velocities.dtype)
 
-    def one(v: Array) -> Array:
-        start = law.initial_state()
+    def one(v: Array, start: Array) -> tuple[Array, Array]:
         state = jax.lax.fori_loop(0, count, lambda _, state: law.advance(zero, v, zero, v, state, dt), start)
-        return law.force(zero, v, state)
+        return state, law.force(zero, v, state)
 
-    return jax.vmap(one)(velocities)
+    return jax.vmap(one)(velocities, states)
 
 
 @eqx.filter_jit

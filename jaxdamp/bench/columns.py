@@ -4,8 +4,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from typing import NoReturn
 
 from jaxdamp import _checks
+from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp.bench.tables import Table
 from jaxdamp.bench.units import SI, USUAL, Conversion, conversion, named_conversion
 
@@ -117,9 +119,13 @@ def find_columns(
     for role in units:
         _checks.one_of("units", role, ROLES)
     if not table.names and not columns:
-        raise ValueError(
+        numbers = Setting("columns", {"time": 0, "stroke": 1, "force": 2})
+        names = Setting("units", {"time": "s", "stroke": "mm", "force": "N"})
+        raise ArgumentError(
             f"{table.file} has no header row, so its columns have no names: pass their numbers and units, for example "
-            'columns={"time": 0, "stroke": 1, "force": 2}, units={"time": "s", "stroke": "mm", "force": "N"}.'
+            f"{numbers}, {names}.",
+            numbers,
+            names,
         )
     found = {}
     for role in ROLES:
@@ -128,7 +134,7 @@ def find_columns(
             found[role] = _with_unit(table, role, index, units)
     for role in ("stroke", "force"):
         if role not in found:
-            _refuse_missing(table, role)
+            _refuse_missing(table, role, found)
     return found
 
 
@@ -142,20 +148,20 @@ def _given(table: Table, role: str, wanted: str | int | None) -> int | None:
     count = table.values.shape[1]
     if isinstance(wanted, int):
         if not 0 <= wanted < count:
-            raise ValueError(f'columns={{"{role}": {wanted}}}: {table.file} has columns 0 to {count - 1}.')
+            given = Setting("columns", {role: wanted})
+            raise ArgumentError(f"{given}: {table.file} has columns 0 to {count - 1}.", given)
         return wanted
+    given = Setting("columns", {role: wanted})
     hits = [i for i, name in enumerate(table.names) if name == wanted]
     hits = hits or [i for i, name in enumerate(table.names) if split_header(name)[0].lower() == wanted.strip().lower()]
     if len(hits) == 1:
         return hits[0]
     if hits:
-        raise ValueError(
-            f'columns={{"{role}": {wanted!r}}} fits columns {hits} of {table.file}: pass the number of one of them.'
-        )
+        raise ArgumentError(f"{given} fits columns {hits} of {table.file}: pass the number of one of them.", given)
     near = get_close_matches(wanted, table.names, 1)
     hint = f" Did you mean {near[0]!r}?" if near else ""
     names = ", ".join(map(repr, table.names)) or "no header"
-    raise ValueError(f'columns={{"{role}": {wanted!r}}}: {table.file} has {names}.{hint}')
+    raise ArgumentError(f"{given}: {table.file} has {names}.{hint}", given)
 
 
 def _named(table: Table, role: str, columns: Mapping[str, str | int | None]) -> int | None:
@@ -168,9 +174,11 @@ def _named(table: Table, role: str, columns: Mapping[str, str | int | None]) -> 
     ]
     if len(hits) > 1:
         names = [table.names[i] for i in hits]
-        raise ValueError(
+        choice = Setting("columns", {role: names[0]})
+        raise ArgumentError(
             f"{table.file}: the columns {' and '.join(map(repr, names))} could all be the {role}. Choose one: "
-            f'columns={{"{role}": {names[0]!r}}}.'
+            f"{choice}.",
+            choice,
         )
     return hits[0] if hits else None
 
@@ -188,16 +196,36 @@ def _with_unit(table: Table, role: str, index: int, units: Mapping[str, str]) ->
     tail = _tail_unit(name, role)
     if tail:
         return Column(role, index, header, tail[1])
-    raise ValueError(
-        f"{where} ({role}) names no unit, and none is assumed. Pass it, for example "
-        f'units={{"{role}": "{USUAL[role][0]}"}}, or put it into the header: "{name} [{USUAL[role][0]}]".'
+    example = Setting("units", {role: USUAL[role][0]})
+    raise ArgumentError(
+        f"{where} ({role}) names no unit, and none is assumed. Pass it, for example {example}, or put it into the "
+        f'header: "{name} [{USUAL[role][0]}]".',
+        example,
     )
 
 
-def _refuse_missing(table: Table, role: str) -> None:
+def _refuse_missing(table: Table, role: str, found: Mapping[str, Column]) -> NoReturn:
+    """Refuse a table without a stroke or a force; propose a column that is no other quantity."""
     names = ", ".join(map(repr, table.names)) or f"{table.values.shape[1]} columns without names"
-    example = table.names[-1] if table.names else 1
-    raise ValueError(
-        f"{table.file} has no column for the {role}: its columns are {names}. Name it: "
-        f'columns={{"{role}": {example!r}}}.'
+    taken = {column.index for column in found.values()}
+    free = [i for i in range(table.values.shape[1]) if i not in taken and not (table.names and _is_other(table, i, role))]
+    if not free:
+        raise ArgumentError(
+            f"{table.file} has no column for the {role}: its columns are {names}, all of them other quantities. A "
+            f"record needs the {role}: export the file again with it."
+        )
+    choice = Setting("columns", {role: table.names[free[0]] if table.names else free[0]})
+    raise ArgumentError(
+        f"{table.file} has no column for the {role}: its columns are {names}. Name it, for example {choice}.", choice
     )
+
+
+def _is_other(table: Table, index: int, role: str) -> bool:
+    """Whether the header or the unit of a column says that it is another quantity."""
+    unit = table.unit_row[index] if table.unit_row else ""
+    header = table.names[index]
+    name, written = split_header(header)
+    said = role_of(header, unit)
+    unit = unit or written or ""
+    foreign = bool(unit) and conversion(role, unit) is None
+    return foreign or (said is not None and said != role) or bool(_NOT_MEASURED.intersection(_words(name)))

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 from pathlib import Path
 
+from jaxdamp import _checks
+
 
 TEXT_ENDINGS = (".csv", ".txt", ".dat", ".tsv", ".asc")
 
@@ -23,13 +25,12 @@ def find_files(paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]])
     """
     asked = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
     if not asked:
-        raise ValueError("Argument `paths` must name at least one file, but is empty.")
+        _checks.refuse("paths", "name at least one file", "empty")
     files = [file for path in asked for file in _expand(path)]
     for file in files:
         if files.count(file) > 1:
-            raise ValueError(
-                f"Argument `paths` must name every file once, but {file} is there {files.count(file)} times."
-            )
+            must, value = "name every file once", f"naming {file}, which is there {files.count(file)} times"
+            _checks.refuse("paths", must, value)
     return tuple(files)
 
 

@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp.bench import sampling
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Column, find_columns
@@ -127,7 +128,9 @@ def _record(
     own = bool(table.preamble) and table.preamble[0].strip() == FILE_MARK
     if own:
         if sign == "compression-positive" or force_sign == "opposite":
-            raise ValueError(f"{where} states that it is rebound-positive: read it without `sign` and `force_sign`.")
+            given = [Setting(name, word) for name, word in (("sign", sign), ("force_sign", force_sign)) if word]
+            words = " and ".join(map(str, given))
+            raise ArgumentError(f"{where} states that it is rebound-positive: read it without {words}.", *given)
         decision = signs.Decision(1.0, 1.0, ("positive stroke is rebound, as the file states",))
     else:
         decision = signs.decide(time, stroke, force, sign, force_sign, where)
@@ -166,17 +169,23 @@ def _time(
     """The instants, from the time column or the sampling rate given."""
     if time is None:
         if rate is None:
-            raise ValueError(
-                f"{where} has no time column: pass the rate at which it was sampled, for example sampling_rate=1000 "
-                '[Hz], or name the column with columns={"time": ...}.'
+            example, name = Setting("sampling_rate", 1000), Setting("columns", {"time": ...})
+            raise ArgumentError(
+                f"{where} has no time column: pass the rate at which it was sampled, for example {example} "
+                f"[Hz], or name the column with {name}.",
+                example,
+                name,
             )
         return sampling.uniform_time(rate, count), f"time from the sampling rate given, {rate:g} Hz"
     time, note = sampling.check_time(time, where, lines)
     own = (count - 1) / (time[-1] - time[0])
     if rate is not None and abs(rate / own - 1) > 0.01:
-        raise ValueError(
-            f"{where}: sampling_rate={rate:g} contradicts the time column, which has {own:.6g} Hz. Leave one of "
-            'them out: columns={"time": None} leaves out the column.'
+        given, without = Setting("sampling_rate", rate), Setting("columns", {"time": None})
+        raise ArgumentError(
+            f"{where}: {given} contradicts the time column, which has {own:.6g} Hz. Leave one of "
+            f"them out: {without} leaves out the column.",
+            given,
+            without,
         )
     return time, note
 
@@ -186,24 +195,21 @@ def _velocity(time: Samples, stroke: Samples, measured: Samples | None, where: s
     derived, how = estimate_velocity(time, stroke)
     if measured is None:
         return derived, how
-    remedy = 'Mend the column or its unit, or derive the velocity from the stroke: columns={"velocity": None}.'
+    without = Setting("columns", {"velocity": None})
+    remedy = f"Mend the column or its unit, or derive the velocity from the stroke: {without}."
     power = float(np.dot(measured, measured) * np.dot(derived, derived))
     likeness = float(np.dot(measured, derived)) / np.sqrt(power) if power > 0 else 0.0
     scale = float(np.dot(measured, derived) / np.dot(derived, derived))
     if likeness < -0.8:
-        raise ValueError(
-            f"{where}: the velocity column has the opposite sign of the stroke's derivative (correlation "
-            f"{likeness:.3f}). {remedy}"
-        )
-    if likeness < 0.8:
-        raise ValueError(
-            f"{where}: the velocity column is not the derivative of the stroke (correlation {likeness:.3f}). {remedy}"
-        )
-    if not 0.8 < scale < 1.25:
-        raise ValueError(
-            f"{where}: the velocity column is {scale:.4g} times the stroke's derivative: one of the two has a wrong "
-            f"unit. {remedy}"
-        )
+        fault = f"has the opposite sign of the stroke's derivative (correlation {likeness:.3f})"
+    elif likeness < 0.8:
+        fault = f"is not the derivative of the stroke (correlation {likeness:.3f})"
+    elif not 0.8 < scale < 1.25:
+        fault = f"is {scale:.4g} times the stroke's derivative: one of the two has a wrong unit"
+    else:
+        fault = ""
+    if fault:
+        raise ArgumentError(f"{where}: the velocity column {fault}. {remedy}", without)
     doubt = " - they differ, look at both" if likeness < 0.99 or not 0.97 < scale < 1.03 else ""
     return measured, (
         f"velocity as measured; it is {scale:.4g} times the stroke's derivative, correlation {likeness:.4f}{doubt}"

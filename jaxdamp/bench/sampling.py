@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp.bench.motion import Samples
 
 
@@ -28,13 +29,16 @@ def check_time(time: Samples, where: str, lines: Sequence[int] | None = None) ->
     """
     what, lines = ("line", lines) if lines else ("sample", range(len(time)))
     steps = np.diff(time)
-    again = 'leave its column out and give the rate: columns={"time": None}, sampling_rate=...'
+    without, rate = Setting("columns", {"time": None}), Setting("sampling_rate")
+    again = f"leave its column out and give the rate: {without}, {rate}"
     back = np.flatnonzero(steps <= 0)
     if back.size:
         i = int(back[0]) + 1
-        raise ValueError(
+        raise ArgumentError(
             f"{where}, {what} {lines[i]}: time goes from {time[i - 1]:.9g} s to {time[i]:.9g} s, but must increase. "
-            f"Cut the record there; or, if its clock is too coarse, {again}."
+            f"Cut the record there; or, if its clock is too coarse, {again}.",
+            without,
+            rate,
         )
     number = np.arange(len(time)) - (len(time) - 1) / 2
     step = float(np.dot(number, time) / np.dot(number, number))
@@ -45,18 +49,22 @@ def check_time(time: Samples, where: str, lines: Sequence[int] | None = None) ->
     gaps = np.flatnonzero(steps > _GAP * usual)
     if gaps.size:
         i = int(gaps[0]) + 1
-        raise ValueError(
+        raise ArgumentError(
             f"{where}, {what} {lines[i]}: {steps[i - 1] / usual - 1:.0f} samples are missing between {time[i - 1]:.6g} "
             f"and {time[i]:.6g} s ({gaps.size} such gaps in all; the usual step is {usual:.4g} s). Cut the record "
-            f"into the parts before and after the gap; or, if its clock is too coarse, {again}."
+            f"into the parts before and after the gap; or, if its clock is too coarse, {again}.",
+            without,
+            rate,
         )
     quantum = 10.0 ** -_decimals(time)
     if off <= 0.6 * quantum:
         note = f"time was rounded to {quantum:g} s in the file; it is put back on a grid of {1 / step:.6g} Hz"
         return time[0] + step * np.arange(len(time)), note
-    raise ValueError(
+    raise ArgumentError(
         f"{where}: the samples are not uniform in time, the steps go from {steps.min():.4g} to {steps.max():.4g} s. "
-        f"Resample all channels with numpy.interp to one rate; or, if only the clock jitters, {again}."
+        f"Resample all channels with numpy.interp to one rate; or, if only the clock jitters, {again}.",
+        without,
+        rate,
     )
 
 
@@ -84,9 +92,11 @@ def check_numbers(
 def check_stroke(stroke: Samples, where: str) -> None:
     """Refuse a stroke that stands still."""
     if np.ptp(stroke) <= 1e-9:
-        raise ValueError(
+        name = Setting("columns", {"stroke": ...})
+        raise ArgumentError(
             f"{where}: the stroke is constant ({stroke[0]:.6g} m), so there is no motion to learn from. Is it the "
-            'right column? Name it with columns={"stroke": ...}.'
+            f"right column? Name it with {name}.",
+            name,
         )
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._checks import ArgumentError, Setting
 from jaxdamp.bench.motion import Samples, cycle_instants, cycle_works
 
 
@@ -73,24 +74,30 @@ def decide(
     clear = abs(loss) >= _LEAST_LOSS
     done = f"work per cycle {work:+.4g} J"
     if sign is None and force_sign is None and not clear:
-        raise ValueError(
+        ways = [Setting("sign", word) for word in SIGNS]
+        raise ArgumentError(
             f"{where}: the sign convention cannot be established from the data, because the {done} is only "
-            f'{abs(loss):.1%} of that of a damper with this force and stroke. Pass sign="rebound-positive" or '
-            'sign="compression-positive".'
+            f"{abs(loss):.1%} of that of a damper with this force and stroke. Pass {ways[0]} or {ways[1]}.",
+            *ways,
         )
     if force_sign is None:
         force_sign = "opposite" if sign is None and loss < 0 else "same"
         if sign is not None and clear and loss < 0:
-            raise ValueError(
-                f"{where}: sign={sign!r} contradicts the data: with force and stroke of the same sign the {done}, and "
-                "a damper cannot give energy. If the force of this bench counts the other way, pass also "
-                'force_sign="opposite".'
+            given, remedy = Setting("sign", sign), Setting("force_sign", "opposite")
+            raise ArgumentError(
+                f"{where}: {given} contradicts the data: with force and stroke of the same sign the {done}, and "
+                f"a damper cannot give energy. If the force of this bench counts the other way, pass also {remedy}.",
+                given,
+                remedy,
             )
     elif clear and (loss < 0) == (force_sign == "same"):
         other = "opposite" if force_sign == "same" else "same"
-        raise ValueError(
-            f"{where}: force_sign={force_sign!r} contradicts the data ({done} as the file counts): a damper cannot "
-            f'give energy. Pass force_sign="{other}", or leave it out.'
+        given, remedy = Setting("force_sign", force_sign), Setting("force_sign", other)
+        raise ArgumentError(
+            f"{where}: {given} contradicts the data ({done} as the file counts): a damper cannot give energy. "
+            f"Pass {remedy}, or leave it out.",
+            given,
+            remedy,
         )
     motion = -1.0 if sign == "compression-positive" else 1.0
     turned = -1.0 if force_sign == "opposite" else 1.0

@@ -11,6 +11,9 @@ from typing import NoReturn
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp import _checks
+from jaxdamp._checks import ArgumentError, Setting
+
 
 DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "white space"}
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*([eEdD][+-]?\d+)?|\.\d+([eEdD][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
@@ -83,7 +86,11 @@ def _split(line: str, delimiter: str) -> list[str]:
     """The cells of a line. One empty cell after a closing delimiter does not count."""
     if delimiter == " ":
         return line.split()
-    cells = [cell.strip() for cell in next(csv.reader([line.strip(" ")], delimiter=delimiter, skipinitialspace=True))]
+    try:
+        row = next(csv.reader([line.strip(" ")], delimiter=delimiter, skipinitialspace=True))
+    except csv.Error:  # a line longer than any of a record, as in a JSON file
+        row = line.split(delimiter)
+    cells = [cell.strip() for cell in row]
     return cells[:-1] if len(cells) > 1 and not cells[-1] else cells
 
 
@@ -117,14 +124,25 @@ def _delimiter(file: Path, rows: list[tuple[int, str]], given: str | None) -> tu
                 f"{file} has only one column: a record needs at least the stroke and the force, side by side, "
                 "divided by comma, semicolon, tab or white space."
             )
-        raise ValueError(f"{file} holds no rows of numbers: its first line is {rows[0][1][:80]!r}.")
+        raise ValueError(
+            f"{file} holds no rows of numbers: its first line is {rows[0][1][:80]!r}.{_other_format(rows[0][1])}"
+        )
     if len(given) != 1:
-        raise ValueError(f"Argument `delimiter` must be one character, but is {given!r}.")
+        _checks.refuse("delimiter", "be one character", repr(given))
     count = (found.get(given) or _widths(rows, given))[1]
     if count > 1:
         return given, count
-    hint = f" It looks like {best!r} ({DELIMITERS[best]}): leave `delimiter` out." if found[best][1] > 1 else ""
-    raise ValueError(f"{file} has no columns divided by {given!r}, the delimiter that was given.{hint}")
+    setting = Setting("delimiter", given)
+    hint = f" It looks like {best!r} ({DELIMITERS[best]}): leave {setting} out." if found[best][1] > 1 else ""
+    raise ArgumentError(f"{file} has no columns divided by {given!r}, the delimiter that was given.{hint}", setting)
+
+
+def _other_format(first: str) -> str:
+    """A sentence on a file that is text, but of another kind."""
+    kind = {"{": "JSON", "[": "JSON", "<": "HTML or XML"}.get(first.lstrip()[:1])
+    if kind is None:
+        return ""
+    return f" It looks like {kind}: export the record from the bench software as CSV, one column a channel."
 
 
 def _header(

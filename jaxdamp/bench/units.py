@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from jaxdamp._checks import ArgumentError, Setting
+
 
 if TYPE_CHECKING:
     import pint
@@ -110,7 +112,7 @@ def named_conversion(role: str, written: str, where: str) -> Conversion:
     other = next((r for r in SI if conversion(r, written) is not None), None)
     what = f"is a unit of {other}, not of {role}" if other else f"is no known unit of {role}"
     example = near[0] if near else USUAL[role][0]
-    raise ValueError(
-        f"{where}: {written!r} {what}. {hint}Usual ones are {', '.join(USUAL[role])}: "
-        f'pass units={{"{role}": "{example}"}}.'
+    usual = Setting("units", {role: example})
+    raise ArgumentError(
+        f"{where}: {written!r} {what}. {hint}Usual ones are {', '.join(USUAL[role])}: pass {usual}.", usual
     )

@@ -1,6 +1,7 @@
 """A law as a force-velocity table."""
 
 import os
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,8 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
 
     A table holds one force for each velocity. For a law with states that is the force at constant velocity once the
     states have settled (`jaxdamp.rig.quasi_static`); its hysteresis does not fit into a table, and the header says so.
+    Velocities at which the law has no settled or no finite force get no row: a comment in the file and a Python warning
+    say how many, where and why.
 
     Arguments:
         law: the law.
@@ -28,14 +31,18 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
         The path of the file.
 
     Raises:
-        ValueError: velocities that do not increase, a folder that does not exist, a law that does not settle.
+        ValueError: velocities that do not increase, a folder that does not exist, a law without a settled force at any
+            of the velocities.
     """
     check_module("law", law, (AbstractDamper,), "to_csv(law, path, velocities)")
     velocity = np.asarray(velocities, dtype=float)
     _checks.finite("velocities", velocity)
     if velocity.ndim != 1 or velocity.size == 0 or np.any(np.diff(velocity) <= 0):
         _checks.refuse("velocities", "be one or more, strictly increasing", velocity, "Try `numpy.unique`.")
-    force = np.asarray(quasi_static(law, velocity))
+    curve = quasi_static(law, velocity)
+    if not curve.settled.any():
+        remedy = "A table cannot hold such a law: take `respond` with the motion that you mean."
+        _checks.refuse("law", "have a force at constant velocity", f"{type(law).__name__}. {curve.note}", remedy)
     header = [
         f"# law: {law!r}",
         "# velocity is positive in extension (rebound), force is positive when it resists extension",
@@ -45,5 +52,12 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
         header.append(
             f"# quasi-static: force at constant velocity; the hysteresis of the law's {states} state(s) is not in here"
         )
-    rows = [f"{float(v)!r},{float(f)!r}" for v, f in zip(velocity, force, strict=True)]
-    return write_whole(path, "\n".join([*header, "velocity [m/s],force [N]", *rows]) + "\n")
+    if curve.note:
+        header.append(f"# rows left out: {curve.note}")
+    force = np.asarray(curve.force)
+    pairs = zip(velocity[curve.settled], force[curve.settled], strict=True)
+    rows = [f"{float(v)!r},{float(f)!r}" for v, f in pairs]
+    written = write_whole(path, "\n".join([*header, "velocity [m/s],force [N]", *rows]) + "\n")
+    if curve.note:
+        warnings.warn(f"{written}: rows left out. {curve.note}", stacklevel=2)
+    return written

@@ -1,5 +1,6 @@
 """What all pictures share: figure, colours, labels with unit and sign, legends beside the axes."""
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -106,6 +107,13 @@ def by_name(argument: str, given: Any, kind: type, words: str, remedy: str, alon
         label = f"{argument}[{name!r}]" if isinstance(given, Mapping) else argument
         _checks.instance(label, item, kind, f"be {words}", remedy)
     return found
+
+
+def note_below(figure: "matplotlib.figure.Figure", sentences: Sequence[str]) -> None:
+    """Remarks in small print under all axes; nothing if there are none."""
+    lines = [line for sentence in sentences for line in textwrap.wrap(sentence, int(11 * figure.get_figwidth()))]
+    if lines:
+        figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize="small", color="0.35")
 
 
 def law_name(law: AbstractDamper) -> str:

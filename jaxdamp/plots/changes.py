@@ -37,9 +37,12 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.0), height_ratios=(1.8, 1.0))
     curves, bars, search = (figure.add_subplot(at) for at in (grid[:, 0], grid[0, 1], grid[1, 1]))
     points = np.asarray(velocities, dtype=float)
+    gaps = []
     for number, (name, pair) in enumerate(pairs.items()):
         colour = _style.COLOURS[number % len(_style.COLOURS)]
-        old, new = (np.asarray(quasi_static(law, points)) for law in pair)
+        held = [quasi_static(law, points) for law in pair]
+        old, new = (np.asarray(curve.force) for curve in held)
+        gaps += [f"{name}{when}: {c.note}" for when, c in zip(("before", "after"), held, strict=True) if c.note]
         curves.plot(points, old, "--", color=colour if len(pairs) > 1 else _style.BLACK, label=f"{name}before")
         curves.plot(points, new, "-", color=colour, linewidth=1.8, label=f"{name}after")
     _style.dress(curves, _style.VELOCITY, _style.FORCE, "Damper law")
@@ -47,6 +50,7 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
     curves.legend(loc="upper left", frameon=False)
     _bars(bars, result)
     _search(search, result)
+    _style.note_below(figure, gaps)
     return figure
 
 

@@ -26,16 +26,19 @@ def force_velocity(
     runs: BenchRun | Sequence[BenchRun] | None = None,
     *,
     baseline: str | None = None,
+    note: str = "",
 ) -> "matplotlib.figure.Figure":
     """Force over velocity of one law or several, over the samples and the peak-velocity points of records.
 
-    A law with states is drawn at constant velocity, its states settled: the curve in the middle of its loops.
+    A law with states is drawn at constant velocity, its states settled: the curve in the middle of its loops. Where it
+    has no settled or no finite force the curve has a gap, and a remark under the picture says why.
 
     Arguments:
         laws: a law, or laws by name.
         velocities: where to draw the curves [m/s]; the range of the records, or −1 to 1 m/s, if left out.
         runs: measured records to draw under the curves.
         baseline: name of the law to draw as a dashed black line, the one that the others are compared with.
+        note: a remark to write under the picture.
 
     Raises:
         ValueError: no law, or a baseline that is not among the laws.
@@ -54,11 +57,13 @@ def force_velocity(
     figure = _style.new_figure(9.5, 5.5)
     axes = figure.subplots()
     handles = _measured(axes, runs)
-    handles += draw_laws(axes, laws, points, baseline)
+    curves, gaps = draw_laws(axes, laws, points, baseline)
+    handles += curves
     _style.dress(axes, _style.VELOCITY, _style.FORCE)
     _style.cross(axes)
     axes.set_xlim(float(points.min()), float(points.max()))
     _style.legend_beside(figure, handles)
+    _style.note_below(figure, [*([note] if note else []), *gaps])
     return figure
 
 
@@ -67,18 +72,19 @@ def draw_laws(
     laws: Mapping[str, AbstractDamper],
     velocities: Float[np.ndarray, " points"],
     baseline: str | None,
-) -> list:
-    """One curve a law; the handles for the legend."""
-    handles, number = [], 0
+) -> tuple[list, list[str]]:
+    """One curve a law; the handles for the legend, and remarks on gaps in the curves."""
+    handles, gaps, number = [], [], 0
     for name, law in laws.items():
-        force = np.asarray(quasi_static(law, velocities))
+        curve = quasi_static(law, velocities)
+        gaps += [f"{name}: {curve.note}"] if curve.note else []
         label = f"{name} (settled)" if law.initial_state().size else name
         if name == baseline:
             style = {"color": _style.BLACK, "linestyle": "--", "zorder": 2.5}
         else:
             style, number = _style.line_style(number), number + 1
-        handles += axes.plot(velocities, force, linewidth=1.8, label=label, **style)
-    return handles
+        handles += axes.plot(velocities, np.asarray(curve.force), linewidth=1.8, label=label, **style)
+    return handles, gaps
 
 
 def _range(runs: Sequence[BenchRun]) -> tuple[float, float]:

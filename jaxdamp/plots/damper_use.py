@@ -50,13 +50,15 @@ def damper_use(
     records = {name: _record(response, damper) for name, response in responses.items()}
     reach = 1.02 * max(float(np.max(np.abs(velocity))) for velocity, _ in records.values())
     edges = np.linspace(-reach, reach, _BINS + 1)
-    middles, handles = 0.5 * (edges[1:] + edges[:-1]), []
+    middles, handles, gaps = 0.5 * (edges[1:] + edges[:-1]), [], []
     for number, (name, (velocity, force)) in enumerate(records.items()):
         style = _style.line_style(number)
         law = responses[name].vehicle.elements()[responses[name].vehicle.frame().element_names.index(damper)]
         held = np.linspace(velocity.min(), velocity.max(), _POINTS)
         trace.plot(velocity, force, color=style["color"], linewidth=0.5, alpha=0.5)
-        handles += trace.plot(held, np.asarray(quasi_static(law, held)), linewidth=1.8, label=name or "law", **style)
+        curve = quasi_static(law, held)
+        gaps += [f"{name or 'law'}: {curve.note}"] if curve.note else []
+        handles += trace.plot(held, np.asarray(curve.force), linewidth=1.8, label=name or "law", **style)
         shares = metrics.velocity_histogram(velocity, edges), metrics.dissipation_histogram(force, velocity, edges)
         for axes, share in zip((time_share, energy_share), shares, strict=True):
             axes.step(middles, 100.0 * np.asarray(share), where="mid", linewidth=1.4, **style)
@@ -67,6 +69,7 @@ def damper_use(
     _style.dress(energy_share, "velocity [m/s]", "share of dissipated energy [%]", "Energy")
     if len(responses) > 1:
         _style.legend_above(figure, handles)
+    _style.note_below(figure, gaps)
     return figure
 
 

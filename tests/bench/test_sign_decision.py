@@ -44,7 +44,7 @@ def test_given_sign_that_contradicts_the_work(sign):
 
 @pytest.mark.parametrize(("turn", "word", "other"), [(-1, "same", "opposite"), (1, "opposite", "same")])
 def test_given_force_sign_that_contradicts_the_work(turn, word, other):
-    with pytest.raises(ValueError, match=rf"force_sign='{word}' contradicts.*force_sign=\"{other}\""):
+    with pytest.raises(ValueError, match=rf"force_sign=\"{word}\" contradicts.*force_sign=\"{other}\""):
         decide(TIME, STROKE, turn * FORCE, None, word, "run")
 
 

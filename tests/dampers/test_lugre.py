@@ -17,7 +17,7 @@ def test_steady_sliding():
     law = LuGre(3e5, 200.0, 150.0, 40.0, 70.0, 0.05)
     v = np.array([-0.5, -0.05, -0.02, 0.01, 0.05, 0.1, 1.0])
     expected = np.sign(v) * (40.0 + 30.0 * np.exp(-((v / 0.05) ** 2))) + 150.0 * v
-    np.testing.assert_allclose(quasi_static(law, v), expected, rtol=1e-9)
+    np.testing.assert_allclose(quasi_static(law, v).force, expected, rtol=1e-9)
 
 
 def test_without_breakaway_it_is_the_law_of_dahl():

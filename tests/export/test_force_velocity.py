@@ -3,7 +3,7 @@ import csv
 import numpy as np
 import pytest
 
-from jaxdamp.dampers import Bilinear, Lag, Table
+from jaxdamp.dampers import Bilinear, Dahl, Lag, Linear, LuGre, Spring, Table
 from jaxdamp.export import to_csv
 
 
@@ -36,3 +36,26 @@ def test_velocities_must_increase(tmp_path, velocities):
     with pytest.raises((ValueError, TypeError), match="velocities"):
         to_csv(Bilinear(2600.0, 1200.0), tmp_path / "fv.csv", np.array(velocities))
     assert not list(tmp_path.iterdir())
+
+
+def test_a_bristle_with_a_spring_gives_a_table(tmp_path):
+    law = LuGre(21141.905, 1535.68, 1347.49, 107.225, 24.03, 0.036445) + Spring(1542.2, -99.2)
+    comments, _, (v, force) = read(to_csv(law, tmp_path / "m.csv", np.linspace(-0.166, 0.166, 601)))
+    friction, sliding = 107.225, np.abs(v) > 0.15  # far above the velocity of breaking away
+    np.testing.assert_allclose(force[sliding] + 99.2, 1347.49 * v[sliding] + friction * np.sign(v[sliding]), rtol=1e-4)
+    assert len(v) == 601 and len(comments) == 3
+
+
+def test_rows_without_a_force_are_left_out_and_said(tmp_path):
+    law = Dahl(stiffness=2e5, friction_force=200.0) + Linear(1000.0)
+    with pytest.warns(UserWarning, match=r"fv\.csv: rows left out\. No force at 2 of 5 velocities"):
+        path = to_csv(law, tmp_path / "fv.csv", [-0.1, -1e-6, 0.0, 1e-6, 0.1])
+    comments, _, (v, force) = read(path)
+    assert v.tolist() == [-0.1, 0.0, 0.1] and np.isfinite(force).all()
+    assert comments[3].startswith("# rows left out: No force at 2 of 5 velocities, from -1e-06 to 1e-06 m/s")
+
+
+def test_a_law_without_any_settled_force_is_refused_in_few_words(tmp_path):
+    with pytest.raises(ValueError, match="must have a force at constant velocity.*take `respond`") as error:
+        to_csv(Lag(Linear(1000.0), 1e4), tmp_path / "fv.csv", np.linspace(-1.0, 1.0, 500))
+    assert len(str(error.value)) < 400 and not list(tmp_path.iterdir())
