@@ -1,6 +1,6 @@
 """From bench records to a damper law: `fit` one law, `compare` many, and say how well the records determine them."""
 
-from jaxdamp.identify.comparing import Comparison, Rung, compare
+from jaxdamp.identify.comparing import Comparison, Failure, Rung, compare, fit_each
 from jaxdamp.identify.cross_validation import CrossValidation, cross_validate
 from jaxdamp.identify.fitting import fit
 from jaxdamp.identify.ladder import LAWS, default_ladder
@@ -13,6 +13,7 @@ __all__ = [
     "Comparison",
     "CrossValidation",
     "Estimate",
+    "Failure",
     "FitResult",
     "Rung",
     "Score",
@@ -21,6 +22,7 @@ __all__ = [
     "cross_validate",
     "default_ladder",
     "fit",
+    "fit_each",
     "fit_percent",
     "train",
 ]

@@ -1,12 +1,12 @@
 """`compare`: several laws on the same records, scored on records they were not fitted to."""
 
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from jaxdamp._progress import Progress
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.identify.fitting import Start, check_starts, fit
+from jaxdamp.identify.fitting import NUMERICAL, Start, check_starts, fit
 from jaxdamp.identify.result import FitResult
 
 
@@ -22,12 +22,42 @@ class Rung(NamedTuple):
     result: FitResult
 
 
+class Failure(NamedTuple):
+    """A law of a comparison that has no fit."""
+
+    name: str
+    reason: str  # in words
+
+
 @dataclasses.dataclass(frozen=True, repr=False)
 class Comparison:
-    """Laws fitted to the same records, in the order given."""
+    """Laws fitted to the same records, in the order given.
+
+    Attributes:
+        rungs: the laws that were fitted, with their errors.
+        held_out: the records scored on, not fitted.
+        failed: the laws without a fit, and why.
+    """
 
     rungs: tuple[Rung, ...]
     held_out: tuple[BenchRun, ...]
+    failed: tuple[Failure, ...] = ()
+
+    @classmethod
+    def of(cls, outcomes: Iterable[Rung | Failure], held_out: Iterable[BenchRun] = ()) -> "Comparison":
+        """The comparison of the outcomes of `fit_each`.
+
+        Raises:
+            ValueError: not one law was fitted.
+        """
+        outcomes = tuple(outcomes)
+        rungs = tuple(outcome for outcome in outcomes if isinstance(outcome, Rung))
+        failed = tuple(outcome for outcome in outcomes if isinstance(outcome, Failure))
+        if not rungs:
+            reasons = list(dict.fromkeys(failure.reason for failure in failed))
+            said = reasons if len(reasons) == 1 else [f"{failure.name}: {failure.reason}" for failure in failed]
+            raise ValueError(f"None of {len(failed)} laws could be fitted. {' '.join(said)}")
+        return cls(rungs, tuple(held_out), failed)
 
     @property
     def best(self) -> Rung:
@@ -39,7 +69,8 @@ class Comparison:
         for rung in self.rungs:
             if rung.name == name:
                 return rung.result
-        raise KeyError(f"No law is named {name!r}; there are {', '.join(r.name for r in self.rungs)}.")
+        why = "".join(f" {failure.name} failed: {failure.reason}" for failure in self.failed if failure.name == name)
+        raise KeyError(f"No fitted law is named {name!r}; there are {', '.join(r.name for r in self.rungs)}.{why}")
 
     def __repr__(self) -> str:
         head = f"{'law':<24}{'free':>5}{'fit %':>8}{'RMSE N':>9}" + f"{'held-out %':>12}{'RMSE N':>9}" * bool(
@@ -51,6 +82,7 @@ class Comparison:
             if r.held_out_rmse is not None:
                 line += f"{r.held_out_fit_percent:>12.1f}{r.held_out_rmse:>9.1f}"
             lines.append(line)
+        lines += [f"{failure.name:<24} failed: {failure.reason}" for failure in self.failed]
         return "\n".join([*lines, f"best: {self.best.name}"])
 
 
@@ -64,6 +96,9 @@ def compare(
 ) -> Comparison:
     """Fit several laws to the same records and score them on others.
 
+    A law that cannot be fitted to these records, or scored on those, costs itself alone: it is listed in `failed` with
+    the reason, and the others go on.
+
     Arguments:
         laws: starts by name, such as `default_ladder(runs)`.
         runs: records to fit.
@@ -72,7 +107,7 @@ def compare(
         options: passed on to `fit`.
 
     Raises:
-        ValueError: no laws; or what `fit` raises.
+        ValueError: no laws, or not one that could be fitted.
 
     >>> from jaxdamp import bench, dampers
     >>> runs = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=5.0).run(
@@ -83,14 +118,41 @@ def compare(
     """
     call = "compare(laws, runs)"
     check_starts(laws, call)
-    runs, held_out, rungs = as_runs(runs, call=call), as_runs(held_out, "held_out"), []
+    runs, held_out = as_runs(runs, call=call), as_runs(held_out, "held_out")
     with Progress("Fitting") as shown:
-        for number, (name, start) in enumerate(laws.items(), 1):
-            if progress is None:
-                shown(f"{name}, {number} of {len(laws)}")
-            else:
-                progress(name)
+        number = 0
+
+        def counted(name: str) -> None:
+            nonlocal number
+            number += 1
+            shown(f"{name}, {number} of {len(laws)}")
+
+        return Comparison.of(fit_each(laws, runs, held_out, progress=progress or counted, **options), held_out)
+
+
+def fit_each(
+    laws: Mapping[str, Start],
+    runs: Sequence[BenchRun],
+    held_out: Sequence[BenchRun] = (),
+    *,
+    progress: Callable[[str], None] = lambda name: None,
+    **options: Any,
+) -> Iterator[Rung | Failure]:
+    """The laws of a comparison one after the other, each as soon as it is fitted or has failed.
+
+    Arguments:
+        laws: starts by name.
+        runs: records to fit.
+        held_out: records to score on, not fitted.
+        progress: called with each name before its fit.
+        options: passed on to `fit`.
+    """
+    for name, start in laws.items():
+        progress(name)
+        try:
             result = fit(start, runs, **options)
             percent, rmse = result.score(held_out)[:2] if held_out else (None, None)
-            rungs.append(Rung(name, len(result.parameters), result.fit_percent, result.rmse, percent, rmse, result))
-    return Comparison(tuple(rungs), held_out)
+        except NUMERICAL as error:
+            yield Failure(name, str(error))
+        else:
+            yield Rung(name, len(result.parameters), result.fit_percent, result.rmse, percent, rmse, result)

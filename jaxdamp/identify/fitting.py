@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.optimize
@@ -27,6 +28,9 @@ from jaxdamp.parameters import FreeParameters, free_parameters
 
 
 Start = AbstractDamper | type[AbstractDamper] | Callable[..., AbstractDamper]
+
+# What a law that does not suit the records raises. A wrong call (`TypeError` and the like) is no matter of one law.
+NUMERICAL = (ValueError, ArithmeticError, eqx.EquinoxRuntimeError, jax.errors.JaxRuntimeError)
 
 
 def fit(

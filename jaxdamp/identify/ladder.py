@@ -1,5 +1,6 @@
 """The ladder: laws from plain to rich, each with a start taken from the records."""
 
+import functools
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -24,6 +25,7 @@ from jaxdamp.dampers import (
     Spring,
     Table,
 )
+from jaxdamp.identify.fitting import NUMERICAL, Start
 
 
 def lag_time(runs: Sequence[BenchRun]) -> float:
@@ -64,7 +66,7 @@ _MEMORYLESS = {
 LAWS = (*_MEMORYLESS, "besinger_lag", "besinger_series_spring", "linear_friction_lag", "bouc_wen", "lugre_spring")
 
 
-def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dict[str, AbstractDamper]:
+def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dict[str, Start]:
     """Laws from plain to rich by name, each started from the records, ready for `compare` or `fit`.
 
     Memoryless: `linear`, `bilinear`, `power_law`, `polynomial` (degree 5), `segmented_polynomial` (paper 000),
@@ -72,30 +74,47 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dic
     hysteresis: `besinger_lag`, `besinger_series_spring` (paper 001), `linear_friction_lag`, and for friction that gives
     before it slides, as in magnetorheological dampers, `bouc_wen` and `lugre_spring` (with a spring beside it).
 
+    A law that cannot be started from these records is a function in its place, which raises the reason when a fit calls
+    it; `compare` goes on with the others.
+
     Raises:
         ValueError: an unknown name.
     """
     runs = as_runs(runs, call="default_ladder(runs, names)")
     names = [names] if isinstance(names, str) else names
-    velocity = np.concatenate([run.velocity for run in runs])
-    force = np.concatenate([run.force for run in runs])
-    lag = lag_time(runs)
-    ladder: dict[str, AbstractDamper] = {}
     for name in names:
         _checks.one_of("law", name, LAWS)
-        if name in _MEMORYLESS:
-            ladder[name] = _MEMORYLESS[name](velocity, force)
-        elif name == "linear_friction_lag":
-            ladder[name] = Lag(_friction(velocity, force), lag)
-        elif name == "bouc_wen":
-            ladder[name] = BoucWen.guess(velocity, force)
-        elif name == "lugre_spring":
-            stroke = np.concatenate([run.stroke for run in runs])
-            ladder[name] = LuGre.guess(velocity, force) + Spring.guess(velocity, force, stroke)
-        else:
-            law = Besinger.guess(velocity, force)
-            stiffness = max(_rate(law, velocity), 1.0) / lag
-            deflection = float(np.sqrt(np.mean(force**2))) / stiffness
-            series = SeriesSpring(law, stiffness, 0.1 * stiffness / deflection**2)
-            ladder[name] = Lag(law, lag) if name == "besinger_lag" else series
+    ladder: dict[str, Start] = {}
+    for name in names:
+        try:
+            ladder[name] = _start(name, runs)
+        except NUMERICAL as error:
+            ladder[name] = functools.partial(_no_start, error)
     return ladder
+
+
+def _no_start(error: Exception, velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
+    """The place of a start that could not be made."""
+    del velocity, force
+    raise ValueError(f"No start can be made from these records: {error}") from error
+
+
+def _start(name: str, runs: Sequence[BenchRun]) -> AbstractDamper:
+    """The start of one law of the ladder."""
+    velocity = np.concatenate([run.velocity for run in runs])
+    force = np.concatenate([run.force for run in runs])
+    if name in _MEMORYLESS:
+        return _MEMORYLESS[name](velocity, force)
+    if name == "linear_friction_lag":
+        return Lag(_friction(velocity, force), lag_time(runs))
+    if name == "bouc_wen":
+        return BoucWen.guess(velocity, force)
+    if name == "lugre_spring":
+        stroke = np.concatenate([run.stroke for run in runs])
+        return LuGre.guess(velocity, force) + Spring.guess(velocity, force, stroke)
+    law, lag = Besinger.guess(velocity, force), lag_time(runs)
+    if name == "besinger_lag":
+        return Lag(law, lag)
+    stiffness = max(_rate(law, velocity), 1.0) / lag
+    deflection = float(np.sqrt(np.mean(force**2))) / stiffness
+    return SeriesSpring(law, stiffness, 0.1 * stiffness / deflection**2)
