@@ -165,8 +165,8 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
 
     Each velocity is held at stroke zero for 1, 2, 4 ... up to 64 s, until no force changes any more; a memoryless law
     answers at once. A point is settled if its force changed, over the last doubling of the time, by no more than 1e-4
-    of itself or of the largest settled force. Friction that acts through a bristle needs longer the slower it moves, and
-    a law that heats up or drifts never settles: such points are left without a force, and the note says so.
+    of itself or of the largest settled force. Friction that acts through a bristle needs longer the slower it moves,
+    and a law that heats up or drifts never settles: such points are left without a force, and the note says so.
 
     Arguments:
         law: the damper law.
