@@ -6,42 +6,87 @@ dyno file → damper law with hysteresis → vehicle on a road → ride metric �
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from jaxdamp import dampers, metrics, roads, vehicles
-from jaxdamp.configuration import Configuration, configure
-from jaxdamp.rig import respond
-from jaxdamp.simulation import Response, Ride, simulate
-
 
 if TYPE_CHECKING:
-    from jaxdamp import bench, export, identify, plots, sweeps, tune
+    from jaxdamp import (
+        bench,
+        dampers,
+        export,
+        identify,
+        metrics,
+        parameters,
+        plots,
+        report,
+        rig,
+        roads,
+        simulation,
+        sweeps,
+        tune,
+        vehicles,
+    )
+    from jaxdamp.configuration import Configuration, configure
+    from jaxdamp.rig import respond
+    from jaxdamp.simulation import Response, Ride, simulate
     from jaxdamp.sweeps import sweep
+
+    __version__: str
 
 
 __all__ = [
     "Configuration",
     "Response",
     "Ride",
+    "__version__",
     "bench",
     "configure",
     "dampers",
     "export",
     "identify",
     "metrics",
+    "parameters",
     "plots",
+    "report",
     "respond",
+    "rig",
     "roads",
     "simulate",
+    "simulation",
     "sweep",
     "sweeps",
     "tune",
     "vehicles",
 ]
 
+_HOMES = {
+    "Configuration": "configuration",
+    "Response": "simulation",
+    "Ride": "simulation",
+    "configure": "configuration",
+    "respond": "rig",
+    "simulate": "simulation",
+    "sweep": "sweeps",
+}
+
 
 def __getattr__(name: str) -> Any:
-    """Subpackages that need more than JAX are imported when they are first used."""
-    if name == "sweep":
-        return import_module("jaxdamp.sweeps").sweep
-    if name in __all__:
-        return import_module(f"jaxdamp.{name}")
-    raise AttributeError(f"module 'jaxdamp' has no attribute {name!r}")
+    """Everything is imported when it is first used, so that the command line answers at once."""
+    if name == "__version__":
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            value = version("jaxdamp")
+        except PackageNotFoundError:  # a source tree on the path, not installed
+            value = "0+unknown"
+    elif name in _HOMES:
+        value = getattr(import_module(f"jaxdamp.{_HOMES[name]}"), name)
+    elif name in __all__:
+        value = import_module(f"jaxdamp.{name}")
+    else:
+        raise AttributeError(f"module 'jaxdamp' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """All that is public, loaded or not."""
+    return sorted({*globals(), *__all__})

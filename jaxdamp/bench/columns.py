@@ -208,9 +208,8 @@ def _refuse_missing(table: Table, role: str, found: Mapping[str, Column]) -> NoR
     """Refuse a table without a stroke or a force; propose a column that is no other quantity."""
     names = ", ".join(map(repr, table.names)) or f"{table.values.shape[1]} columns without names"
     taken = {column.index for column in found.values()}
-    free = [
-        i for i in range(table.values.shape[1]) if i not in taken and not (table.names and _is_other(table, i, role))
-    ]
+    left = [i for i in range(table.values.shape[1]) if i not in taken]
+    free = [i for i in left if not table.names or not _is_other(table, i, role)]
     if not free:
         raise ArgumentError(
             f"{table.file} has no column for the {role}: its columns are {names}, all of them other quantities. A "

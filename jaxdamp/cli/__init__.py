@@ -1,6 +1,29 @@
-"""The command line: `jaxdamp fit` and `jaxdamp demo`, the two jobs that need no code, and `jaxdamp laws`."""
+"""The command line: `jaxdamp fit`, `demo` and `ride`, the jobs that need no code, and lists of laws and vehicles."""
 
-from jaxdamp.cli.commands import app
+from typing import TYPE_CHECKING, Any
+
+from jaxdamp.cli import interrupt
 
 
-__all__ = ["app"]
+if TYPE_CHECKING:
+    from jaxdamp.cli.commands import app
+
+
+__all__ = ["app", "main"]
+
+
+def main() -> None:
+    """Run the command line as a program of its own; Ctrl-C is answered from the first import on."""
+    with interrupt.watched():
+        from jaxdamp.cli.commands import app
+
+        app(prog_name="jaxdamp")
+
+
+def __getattr__(name: str) -> Any:
+    """The application is loaded when it is first used, so that `main` comes before all other imports."""
+    if name == "app":
+        from jaxdamp.cli.commands import app
+
+        return app
+    raise AttributeError(f"module 'jaxdamp.cli' has no attribute {name!r}")

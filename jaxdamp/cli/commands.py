@@ -8,7 +8,6 @@ import typer
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="""From a dyno file to a damper law, a ride and a better damper.
@@ -22,14 +21,38 @@ decided is printed.""",
 )
 
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
-Force = Annotated[bool, typer.Option("--force", help="Write into a folder that jaxdamp did not write.")]
+Replace = Annotated[
+    bool,
+    typer.Option(
+        "--replace", "--force", help="Write into --out although it is not empty: results of jaxdamp are replaced."
+    ),
+]
+
+
+def _say_version(asked: bool) -> bool:
+    if asked:
+        import jaxdamp
+
+        typer.echo(f"jaxdamp {jaxdamp.__version__}")
+        raise typer.Exit
+    return asked
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the version and stop.", callback=_say_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Options before a command. The help of the application stands above."""
 
 
 @app.command()
 def fit(
     files: Annotated[list[Path], typer.Argument(help="Text files with records, patterns, or folders of *.csv.")],
     law: Annotated[
-        list[str], typer.Option(help='Name of a law, see "jaxdamp laws"; may be given several times; or "all".')
+        list[str],
+        typer.Option(help='Names of laws, see "jaxdamp laws": "linear,besinger"; or "all". May be repeated.'),
     ] = ["all"],  # noqa: B006 (typer copies it)
     held_out: Annotated[
         list[str], typer.Option(help='Records to score on, not to fit: a name or a pattern, such as "30mm_*".')
@@ -58,7 +81,7 @@ def fit(
         str, typer.Option(help='"samples": every sample counts the same; "runs": every record, by its RMS force.')
     ] = "samples",
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-fit"),
-    force: Force = False,
+    replace: Replace = False,
     debug: Debug = False,
 ) -> None:
     """Fit damper laws to bench records, and say how good they are.
@@ -71,7 +94,7 @@ def fit(
         console.prepare()
         options = fitting.ReadOptions(sign, force_sign, tuple(columns), tuple(units), sampling_rate, delimiter)
         fitting.run_fit(
-            console.Screen(), files, options, laws=law, held_out=held_out, weighting=weighting, out=out, force=force
+            console.Screen(), files, options, laws=law, held_out=held_out, weighting=weighting, out=out, replace=replace
         )
 
 
@@ -79,7 +102,7 @@ def fit(
 def demo(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-demo"),
     seed: Annotated[int, typer.Option(help="Of the noise of the virtual bench and of the roads.")] = 0,
-    force: Force = False,
+    replace: Replace = False,
     debug: Debug = False,
 ) -> None:
     """Run the whole chain on a damper whose truth is known. Needs no input.
@@ -92,13 +115,13 @@ def demo(
 
     with console.plain_errors(debug):
         console.prepare()
-        demonstration.run_demo(console.Screen(), demonstration.Scenario(seed=seed), out=out, force=force)
+        demonstration.run_demo(console.Screen(), demonstration.Scenario(seed=seed), out=out, replace=replace)
 
 
 @app.command()
 def ride(
     law: Annotated[Path, typer.Argument(help="A law as JSON, such as best_law.json of jaxdamp fit.")],
-    vehicle: Annotated[str, typer.Option(help="A published vehicle, such as half_car_002.")] = "quarter_car_000",
+    vehicle: Annotated[str, typer.Option(help='A published vehicle, see "jaxdamp vehicles".')] = "quarter_car_000",
     road: Annotated[
         str, typer.Option(help="iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.")
     ] = "iso:C",
@@ -108,7 +131,7 @@ def ride(
     dt: Annotated[float, typer.Option(help="Step [s].")] = 1e-3,
     seed: Annotated[int, typer.Option(help="Of a random road.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-ride"),
-    force: Force = False,
+    replace: Replace = False,
     debug: Debug = False,
 ) -> None:
     """Ride on a law: metrics, comfort by ISO 2631-1 and pictures, beside a baseline.
@@ -120,7 +143,16 @@ def ride(
     with console.plain_errors(debug):
         console.prepare()
         options = {"vehicle": vehicle, "road": road, "speed": speed, "duration": duration, "dt": dt, "seed": seed}
-        riding.run_ride(console.Screen(), law, baseline=baseline, out=out, force=force, **options)
+        riding.run_ride(console.Screen(), law, baseline=baseline, out=out, replace=replace, **options)
+
+
+@app.command(name="vehicles")
+def list_vehicles() -> None:
+    """List the vehicles that a law can be put into."""
+    from jaxdamp.cli.console import Screen
+    from jaxdamp.cli.riding import vehicles_table
+
+    Screen().table(vehicles_table())
 
 
 @app.command()

@@ -14,6 +14,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from jaxdamp.cli import interrupt
+from jaxdamp.cli.wording import message
 from jaxdamp.report import Column, Table
 
 
@@ -73,8 +75,10 @@ class Screen:
     def stage(self, title: str, total: int | None = None) -> Iterator[Advance]:
         """A stage of the work: shows that it runs and how far it is, and notes how long it took.
 
-        Gives a function to be called with a word on what is being done now and the number of parts done so far.
+        Gives a function to be called with a word on what is being done now and the number of parts done so far. Ctrl-C
+        stops the work there, and where a stage begins.
         """
+        interrupt.check()
         started = time.perf_counter()
         if self.console.is_terminal:
             columns = [SpinnerColumn(), TextColumn("{task.description}", markup=False)]
@@ -82,10 +86,15 @@ class Screen:
             columns += [TimeElapsedColumn(), TextColumn("{task.fields[detail]}", markup=False)]
             with Progress(*columns, console=self.console, transient=True) as progress:
                 task = progress.add_task(title, total=total, detail="")
-                yield lambda detail, done: progress.update(task, completed=done, detail=detail)
+
+                def advance(detail: str, done: int) -> None:
+                    interrupt.check()
+                    progress.update(task, completed=done, detail=detail)
+
+                yield advance
         else:
             self.say(f"{title} ...")
-            yield lambda detail, done: None
+            yield lambda detail, done: interrupt.check()
         seconds = time.perf_counter() - started
         self.times[title] = seconds
         self.say(f"{title}: done in {seconds:.1f} s", "green")
@@ -108,12 +117,16 @@ def prepare() -> None:
 
 @contextmanager
 def plain_errors(debug: bool) -> Iterator[None]:
-    """Show what the library refuses as one message without traceback, and end with exit code 2."""
+    """Show what the library refuses as one message without traceback, and end with exit code 2; after Ctrl-C 130."""
+    screen = Console(stderr=True, highlight=False, soft_wrap=True)
     try:
-        yield
+        with interrupt.watched():
+            yield
+    except interrupt.Interrupted as stop:
+        screen.print(Text(str(stop), style="yellow"))
+        raise typer.Exit(interrupt.EXIT_CODE) from stop
     except (ValueError, OSError) as error:
         if debug:
             raise
-        screen = Console(stderr=True, highlight=False, soft_wrap=True)
-        screen.print(Text.assemble(("Error: ", "bold red"), (str(error), "red")))
+        screen.print(Text.assemble(("Error: ", "bold red"), (message(error), "red")))
         raise typer.Exit(2) from error

@@ -9,9 +9,13 @@ import numpy as np
 from jaxdamp import bench, export, plots, roads, simulate, tune, vehicles
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.cli import findings as tables
+from jaxdamp.cli import interrupt
+from jaxdamp.cli.attempts import Attempts
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.fitting import Findings, fit_laws, velocities, write_findings, write_table
-from jaxdamp.cli.results import results_folder, written
+from jaxdamp.cli.fit_files import draw_findings, velocities, write_findings, write_table
+from jaxdamp.cli.fitted import Findings
+from jaxdamp.cli.fitting import fit_laws
+from jaxdamp.cli.results import Results, results_folder
 from jaxdamp.dampers import AbstractDamper, Besinger, Linear, SeriesSpring
 from jaxdamp.identify import FitResult
 from jaxdamp.parameters import match_paths, parameters
@@ -76,29 +80,35 @@ ISO = "ISO 8608 class C at 20 m/s"
 COMFORT = "rms_sprung_acceleration"
 
 
-def run_demo(screen: Screen, scenario: Scenario, *, out: Path, force: bool = False) -> None:
-    """Records, fits, rides, a tuning, and a folder with all of it."""
-    with results_folder(out, "demo", force=force) as folder:
-        report = Report("jaxdamp demo: from bench records to a better damper")
-        runs = record(screen, scenario, folder)
+def run_demo(screen: Screen, scenario: Scenario, *, out: Path, replace: bool = False) -> None:
+    """Records, fits, rides, a tuning, and a folder with all of it: laws and tables first, then the pictures."""
+    attempts, report = Attempts(), Report("jaxdamp demo: from bench records to a better damper")
+    with results_folder(out, "demo", replace=replace) as results:
+        runs = record(screen, scenario, results.draft)
         held = runs.select(scenario.held_out)
         findings = fit_laws(screen, scenario.laws, runs.without(scenario.held_out), held)
         show_fits(screen, findings, scenario)
+        with interrupt.saving(), screen.stage("Laws and tables"):
+            write_findings(results.draft, findings, runs, attempts)
+            _write_truth(results.draft, findings, scenario, attempts)
+            results.publish(f"the rides, the tuning, {findings.missing}")
         rides = {name: ride(screen, name, road, findings, scenario) for name, road in _roads(scenario).items()}
         show_rides(screen, rides)
-        tuned = improve(screen, findings, rides[ISO], scenario)
-        show_tuning(screen, tuned)
-        with screen.stage("Pictures, tables and laws"):
+        tuned = improve(screen, findings, rides[ISO], scenario) if _has_truth(findings, scenario) else None
+        if tuned is not None:
+            show_tuning(screen, tuned)
+        _save_rides(results, rides, tuned, velocities(findings.comparison), attempts)
+        with screen.stage("Pictures and report"):
             _introduce(report, scenario)
-            write_findings(folder, findings, runs, report)
-            _write_truth(folder, findings, scenario, report)
-            _write_rides(folder, rides, report)
-            after = simulate(tuned.vehicle, _roads(scenario)[ISO], duration=scenario.duration)
-            pair = {"before": rides[ISO][scenario.true_name], "after": after}
-            _write_tuning(folder, tuned, pair, velocities(findings.comparison), report)
-            report.write(folder / "report.html")
-        names = written(folder)
-    screen.files(out, names)
+            draw_findings(results.draft, findings, report, attempts)
+            _report_truth(findings, scenario, report)
+            _draw_rides(results.draft, rides, report, attempts)
+            if tuned is not None:
+                _draw_tuning(results.draft, tuned, rides[ISO][scenario.true_name], scenario, report, attempts)
+            report.points(attempts.troubles)
+            report.write(results.draft / "report.html")
+    screen.files(out, results.published)
+    screen.points(attempts.troubles, style="yellow")
     screen.table(screen.times_table())
     screen.say(f"Open {out / 'report.html'}. The records are files like those of a real bench; fit them yourself:")
     screen.say(f'  jaxdamp fit {out / "records"} --held-out "{scenario.held_out}" --sign rebound-positive', "bold")
@@ -168,7 +178,10 @@ def improve(screen: Screen, findings: Findings, rides: Mapping[str, Response], s
 def show_fits(screen: Screen, findings: Findings, scenario: Scenario) -> None:
     """The ladder and the recovered parameters."""
     screen.table(findings.ladder, mark=findings.comparison.best.name)
+    screen.points(findings.failures, style="red")
     screen.say(" ".join(findings.verdict))
+    if not _has_truth(findings, scenario):
+        return
     result = findings.comparison[scenario.true_name]
     screen.table(truth_table(scenario, result))
     screen.say(truth_verdict(scenario, result))
@@ -268,41 +281,75 @@ def _introduce(report: Report, scenario: Scenario) -> None:
     report.text(f"The true damper: {scenario.law!r}")
 
 
-def _write_truth(folder: Path, findings: Findings, scenario: Scenario, report: Report) -> None:
-    result = findings.comparison[scenario.true_name]
-    table = truth_table(scenario, result)
-    export.to_json(scenario.law, folder / "true_law.json")
-    write_table(folder, "parameters_and_truth", table)
+def _has_truth(findings: Findings, scenario: Scenario) -> bool:
+    """Whether the law with the true parameters was fitted."""
+    return any(rung.name == scenario.true_name for rung in findings.comparison.rungs)
+
+
+def _write_truth(folder: Path, findings: Findings, scenario: Scenario, attempts: Attempts) -> None:
+    with attempts.part("true_law.json"):
+        export.to_json(scenario.law, folder / "true_law.json")
+    if _has_truth(findings, scenario):
+        write_table(folder, "parameters_and_truth", truth_table(scenario, findings.comparison[scenario.true_name]))
+
+
+def _save_rides(
+    results: Results,
+    rides: Mapping[str, Mapping[str, Response]],
+    tuned: TuneResult | None,
+    velocities: np.ndarray,
+    attempts: Attempts,
+) -> None:
+    """Put the tables of the rides and the tuning into place, and the tuned law."""
+    with interrupt.saving():
+        (results.draft / "tables").mkdir()
+        for index, (title, responses) in enumerate(rides.items()):
+            write_table(results.draft, f"ride_{index + 1}", ride_table(title, responses))
+        if tuned is not None:
+            for name, table in zip(("tuned_parameters", "tuned_metrics"), tuning_tables(tuned), strict=True):
+                write_table(results.draft, name, table)
+            law = tuned.vehicle.elements()[0]
+            with attempts.part("tuned_law.json"):
+                export.to_json(law, results.draft / "tuned_law.json")
+            with attempts.part("tuned_law_force_velocity.csv"):
+                export.to_csv(law, results.draft / "tuned_law_force_velocity.csv", velocities)
+        results.publish("the pictures and the report")
+
+
+def _report_truth(findings: Findings, scenario: Scenario, report: Report) -> None:
     report.heading("Was the truth found?")
+    if not _has_truth(findings, scenario):
+        report.text(f"{scenario.true_name} could not be fitted.")
+        return
+    result = findings.comparison[scenario.true_name]
     report.text(truth_verdict(scenario, result))
-    report.table(table)
+    report.table(truth_table(scenario, result))
 
 
-def _write_rides(folder: Path, rides: Mapping[str, Mapping[str, Response]], report: Report) -> None:
+def _draw_rides(folder: Path, rides: Mapping[str, Mapping[str, Response]], report: Report, attempts: Attempts) -> None:
     report.heading("The ride on each law")
     for index, (title, responses) in enumerate(rides.items()):
-        table = ride_table(title, responses)
-        write_table(folder, f"ride_{index + 1}", table)
-        report.table(table)
+        report.table(ride_table(title, responses))
         if index == 0:
             report.text(ride_verdict(responses))
         shown = {name: responses[name] for name in (PAPER_LINEAR, *list(responses)[1:][-3:])}
-        report.picture(plots.ride(shown), f"Quarter car on {title}", folder / f"ride_{index + 1}.png")
+        with attempts.part(f"The picture ride_{index + 1}.png"):
+            report.picture(plots.ride(shown), f"Quarter car on {title}", folder / f"ride_{index + 1}.png")
 
 
-def _write_tuning(
-    folder: Path, tuned: TuneResult, pair: Mapping[str, Response], velocities: np.ndarray, report: Report
+def _draw_tuning(
+    folder: Path, tuned: TuneResult, before: Response, scenario: Scenario, report: Report, attempts: Attempts
 ) -> None:
     report.heading("A better damper")
     report.text(
         "The damping coefficients were tuned for the least RMS body acceleration, with no more travel than before."
     )
-    for name, table in zip(("tuned_parameters", "tuned_metrics"), tuning_tables(tuned), strict=True):
-        write_table(folder, name, table)
+    for table in tuning_tables(tuned):
         report.table(table)
     report.points(tuned.warnings)
-    report.picture(plots.tuning(tuned), "Before and after the tuning", folder / "tuning.png")
-    report.picture(plots.ride(pair), f"Quarter car on {ISO}, before and after", folder / "tuning_ride.png")
-    law = tuned.vehicle.elements()[0]
-    export.to_json(law, folder / "tuned_law.json")
-    export.to_csv(law, folder / "tuned_law_force_velocity.csv", velocities)
+    with attempts.part("The picture tuning.png"):
+        report.picture(plots.tuning(tuned), "Before and after the tuning", folder / "tuning.png")
+    with attempts.part("The picture tuning_ride.png"):
+        after = simulate(tuned.vehicle, _roads(scenario)[ISO], duration=scenario.duration)
+        figure = plots.ride({"before": before, "after": after})
+        report.picture(figure, f"Quarter car on {ISO}, before and after", folder / "tuning_ride.png")

@@ -72,6 +72,7 @@ def ladder_table(comparison: Comparison, shares: Mapping[str, Shares]) -> Table:
         scores = (rung.name, rung.parameters, rung.fit_percent, rung.rmse)
         scores += (rung.held_out_fit_percent, rung.held_out_rmse) if held else ()
         rows.append((*scores, *(100 * share for share in shares[rung.name]), _short_note(rung.result)))
+    rows += [(failure.name, *[None] * (len(columns) - 2), "failed") for failure in comparison.failed]
     return Table("Laws (shape, hysteresis and rest are shares of the squared error)", tuple(columns), tuple(rows))
 
 
@@ -105,13 +106,19 @@ def _numbers(law: AbstractDamper) -> dict[str, float]:
     return {name: float(value) for name, value in zip(free.names, free.values, strict=True)}
 
 
+def failures(comparison: Comparison, unfitted: Sequence[str] = ()) -> list[str]:
+    """The laws without a fit, and why."""
+    left = [f"{name} was not fitted: interrupted." for name in unfitted]
+    return [f"{failure.name} could not be fitted. {failure.reason}" for failure in comparison.failed] + left
+
+
 def verdict(comparison: Comparison, shares: Mapping[str, Shares]) -> list[str]:
     """How good the laws are, in words."""
     best = comparison.best
     static = [r for r in comparison.rungs if is_memoryless(r.result.law)]
     sentences = [_praise(best, comparison)]
     if static:
-        rung = min(static, key=_error)
+        rung = min(static, key=lambda rung: rung.error)
         part = shares[rung.name].hysteresis
         lead = "It is a law of velocity alone" if rung is best else f"The best law of velocity alone is {rung.name}"
         if part >= 0.05:
@@ -124,7 +131,7 @@ def verdict(comparison: Comparison, shares: Mapping[str, Shares]) -> list[str]:
         if rung is best and part >= 0.05 and len(static) == len(comparison.rungs):
             sentences.append("Try a law with hysteresis, such as besinger_lag or besinger_series_spring.")
         elif rung is not best:
-            factor = _error(rung) / _error(best)
+            factor = rung.error / best.error
             sentences.append(f"{best.name} has a {factor:.1f} times smaller error.")
     if not is_memoryless(best.result.law) and shares[best.name].hysteresis >= 0.05:
         part = 100 * shares[best.name].hysteresis
@@ -135,17 +142,13 @@ def verdict(comparison: Comparison, shares: Mapping[str, Shares]) -> list[str]:
     return sentences
 
 
-def _error(rung: Rung) -> float:
-    return rung.rmse if rung.held_out_rmse is None else rung.held_out_rmse
-
-
 def _praise(best: Rung, comparison: Comparison) -> str:
     where, runs = ("held-out", comparison.held_out) if comparison.held_out else ("fitted", best.result.runs)
     percent = best.fit_percent if best.held_out_fit_percent is None else best.held_out_fit_percent
     largest = max(float(abs(run.force).max()) for run in runs)
-    share = 100 * _error(best) / largest
+    share = 100 * best.error / largest
     lead = "Smallest error" if len(comparison.rungs) > 1 else "Error"
     return (
-        f"{lead} on the {where} records: {best.name}, RMSE {_error(best):.1f} N, {share:.1f} % of their largest force"
+        f"{lead} on the {where} records: {best.name}, RMSE {best.error:.1f} N, {share:.1f} % of their largest force"
         f" of {largest:.0f} N (fit {percent:.1f} %)."
     )

@@ -6,14 +6,24 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from jaxdamp import _checks, bench, identify
+from jaxdamp._checks import Setting
 from jaxdamp.bench import BenchRun, BenchSet
+from jaxdamp.cli.wording import in_options
 
 
+_COMPRESSION = Setting("sign", "compression-positive")  # what the reader proposes in its notes
 ROLES = ("time", "stroke", "velocity", "force", "temperature")
 
 
 def law_names(asked: Sequence[str]) -> list[str]:
-    """The laws to fit: all, or those named, each once."""
+    """The laws to fit: all, or those named, each once; "linear,besinger" names two.
+
+    >>> law_names(["linear, besinger", "linear"])
+    ['linear', 'besinger']
+    """
+    asked = [name.strip() for text in asked for name in text.split(",") if name.strip()]
+    if not asked:
+        _checks.refuse("law", "name a law", "empty", 'See "jaxdamp laws".')
     for name in asked:
         _checks.one_of("law", name, ("all", *identify.LAWS))
     return list(identify.LAWS) if "all" in asked else list(dict.fromkeys(asked))
@@ -72,7 +82,8 @@ def decisions(runs: Sequence[BenchRun]) -> list[str]:
     """What the reader decided; notes that differ only in their numbers are said once, with those of the first."""
     kinds: dict[str, list[str]] = {}
     for run in runs:
-        for note in run.notes:
+        for said in run.notes:
+            note = in_options(said, (_COMPRESSION,))
             kinds.setdefault(re.sub(r"[+-]?\d[\d.]*(?:e[+-]?\d+)?", "#", note), []).append(note)
     sentences = []
     for notes in kinds.values():

@@ -1,5 +1,6 @@
-"""The folder that a command writes: whole or not at all, and never over what is not its own."""
+"""The folder that a command writes: never over what is there, and never half-written without saying so."""
 
+import errno
 import json
 import os
 import shutil
@@ -8,39 +9,147 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from jaxdamp.cli import interrupt
+from jaxdamp.cli.interrupt import Interrupted
+
 
 MANIFEST = "manifest.json"
+UNFINISHED = "UNFINISHED.txt"
 FORMAT = "jaxdamp results"
 
 
-@contextmanager
-def results_folder(target: Path, command: str, *, force: bool = False) -> Iterator[Path]:
-    """A draft folder to write into, which takes the place of the target when all is done.
+class Results:
+    """A draft folder to write into, and the folder that its files are moved to.
 
-    A target that does not exist, is empty, or was written by a command before is replaced, file by file: files that
-    others put there stay. Any other folder is refused, unless `force` is set, and even then only files of the same
-    names are replaced.
+    Attributes:
+        draft: where to write.
+        target: what the user named.
+        missing: what was still to come at the last `publish`, in words.
+    """
+
+    def __init__(self, target: Path, command: str, earlier: list[str]) -> None:
+        self.target, self._command, self._earlier = target, command, earlier
+        self._published: set[str] = set()
+        self.missing = "everything"
+        self.draft = self._new_draft()
+
+    def _new_draft(self) -> Path:
+        return Path(tempfile.mkdtemp(prefix=f".{self.target.name}.", suffix=".draft", dir=self.target.parent))
+
+    @property
+    def published(self) -> list[str]:
+        """The files that are in place so far, without those that tell of them."""
+        return sorted(self._published - {MANIFEST, UNFINISHED})
+
+    def publish(self, missing: str = "") -> None:
+        """Move what is written so far into place.
+
+        Arguments:
+            missing: what is still to come, in words, for a file that stays in the folder until all is there.
+        """
+        self.missing = missing
+        with interrupt.undisturbed():
+            results = {*self.published, *written(self.draft)}
+            files = [*sorted(results), *([UNFINISHED] if missing else []), MANIFEST]
+            if missing:
+                text = f"These results of jaxdamp {self._command} are not complete. Missing: {missing}.\n"
+                (self.draft / UNFINISHED).write_text(text, encoding="utf-8")
+            manifest = {"format": FORMAT, "command": self._command, "complete": not missing, "files": files}
+            text = json.dumps(manifest, indent=1, ensure_ascii=False) + "\n"
+            (self.draft / MANIFEST).write_text(text, encoding="utf-8")
+            self._move(files)
+            if missing:
+                self.draft = self._new_draft()
+
+    def _move(self, files: list[str]) -> None:
+        """Move the draft into place and take away what only an earlier run or stage wrote."""
+        fresh = written(self.draft)
+        if not self.target.exists():
+            mask = os.umask(0)
+            os.umask(mask)
+            self.draft.chmod(0o777 & ~mask)
+            self.draft.rename(self.target)
+        for name in fresh if self.draft.exists() else ():
+            place = self.target / name
+            place.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(self.draft / name, place)
+        for name in {*self._earlier, *self._published} - set(files):
+            (self.target / name).unlink(missing_ok=True)
+            for folder in (self.target / name).parents:
+                if folder == self.target or not folder.is_dir() or any(folder.iterdir()):
+                    break
+                folder.rmdir()
+        self._published, self._earlier = set(files), []
+
+    def discard(self) -> str:
+        """Remove the draft, and say what is in place."""
+        shutil.rmtree(self.draft, ignore_errors=True)
+        if not self.published:
+            return ""
+        return f"{str(self.target)!r} holds what was finished before. Not written: {self.missing}."
+
+
+@contextmanager
+def results_folder(target: Path, command: str, *, replace: bool = False) -> Iterator[Results]:
+    """Results to write; they are in place when all is done, or from the first `publish` on.
+
+    The target must not exist, or be empty. With `replace`, what a command wrote there before is replaced as soon as
+    there is something new, file by file: files that others put there stay, unless they have the name of a new one.
 
     Arguments:
         target: the folder to write.
         command: name of the command, for the manifest.
-        force: write into a folder of others.
+        replace: write into a folder that is not empty.
 
     Raises:
-        ValueError: the target is a file, or a folder with other contents.
+        ValueError: the target is a file, is not empty, or cannot be written.
+        Interrupted: Ctrl-C, with words on what was written. What is finished is in place then.
     """
     target = target.expanduser()
-    earlier = _earlier_files(target, force)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".draft", dir=target.parent))
+    results = _opened(target, command, replace)
     try:
-        yield draft
-        files = written(draft)
-        manifest = {"format": FORMAT, "command": command, "files": [*files, MANIFEST]}
-        (draft / MANIFEST).write_text(json.dumps(manifest, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-        _publish(draft, target, earlier)
+        with interrupt.closing(results.discard):
+            yield results
+            results.publish()
+    except Interrupted as stop:
+        raise Interrupted(_kept(results)) from stop
+    except OSError as error:
+        if error.filename is None or not str(error.filename).startswith(str(results.draft)):
+            raise
+        place = target / Path(error.filename).relative_to(results.draft)
+        raise _unwritable(place, error) from error
     finally:
-        shutil.rmtree(draft, ignore_errors=True)
+        shutil.rmtree(results.draft, ignore_errors=True)
+
+
+def _opened(target: Path, command: str, replace: bool) -> Results:
+    """The results of a folder that may be written."""
+    earlier = _earlier_files(target, replace)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.exists() and not os.access(target, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        return Results(target, command, earlier)
+    except OSError as error:
+        raise _unwritable(target, error) from error
+
+
+def _unwritable(place: Path, error: OSError) -> ValueError:
+    return ValueError(f"{str(place)!r} cannot be written ({error.strerror}): name another folder with --out.")
+
+
+def _kept(results: Results) -> str:
+    """Put what is finished into place after an interruption, and say so."""
+    if written(results.draft):
+        results.publish(results.missing)
+    if not results.published:
+        return "Interrupted. Nothing was written."
+    names = results.published
+    shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+    return (
+        f"Interrupted. {str(results.target)!r} holds what was finished: {shown}. Not written: {results.missing}, as "
+        f"{UNFINISHED} in it says too."
+    )
 
 
 def written(folder: Path) -> list[str]:
@@ -48,44 +157,29 @@ def written(folder: Path) -> list[str]:
     return sorted(file.relative_to(folder).as_posix() for file in folder.rglob("*") if file.is_file())
 
 
-def _earlier_files(target: Path, force: bool) -> list[str]:
-    """The files that a command wrote into the target before."""
+def _earlier_files(target: Path, replace: bool) -> list[str]:
+    """The files that a command wrote into the target before; a refusal where nothing may be replaced."""
     if not target.exists():
         return []
     if not target.is_dir():
         raise ValueError(f"{str(target)!r} is a file: name a folder with --out.")
     if not any(target.iterdir()):
         return []
+    by = ""
     try:
         manifest = json.loads((target / MANIFEST).read_text(encoding="utf-8"))
-        if manifest["format"] == FORMAT:
-            return [name for name in manifest["files"] if ".." not in Path(name).parts and not Path(name).is_absolute()]
+        ours, by = manifest["format"] == FORMAT, manifest.get("command", "")
+        files = [name for name in manifest["files"] if ".." not in Path(name).parts and not Path(name).is_absolute()]
     except (OSError, ValueError, KeyError, TypeError):
-        pass
-    if force:
-        return []
+        ours, files = False, []
+    if replace:
+        return files if ours else []
+    if ours:
+        raise ValueError(
+            f"The folder {str(target)!r} holds the results of an earlier run of jaxdamp {by}: "
+            "name another one with --out, or pass --replace to replace them."
+        )
     raise ValueError(
         f"The folder {str(target)!r} is not empty and was not written by jaxdamp: name another one with --out, or "
-        "pass --force to write into it (files of the same names are replaced, all others stay)."
+        "pass --replace to write into it (files of the same names are replaced, all others stay)."
     )
-
-
-def _publish(draft: Path, target: Path, earlier: list[str]) -> None:
-    """Move the draft into place."""
-    mask = os.umask(0)
-    os.umask(mask)
-    draft.chmod(0o777 & ~mask)
-    if not target.exists():
-        draft.rename(target)
-        return
-    fresh = written(draft)
-    for name in fresh:
-        place = target / name
-        place.parent.mkdir(parents=True, exist_ok=True)
-        os.replace(draft / name, place)
-    for name in set(earlier) - set(fresh):
-        (target / name).unlink(missing_ok=True)
-        for folder in (target / name).parents:
-            if folder == target or not folder.is_dir() or any(folder.iterdir()):
-                break
-            folder.rmdir()

@@ -5,8 +5,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from jaxdamp import _checks, export, plots, roads, simulate, vehicles
+from jaxdamp.cli import interrupt
+from jaxdamp.cli.attempts import Attempts
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.results import results_folder, written
+from jaxdamp.cli.results import results_folder
+from jaxdamp.cli.unusual import unusual
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots.damper_use import dampers_of
 from jaxdamp.report import Cell, Column, Report, Table
@@ -22,6 +25,12 @@ def presets() -> dict[str, Callable[..., AbstractVehicle]]:
     """The published vehicles that take a damper, by name."""
     known = inspect.getmembers(vehicles.presets, inspect.isfunction)
     return {name: make for name, make in known if "damper" in inspect.signature(make).parameters}
+
+
+def vehicles_table() -> Table:
+    """The published vehicles that take a damper, with a line of meaning."""
+    rows = tuple((name, (inspect.getdoc(make) or "").partition("\n")[0]) for name, make in presets().items())
+    return Table("Vehicles", (Column("vehicle"), Column("what it is")), rows)
 
 
 def parse_road(text: str, *, speed: float, duration: float, seed: int) -> AbstractRoad:
@@ -59,14 +68,16 @@ def run_ride(
     dt: float = 1e-3,
     seed: int = 0,
     out: Path,
-    force: bool = False,
+    replace: bool = False,
 ) -> dict[str, Response]:
-    """Ride on a law and a baseline, compare their metrics, and write tables and pictures into a folder."""
+    """Ride on a law and a baseline, compare their metrics, and write tables, then pictures, into a folder."""
     _checks.one_of("vehicle", vehicle, presets())
     _checks.positive("speed", speed)
     make, files = presets()[vehicle], ({} if baseline is None else {"baseline": baseline}) | {"law": law}
     laws = {name: export.from_json(path) for name, path in files.items()}
-    with results_folder(out, "ride", force=force) as folder:
+    screen.points(unusual(road, speed), style="yellow")
+    attempts = Attempts()
+    with results_folder(out, "ride", replace=replace) as results:
         responses: dict[str, Response] = {}
         with screen.stage("Driving", total=len(laws)) as advance:
             for done, (name, found) in enumerate(laws.items()):
@@ -77,14 +88,18 @@ def run_ride(
             tables = [metrics_table(responses), comfort_table(responses)]
         for table in tables:
             screen.table(table)
+        interrupt.keep()
         title = f"{vehicle} on {road} at {speed:g} m/s"
         timing = next(iter(responses.values())).axle_timing
         if timing.kind != "one axle":
             screen.say(f"Axles: {timing}.")
-        with screen.stage("Pictures and tables"):
-            _write(folder, title, laws, responses, tables)
-        names = written(folder)
-    screen.files(out, names)
+        with interrupt.saving(), screen.stage("Tables and channels"):
+            _write(results.draft, laws, responses, tables)
+            results.publish("the pictures and the report")
+        with screen.stage("Pictures and report"):
+            _draw(results.draft, title, laws, responses, tables, attempts)
+    screen.files(out, results.published)
+    screen.points(attempts.troubles, style="yellow")
     return responses
 
 
@@ -128,22 +143,39 @@ def comfort_table(responses: Mapping[str, Response]) -> Table:
 
 
 def _write(
-    folder: Path, title: str, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response], tables: list[Table]
+    folder: Path, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response], tables: list[Table]
 ) -> None:
+    """Laws, tables and channels."""
+    for name, law in laws.items():
+        export.to_json(law, folder / f"{name}.json")
+    for file, table in zip(("metrics", "comfort"), tables, strict=True):
+        (folder / f"{file}.csv").write_text(table.to_csv(), encoding="utf-8")
+    for name, response in responses.items():
+        response.to_xarray().to_dataframe().to_csv(folder / f"channels_{name}.csv")
+
+
+def _draw(
+    folder: Path,
+    title: str,
+    laws: Mapping[str, AbstractDamper],
+    responses: Mapping[str, Response],
+    tables: list[Table],
+    attempts: Attempts,
+) -> None:
+    """Pictures, and the report with them."""
     report = Report(title)
     timing = next(iter(responses.values())).axle_timing
     if timing.kind != "one axle":
         report.text(f"Axles: {timing}.")
     for name, law in laws.items():
         report.text(f"{name}: {law!r}")
-        export.to_json(law, folder / f"{name}.json")
-    for file, table in zip(("metrics", "comfort"), tables, strict=True):
-        (folder / f"{file}.csv").write_text(table.to_csv(), encoding="utf-8")
+    for table in tables:
         report.table(table)
-    report.picture(plots.ride(responses, weighting="Wk"), title, folder / "ride.png")
+    with attempts.part("The picture ride.png"):
+        report.picture(plots.ride(responses, weighting="Wk"), title, folder / "ride.png")
     for damper in dampers_of(next(iter(responses.values()))):
-        figure = plots.damper_use(responses, damper=damper)
-        report.picture(figure, f"What the ride makes the {damper.replace('_', ' ')} do", folder / f"{damper}.png")
-    for name, response in responses.items():
-        response.to_xarray().to_dataframe().to_csv(folder / f"channels_{name}.csv")
+        with attempts.part(f"The picture {damper}.png"):
+            figure = plots.damper_use(responses, damper=damper)
+            report.picture(figure, f"What the ride makes the {damper.replace('_', ' ')} do", folder / f"{damper}.png")
+    report.points(attempts.troubles)
     report.write(folder / "report.html")

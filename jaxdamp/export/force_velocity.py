@@ -59,5 +59,5 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
     rows = [f"{float(v)!r},{float(f)!r}" for v, f in pairs]
     written = write_whole(path, "\n".join([*header, "velocity [m/s],force [N]", *rows]) + "\n")
     if curve.note:
-        warnings.warn(f"{written}: rows left out. {curve.note}", stacklevel=2)
+        warnings.warn(f"{written.name}: rows left out. {curve.note}", stacklevel=2)
     return written

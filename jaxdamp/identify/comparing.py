@@ -21,6 +21,11 @@ class Rung(NamedTuple):
     held_out_rmse: float | None  # N
     result: FitResult
 
+    @property
+    def error(self) -> float:
+        """RMSE [N] by which laws are ranked: on the held-out records, or on the fitted ones if there are none."""
+        return self.rmse if self.held_out_rmse is None else self.held_out_rmse
+
 
 class Failure(NamedTuple):
     """A law of a comparison that has no fit."""
@@ -62,7 +67,7 @@ class Comparison:
     @property
     def best(self) -> Rung:
         """The law with the smallest error on the held-out records, or on the fitted ones if there are none."""
-        return min(self.rungs, key=lambda r: r.rmse if r.held_out_rmse is None else r.held_out_rmse)
+        return min(self.rungs, key=lambda rung: rung.error)
 
     def __getitem__(self, name: str) -> FitResult:
         """The fit of the law of that name."""

@@ -9,7 +9,7 @@ from jaxdamp.cli import app
 
 def jaxdamp(*words: str | Path, code: int = 0) -> Result:
     result = CliRunner().invoke(app, [str(word) for word in words])
-    assert result.exit_code == code, result.output
+    assert result.exit_code == code, (result.output, result.exception)
     return result
 
 

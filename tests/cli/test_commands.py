@@ -1,5 +1,6 @@
 import csv
 import json
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,8 @@ from jaxdamp import identify
 from jaxdamp.bench import BenchSet
 from jaxdamp.cli import app
 from jaxdamp.cli.findings import LAWS
+from jaxdamp.cli.options import law_names
+from jaxdamp.cli.riding import presets
 from jaxdamp.dampers import Bilinear
 from jaxdamp.export import from_json
 
@@ -26,14 +29,23 @@ def test_help_states_units_and_signs() -> None:
     text = " ".join(jaxdamp("--help").output.split())
     assert "SI everywhere" in text and '"stroke [mm]"' in text
     assert "positive in rebound" in text and "positive when it resists extension" in text
-    assert all(command in text for command in ("fit", "demo", "laws"))
+    assert all(command in text for command in ("fit", "demo", "ride", "laws", "vehicles", "--version"))
+
+
+def test_version_is_that_of_the_package() -> None:
+    assert jaxdamp("--version").output == f"jaxdamp {version('jaxdamp')}\n"
+
+
+def test_vehicles_are_listed_with_a_line_of_meaning() -> None:
+    lines = {line.split()[0]: line for line in jaxdamp("vehicles").output.splitlines() if line.strip()}
+    assert all(len(lines[name].split()) > 4 for name in presets())
 
 
 @pytest.mark.parametrize(
     ("command", "options"),
     [
-        ("fit", "--law --held-out --sign --force-sign --columns --units --sampling-rate --weighting --out --force"),
-        ("demo", "--out --seed --force --debug"),
+        ("fit", "--law --held-out --sign --force-sign --columns --units --sampling-rate --weighting --out --replace"),
+        ("demo", "--out --seed --replace --debug"),
     ],
 )
 def test_help_of_a_command_names_its_options(command: str, options: str) -> None:
@@ -92,7 +104,7 @@ def test_what_the_reader_decided_is_printed(lab_file: Path, tmp_path: Path) -> N
     text = jaxdamp("fit", lab_file, "--law", "bilinear", "--out", tmp_path / "fit").output
     flat = " ".join(text.split())
     assert "force from 'load [kN]' in kN" in flat
-    assert "positive stroke taken as rebound" in flat
+    assert "positive stroke taken as rebound: if the bench counts compression positive, pass --sign" in flat
     law = from_json(tmp_path / "fit" / "best_law.json")
     assert isinstance(law, Bilinear) and float(law.rebound_rate) == pytest.approx(1200.0, rel=2e-3)  # taken wrongly
 
@@ -115,6 +127,13 @@ def test_columns_units_and_sampling_rate_read_a_file_without_header(tmp_path: Pa
     jaxdamp("fit", path, "--law", "bilinear", *words, "--delimiter", ";", "--out", tmp_path / "fit")
     law = from_json(tmp_path / "fit" / "best_law.json")
     assert isinstance(law, Bilinear) and float(law.rebound_rate) == pytest.approx(2600.0, rel=5e-3)
+
+
+def test_laws_may_be_divided_by_commas() -> None:
+    assert law_names(["linear, besinger", "bilinear", "linear"]) == ["linear", "besinger", "bilinear"]
+    assert law_names(["linear,all"]) == list(identify.LAWS)
+    with pytest.raises(ValueError, match="Did you mean 'besinger'"):
+        law_names(["linear,besingr"])
 
 
 def test_records_are_held_out_by_pattern_or_by_file(records: Path, tmp_path: Path) -> None:
@@ -157,7 +176,10 @@ def test_a_sign_that_contradicts_the_work_is_refused(lab_file: Path, tmp_path: P
         (("--columns", "strok=x"), "Did you mean 'stroke'?"),
         (("--columns", "stroke"), "--columns must read like stroke=..."),
         (("--units", "stroke=furlong_s"), "furlong_s"),
-        (("--weighting", "records"), "`weighting`"),
+        (("--weighting", "records"), "Option --weighting must be one of"),
+        (("--columns", "stroke=hub"), "--columns stroke=hub: "),
+        (("--columns", "stroke=7"), "--columns stroke=7: "),
+        (("--sampling-rate", "77"), "--columns time=none leaves out the column"),
         (("--held-out", "20mm_*"), "Option --held-out: No record is called '20mm_*'"),
         (("--held-out", "10mm_*"), "leaves no record to fit"),
     ],
@@ -171,10 +193,40 @@ def test_a_folder_of_others_is_refused(records: Path, tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("keep")
     message = refused(tmp_path, "fit", records, "--law", "linear", "--out", tmp_path / "mine")
-    assert "not written by jaxdamp" in message and "--force" in message
-    jaxdamp("fit", records, "--law", "linear", "--out", tmp_path / "mine", "--force")
+    assert "not written by jaxdamp" in message and "--replace" in message
+    jaxdamp("fit", records, "--law", "linear", "--out", tmp_path / "mine", "--replace")
     assert (tmp_path / "mine" / "notes.txt").read_text() == "keep"
     assert (tmp_path / "mine" / "best_law.json").exists()
+
+
+def test_results_of_an_earlier_run_are_refused_before_anything_is_read(tmp_path: Path) -> None:
+    (tmp_path / "fit").mkdir()
+    manifest = {"format": "jaxdamp results", "command": "fit", "complete": True, "files": []}
+    (tmp_path / "fit" / "manifest.json").write_text(json.dumps(manifest))
+    message = refused(tmp_path, "fit", "no_such_file.csv", "--law", "linear", "--out", tmp_path / "fit")
+    assert "holds the results of an earlier run of jaxdamp fit" in message
+    assert "--out" in message and "--replace" in message
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('{"force": [' + ", ".join(["0.125"] * 60_000) + "]}", "looks like JSON"),
+        ("<html>\n<td>1</td></html>", "looks like HTML"),
+        ("t_s,F_N\n" + "0,1\n" * 30, "no column for the stroke: its columns are 't_s', 'F_N', all of them other"),
+        ("t_s,a,F_N\n" + "0,1,2\n" * 30, "Name it, for example --columns stroke=a."),
+        ("t_s,stroke,F_N\n" + "0,1,2\n" * 30, "for example --units stroke=mm,"),
+        (
+            "x_mm,F_N\n" + "0,1\n1,3\n" * 30,
+            "for example --sampling-rate 1000 [Hz], or name the column with --columns time=...",
+        ),
+        ("0,1,2\n" * 30, "--columns time=0,stroke=1,force=2, --units time=s,stroke=mm,force=N"),
+    ],
+)
+def test_errors_of_the_reader_speak_of_options(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "run.csv").write_text(text)
+    said = refused(tmp_path, "fit", tmp_path / "run.csv", "--law", "linear", "--out", tmp_path / "fit")
+    assert message in said and "={" not in said
 
 
 def test_debug_shows_where_an_error_comes_from(records: Path, tmp_path: Path) -> None:

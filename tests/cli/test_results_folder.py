@@ -1,16 +1,23 @@
+import errno
 import json
+import os
 from pathlib import Path
 
 import pytest
 
+from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.results import results_folder, written
 
 
-def _write(target: Path, *names: str, force: bool = False) -> None:
-    with results_folder(target, "test", force=force) as folder:
-        for name in names:
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_text(name)
+def _fill(folder: Path, *names: str) -> None:
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(name)
+
+
+def _write(target: Path, *names: str, replace: bool = False) -> None:
+    with results_folder(target, "test", replace=replace) as results:
+        _fill(results.draft, *names)
 
 
 def test_files_appear_with_a_manifest(tmp_path: Path) -> None:
@@ -23,8 +30,8 @@ def test_files_appear_with_a_manifest(tmp_path: Path) -> None:
 
 
 def test_a_failure_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError), results_folder(tmp_path / "out", "test") as folder:
-        (folder / "a.txt").write_text("half")
+    with pytest.raises(RuntimeError), results_folder(tmp_path / "out", "test") as results:
+        _fill(results.draft, "a.txt")
         raise RuntimeError
     assert list(tmp_path.iterdir()) == []
 
@@ -32,18 +39,85 @@ def test_a_failure_leaves_nothing(tmp_path: Path) -> None:
 def test_a_failure_leaves_earlier_results_as_they_were(tmp_path: Path) -> None:
     target = tmp_path / "out"
     _write(target, "a.txt")
-    with pytest.raises(RuntimeError), results_folder(target, "test") as folder:
-        (folder / "a.txt").write_text("half")
+    with pytest.raises(RuntimeError), results_folder(target, "test", replace=True) as results:
+        (results.draft / "a.txt").write_text("half")
         raise RuntimeError
     assert (target / "a.txt").read_text() == "a.txt"
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-def test_a_second_run_replaces_its_own_files_and_keeps_those_of_others(tmp_path: Path) -> None:
+def test_a_second_run_is_refused(tmp_path: Path) -> None:
+    _write(tmp_path / "out", "a.txt")
+    with pytest.raises(ValueError, match="earlier run of jaxdamp test: name another one with --out, or pass --replace"):
+        _write(tmp_path / "out", "b.txt")
+    assert written(tmp_path / "out") == ["a.txt", "manifest.json"]
+
+
+def test_what_is_published_stays_and_says_that_it_is_not_all(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    with pytest.raises(RuntimeError), results_folder(target, "test") as results:
+        _fill(results.draft, "law.json", "sub/table.csv")
+        results.publish("the pictures")
+        assert json.loads((target / "manifest.json").read_text())["complete"] is False
+        assert "Missing: the pictures." in (target / "UNFINISHED.txt").read_text()
+        _fill(results.draft, "half.png")
+        raise RuntimeError
+    assert written(target) == ["UNFINISHED.txt", "law.json", "manifest.json", "sub/table.csv"]
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_the_note_that_something_is_missing_goes_at_the_end(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    _write(target, "old.txt", "law.json")
+    with results_folder(target, "test", replace=True) as results:
+        assert (target / "old.txt").exists()
+        _fill(results.draft, "law.json")
+        results.publish("the pictures")
+        assert not (target / "old.txt").exists()
+        _fill(results.draft, "picture.png")
+    assert written(target) == ["law.json", "manifest.json", "picture.png"]
+    assert results.published == ["law.json", "picture.png"]
+    manifest = json.loads((target / "manifest.json").read_text())
+    assert manifest["complete"] and manifest["files"] == ["law.json", "picture.png", "manifest.json"]
+
+
+def test_an_interruption_keeps_what_is_finished(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    with (
+        pytest.raises(Interrupted, match=r"holds what was finished: law\.json, one\.png") as stop,
+        results_folder(target, "test") as results,
+    ):
+        _fill(results.draft, "law.json")
+        results.publish("the pictures")
+        _fill(results.draft, "one.png")
+        raise Interrupted
+    assert "Not written: the pictures" in str(stop.value)
+    assert written(target) == ["UNFINISHED.txt", "law.json", "manifest.json", "one.png"]
+    with pytest.raises(Interrupted, match="Nothing was written"), results_folder(tmp_path / "two", "test"):
+        raise Interrupted
+    assert not (tmp_path / "two").exists()
+
+
+def test_a_folder_that_cannot_be_made_is_named_as_the_user_named_it(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ValueError, match=r"/file/out' cannot be written \(.*\): name another") as error:
+        _write(tmp_path / "file" / "out", "a.txt")
+    assert "draft" not in str(error.value)
+
+
+def test_a_full_disk_is_told_of_the_users_folder(tmp_path: Path) -> None:
+    with (
+        pytest.raises(ValueError, match=r"/out/laws/a.json' cannot be written \(No space left on device\)"),
+        results_folder(tmp_path / "out", "test") as results,
+    ):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(results.draft / "laws" / "a.json"))
+
+
+def test_replacing_takes_away_its_own_files_and_keeps_those_of_others(tmp_path: Path) -> None:
     target = tmp_path / "out"
     _write(target, "a.txt", "old/b.txt", "kept/c.txt")
     (target / "kept" / "notes.txt").write_text("mine")
-    _write(target, "a.txt", "new/d.txt")
+    _write(target, "a.txt", "new/d.txt", replace=True)
     assert written(target) == ["a.txt", "kept/notes.txt", "manifest.json", "new/d.txt"]
     assert not (target / "old").exists()
 
@@ -55,7 +129,7 @@ def test_an_empty_folder_is_taken(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("manifest", ["", "[]", '{"format": "other"}'])
-def test_a_folder_of_others_is_refused_and_force_replaces_only_files_of_the_same_name(
+def test_a_folder_of_others_is_refused_and_only_files_of_the_same_name_are_replaced(
     tmp_path: Path, manifest: str
 ) -> None:
     target = tmp_path / "out"
@@ -64,14 +138,14 @@ def test_a_folder_of_others_is_refused_and_force_replaces_only_files_of_the_same
     (target / "mine.txt").write_text("mine")
     with pytest.raises(ValueError, match="was not written by jaxdamp"):
         _write(target, "a.txt")
-    _write(target, "a.txt", force=True)
+    _write(target, "a.txt", replace=True)
     assert written(target) == ["a.txt", "manifest.json", "mine.txt"]
 
 
 def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("a file")
     with pytest.raises(ValueError, match="is a file"):
-        _write(tmp_path / "out", "a.txt", force=True)
+        _write(tmp_path / "out", "a.txt", replace=True)
 
 
 def test_a_manifest_cannot_point_outside_the_folder(tmp_path: Path) -> None:
@@ -80,5 +154,5 @@ def test_a_manifest_cannot_point_outside_the_folder(tmp_path: Path) -> None:
     (tmp_path / "precious.txt").write_text("mine")
     files = ["../precious.txt", str(tmp_path / "precious.txt"), "a.txt"]
     (target / "manifest.json").write_text(json.dumps({"format": "jaxdamp results", "files": files}))
-    _write(target, "b.txt")
+    _write(target, "b.txt", replace=True)
     assert (tmp_path / "precious.txt").exists() and not (target / "a.txt").exists()

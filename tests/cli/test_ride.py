@@ -50,10 +50,10 @@ def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
     ("words", "message"),
     [
         (["--vehicle", "half_car_02"], "Did you mean 'half_car_002'?"),
-        (["--road", "iso:K"], "`road_class` must be one of 'A'"),
-        (["--road", "bump:3"], "`road` must read like bump:HEIGHT:LENGTH"),
+        (["--road", "iso:K"], "CLASS in --road iso:CLASS must be one of 'A'"),
+        (["--road", "bump:3"], "Option --road must read like bump:HEIGHT:LENGTH"),
         (["--road", "nothing.csv"], "a file that is there, but is 'nothing.csv'"),
-        (["--speed", "-3"], "`speed` must be positive"),
+        (["--speed", "-3"], "Option --speed must be positive"),
     ],
 )
 def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], message: str) -> None:

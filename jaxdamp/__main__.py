@@ -1,0 +1,6 @@
+"""`python -m jaxdamp`: the command line."""
+
+from jaxdamp.cli import main
+
+
+main()

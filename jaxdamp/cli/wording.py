@@ -1,0 +1,71 @@
+"""What the library says of Python's arguments, said of the options of the command line."""
+
+import shlex
+from typing import Any
+
+from jaxdamp._checks import ArgumentError, Setting
+
+
+OPTIONS = (
+    "columns",
+    "delimiter",
+    "dt",
+    "duration",
+    "force_sign",
+    "held_out",
+    "law",
+    "road",
+    "sampling_rate",
+    "seed",
+    "sign",
+    "speed",
+    "units",
+    "vehicle",
+    "weighting",
+)
+OTHER_WORDS = {"paths": "FILES", "path_or_text": "The law file", "road_class": "CLASS in --road iso:CLASS"}
+
+
+def option(argument: str) -> str:
+    """The option that sets an argument: "--force-sign" for "force_sign"."""
+    return f"--{argument.replace('_', '-')}"
+
+
+def option_text(setting: Setting) -> str:
+    """An argument with its value as it is given on the command line.
+
+    >>> option_text(Setting("columns", {"time": None, "stroke": "x mm"}))
+    "--columns 'time=none,stroke=x mm'"
+    >>> option_text(Setting("sampling_rate"))
+    '--sampling-rate ...'
+    """
+    if isinstance(setting.value, dict):
+        value = ",".join(f"{role}={_word(item)}" for role, item in setting.value.items())
+    else:
+        value = _word(setting.value)
+    return f"{option(setting.argument)} {value if '...' in value else shlex.quote(value)}"
+
+
+def _word(value: Any) -> str:
+    if value is None:
+        return "none"
+    return "..." if value is ... else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def in_options(text: str, settings: tuple[Setting, ...] = ()) -> str:
+    """A sentence of the library with its settings as options."""
+    for setting in settings:
+        if setting.argument in OPTIONS:
+            text = text.replace(str(setting), option_text(setting))
+    return text
+
+
+def message(error: Exception) -> str:
+    """What an error says, in the language of the command line."""
+    if not isinstance(error, ArgumentError):
+        return str(error)
+    text = in_options(str(error), error.settings)
+    name = error.argument
+    if name in OPTIONS:
+        return text.replace(f"Argument `{name}`", f"Option {option(name)}")
+    return text.replace(f"Argument `{name}`", OTHER_WORDS[name]) if name in OTHER_WORDS else text
