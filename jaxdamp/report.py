@@ -18,6 +18,26 @@ if TYPE_CHECKING:
 Cell = str | float | int | None
 
 
+class Shown(float):
+    """A number with the text that a reader is shown; files keep all its digits.
+
+    >>> number = Shown(14361.2734, "14361")
+    >>> f"{number:.4g}", str(number)
+    ('14361', '14361.2734')
+    """
+
+    text: str
+
+    def __new__(cls, value: float, text: str) -> "Shown":
+        """The number, and its text."""
+        self = super().__new__(cls, value)
+        self.text = text
+        return self
+
+    def __format__(self, spec: str) -> str:
+        return self.text
+
+
 class Column(NamedTuple):
     """A column: its name, its unit, and how a number in it is written for reading."""
 

@@ -10,7 +10,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, FitResult, Rung
 from jaxdamp.identify.traces import is_memoryless
 from jaxdamp.parameters import free_parameters
-from jaxdamp.report import Cell, Column, Table
+from jaxdamp.report import Cell, Column, Shown, Table
 
 
 class Law(NamedTuple):
@@ -92,7 +92,8 @@ def parameter_table(name: str, result: FitResult, truth: AbstractDamper | None =
     known = {} if truth is None else _numbers(truth)
     rows: list[tuple[Cell, ...]] = []
     for e in result.parameters:
-        row: tuple[Cell, ...] = (e.name, e.unit or "–", e.value, e.standard_error)
+        value, error = identify.rounded(e.value, e.standard_error)
+        row: tuple[Cell, ...] = (e.name, e.unit or "–", Shown(e.value, value), Shown(e.standard_error, error))
         if truth is not None:
             true = known.get(e.name)
             row += (true, None if true is None else (e.value - true) / e.standard_error)

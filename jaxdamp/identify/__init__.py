@@ -4,7 +4,7 @@ from jaxdamp.identify.comparing import Comparison, Failure, Rung, compare, fit_e
 from jaxdamp.identify.cross_validation import CrossValidation, cross_validate
 from jaxdamp.identify.fitting import fit
 from jaxdamp.identify.ladder import LAWS, default_ladder
-from jaxdamp.identify.result import Estimate, FitResult, Score, fit_percent
+from jaxdamp.identify.result import Estimate, FitResult, Score, fit_percent, rounded
 from jaxdamp.identify.training import Training, train
 
 
@@ -24,5 +24,6 @@ __all__ = [
     "fit",
     "fit_each",
     "fit_percent",
+    "rounded",
     "train",
 ]

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+PLACES = 3  # behind the point, of a value too large or too small to be written out
+
+
 class Estimate(NamedTuple):
     """One fitted number.
 
@@ -30,6 +33,24 @@ class Estimate(NamedTuple):
     interval: tuple[float, float]  # 95 %, cut at the edges of the range
     meaning: str
     note: str  # "", "not identifiable" or "at a bound"
+
+
+def rounded(value: float, error: float) -> tuple[str, str]:
+    """A value and its standard error as text, with the digits that mean something.
+
+    The error gets two digits, the value those down to the second digit of the error, but one at least.
+
+    >>> rounded(14361.27, 61.8), rounded(0.9035, 0.2912), rounded(3.2, float("inf"))
+    (('14361', '62'), ('0.90', '0.29'), ('3.2', 'inf'))
+    """
+    if not (np.isfinite(error) and np.isfinite(value) and error > 0):
+        return f"{value:.5g}", f"{error:.2g}"
+    place = int(np.floor(np.log10(error))) - 1
+    place_of_value = min(place, int(np.floor(np.log10(abs(value))))) if value else place
+    if max(abs(value), error) >= 1e9 or place_of_value < -9:
+        return f"{value:.{PLACES}e}", f"{error:.1e}"
+    texts = (f"{round(number, -at):.{max(-at, 0)}f}" for number, at in ((value, place_of_value), (error, place)))
+    return next(texts), next(texts)
 
 
 class Score(NamedTuple):
@@ -124,10 +145,11 @@ class FitResult:
 
     def __repr__(self) -> str:
         width = max(len(e.name) for e in self.parameters)
+        texts = [rounded(e.value, e.standard_error) for e in self.parameters]
         lines = [
             f"{type(self.law).__name__} on {len(self.runs)} records: {self.fit_percent:.1f} %, RMSE {self.rmse:.4g} N"
         ]
-        for e in self.parameters:
+        for e, (value, error) in zip(self.parameters, texts, strict=True):
             note = f"  ({e.note})" if e.note else ""
-            lines.append(f"  {e.name:<{width}}  {e.value:>11.5g} ± {e.standard_error:<9.2g} {e.unit}{note}")
+            lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
         return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])

@@ -105,7 +105,11 @@ def minimise(
     ]
     notes += [f"{c.name} ended at a bound, {c.after:.5g} {c.unit}." for c in changes if c.note]
     if not converged and not over_limit:
-        notes.append(f"The search ended before an optimum ({message}); the scaled gradient left is {left:.1e}.")
+        ended = "" if message.startswith("Optimization terminated successfully") else f", saying: {message}"
+        notes.append(
+            f"The search stopped where the metric could still fall{ended}: a change of the free numbers by their own"
+            f" size would change it at a rate of {left:.1e} of itself. Start from the result, or allow more steps."
+        )
     return TuneResult(
         free.build(jnp.asarray(values)),
         vehicle,

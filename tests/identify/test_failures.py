@@ -1,0 +1,52 @@
+"""A law that cannot be fitted costs a comparison that law alone; a wrong call costs the whole of it."""
+
+import numpy as np
+import pytest
+
+from jaxdamp.dampers import AbstractDamper, Bilinear, Linear
+from jaxdamp.identify import Rung, compare, default_ladder, fit, fit_each, ladder
+
+
+TRUTH = Bilinear(2600.0, 1200.0)
+
+
+def _no_start(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
+    raise ZeroDivisionError("no velocity")
+
+
+def test_the_others_are_fitted_and_the_failure_is_named(sines):
+    runs = sines(TRUTH, noise=5.0)
+    laws = {"bad": Linear(float("nan")), "linear": Linear, "none": _no_start, "bilinear": Bilinear}
+    comparison = compare(laws, runs, held_out=runs[:1])
+    assert [rung.name for rung in comparison.rungs] == ["linear", "bilinear"] and comparison.best.name == "bilinear"
+    assert [failure.name for failure in comparison.failed] == ["bad", "none"]
+    assert comparison.failed[1].reason == "no velocity"
+    assert "none" in repr(comparison) and "failed: no velocity" in repr(comparison)
+    with pytest.raises(KeyError, match="none failed: no velocity"):
+        comparison["none"]
+
+
+def test_each_fit_is_there_as_soon_as_it_is_done(sines):
+    seen: list[str] = []
+    fits = fit_each({"linear": Linear, "bilinear": Bilinear}, sines(TRUTH, noise=5.0), progress=seen.append)
+    first = next(fits)
+    assert isinstance(first, Rung) and first.name == "linear" and seen == ["linear"]
+
+
+def test_a_comparison_without_any_fit_says_why(sines):
+    with pytest.raises(ValueError, match=r"None of 2 laws could be fitted\. a: no velocity b: .* be finite"):
+        compare({"a": _no_start, "b": Linear(float("nan"))}, sines(TRUTH, noise=5.0))
+    with pytest.raises(ValueError, match=r"None of 1 laws could be fitted\. Argument `weighting` must be one of"):
+        compare({"linear": Linear}, sines(TRUTH, noise=5.0), weighting="records")
+    with pytest.raises(TypeError):
+        compare({"linear": Linear, "bilinear": Bilinear}, sines(TRUTH, noise=5.0), wieghting="runs")
+
+
+def test_a_start_that_cannot_be_made_is_a_failure_of_that_law(sines, monkeypatch):
+    monkeypatch.setitem(ladder._MEMORYLESS, "table", _no_start)
+    runs = sines(TRUTH, noise=5.0)
+    comparison = compare(default_ladder(runs, ["table", "linear"]), runs)
+    assert [rung.name for rung in comparison.rungs] == ["linear"]
+    assert comparison.failed[0].reason == "No start can be made from these records: no velocity"
+    with pytest.raises(ValueError, match="No start can be made"):
+        fit(default_ladder(runs, ["table"])["table"], runs)
