@@ -57,7 +57,7 @@ def _exponential_slope(primals: tuple[Numbers], tangents: tuple[Numbers]) -> tup
 
 @jax.custom_jvp
 def logarithm(x: Numbers) -> Numbers:
-    """Natural logarithm of positive normal numbers, to a few roundings.
+    """Natural logarithm of numbers from 2.3e-308 to 6e307, to a few roundings.
 
     k ln 2 + 2 artanh((m − 1)/(m + 1)) with x = 2ᵏ m, ½ ≤ m² < 2.
     """
