@@ -65,7 +65,7 @@ def logarithm(x: Numbers) -> Numbers:
         return jnp.log(x)
     bits = jax.lax.bitcast_convert_type(x, jnp.int64)
     twos = (bits - _SQUARE_ROOT_OF_HALF) >> _MANTISSA_BITS
-    # From the bits only the power of two, which is a constant: x · 2⁻ᵏ is exact and has a slope, m by its bits has none.
+    # From the bits only the power of two, a constant: x · 2⁻ᵏ is exact and has a slope, m by its bits would have none.
     m = x * jax.lax.bitcast_convert_type(_ONE - (twos << _MANTISSA_BITS), jnp.float64)
     s = (m - 1.0) / (m + 1.0)
     series = jnp.zeros_like(s)

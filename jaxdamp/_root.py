@@ -27,8 +27,8 @@ def increasing_root(
     the middle of the bracket where Newton would leave it, or has not halved the residual in two steps (as when it
     cycles about a kink). With the default `close`, a dozen reach rounding for power laws, friction and kinked laws in
     series with springs of 1e5 to 1.5e7 N/m at 1 ms, from any guess.
-    Derivatives, forward and reverse, come from the implicit function theorem and do not pass through the steps (second
-    ones, forward over reverse in a loop, pass through the last step if no safe one was needed, and then hold to `close`).
+    Derivatives, forward and reverse, come from the implicit function theorem and do not pass through the steps. (Second
+    ones, forward over reverse in a loop, do so where the likely steps were enough, and then are good to `close`.)
 
     Arguments:
         function: increasing on the bracket.

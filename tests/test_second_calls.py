@@ -14,8 +14,8 @@ COMPILED = "/jax/core/compile/backend_compile_duration"
 compilations: list[str] = []
 
 
-def _note(event: str, duration: float, **more: object) -> None:
-    del duration, more
+def _note(event: str, duration_secs: float, **kwargs: str | int) -> None:
+    del duration_secs, kwargs
     if event == COMPILED:
         compilations.append(event)
 

@@ -27,7 +27,7 @@ class AbstractDamper(eqx.Module):
     """
 
     answers_at_once: ClassVar[bool] = True  # the force depends on the velocity directly, not only through states
-    smooth_state: ClassVar[bool] = False  # own states change smoothly where the velocity has a kink: may be extrapolated
+    smooth_state: ClassVar[bool] = False  # own states have no kink where the velocity has one: may be extrapolated
 
     def __check_init__(self) -> None:
         check_parameters(self)

@@ -43,7 +43,9 @@ def ends(names):
 
 def car(front, rear):
     """Symmetric but for its laws."""
-    return HalfCar(580.0, 1100.0, 1.2, 1.2, *(Corner(40.0, 23.5e3, 190e3, **laws) for laws in (front, rear)))
+    corners = {"front": front, "rear": rear}
+    ends = {name: Corner(40.0, 23.5e3, 190e3, **laws) for name, laws in corners.items()}
+    return HalfCar(580.0, 1100.0, 1.2, 1.2, ends["front"], ends["rear"])
 
 
 def road(heights):
@@ -114,4 +116,4 @@ def test_wrappers_predict_as_the_law_inside_does():
     for outer in wrapped:
         np.testing.assert_allclose(outer.predict(*way, state, 1e-3), cheap, rtol=1e-14)
     halved = MotionRatio(law, 0.5).predict(*way, state, 1e-3)
-    np.testing.assert_allclose(halved, law.predict(*(0.5 * a for a in way), state, 1e-3), rtol=1e-14)
+    np.testing.assert_allclose(halved, law.predict(0.0, 0.1, 1.1e-4, 0.12, state, 1e-3), rtol=1e-14)
