@@ -2,6 +2,8 @@
 
 To differentiate, `jnp.maximum` and `jnp.max` compare their result with their arguments. A compiler may compute an
 argument anew for that, round it otherwise, find none equal, and so lose the derivative. These compare the arguments.
+When differentiated, their value is selected by the same comparison, so that second derivatives do not depend on it
+either (see `jaxdamp._elementary` on loops that forget custom derivatives).
 """
 
 from typing import Any
@@ -40,20 +42,20 @@ def largest(numbers: Numbers, axis: int = 0) -> Numbers:
 
 
 def _slope_of_least(primals: tuple[Any, Any], tangents: tuple[Any, Any]) -> tuple[Numbers, Numbers]:
-    ans = at_least(*primals)
-    return ans, _shared(jnp.subtract(*primals), ans, tangents)
+    return _selected(primals, jnp.subtract(*primals), tangents)
 
 
 def _slope_of_most(primals: tuple[Any, Any], tangents: tuple[Any, Any]) -> tuple[Numbers, Numbers]:
-    ans = at_most(*primals)
-    return ans, _shared(jnp.subtract(*reversed(primals)), ans, tangents)
+    return _selected(primals, jnp.subtract(*reversed(primals)), tangents)
 
 
-def _shared(lead: Numbers, ans: Numbers, changes: tuple[Any, Any]) -> Numbers:
-    """The change of the one that leads, or the mean."""
+def _selected(values: tuple[Any, Any], lead: Numbers, changes: tuple[Any, Any]) -> tuple[Numbers, Numbers]:
+    """The value that leads and its change; of equal ones the mean of both."""
+    one, other = (jnp.asarray(value, lead.dtype) for value in values)
+    ans = jnp.where(lead > 0, one, jnp.where(lead < 0, other, 0.5 * one + 0.5 * other))
     share = jnp.where(lead > 0, 1.0, jnp.where(lead < 0, 0.0, 0.5)).astype(ans.dtype)
     parts = zip((share, 1.0 - share), changes, strict=True)
-    return sum((part * change for part, change in parts if type(change) is not SymbolicZero), jnp.zeros_like(ans))
+    return ans, sum((part * change for part, change in parts if type(change) is not SymbolicZero), jnp.zeros_like(ans))
 
 
 at_least.defjvp(_slope_of_least, symbolic_zeros=True)

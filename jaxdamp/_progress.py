@@ -3,21 +3,22 @@
 import sys
 import time
 from types import TracebackType
-from typing import final
+from typing import Any, final
 
 
 @final
 class Progress:
     """`with Progress("Fitting") as progress: progress("besinger, 2 of 5")` writes over one line of the terminal.
 
-    Nothing is shown before two seconds have gone by, nor where the output goes to a file. In a notebook the line is
-    written below the cell.
+    Nothing is shown before two seconds have gone by, nor where the output goes to a file. In a notebook the line stands
+    below the cell while the work lasts; the notebook that is saved does not hold it.
     """
 
     def __init__(self, label: str, delay: float = 2.0) -> None:
         self._label, self._due, self._width = label, time.monotonic() + delay, 0
-        self._stream = sys.stdout if "ipykernel" in sys.modules else sys.stderr
-        self._watched = "ipykernel" in sys.modules or self._stream.isatty()
+        self._notebook, self._output = "ipykernel" in sys.modules, None
+        self._stream = sys.stderr
+        self._watched = self._notebook or self._stream.isatty()
 
     def __enter__(self) -> "Progress":
         return self
@@ -25,9 +26,12 @@ class Progress:
     def __call__(self, text: str) -> None:
         """Show the label and a text, in place of the last one."""
         if self._watched and time.monotonic() >= self._due:
-            self._write(f"{self._label}: {text}")
+            self._show(f"{self._label}: {text}")
 
-    def _write(self, line: str) -> None:
+    def _show(self, line: str) -> None:
+        if self._notebook:
+            self._output = _displayed(line, self._output)
+            return
         self._stream.write("\r" + line.ljust(self._width))
         self._stream.flush()
         self._width = len(line)
@@ -36,7 +40,20 @@ class Progress:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Wipe the line."""
-        if self._width:
-            self._write("")
+        if self._output is not None:
+            _displayed("", self._output)
+        elif self._width:
+            self._show("")
             self._stream.write("\r")
             self._stream.flush()
+
+
+def _displayed(line: str, output: Any) -> Any:
+    """Show a line below the cell, in place of what an earlier output showed; gives the output."""
+    from IPython.display import display
+
+    content = {"text/plain": line}
+    if output is None:
+        return display(content, raw=True, display_id=True)
+    output.update(content, raw=True)
+    return output

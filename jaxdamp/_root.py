@@ -27,7 +27,8 @@ def increasing_root(
     the middle of the bracket where Newton would leave it, or has not halved the residual in two steps (as when it
     cycles about a kink). With the default `close`, a dozen reach rounding for power laws, friction and kinked laws in
     series with springs of 1e5 to 1.5e7 N/m at 1 ms, from any guess.
-    Derivatives, forward and reverse, come from the implicit function theorem and do not pass through the steps.
+    Derivatives, forward and reverse, come from the implicit function theorem and do not pass through the steps. (Second
+    ones, forward over reverse in a loop, do so where the likely steps were enough, and then are good to `close`.)
 
     Arguments:
         function: increasing on the bracket.
@@ -38,6 +39,9 @@ def increasing_root(
         likely: number of plain Newton steps that a good guess is likely to need; none to be safe from the first.
         close: relative length of a step that is the last: what is left is about its square.
     """
+
+    def tangent_solve(linear: Callable[[Scalar], Scalar], value: Scalar) -> Scalar:
+        return value * (1.0 / linear(jnp.ones_like(value)))  # no quotient for each of many tangents
 
     def solve(f: Callable[[Scalar], Scalar], w: Scalar) -> Scalar:
         def newton(w: Scalar) -> tuple[Scalar, Scalar, Scalar]:
@@ -68,17 +72,20 @@ def increasing_root(
             return still_moving & (count < steps)
 
         def again(now: tuple[Any, ...]) -> tuple[Any, ...]:
-            count, _, state = now
-            after = narrow(state)
-            return count + 1, moved(state[0], after[0]), after
+            count, _, (w, *others) = now
+
+            def safe_step(_: Callable[[Scalar], Scalar], w: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
+                after, *rest = narrow((w, *others))
+                return after, tuple(rest)
+
+            # Its own root to the derivatives: second ones in reverse mode come here, see `jaxdamp._elementary`.
+            after, rest = jax.lax.custom_root(f, w, safe_step, tangent_solve, has_aux=True)
+            return count + 1, moved(w, after), (after, *rest)
 
         start = jnp.ones_like(w, bool)
         for _ in range(likely if fuses_loops() else 0):  # written out they are fast, but take longer to compile
             before, w = w, jnp.clip(newton(w)[2], low, high)
             start = moved(before, w)
         return jax.lax.while_loop(going, again, (0, start, (w, low, high, never, never)))[2][0]
-
-    def tangent_solve(linear: Callable[[Scalar], Scalar], value: Scalar) -> Scalar:
-        return value * (1.0 / linear(jnp.ones_like(value)))  # no quotient for each of many tangents
 
     return jax.lax.custom_root(function, jax.lax.stop_gradient(guess), solve, tangent_solve)

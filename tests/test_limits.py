@@ -25,3 +25,15 @@ def test_is_the_maximum_along_an_axis(rng):
 
 def test_the_first_of_equal_numbers_has_the_derivative():
     np.testing.assert_array_equal(jax.grad(largest)(jnp.array([1.0, 3.0, 3.0])), [0.0, 1.0, 0.0])
+
+
+def test_second_derivatives_over_a_loop_share_them_too():
+    def looped(limit, x):
+        return jax.lax.scan(lambda carry, _: (x * limit(carry, 1.0) ** 2, None), x, None, length=2)[0]
+
+    for limit, sides in ((at_least, (0.7, 1.0, 1.3)), (at_most, (0.7, 1.0, 1.3))):
+        for side in sides:
+            x = jnp.asarray(side)
+            expected = float(jax.jacfwd(jax.jacfwd(lambda x, limit=limit: looped(limit, x)))(x))
+            found = float(jax.hessian(lambda x, limit=limit: looped(limit, x))(x))
+            np.testing.assert_allclose(found, expected, rtol=1e-13)

@@ -1,4 +1,5 @@
 import io
+import sys
 
 from jaxdamp._progress import Progress
 
@@ -33,3 +34,27 @@ def test_is_silent_where_nobody_watches(monkeypatch):
     with Progress("Fitting", delay=0.0) as progress:
         progress("linear")
     assert stream.getvalue() == ""
+
+
+def test_a_notebook_shows_the_line_and_does_not_store_it(monkeypatch):
+    shown = []
+
+    class Output:
+        def update(self, content, *, raw):
+            assert raw
+            shown.append(content["text/plain"])
+
+    def display(content, *, raw, display_id):
+        assert raw and display_id
+        shown.append(content["text/plain"])
+        return Output()
+
+    monkeypatch.setitem(sys.modules, "ipykernel", sys)
+    monkeypatch.setattr("IPython.display.display", display)
+    with Progress("Fitting", delay=0.0) as progress:
+        progress("linear")
+        progress("table")
+    assert shown == ["Fitting: linear", "Fitting: table", ""]
+    with Progress("Fitting", delay=0.0):
+        pass
+    assert len(shown) == 3

@@ -130,7 +130,7 @@ def test_a_module_without_a_storey_is_found():
 def run(code: str) -> str:
     """What a fresh interpreter prints, errors and warnings included."""
     command = [sys.executable, "-W", "error::SyntaxWarning", "-c", code]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT.parent, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT.parent)
     assert done.returncode == 0, done.stderr
     return done.stdout + done.stderr
 

@@ -40,10 +40,8 @@ def one_spring(spring: Callable[[Scalar], Scalar], reach: Callable[[Scalar], Sca
 
 def answers_at_once(law: AbstractDamper) -> bool:
     """Whether the force depends on the velocity directly, not only through states."""
-    if not getattr(law, "answers_at_once", True):
-        return False
     inside = parts(law)
-    return not inside or any(map(answers_at_once, inside))
+    return law.answers_at_once and (not inside or any(map(answers_at_once, inside)))
 
 
 def refuse_late(argument: str, law: AbstractDamper, name: str) -> None:

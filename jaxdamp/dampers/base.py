@@ -26,6 +26,9 @@ class AbstractDamper(eqx.Module):
     `AbstractMemoryless`, which bring it.
     """
 
+    answers_at_once: ClassVar[bool] = True  # the force depends on the velocity directly, not only through states
+    smooth_state: ClassVar[bool] = False  # own states have no kink where the velocity has one: may be extrapolated
+
     def __check_init__(self) -> None:
         check_parameters(self)
 
@@ -55,6 +58,10 @@ class AbstractDamper(eqx.Module):
     ) -> State:
         """What `advance` will give, or something near it that costs less, from which an engine predicts the force."""
         return self.advance(x0, v0, x1, v1, state, dt)
+
+    def laws_with_states(self) -> list["AbstractDamper"]:
+        """The laws inside whose states are part of this law's states: all laws in its fields, unless it says others."""
+        return parts(self)
 
     def __add__(self, other: "AbstractDamper") -> "AbstractDamper":
         """Two laws side by side: forces add."""
@@ -198,6 +205,13 @@ class Sum(AbstractDamper):
         pairs = zip(self.terms, _states_of(self.terms, state), strict=True)
         return jnp.concatenate([term.advance(x0, v0, x1, v1, s, dt) for term, s in pairs])
 
+    def predict(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """What every term predicts."""
+        pairs = zip(self.terms, _states_of(self.terms, state), strict=True)
+        return jnp.concatenate([term.predict(x0, v0, x1, v1, s, dt) for term, s in pairs])
+
 
 @final
 class Scaled(AbstractDamper):
@@ -238,3 +252,9 @@ class Scaled(AbstractDamper):
     ) -> State:
         """The step of the law."""
         return self.law.advance(x0, v0, x1, v1, state, dt)
+
+    def predict(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """What the law predicts."""
+        return self.law.predict(x0, v0, x1, v1, state, dt)

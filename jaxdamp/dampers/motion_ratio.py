@@ -42,3 +42,10 @@ class MotionRatio(AbstractDamper):
         """The step of the law."""
         i = self.ratio
         return self.law.advance(i * x0, i * v0, i * x1, i * v1, state, dt)
+
+    def predict(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """What the law predicts."""
+        i = self.ratio
+        return self.law.predict(i * x0, i * v0, i * x1, i * v1, state, dt)

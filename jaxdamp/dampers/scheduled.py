@@ -90,3 +90,13 @@ class Scheduled(AbstractDamper):
     ) -> State:
         """The step of the law."""
         return self.at_command().advance(x0, v0, x1, v1, state, dt)
+
+    def predict(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """What the law predicts."""
+        return self.at_command().predict(x0, v0, x1, v1, state, dt)
+
+    def laws_with_states(self) -> list[AbstractDamper]:
+        """One of the laws: the states are those of the law at the command."""
+        return [self.laws[0]]

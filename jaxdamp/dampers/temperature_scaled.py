@@ -66,3 +66,9 @@ class TemperatureScaled(AbstractDamper):
     ) -> State:
         """The step of the law."""
         return self.law.advance(x0, v0, x1, v1, state, dt)
+
+    def predict(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """What the law predicts."""
+        return self.law.predict(x0, v0, x1, v1, state, dt)

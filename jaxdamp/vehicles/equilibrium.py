@@ -36,8 +36,10 @@ def rest_position(form: PortForm, laws: Sequence[AbstractDamper], road: Float[Ar
         return jnp.linalg.solve(form.stiffness, form.road_stiffness @ road - form.ports.T @ forces)
     arrays, rest = eqx.partition((form, ports, road), eqx.is_array)
     found = _newton(*eqx.combine(jax.lax.stop_gradient(arrays), rest))
-    left, slope = _unbalanced(form, ports, road, found)  # one more step, through which derivatives pass
-    return found - jnp.linalg.solve(slope, left)
+    for _ in range(2):  # derivatives pass through these: one step has the first of them right, two the next as well
+        left, slope = _unbalanced(form, ports, road, found)
+        found = found - jnp.linalg.solve(slope, left)
+    return found
 
 
 def _unbalanced(form: PortForm, ports: Ports, road: Array, q: Float[Array, " q"]) -> tuple[Array, Array]:

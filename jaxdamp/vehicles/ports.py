@@ -11,7 +11,6 @@ from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar, State
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.dampers.base import parts
 
 
 # One array, or a tuple of scalars; who calls knows which.
@@ -32,7 +31,7 @@ def _alike(one: AbstractDamper, other: AbstractDamper) -> bool:
     same_shape = [
         jnp.shape(a) == jnp.shape(b) if array else a == b for (a, b), array in zip(pairs, arrays, strict=True)
     ]
-    return all(same_shape)
+    return any(arrays) and all(same_shape)
 
 
 @final
@@ -51,6 +50,7 @@ class Ports(eqx.Module):
 
     laws: tuple[AbstractDamper, ...]  # one of each kind, its arrays stacked where there are several
     members: tuple[tuple[int, ...], ...]  # the ports of each kind
+    smooth: tuple[bool, ...] = eqx.field(static=True)  # of each kind, asked of one law: stacked ones cannot answer
 
     def __init__(self, laws: Sequence[AbstractDamper], *, apart: bool = False) -> None:
         kinds: list[list[int]] = []
@@ -61,6 +61,7 @@ class Ports(eqx.Module):
             else:
                 found.append(i)
         self.members = tuple(tuple(kind) for kind in kinds)
+        self.smooth = tuple(is_smooth(laws[kind[0]]) for kind in kinds)
         self.laws = tuple(
             laws[kind[0]] if len(kind) == 1 else jax.tree.map(_stacked, *[laws[i] for i in kind]) for kind in kinds
         )
@@ -95,7 +96,7 @@ class Ports(eqx.Module):
 
     def first_earlier(self, states: States) -> Earlier:
         """The states before the beginning: what they are then."""
-        kept = [state if is_smooth(law) else None for law, state in zip(self.laws, states, strict=True)]
+        kept = [state if smooth else None for smooth, state in zip(self.smooth, states, strict=True)]
         return kept, kept
 
     def next_earlier(self, states: States, earlier: Earlier) -> Earlier:
@@ -147,10 +148,9 @@ class Ports(eqx.Module):
 
 def is_smooth(law: AbstractDamper) -> bool:
     """Whether the law has states and all of them pass kinks of the velocity smoothly, so that they can be foreseen."""
-    inside = parts(law)
-    size, of_parts = law.initial_state().shape[-1], sum(part.initial_state().shape[-1] for part in inside)
-    own = size == of_parts or getattr(law, "smooth_state", False)
-    return size > 0 and own and all(is_smooth(part) for part in inside if part.initial_state().size)
+    inside = [part for part in law.laws_with_states() if part.initial_state().size]
+    size, of_parts = law.initial_state().size, sum(part.initial_state().size for part in inside)
+    return size > 0 and (size == of_parts or law.smooth_state) and all(map(is_smooth, inside))
 
 
 def _stacked(*leaves: Any) -> Any:

@@ -1,4 +1,5 @@
 import io
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -6,6 +7,7 @@ from rich.console import Console
 
 from jaxdamp import bench, identify
 from jaxdamp.bench import BenchSet, SineTest
+from jaxdamp.cli import console
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.findings import ladder_table, parameter_table, verdict
 from jaxdamp.cli.options import assignments, column_numbers, decisions
@@ -95,14 +97,17 @@ def test_a_report_escapes_what_it_is_told() -> None:
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_a_stage_shows_progress_and_keeps_its_time(terminal: bool) -> None:
+def test_a_stage_shows_progress_and_keeps_its_time(terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([100.0, 102.34])
+    monkeypatch.setattr(console, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
     screen = Screen()
     screen.console = Console(file=io.StringIO(), force_terminal=terminal, width=100)
     with screen.stage("Work [N]", 2) as advance:
         advance("[m/s]", 0)
         advance("", 2)
     file = screen.console.file
-    assert isinstance(file, io.StringIO) and "Work [N]: done in 0.0 s" in file.getvalue()
+    assert isinstance(file, io.StringIO) and "Work [N]: done in 2.3 s" in file.getvalue()
+    assert screen.times["Work [N]"] == pytest.approx(2.34)
     assert screen.times_table().rows[0][0] == "Work [N]"
 
 

@@ -12,6 +12,7 @@ from jaxdamp import dampers
 from jaxdamp.dampers import (
     AbstractDamper,
     AbstractMemoryless,
+    AbstractStateful,
     AccelerationSurface,
     Besinger,
     Bilinear,
@@ -285,6 +286,23 @@ class _Nameless(AbstractMemoryless):
 
 
 @final
+class _ActiveBetweenSines(AbstractStateful):
+    """Takes energy in, but for a band about 45 Hz, which it amplifies: no sine of the contract lies there."""
+
+    rate: jax.Array = parameter("N s/m", "slope", positive)
+
+    def initial_state(self):
+        return jnp.zeros(2)
+
+    def force(self, x, v, state):
+        return self.rate * (v - 8.0 * state[0])
+
+    def state_rate(self, x, v, state):
+        w = 2 * jnp.pi * 45.0
+        return jnp.stack([w * (0.2 * (v - state[0]) - state[1]), w * state[0]])
+
+
+@final
 class _FixedStep(AbstractDamper):
     """A lag whose step takes every dt for a millisecond."""
 
@@ -308,6 +326,7 @@ class _FixedStep(AbstractDamper):
     [
         (_Jumping, contract.check_continuous),
         (_Active, contract.check_passive),
+        (_ActiveBetweenSines, contract.check_passive),
         (_InfiniteSlope, contract.check_finite),
         (_Preloaded, contract.check_rest),
         (_WithoutGradient, contract.check_derivatives),

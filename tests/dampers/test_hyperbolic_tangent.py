@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from jaxdamp import respond
 from jaxdamp.dampers import HyperbolicTangent
+from jaxdamp.parameters import parameters
 
 from .motions import last_cycle, work
 from .single_precision import single_precision_error
@@ -50,7 +52,13 @@ def test_guess_from_a_loop():
 
 @pytest.mark.parametrize("v", [np.zeros(50), np.linspace(-1, 1, 50)])
 def test_guess_is_a_law_whatever_the_data(v):
-    HyperbolicTangent.guess(v, -500.0 * v)
+    law = HyperbolicTangent.guess(v, -500.0 * v)
+    numbers = {p.path: np.asarray(p.value) for p in parameters(law)}
+    assert all(np.all(np.isfinite(value)) for value in numbers.values()), numbers
+    assert numbers["yield_force"] > 0.0 and numbers["viscous_rate"] >= 0.0
+    t = np.linspace(0.0, 0.2, 201)
+    force = respond(law, t, 0.01 * np.sin(30.0 * t), 0.3 * np.cos(30.0 * t))
+    assert np.all(np.isfinite(force)) and np.mean(force[100:] * np.cos(30.0 * t)[100:]) > 0.0
 
 
 def test_single_precision():

@@ -1,0 +1,65 @@
+"""A second call compiles nothing, with other numbers of the same kind."""
+
+import jax
+import numpy as np
+import pytest
+
+from jaxdamp import Ride, bench, identify, respond, roads, simulate
+from jaxdamp.bench import BenchSet, SineTest
+from jaxdamp.dampers import Bilinear, BoucWen, Lag, Spring
+from jaxdamp.vehicles.presets import half_car_002
+
+
+COMPILED = "/jax/core/compile/backend_compile_duration"
+compilations: list[str] = []
+
+
+def _note(event: str, duration_secs: float, **kwargs: str | int) -> None:
+    del duration_secs, kwargs
+    if event == COMPILED:
+        compilations.append(event)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def counted():
+    jax.monitoring.register_event_duration_secs_listener(_note)
+
+
+def in_calls(call, arguments):
+    """How many programs each of several calls compiled."""
+    counts = []
+    for argument in arguments:
+        before = len(compilations)
+        jax.block_until_ready(call(argument))
+        counts.append(len(compilations) - before)
+    return counts
+
+
+ROAD = roads.cosine_bump(0.03, start=0.0, duration=0.03)
+TIME = 1e-3 * np.arange(101)
+CALLS = {
+    "simulate": lambda rate: simulate(half_car_002(Lag(Bilinear(rate, 900.0), 4e-3)), ROAD, duration=0.05).motion,
+    "Ride": lambda rate: Ride(half_car_002(Lag(Bilinear(rate, 900.0), 4e-3)), ROAD, duration=0.05)(),
+    "respond": lambda rate: respond(
+        BoucWen(rate, 0.0, 300.0, 1e-3) + Spring(rate), TIME, 1e-5 * rate * np.sin(30 * TIME)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_of_a_law_with_other_numbers(name):
+    first, *others = in_calls(CALLS[name], [1500.0, 1700.0, 1900.0])
+    assert first > 0 and others == [0, 0]
+
+
+def test_of_a_fit_of_other_records():
+    def runs(rate: float) -> BenchSet:
+        dyno = bench.VirtualDyno(Bilinear(rate, 900.0), sampling_rate=200.0, force_noise=5.0)
+        return dyno.run([SineTest(0.01, 2.0)])
+
+    def fit(records: BenchSet) -> float:
+        return identify.fit(Bilinear, records)["rebound_rate"].value
+
+    made = [runs(rate) for rate in (1500.0, 1700.0, 1900.0)]
+    first, *others = in_calls(fit, made)
+    assert first > 0 and others == [0, 0]
