@@ -15,6 +15,8 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers.fitted_range import FittedRange, with_fitted_range
+from jaxdamp.dampers.motion import Motion
 from jaxdamp.parameters import check_parameters, nonnegative, parameter, readable, real
 
 
@@ -24,9 +26,15 @@ class AbstractDamper(eqx.Module):
     A law whose states are fast compared with a step of about a millisecond derives from this class and brings its own
     `advance`, exact or implicit. Other laws derive from `AbstractStateful`, `AbstractStateless` or
     `AbstractMemoryless`, which bring it.
+
+    Every law can say in `fitted_to` which range its records covered (`with_fitted_range`).
     """
 
+    fitted_to: FittedRange | None = eqx.field(kw_only=True, default=None, repr=False)
+
     def __check_init__(self) -> None:
+        if "fitted_to" not in vars(self):  # as after an `__init__` written by hand; trees need the field to be there
+            object.__setattr__(self, "fitted_to", None)
         check_parameters(self)
 
     def __repr__(self) -> str:
@@ -56,13 +64,19 @@ class AbstractDamper(eqx.Module):
         """What `advance` will give, or something near it that costs less, from which an engine predicts the force."""
         return self.advance(x0, v0, x1, v1, state, dt)
 
+    def motion_inside(self, motion: Motion) -> list[tuple["AbstractDamper", Motion]]:
+        """What each law directly inside goes through while this law goes through a motion, as far as it is known.
+
+        By default stroke and velocity are those of the whole, and the force is not known. A wrapper whose inner law
+        moves otherwise says how.
+        """
+        return [(part, motion.with_force(None)) for part in parts(self)]
+
     def __add__(self, other: "AbstractDamper") -> "AbstractDamper":
         """Two laws side by side: forces add."""
         if not isinstance(other, AbstractDamper):
             return NotImplemented
-        mine = self.terms if isinstance(self, Sum) else (self,)
-        theirs = other.terms if isinstance(other, Sum) else (other,)
-        return Sum(mine + theirs)
+        return Sum(_terms(self) + _terms(other))
 
     def __mul__(self, factor: Any) -> "AbstractDamper":
         """The force times a factor."""
@@ -156,6 +170,16 @@ def own_and_inner(law: AbstractDamper, state: State) -> tuple[Scalar, Float[Arra
     return state[0], state[1:]
 
 
+def _terms(law: AbstractDamper) -> tuple[AbstractDamper, ...]:
+    """The terms of a sum, or the law itself. What a sum was fitted to holds for its terms, but for the force."""
+    if not isinstance(law, Sum):
+        return (law,)
+    if law.fitted_to is None:
+        return law.terms
+    covered = law.fitted_to.without("force")
+    return tuple(with_fitted_range(term, covered) if term.fitted_to is None else term for term in law.terms)
+
+
 def _states_of(terms: tuple[AbstractDamper, ...], state: State) -> list[Array]:
     """Cut the concatenated states of several laws into theirs."""
     sizes = [term.initial_state().size for term in terms]
@@ -220,6 +244,10 @@ class Scaled(AbstractDamper):
             _checks.refuse("factor", "not be negative", factor, remedy)
 
     preserves_linearity: ClassVar[bool] = True
+
+    def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
+        """The same motion at a force that is smaller by the factor."""
+        return [(self.law, motion.divided(self.factor))]
 
     def initial_state(self) -> State:
         """The states of the law."""
