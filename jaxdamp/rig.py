@@ -109,7 +109,8 @@ def _warn_of_range(law: AbstractDamper, *channels: Signal) -> None:
     if has_fitted_range(law):
         known = [_checks.concrete(channel) for channel in channels]
         if all(values is not None for values in known):
-            motion = Motion(*(np.asarray(values, dtype=float) for values in known))
+            stroke, velocity, force = (np.asarray(values, dtype=float) for values in known)
+            motion = Motion(stroke, velocity, force)
             warn_outside([sentence(type(law).__name__, range_use(law, motion))], stacklevel=4)
 
 

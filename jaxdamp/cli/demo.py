@@ -11,6 +11,7 @@ from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.cli import findings as tables
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.fitting import Findings, fit_laws, velocities, write_findings, write_table
+from jaxdamp.cli.ranges import range_remarks, said_in_tables
 from jaxdamp.cli.results import results_folder, written
 from jaxdamp.dampers import AbstractDamper, Besinger, Linear, SeriesSpring
 from jaxdamp.identify import FitResult
@@ -93,7 +94,8 @@ def run_demo(screen: Screen, scenario: Scenario, *, out: Path, force: bool = Fal
             write_findings(folder, findings, runs, report)
             _write_truth(folder, findings, scenario, report)
             _write_rides(folder, rides, report)
-            after = simulate(tuned.vehicle, _roads(scenario)[ISO], duration=scenario.duration)
+            with said_in_tables():
+                after = simulate(tuned.vehicle, _roads(scenario)[ISO], duration=scenario.duration)
             pair = {"before": rides[ISO][scenario.true_name], "after": after}
             _write_tuning(folder, tuned, pair, velocities(findings.comparison), report)
             report.write(folder / "report.html")
@@ -137,7 +139,8 @@ def ride(screen: Screen, title: str, road: AbstractRoad, findings: Findings, sce
         for done, (name, law) in enumerate(laws.items()):
             advance(name, done)
             car = vehicles.presets.quarter_car_000(law)
-            responses[name] = simulate(car, road, duration=scenario.duration)
+            with said_in_tables():
+                responses[name] = simulate(car, road, duration=scenario.duration)
     return responses
 
 
@@ -220,6 +223,7 @@ def show_rides(screen: Screen, rides: Mapping[str, Mapping[str, Response]]) -> N
         screen.table(ride_table(title, responses))
         if index == 0:
             screen.say(ride_verdict(responses))
+        screen.points(range_remarks(responses), style="yellow")
 
 
 def tuning_tables(tuned: TuneResult) -> tuple[Table, Table]:
@@ -286,6 +290,7 @@ def _write_rides(folder: Path, rides: Mapping[str, Mapping[str, Response]], repo
         report.table(table)
         if index == 0:
             report.text(ride_verdict(responses))
+        report.points(range_remarks(responses))
         shown = {name: responses[name] for name in (PAPER_LINEAR, *list(responses)[1:][-3:])}
         report.picture(plots.ride(shown), f"Quarter car on {title}", folder / f"ride_{index + 1}.png")
 

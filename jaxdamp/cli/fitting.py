@@ -12,6 +12,7 @@ from jaxdamp.bench import BenchSet
 from jaxdamp.cli import findings as tables
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.options import ReadOptions, decisions, law_names, split
+from jaxdamp.cli.ranges import fitted_range_table
 from jaxdamp.cli.residual import Shares, residual_shares
 from jaxdamp.cli.results import results_folder, written
 from jaxdamp.identify import Comparison
@@ -94,6 +95,8 @@ def show(screen: Screen, findings: Findings) -> None:
     best = findings.comparison.best
     screen.table(findings.ladder, mark=best.name)
     screen.table(tables.parameter_table(best.name, best.result))
+    if best.result.law.fitted_to is not None:
+        screen.table(fitted_range_table(best.result.law.fitted_to))
     screen.say(" ".join(findings.verdict))
     screen.points(best.result.warnings, style="yellow")
 
@@ -112,6 +115,8 @@ def write_findings(folder: Path, findings: Findings, runs: BenchSet, report: Rep
     export.to_csv(best.result.law, folder / "best_law_force_velocity.csv", velocities(comparison))
     report.heading("How good the laws are")
     report.text(*findings.verdict)
+    if best.result.law.fitted_to is not None:
+        report.table(fitted_range_table(best.result.law.fitted_to))
     report.table(findings.ladder)
     if len(comparison.rungs) > 1:
         report.picture(plots.ladder(comparison), "Errors of the laws", folder / "ladder.png")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from jaxdamp import _checks, export, plots, roads, simulate, vehicles
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.ranges import range_remarks, range_use_table, said_in_tables
 from jaxdamp.cli.results import results_folder, written
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots.damper_use import dampers_of
@@ -73,16 +74,19 @@ def run_ride(
                 advance(name, done)
                 car = make(damper=found)
                 under = parse_road(road, speed=speed, duration=duration or USUAL, seed=seed)
-                responses[name] = simulate(car, under, duration=duration or under.duration or USUAL, dt=dt)
+                with said_in_tables():
+                    responses[name] = simulate(car, under, duration=duration or under.duration or USUAL, dt=dt)
             tables = [metrics_table(responses), comfort_table(responses)]
-        for table in tables:
+            uses = [table for table in [range_use_table(responses)] if table is not None]
+        for table in [*tables, *uses]:
             screen.table(table)
+        screen.points(range_remarks(responses), style="yellow")
         title = f"{vehicle} on {road} at {speed:g} m/s"
         timing = next(iter(responses.values())).axle_timing
         if timing.kind != "one axle":
             screen.say(f"Axles: {timing}.")
         with screen.stage("Pictures and tables"):
-            _write(folder, title, laws, responses, tables)
+            _write(folder, title, laws, responses, tables, uses)
         names = written(folder)
     screen.files(out, names)
     return responses
@@ -128,18 +132,28 @@ def comfort_table(responses: Mapping[str, Response]) -> Table:
 
 
 def _write(
-    folder: Path, title: str, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response], tables: list[Table]
+    folder: Path,
+    title: str,
+    laws: Mapping[str, AbstractDamper],
+    responses: Mapping[str, Response],
+    tables: list[Table],
+    uses: list[Table],
 ) -> None:
     report = Report(title)
     timing = next(iter(responses.values())).axle_timing
     if timing.kind != "one axle":
         report.text(f"Axles: {timing}.")
     for name, law in laws.items():
-        report.text(f"{name}: {law!r}")
+        covered = f" Fitted to: {law.fitted_to.words()}." if law.fitted_to is not None else ""
+        report.text(f"{name}: {law!r}{'.' * bool(covered)}{covered}")
         export.to_json(law, folder / f"{name}.json")
     for file, table in zip(("metrics", "comfort"), tables, strict=True):
         (folder / f"{file}.csv").write_text(table.to_csv(), encoding="utf-8")
         report.table(table)
+    for table in uses:
+        (folder / "range_use.csv").write_text(table.to_csv(), encoding="utf-8")
+        report.table(table)
+    report.points(range_remarks(responses))
     report.picture(plots.ride(responses, weighting="Wk"), title, folder / "ride.png")
     for damper in dampers_of(next(iter(responses.values()))):
         figure = plots.damper_use(responses, damper=damper)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import VectorLike
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, extrapolated
 from jaxdamp.export._write import write_whole
 from jaxdamp.rig import quasi_static
 
@@ -18,6 +18,8 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
 
     A table holds one force for each velocity. For a law with states that is the force at constant velocity once the
     states have settled (`jaxdamp.rig.quasi_static`); its hysteresis does not fit into a table, and the header says so.
+    The header also says what the law was fitted to, and which rows lie beyond: marks in the rows themselves would keep
+    simulators from reading them.
 
     Arguments:
         law: the law.
@@ -45,5 +47,19 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
         header.append(
             f"# quasi-static: force at constant velocity; the hysteresis of the law's {states} state(s) is not in here"
         )
+    header += _range_lines(law, velocity)
     rows = [f"{float(v)!r},{float(f)!r}" for v, f in zip(velocity, force, strict=True)]
     return write_whole(path, "\n".join([*header, "velocity [m/s],force [N]", *rows]) + "\n")
+
+
+def _range_lines(law: AbstractDamper, velocity: np.ndarray) -> list[str]:
+    """What the law was fitted to, and the rows that lie beyond."""
+    lines = [] if law.fitted_to is None else [f"# fitted to: {law.fitted_to.words()}"]
+    outside = extrapolated(law, velocity)
+    if not outside.any():
+        return lines
+    if outside.all():
+        return [*lines, "# extrapolated: all rows lie beyond the velocities that the law was fitted to"]
+    measured = velocity[~outside]
+    where = f"rows below {measured[0]:.6g} m/s and above {measured[-1]:.6g} m/s"
+    return [*lines, f"# extrapolated: {where}, {np.count_nonzero(outside)} of {velocity.size}, beyond all records"]

@@ -225,13 +225,16 @@ def _fitted_to(plain: Any, owner: str) -> FittedRange | None:
         return None
     where = f"{owner}.{FITTED_TO}"
     if not isinstance(plain, dict):
-        _checks.refuse(
-            where, 'be written as {"velocity": {"value": [...], "unit": "m/s"}, ...}', json.dumps(plain)[:80]
-        )
-    for name in plain:
+        must = 'be written as {"velocity": {"value": [...], "unit": "m/s"}, ...}'
+        _checks.refuse(where, must, json.dumps(plain)[:80])
+    limits: dict[str, tuple[float, float]] = {}
+    for name, quantity in plain.items():
         _checks.one_of(where, name, UNITS)
-    limits = {name: np.asarray(_number(value, UNITS[name], f"{where}.{name}")) for name, value in plain.items()}
-    return FittedRange(**{name: tuple(pair.tolist()) if pair.ndim else pair for name, pair in limits.items()})
+        if _number(quantity, UNITS[name], f"{where}.{name}").shape != (2,):
+            _checks.refuse(f"{where}.{name}", "be the lowest and the highest value", json.dumps(quantity)[:80])
+        low, high = quantity["value"]
+        limits[name] = float(low), float(high)
+    return FittedRange(**limits)
 
 
 def _value(plain: Any, where: str) -> Any:

@@ -126,8 +126,8 @@ class Ride(eqx.Module):
         vehicle = replace(self.vehicle, dict(point or {}))
         if not has_fitted_range(vehicle):
             return {}
-        step = jnp.asarray(self.dt, dtype=float)
-        saved = exponential_steps(without_fitted_ranges(vehicle), self.heights, step, None, self.substeps, 1)
+        heights, step = self.on_axles_of(vehicle).heights, jnp.asarray(self.dt, dtype=float)
+        saved = exponential_steps(without_fitted_ranges(vehicle), heights, step, None, self.substeps, 1)
         return range_uses(vehicle, saved.motion, saved.road, saved.road_rate, saved.port_force)
 
     def __call__(self, point: Mapping[str, Any] | None = None) -> dict[str, Scalar]:
