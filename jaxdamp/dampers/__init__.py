@@ -5,7 +5,15 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 """
 
 from jaxdamp.dampers.acceleration_surface import AccelerationSurface
-from jaxdamp.dampers.base import AbstractDamper, AbstractMemoryless, AbstractStateful, AbstractStateless, Scaled, Sum
+from jaxdamp.dampers.base import (
+    AbstractDamper,
+    AbstractMemoryless,
+    AbstractStateful,
+    AbstractStateless,
+    Scaled,
+    Sum,
+    with_fitted_range,
+)
 from jaxdamp.dampers.besinger import Besinger
 from jaxdamp.dampers.bilinear import Bilinear
 from jaxdamp.dampers.bouc_wen import BoucWen
@@ -19,7 +27,6 @@ from jaxdamp.dampers.digressive_progressive import DigressiveProgressive
 from jaxdamp.dampers.fitted_range import (
     FittedRange,
     OutsideFittedRangeWarning,
-    with_fitted_range,
     without_fitted_ranges,
 )
 from jaxdamp.dampers.force_surface import ForceSurface

@@ -6,7 +6,7 @@ extension: a passive law takes in energy, ∮ F v dt ≥ 0. One instance is one 
 
 import dataclasses
 from abc import abstractmethod
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, TypeVar, final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,9 +15,12 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers.fitted_range import FittedRange, with_fitted_range
+from jaxdamp.dampers.fitted_range import UNITS, FittedRange, Limits
 from jaxdamp.dampers.motion import Motion
 from jaxdamp.parameters import check_parameters, nonnegative, parameter, readable, real
+
+
+L = TypeVar("L")
 
 
 class AbstractDamper(eqx.Module):
@@ -155,6 +158,38 @@ def parts(law: AbstractDamper) -> list[AbstractDamper]:
     values = [getattr(law, field.name) for field in dataclasses.fields(law)]
     inside = [part for value in values for part in (value if isinstance(value, tuple) else (value,))]
     return [part for part in inside if isinstance(part, AbstractDamper)]
+
+
+def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Limits) -> L:
+    """The same law with the range of the records that it was fitted to, in place of any range it had.
+
+    `identify.fit` and `train` do this; state it yourself for a law whose numbers come from elsewhere. Laws inside keep
+    ranges of their own. Everything that uses the law then says by how much it leaves the range.
+
+    Arguments:
+        law: any law.
+        fitted_to: the range; or give the limits by name.
+        limits: as `FittedRange` takes them, such as `velocity=(-0.5, 0.5)`.
+
+    Raises:
+        ValueError: something that is not a law; neither a range nor limits, or both; a quantity that no range has;
+            limits out of order.
+
+    >>> from jaxdamp.dampers import Linear
+    >>> with_fitted_range(Linear(1500.0), velocity=(-0.5, 0.9)).fitted_to.words()
+    'velocity −0.5 to 0.9 m/s'
+    """
+    if not isinstance(law, AbstractDamper):
+        _checks.refuse("law", "be a damper law", f"a {type(law).__name__}", "Of a vehicle, give it to its dampers.")
+    for name in limits:
+        _checks.one_of("limits", name, UNITS)
+    if (fitted_to is None) == (not limits):
+        remedy = "Write for example `with_fitted_range(law, velocity=(-0.5, 0.5))`."
+        _checks.refuse("fitted_to", "be given, or limits by name, and not both", repr(fitted_to), remedy)
+    changed = object.__new__(type(law))
+    for name, value in (vars(law) | {"fitted_to": fitted_to or FittedRange(**limits)}).items():
+        object.__setattr__(changed, name, value)
+    return changed
 
 
 def refuse_states(argument: str, law: AbstractDamper, remedy: str) -> None:

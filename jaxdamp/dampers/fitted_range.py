@@ -1,6 +1,6 @@
 """The range of the records that a law was fitted to, which travels with the law."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, final
+from typing import Any, NamedTuple, TypeVar, final
 
 import equinox as eqx
 import jax
@@ -10,13 +10,8 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 
 
-if TYPE_CHECKING:
-    from jaxdamp.dampers.base import AbstractDamper
-
-
 UNITS = {"velocity": "m/s", "stroke": "m", "frequency": "Hz", "force": "N", "temperature": "K", "command": ""}
 Limits = tuple[float | int, float | int]
-L = TypeVar("L", bound="AbstractDamper")
 Tree = TypeVar("Tree")
 
 
@@ -152,35 +147,6 @@ def _checked(name: str, limits: Limits | None) -> tuple[float, float]:
         must = f"be the lowest and the highest value{unit}, two finite numbers in order"
         _checks.refuse(name, must, limits, "Leave out what is not known.")
     return float(numbers[0]), float(numbers[1])
-
-
-def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Limits | None) -> L:
-    """The same law with the range of the records that it was fitted to, in place of any range it had.
-
-    `identify.fit` and `train` do this; state it yourself for a law whose numbers come from elsewhere. Laws inside keep
-    ranges of their own. Everything that uses the law then says by how much it leaves the range.
-
-    Arguments:
-        law: any law.
-        fitted_to: the range; or give the limits by name.
-        limits: as `FittedRange` takes them, such as `velocity=(-0.5, 0.5)`.
-
-    Raises:
-        ValueError: neither a range nor limits, or both; a quantity that no range has; limits out of order.
-
-    >>> from jaxdamp.dampers import Linear
-    >>> with_fitted_range(Linear(1500.0), velocity=(-0.5, 0.9)).fitted_to.words()
-    'velocity −0.5 to 0.9 m/s'
-    """
-    for name in limits:
-        _checks.one_of("limits", name, UNITS)
-    if (fitted_to is None) == (not limits):
-        remedy = "Write for example `with_fitted_range(law, velocity=(-0.5, 0.5))`."
-        _checks.refuse("fitted_to", "be given, or limits by name, and not both", repr(fitted_to), remedy)
-    changed = object.__new__(type(law))
-    for name, value in (vars(law) | {"fitted_to": fitted_to or FittedRange(**limits)}).items():
-        object.__setattr__(changed, name, value)
-    return changed
 
 
 def without_fitted_ranges(tree: Tree) -> Tree:

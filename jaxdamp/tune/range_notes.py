@@ -47,8 +47,8 @@ def range_notes(
 def _stationary_use(vehicle: AbstractVehicle, road: WhiteRoad) -> dict[str, list[RangeUse]]:
     """The use of each law whose velocity is a channel of the linearised vehicle: normally distributed."""
     rms = stationary_rms(linearise(vehicle), road.velocity_psd, speed=road.speed)
-    ends = scipy.special.ndtr(np.array([-_DEVIATIONS, _DEVIATIONS]))
-    normal = scipy.special.ndtri(np.linspace(*ends, _POINTS))
+    tail = float(scipy.special.ndtr(-_DEVIATIONS))
+    normal = scipy.special.ndtri(np.linspace(tail, 1.0 - tail, _POINTS))
     laws = {name: law for name, law in named_laws(vehicle).items() if f"{name}_velocity" in rms}
     velocities = {name: float(rms[f"{name}_velocity"]) * normal for name in laws}
     return {name: range_use(law, Motion(velocity=velocities[name])) for name, law in laws.items()}
