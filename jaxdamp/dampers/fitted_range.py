@@ -45,6 +45,7 @@ class FittedRange(eqx.Module):
     Raises:
         ValueError: limits that are not two finite numbers in order.
 
+    >>> from jaxdamp.dampers import FittedRange
     >>> FittedRange(velocity=(-0.5, 0.9), command=(0.0, 2.0))
     FittedRange(velocity=(-0.5, 0.9), command=(0.0, 2.0))
     """

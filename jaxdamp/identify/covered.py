@@ -16,7 +16,7 @@ def covered_range(runs: Sequence[BenchRun]) -> FittedRange:
 
     >>> from jaxdamp import bench, dampers
     >>> runs = bench.VirtualDyno(dampers.Linear(1500.0)).run([bench.SineTest(0.01, f) for f in (1.0, 3.0)])
-    >>> covered_range(runs).words()
+    >>> covered_range(tuple(runs)).words()
     'velocity −0.188 to 0.188 m/s, stroke −10 to 10 mm, frequency 1 to 3 Hz, force −283 to 283 N'
     """
     channels = {name: [getattr(run, name) for run in runs] for name in ("velocity", "stroke", "force")}
