@@ -71,7 +71,8 @@ def test_a_range_changes_no_number_and_compiles_nothing_anew():
 
     def listener(event: str, duration_secs: float, **rest: Any) -> None:
         del duration_secs, rest
-        compiled.append(event) if event.endswith("backend_compile_duration") else None
+        if event.endswith("backend_compile_duration"):
+            compiled.append(event)
 
     jax.monitoring.register_event_duration_secs_listener(listener)
     try:
