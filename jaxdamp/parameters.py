@@ -184,7 +184,7 @@ def readable(module: eqx.Module) -> str:
             return eqx.tree_pformat(value) if numbers is None or numbers.size > 50 else repr(numbers.tolist())
         return repr(value)
 
-    fields = [f"{field.name}={text(getattr(module, field.name))}" for field in dataclasses.fields(module)]
+    fields = [f"{field.name}={text(getattr(module, field.name))}" for field in dataclasses.fields(module) if field.repr]
     return f"{type(module).__name__}({', '.join(fields)})"
 
 

@@ -11,8 +11,10 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal, SignalLike
-from jaxdamp.dampers import AbstractDamper, Sum
+from jaxdamp.dampers import AbstractDamper, Motion, Sum, range_use, without_fitted_ranges
 from jaxdamp.dampers.coverage import coverage, refuse_gaps
+from jaxdamp.dampers.fitted_range import has_fitted_range
+from jaxdamp.dampers.range_use import sentence, warn_outside
 from jaxdamp.parameters import as_float
 
 
@@ -35,6 +37,8 @@ def respond(
     atol: float = 1e-10,
 ) -> Signal:
     """Force [N] of a damper law whose stroke is prescribed, as on a test bench.
+
+    A motion outside the range that the law was fitted to (`law.fitted_to`) gives an `OutsideFittedRangeWarning`.
 
     The law starts at rest (`law.initial_state()`), so a law with states needs about a cycle, or a few lag times, to
     forget the start of a record that begins in motion.
@@ -88,6 +92,7 @@ def respond(
     dt = (time[-1] - time[0]) / (time.size - 1)
     rate = jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else as_float(velocity)
     _refuse_strokes(law, stroke)
+    fitted, law = law, without_fitted_ranges(law)
     if isinstance(method, str) and method != "step":
         _checks.refuse("method", "be 'step' or a diffrax solver", repr(method), "Pass `method=diffrax.Kvaerno5()`.")
     if isinstance(method, str) or not law.initial_state().size:
@@ -95,7 +100,18 @@ def respond(
     else:
         force = _solve(law, time, stroke, rate, substeps, method, rtol, atol)
     refuse_gaps(law, force, "over the whole motion")
+    _warn_of_range(fitted, stroke, rate, force)
     return force
+
+
+def _warn_of_range(law: AbstractDamper, *channels: Signal) -> None:
+    """Say by how much known stroke, velocity and force leave the range that the law was fitted to."""
+    if has_fitted_range(law):
+        known = [_checks.concrete(channel) for channel in channels]
+        if all(values is not None for values in known):
+            stroke, velocity, force = (np.asarray(values, dtype=float) for values in known)
+            motion = Motion(stroke, velocity, force)
+            warn_outside([sentence(type(law).__name__, range_use(law, motion))], stacklevel=4)
 
 
 def _refuse_strokes(law: AbstractDamper, stroke: Signal) -> None:
@@ -187,6 +203,7 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     if velocities.ndim != 1 or velocities.size == 0:
         _checks.refuse("velocities", "be one or more in one dimension", f"of shape {velocities.shape}")
     _checks.finite("velocities", velocities)
+    law = without_fitted_ranges(law)
     states = jnp.broadcast_to(law.initial_state(), (velocities.size, law.initial_state().size))
     states, force = _hold(law, velocities, states, jnp.asarray(0))
     if law.initial_state().size == 0:

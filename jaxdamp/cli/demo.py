@@ -15,6 +15,7 @@ from jaxdamp.cli.console import Screen
 from jaxdamp.cli.fit_files import draw_findings, velocities, write_findings, write_table
 from jaxdamp.cli.fitted import Findings
 from jaxdamp.cli.fitting import fit_laws
+from jaxdamp.cli.ranges import range_remarks, said_in_tables
 from jaxdamp.cli.results import Results, results_folder
 from jaxdamp.dampers import AbstractDamper, Besinger, Linear, SeriesSpring
 from jaxdamp.identify import FitResult
@@ -147,7 +148,8 @@ def ride(screen: Screen, title: str, road: AbstractRoad, findings: Findings, sce
         for done, (name, law) in enumerate(laws.items()):
             advance(name, done)
             car = vehicles.presets.quarter_car_000(law)
-            responses[name] = simulate(car, road, duration=scenario.duration)
+            with said_in_tables():
+                responses[name] = simulate(car, road, duration=scenario.duration)
     return responses
 
 
@@ -233,6 +235,7 @@ def show_rides(screen: Screen, rides: Mapping[str, Mapping[str, Response]]) -> N
         screen.table(ride_table(title, responses))
         if index == 0:
             screen.say(ride_verdict(responses))
+        screen.points(range_remarks(responses), style="yellow")
 
 
 def tuning_tables(tuned: TuneResult) -> tuple[Table, Table]:
@@ -332,6 +335,7 @@ def _draw_rides(folder: Path, rides: Mapping[str, Mapping[str, Response]], repor
         report.table(ride_table(title, responses))
         if index == 0:
             report.text(ride_verdict(responses))
+        report.points(range_remarks(responses))
         shown = {name: responses[name] for name in (PAPER_LINEAR, *list(responses)[1:][-3:])}
         with attempts.part(f"The picture ride_{index + 1}.png"):
             report.picture(plots.ride(shown), f"Quarter car on {title}", folder / f"ride_{index + 1}.png")

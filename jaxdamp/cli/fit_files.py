@@ -10,6 +10,7 @@ from jaxdamp.bench import BenchSet
 from jaxdamp.cli import findings as tables
 from jaxdamp.cli.attempts import Attempts
 from jaxdamp.cli.fitted import Findings
+from jaxdamp.cli.ranges import fitted_range_table
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison
 from jaxdamp.report import Report, Table
@@ -40,6 +41,8 @@ def draw_findings(folder: Path, findings: Findings, report: Report, attempts: At
     comparison, best = findings.comparison, findings.comparison.best
     report.heading("How good the laws are")
     report.text(*findings.verdict)
+    if best.result.law.fitted_to is not None:
+        report.table(fitted_range_table(best.result.law.fitted_to))
     report.table(findings.ladder)
     report.points(findings.failures)
     if len(comparison.rungs) > 1:

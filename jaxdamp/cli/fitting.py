@@ -13,6 +13,7 @@ from jaxdamp.cli.fit_files import draw_findings, write_findings
 from jaxdamp.cli.fitted import Findings
 from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.options import ReadOptions, decisions, law_names, split
+from jaxdamp.cli.ranges import fitted_range_table
 from jaxdamp.cli.residual import Shares, residual_shares
 from jaxdamp.cli.results import results_folder
 from jaxdamp.identify import Comparison, Failure, Rung
@@ -101,5 +102,7 @@ def show(screen: Screen, findings: Findings) -> None:
     screen.table(findings.ladder, mark=best.name)
     screen.points(findings.failures, style="red")
     screen.table(tables.parameter_table(best.name, best.result))
+    if best.result.law.fitted_to is not None:
+        screen.table(fitted_range_table(best.result.law.fitted_to))
     screen.say(" ".join(findings.verdict))
     screen.points(best.result.warnings, style="yellow")

@@ -8,6 +8,7 @@ from jaxdamp import _checks, export, plots, roads, simulate, vehicles
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.attempts import Attempts
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.ranges import range_remarks, range_use_table, said_in_tables
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.unusual import unusual
 from jaxdamp.dampers import AbstractDamper
@@ -84,20 +85,23 @@ def run_ride(
                 advance(name, done)
                 car = make(damper=found)
                 under = parse_road(road, speed=speed, duration=duration or USUAL, seed=seed)
-                responses[name] = simulate(car, under, duration=duration or under.duration or USUAL, dt=dt)
+                with said_in_tables():
+                    responses[name] = simulate(car, under, duration=duration or under.duration or USUAL, dt=dt)
             tables = [metrics_table(responses), comfort_table(responses)]
-        for table in tables:
+            uses = [table for table in [range_use_table(responses)] if table is not None]
+        for table in [*tables, *uses]:
             screen.table(table)
+        screen.points(range_remarks(responses), style="yellow")
         interrupt.keep()
         title = f"{vehicle} on {road} at {speed:g} m/s"
         timing = next(iter(responses.values())).axle_timing
         if timing.kind != "one axle":
             screen.say(f"Axles: {timing}.")
         with interrupt.saving(), screen.stage("Tables and channels"):
-            _write(results.draft, laws, responses, tables)
+            _write(results.draft, laws, responses, tables, uses)
             results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
-            _draw(results.draft, title, laws, responses, tables, attempts)
+            _draw(results.draft, title, laws, responses, [*tables, *uses], attempts)
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
     return responses
@@ -143,13 +147,19 @@ def comfort_table(responses: Mapping[str, Response]) -> Table:
 
 
 def _write(
-    folder: Path, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response], tables: list[Table]
+    folder: Path,
+    laws: Mapping[str, AbstractDamper],
+    responses: Mapping[str, Response],
+    tables: list[Table],
+    uses: list[Table],
 ) -> None:
     """Laws, tables and channels."""
     for name, law in laws.items():
         export.to_json(law, folder / f"{name}.json")
     for file, table in zip(("metrics", "comfort"), tables, strict=True):
         (folder / f"{file}.csv").write_text(table.to_csv(), encoding="utf-8")
+    for table in uses:
+        (folder / "range_use.csv").write_text(table.to_csv(), encoding="utf-8")
     for name, response in responses.items():
         response.to_xarray().to_dataframe().to_csv(folder / f"channels_{name}.csv")
 
@@ -168,9 +178,11 @@ def _draw(
     if timing.kind != "one axle":
         report.text(f"Axles: {timing}.")
     for name, law in laws.items():
-        report.text(f"{name}: {law!r}")
+        covered = f" Fitted to: {law.fitted_to.words()}." if law.fitted_to is not None else ""
+        report.text(f"{name}: {law!r}{'.' * bool(covered)}{covered}")
     for table in tables:
         report.table(table)
+    report.points(range_remarks(responses))
     with attempts.part("The picture ride.png"):
         report.picture(plots.ride(responses, weighting="Wk"), title, folder / "ride.png")
     for damper in dampers_of(next(iter(responses.values()))):

@@ -5,7 +5,15 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 """
 
 from jaxdamp.dampers.acceleration_surface import AccelerationSurface
-from jaxdamp.dampers.base import AbstractDamper, AbstractMemoryless, AbstractStateful, AbstractStateless, Scaled, Sum
+from jaxdamp.dampers.base import (
+    AbstractDamper,
+    AbstractMemoryless,
+    AbstractStateful,
+    AbstractStateless,
+    Scaled,
+    Sum,
+    with_fitted_range,
+)
 from jaxdamp.dampers.besinger import Besinger
 from jaxdamp.dampers.bilinear import Bilinear
 from jaxdamp.dampers.bouc_wen import BoucWen
@@ -16,6 +24,11 @@ from jaxdamp.dampers.coulomb_friction import CoulombFriction
 from jaxdamp.dampers.dahl import Dahl
 from jaxdamp.dampers.degressive import Degressive
 from jaxdamp.dampers.digressive_progressive import DigressiveProgressive
+from jaxdamp.dampers.fitted_range import (
+    FittedRange,
+    OutsideFittedRangeWarning,
+    without_fitted_ranges,
+)
 from jaxdamp.dampers.force_surface import ForceSurface
 from jaxdamp.dampers.frequency_selective import FrequencySelective
 from jaxdamp.dampers.gas_spring import GasSpring
@@ -27,12 +40,14 @@ from jaxdamp.dampers.linear import Linear
 from jaxdamp.dampers.lugre import LuGre
 from jaxdamp.dampers.modified_bouc_wen import ModifiedBoucWen
 from jaxdamp.dampers.mono_tube import MonoTube
+from jaxdamp.dampers.motion import Motion
 from jaxdamp.dampers.motion_ratio import MotionRatio
 from jaxdamp.dampers.neural_hysteresis import NeuralHysteresis
 from jaxdamp.dampers.piecewise_linear import PiecewiseLinear
 from jaxdamp.dampers.piston_flow import PistonFlow
 from jaxdamp.dampers.polynomial import Polynomial
 from jaxdamp.dampers.power_law import PowerLaw
+from jaxdamp.dampers.range_use import RangeUse, extrapolated, range_use
 from jaxdamp.dampers.saturating import Saturating
 from jaxdamp.dampers.scheduled import Scheduled
 from jaxdamp.dampers.segmented_polynomial import SegmentedPolynomial
@@ -60,6 +75,7 @@ __all__ = [
     "Dahl",
     "Degressive",
     "DigressiveProgressive",
+    "FittedRange",
     "ForceSurface",
     "FrequencySelective",
     "GasSpring",
@@ -71,12 +87,15 @@ __all__ = [
     "LuGre",
     "ModifiedBoucWen",
     "MonoTube",
+    "Motion",
     "MotionRatio",
     "NeuralHysteresis",
+    "OutsideFittedRangeWarning",
     "PiecewiseLinear",
     "PistonFlow",
     "Polynomial",
     "PowerLaw",
+    "RangeUse",
     "Saturating",
     "Scaled",
     "Scheduled",
@@ -89,6 +108,10 @@ __all__ = [
     "Sum",
     "Table",
     "TemperatureScaled",
+    "extrapolated",
+    "range_use",
     "takes_command",
     "with_command",
+    "with_fitted_range",
+    "without_fitted_ranges",
 ]

@@ -6,7 +6,7 @@ extension: a passive law takes in energy, ∮ F v dt ≥ 0. One instance is one 
 
 import dataclasses
 from abc import abstractmethod
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, TypeVar, final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,7 +15,12 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers.fitted_range import UNITS, FittedRange, Limits
+from jaxdamp.dampers.motion import Motion
 from jaxdamp.parameters import check_parameters, nonnegative, parameter, readable, real
+
+
+L = TypeVar("L")
 
 
 class AbstractDamper(eqx.Module):
@@ -24,12 +29,18 @@ class AbstractDamper(eqx.Module):
     A law whose states are fast compared with a step of about a millisecond derives from this class and brings its own
     `advance`, exact or implicit. Other laws derive from `AbstractStateful`, `AbstractStateless` or
     `AbstractMemoryless`, which bring it.
+
+    Every law can say in `fitted_to` which range its records covered (`with_fitted_range`).
     """
 
     answers_at_once: ClassVar[bool] = True  # the force depends on the velocity directly, not only through states
     smooth_state: ClassVar[bool] = False  # own states have no kink where the velocity has one: may be extrapolated
 
+    fitted_to: FittedRange | None = eqx.field(kw_only=True, default=None, repr=False)
+
     def __check_init__(self) -> None:
+        if "fitted_to" not in vars(self):  # as after an `__init__` written by hand; trees need the field to be there
+            object.__setattr__(self, "fitted_to", None)
         check_parameters(self)
 
     def __repr__(self) -> str:
@@ -63,13 +74,19 @@ class AbstractDamper(eqx.Module):
         """The laws inside whose states are part of this law's states: all laws in its fields, unless it says others."""
         return parts(self)
 
+    def motion_inside(self, motion: Motion) -> list[tuple["AbstractDamper", Motion]]:
+        """What each law directly inside goes through while this law goes through a motion, as far as it is known.
+
+        By default stroke and velocity are those of the whole, and the force is not known. A wrapper whose inner law
+        moves otherwise says how.
+        """
+        return [(part, motion.with_force(None)) for part in parts(self)]
+
     def __add__(self, other: "AbstractDamper") -> "AbstractDamper":
         """Two laws side by side: forces add."""
         if not isinstance(other, AbstractDamper):
             return NotImplemented
-        mine = self.terms if isinstance(self, Sum) else (self,)
-        theirs = other.terms if isinstance(other, Sum) else (other,)
-        return Sum(mine + theirs)
+        return Sum(_terms(self) + _terms(other))
 
     def __mul__(self, factor: Any) -> "AbstractDamper":
         """The force times a factor."""
@@ -150,6 +167,38 @@ def parts(law: AbstractDamper) -> list[AbstractDamper]:
     return [part for part in inside if isinstance(part, AbstractDamper)]
 
 
+def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Limits) -> L:
+    """The same law with the range of the records that it was fitted to, in place of any range it had.
+
+    `identify.fit` and `train` do this; state it yourself for a law whose numbers come from elsewhere. Laws inside keep
+    ranges of their own. Everything that uses the law then says by how much it leaves the range.
+
+    Arguments:
+        law: any law.
+        fitted_to: the range; or give the limits by name.
+        limits: as `FittedRange` takes them, such as `velocity=(-0.5, 0.5)`.
+
+    Raises:
+        ValueError: something that is not a law; neither a range nor limits, or both; a quantity that no range has;
+            limits out of order.
+
+    >>> from jaxdamp.dampers import Linear
+    >>> with_fitted_range(Linear(1500.0), velocity=(-0.5, 0.9)).fitted_to.words()
+    'velocity −0.5 to 0.9 m/s'
+    """
+    if not isinstance(law, AbstractDamper):
+        _checks.refuse("law", "be a damper law", f"a {type(law).__name__}", "Of a vehicle, give it to its dampers.")
+    for name in limits:
+        _checks.one_of("limits", name, UNITS)
+    if (fitted_to is None) == (not limits):
+        remedy = "Write for example `with_fitted_range(law, velocity=(-0.5, 0.5))`."
+        _checks.refuse("fitted_to", "be given, or limits by name, and not both", repr(fitted_to), remedy)
+    changed = object.__new__(type(law))
+    for name, value in (vars(law) | {"fitted_to": fitted_to or FittedRange(**limits)}).items():
+        object.__setattr__(changed, name, value)
+    return changed
+
+
 def refuse_states(argument: str, law: AbstractDamper, remedy: str) -> None:
     """Refuse a law with states where only the force of this instant has a meaning."""
     if law.initial_state().size:
@@ -161,6 +210,16 @@ def own_and_inner(law: AbstractDamper, state: State) -> tuple[Scalar, Float[Arra
     if not state.size:
         _checks.refuse("state", f"hold the state of {type(law).__name__} first", "empty", _START)
     return state[0], state[1:]
+
+
+def _terms(law: AbstractDamper) -> tuple[AbstractDamper, ...]:
+    """The terms of a sum, or the law itself. What a sum was fitted to holds for its terms, but for the force."""
+    if not isinstance(law, Sum):
+        return (law,)
+    if law.fitted_to is None:
+        return law.terms
+    covered = law.fitted_to.without("force")
+    return tuple(with_fitted_range(term, covered) if term.fitted_to is None else term for term in law.terms)
 
 
 def _states_of(terms: tuple[AbstractDamper, ...], state: State) -> list[Array]:
@@ -234,6 +293,10 @@ class Scaled(AbstractDamper):
             _checks.refuse("factor", "not be negative", factor, remedy)
 
     preserves_linearity: ClassVar[bool] = True
+
+    def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
+        """The same motion at a force that is smaller by the factor."""
+        return [(self.law, motion.divided(self.factor))]
 
     def initial_state(self) -> State:
         """The states of the law."""

@@ -9,6 +9,7 @@ from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._series import Deflections, Springs, refuse_late, series_rate, series_step
 from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.motion import Motion
 from jaxdamp.parameters import parameter, positive
 
 
@@ -46,6 +47,10 @@ class Bushing(AbstractDamper):
     damping: Number = parameter("N s/m", "c_b, damping of the bushing", positive)
 
     answers_at_once: ClassVar[bool] = False
+
+    def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
+        """The same force; stroke and velocity of the whole, of which the rubber takes a part, so mostly a bound."""
+        return [(self.law, motion)]
 
     def __check_init__(self) -> None:
         refuse_late("law", self.law, "Bushing")

@@ -1,34 +1,20 @@
 """Laws that take a command: a voltage, a coil current, the click of an adjuster."""
 
-import dataclasses
-from typing import Any
-
 import equinox as eqx
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import ScalarLike
+from jaxdamp.dampers._commands import command_paths
 from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.range_use import range_use, sentence, warn_outside
 from jaxdamp.parameters import as_float, check_parameters, get
-
-
-def _paths(tree: Any, prefix: str = "") -> list[str]:
-    if isinstance(tree, tuple | list):
-        return [path for i, item in enumerate(tree) for path in _paths(item, f"{prefix}{i}.")]
-    if not isinstance(tree, eqx.Module):
-        return []
-    found = []
-    for field in dataclasses.fields(tree):
-        if (field.metadata.get("setting") or {}).get("command"):
-            found.append(prefix + field.name)
-        else:
-            found += _paths(getattr(tree, field.name), f"{prefix}{field.name}.")
-    return found
 
 
 def takes_command(law: AbstractDamper) -> bool:
     """Whether there is a command in the law or in a law inside."""
-    return bool(_paths(law))
+    return bool(command_paths(law))
 
 
 def with_command(law: AbstractDamper, command: ScalarLike) -> AbstractDamper:
@@ -39,11 +25,14 @@ def with_command(law: AbstractDamper, command: ScalarLike) -> AbstractDamper:
     >>> float(law.law.voltage)
     1.5
 
+    A command beyond those of the records that the law was fitted to gives an `OutsideFittedRangeWarning`; one beyond
+    the levels of a `Scheduled` law is refused (inside compiled code it is held at the nearest level).
+
     Raises:
         ValueError: a law without a command; a command outside its domain.
     """
     check_module("law", law, (AbstractDamper,), "with_command(law, command)")
-    paths = _paths(law)
+    paths = command_paths(law)
     if not paths:
         remedy = "`ModifiedBoucWen` takes a voltage; `Scheduled` makes any law depend on a command."
         _checks.refuse("law", "take a command", f"{law}, which takes none", remedy)
@@ -53,4 +42,6 @@ def with_command(law: AbstractDamper, command: ScalarLike) -> AbstractDamper:
         owner = get(changed, path.rpartition(".")[0])
         check_parameters(owner)
         owner.__check_init__()
+    uses = [use for use in range_use(changed, Motion()) if use.quantity == "command"]
+    warn_outside([sentence(type(law).__name__, uses)])
     return changed

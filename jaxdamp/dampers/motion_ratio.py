@@ -4,6 +4,7 @@ from typing import ClassVar, final
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.motion import Motion
 from jaxdamp.parameters import parameter, positive
 
 
@@ -23,6 +24,10 @@ class MotionRatio(AbstractDamper):
     ratio: Number = parameter("", "damper travel divided by wheel travel", positive)
 
     preserves_linearity: ClassVar[bool] = True
+
+    def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
+        """The damper's own stroke and velocity, i times those at the wheel, and its own force."""
+        return [(self.law, motion.moved(self.ratio).divided(self.ratio))]
 
     def initial_state(self) -> State:
         """The states of the law."""

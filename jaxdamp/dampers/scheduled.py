@@ -11,6 +11,7 @@ from jaxdamp._field_types import check_field_types
 from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.fitted_range import without_fitted_ranges
 from jaxdamp.parameters import increasing, setting
 
 
@@ -52,7 +53,8 @@ class Scheduled(AbstractDamper):
             must = "hold two laws or more, and a level for each"
             _checks.refuse("laws", must, f"{len(self.laws)} laws and levels of shape {self.levels.shape}")
         structures = {
-            (jax.tree.structure(law), tuple(jnp.shape(leaf) for leaf in jax.tree.leaves(law))) for law in self.laws
+            (jax.tree.structure(law), tuple(jnp.shape(leaf) for leaf in jax.tree.leaves(law)))
+            for law in without_fitted_ranges(self.laws)
         }
         if len(structures) > 1:
             remedy = "Use one law class with vectors of one length, such as tables over the same velocities."
@@ -70,8 +72,8 @@ class Scheduled(AbstractDamper):
 
     def at_command(self) -> AbstractDamper:
         """The law with its numbers at the command."""
-        shares = self.shares()
-        return jax.tree.map(lambda *leaves: jnp.tensordot(shares, jnp.stack(leaves), 1), *self.laws)
+        shares, laws = self.shares(), without_fitted_ranges(self.laws)
+        return jax.tree.map(lambda *leaves: jnp.tensordot(shares, jnp.stack(leaves), 1), *laws)
 
     def initial_state(self) -> State:
         """The states of the law."""

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._series import one_spring, refuse_late, series_rate, series_step
 from jaxdamp.dampers.base import AbstractDamper, own_and_inner
+from jaxdamp.dampers.motion import Motion
 from jaxdamp.parameters import nonnegative, parameter, positive
 
 
@@ -33,6 +34,10 @@ class SeriesSpring(AbstractDamper):
 
     answers_at_once: ClassVar[bool] = False
     smooth_state: ClassVar[bool] = True
+
+    def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
+        """The same force; stroke and velocity of the whole, of which the spring takes a part, so mostly a bound."""
+        return [(self.law, motion)]
 
     def __check_init__(self) -> None:
         refuse_late("law", self.law, "SeriesSpring")

@@ -5,6 +5,7 @@ from typing import ClassVar, final
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.motion import Motion
 from jaxdamp.parameters import parameter, positive, setting
 
 
@@ -38,6 +39,10 @@ class TemperatureScaled(AbstractDamper):
     sensitivity: Number = parameter("1/K", "κ, loss of force for each kelvin", default=0.002)
 
     preserves_linearity: ClassVar[bool] = True
+
+    def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
+        """The same motion at the oil temperature, at the force of the law's own temperature."""
+        return [(self.law, motion.divided(self.factor()).at_temperature(self.temperature))]
 
     def __check_init__(self) -> None:
         factor = _checks.concrete(self.factor())

@@ -9,7 +9,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import VectorLike
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, extrapolated
 from jaxdamp.export._write import write_whole
 from jaxdamp.rig import quasi_static
 
@@ -21,6 +21,8 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
     states have settled (`jaxdamp.rig.quasi_static`); its hysteresis does not fit into a table, and the header says so.
     Velocities at which the law has no settled or no finite force get no row: a comment in the file and a Python warning
     say how many, where and why.
+    The header also says what the law was fitted to, and which rows lie beyond: marks in the rows themselves would keep
+    simulators from reading them.
 
     Arguments:
         law: the law.
@@ -54,6 +56,7 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
         )
     if curve.note:
         header.append(f"# rows left out: {curve.note}")
+    header += _range_lines(law, velocity[curve.settled])
     force = np.asarray(curve.force)
     pairs = zip(velocity[curve.settled], force[curve.settled], strict=True)
     rows = [f"{float(v)!r},{float(f)!r}" for v, f in pairs]
@@ -61,3 +64,16 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
     if curve.note:
         warnings.warn(f"{written.name}: rows left out. {curve.note}", stacklevel=2)
     return written
+
+
+def _range_lines(law: AbstractDamper, velocity: np.ndarray) -> list[str]:
+    """What the law was fitted to, and the rows that lie beyond."""
+    lines = [] if law.fitted_to is None else [f"# fitted to: {law.fitted_to.words()}"]
+    outside = extrapolated(law, velocity)
+    if not outside.any():
+        return lines
+    if outside.all():
+        return [*lines, "# extrapolated: all rows lie beyond the velocities that the law was fitted to"]
+    measured = velocity[~outside]
+    where = f"rows below {measured[0]:.6g} m/s and above {measured[-1]:.6g} m/s"
+    return [*lines, f"# extrapolated: {where}, {np.count_nonzero(outside)} of {velocity.size}, beyond all records"]

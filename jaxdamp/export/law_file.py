@@ -13,20 +13,23 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._types import Number
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, FittedRange
+from jaxdamp.dampers.fitted_range import UNITS, has_fitted_range
 from jaxdamp.export._write import write_whole
 from jaxdamp.parameters import as_float
 
 
 FORMAT = "jaxdamp law"
-VERSION = 1
+PLAIN, WITH_RANGES = 1, 2  # versions: a file of the second may say what its laws were fitted to
+FITTED_TO = "fitted_to"
 
 
 def to_json(law: AbstractDamper, path: str | os.PathLike[str] | None = None) -> str:
     """Write a law, of any composition, as JSON.
 
     Every number stands with its unit, all digits are kept: `from_json` gives the same law, bit for bit. Laws that you
-    defined yourself are written by the name of their class.
+    defined yourself are written by the name of their class. The range that a law was fitted to stands with it, under
+    "fitted_to".
 
     Arguments:
         law: the law.
@@ -52,7 +55,8 @@ def to_json(law: AbstractDamper, path: str | os.PathLike[str] | None = None) -> 
     """
     if not isinstance(law, AbstractDamper):
         _checks.refuse("law", "be a damper law", f"a {type(law).__name__}")
-    text = _layout({"format": FORMAT, "version": VERSION, "law": _plain_law(law)}) + "\n"
+    version = WITH_RANGES if has_fitted_range(law) else PLAIN
+    text = _layout({"format": FORMAT, "version": version, "law": _plain_law(law)}) + "\n"
     if path is not None:
         write_whole(path, text)
     return text.rstrip("\n")
@@ -88,11 +92,16 @@ def from_json(path_or_text: str | os.PathLike[str]) -> AbstractDamper:
         raise ValueError(f"A law must be written in JSON, but {source} is not: {error}.") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         _checks.refuse("path_or_text", f'begin with "format": "{FORMAT}"', source, "Was it written by `to_json`?")
-    if document.get("version") != VERSION:
+    version = document.get("version")
+    if version not in (PLAIN, WITH_RANGES):
         remedy = "Another version of jaxdamp wrote it; read it with that one."
-        _checks.refuse("version", f"be {VERSION}", repr(document.get("version")), remedy)
+        _checks.refuse("version", f"be {PLAIN} or {WITH_RANGES}", repr(version), remedy)
     _same_names("the law file", ["format", "version", "law"], document)
-    return _law(document["law"], "law")
+    law = _law(document["law"], "law")
+    if version == PLAIN and has_fitted_range(law):
+        remedy = f'Files that say what laws were fitted to are of "version": {WITH_RANGES}.'
+        _checks.refuse("the law file", f"have no {FITTED_TO!r} in version {PLAIN}", "one that has", remedy)
+    return law
 
 
 # ---- a law to plain dictionaries
@@ -104,11 +113,21 @@ def _plain_law(law: AbstractDamper) -> dict[str, Any]:
         remedy = "Give your class a name of its own; after redefining it, make the law anew."
         _checks.refuse("law", "be of a class that can be found by its name", f"a {name} unlike another {name}", remedy)
     result: dict[str, Any] = {"class": name}
-    for field in dataclasses.fields(law):
+    for field in _own_fields(law):
         value, where = getattr(law, field.name), f"{name}.{field.name}"
         declared = _declared(field)
         result[field.name] = _plain(value, where) if declared is None else _quantity(value, declared["unit"], where)
+    if law.fitted_to is not None:
+        _known_number(law.fitted_to.limits, f"{name}.{FITTED_TO}")
+        result[FITTED_TO] = {
+            quantity.name: {"value": list(quantity.limits), "unit": quantity.unit} for quantity in law.fitted_to.known()
+        }
     return result
+
+
+def _own_fields(law: AbstractDamper | type[AbstractDamper]) -> list[dataclasses.Field]:
+    """The fields of a law but for its range, which all laws have."""
+    return [field for field in dataclasses.fields(law) if field.name != FITTED_TO]
 
 
 def _plain(value: Any, where: str) -> Any:
@@ -129,15 +148,19 @@ def _plain(value: Any, where: str) -> Any:
 
 
 def _quantity(value: Any, unit: str | None, where: str) -> dict[str, Any]:
-    numbers = _checks.concrete(value)
-    if numbers is None:
-        _checks.refuse(
-            where, "have a known value", "traced", "Call `to_json` outside `jax.jit`, `jax.vmap`, `jax.grad`."
-        )
+    numbers = _known_number(value, where)
     if not np.issubdtype(numbers.dtype, np.floating):
         _checks.refuse(where, "hold floating-point numbers", f"of type {numbers.dtype}")
     _checks.finite(where, numbers)
     return {"value": numbers.tolist()} | ({} if unit is None else {"unit": unit})
+
+
+def _known_number(value: Any, where: str) -> np.ndarray:
+    numbers = _checks.concrete(value)
+    if numbers is None:
+        remedy = "Call `to_json` outside `jax.jit`, `jax.vmap`, `jax.grad`."
+        _checks.refuse(where, "have a known value", "traced", remedy)
+    return numbers
 
 
 def _layout(value: Any, indent: str = "") -> str:
@@ -175,9 +198,11 @@ def _law(plain: Any, where: str) -> AbstractDamper:
         near = get_close_matches(name, sorted(_classes()), 1)
         hint = f"Did you mean {near[0]!r}? " if near else ""
         _checks.refuse(where, "be a law that is known", f"{name!r}", f"{hint}Import the module of your own laws first.")
-    fields = dataclasses.fields(kind)
+    fields = _own_fields(kind)
+    covered = _fitted_to(plain.get(FITTED_TO), name)
     # options that a class was given after the file was written have their default
-    plain = {f.name: f.default for f in fields if _declared(f) is None and isinstance(f.default, bool)} | plain
+    options = {f.name: f.default for f in fields if _declared(f) is None and isinstance(f.default, bool)}
+    plain = options | {key: value for key, value in plain.items() if key != FITTED_TO}
     _same_names(name, ["class"] + [field.name for field in fields], plain)
     law = object.__new__(kind)
     for field in fields:
@@ -187,10 +212,29 @@ def _law(plain: Any, where: str) -> AbstractDamper:
         if field.type is Number and np.ndim(value):
             _checks.refuse(here, "be one number", value)
         object.__setattr__(law, field.name, value)
+    object.__setattr__(law, FITTED_TO, covered)
     for base in kind.__mro__:
         if "__check_init__" in base.__dict__:
             base.__dict__["__check_init__"](law)
     return law
+
+
+def _fitted_to(plain: Any, owner: str) -> FittedRange | None:
+    """The range of a law, as `_plain_law` writes it."""
+    if plain is None:
+        return None
+    where = f"{owner}.{FITTED_TO}"
+    if not isinstance(plain, dict):
+        must = 'be written as {"velocity": {"value": [...], "unit": "m/s"}, ...}'
+        _checks.refuse(where, must, json.dumps(plain)[:80])
+    limits: dict[str, tuple[float, float]] = {}
+    for name, quantity in plain.items():
+        _checks.one_of(where, name, UNITS)
+        if _number(quantity, UNITS[name], f"{where}.{name}").shape != (2,):
+            _checks.refuse(f"{where}.{name}", "be the lowest and the highest value", json.dumps(quantity)[:80])
+        low, high = quantity["value"]
+        limits[name] = float(low), float(high)
+    return FittedRange(**limits)
 
 
 def _value(plain: Any, where: str) -> Any:

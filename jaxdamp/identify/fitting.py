@@ -14,11 +14,12 @@ from jaxtyping import Bool, Float
 
 from jaxdamp import _checks, dampers
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.dampers import AbstractDamper, AbstractStateless
+from jaxdamp.dampers import AbstractDamper, AbstractStateless, with_fitted_range, without_fitted_ranges
 from jaxdamp.dampers.base import parts
 from jaxdamp.dampers.coverage import coverage
 from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.coordinates import box, edges, to_values
+from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.judgement import judge, warn
 from jaxdamp.identify.result import FitResult, score
 from jaxdamp.identify.search import Found, linearised, search
@@ -69,7 +70,8 @@ def fit(
         max_steps: of the search.
 
     Returns:
-        The law, its parameters with standard errors, scores and warnings; a search that fails says so in `warnings`.
+        The law with the range of the fitted records (`law.fitted_to`), its parameters with standard errors, scores and
+        warnings; a search that fails says so in `warnings`.
 
     Raises:
         ValueError: no records; names that fit no parameter; a start outside its bounds or without finite forces; a
@@ -86,7 +88,8 @@ def fit(
     _check(runs, force_noise, max_steps)
     sigma = weights(weighting, runs)
     fitted_to = np.isfinite(sigma)
-    begin = started(law, [run for run, yes in zip(runs, fitted_to, strict=True) if yes])
+    used_runs = [run for run, yes in zip(runs, fitted_to, strict=True) if yes]
+    begin = started(law, used_runs)
     free = free_parameters(begin, freeze=freeze, bounds=bounds)
     _checks.finite("law", free.values)
     made, places = batches(begin, runs, sigma, samples_per_cycle)
@@ -102,7 +105,7 @@ def fit(
     sides = edges(free, found.values)
     known = uncertainty(found.jacobian, found.residual, noise, sides != 0)
     estimates = judge(free, found.values, known, sides, np.linalg.norm(found.jacobian, axis=0) / level, dof)
-    fitted = free.build(jnp.asarray(found.values))
+    fitted = with_fitted_range(free.build(jnp.asarray(found.values)), covered_range(used_runs))
     percent, rmse, scores = score(fitted, runs, fitted_to)
     notes = warn(estimates, "" if found.converged else found.said, found.residual[used], force_noise is None)
     return FitResult(
@@ -153,10 +156,10 @@ def check_starts(laws: Any, call: str) -> None:
 
 
 def started(law: Start, runs: Sequence[BenchRun]) -> AbstractDamper:
-    """An instance to start from."""
+    """An instance to start from, without the ranges of earlier fits."""
     check_start("law", law)
     if isinstance(law, AbstractDamper):
-        return law
+        return without_fitted_ranges(law)
     guess = getattr(law, "guess", None) if isinstance(law, type) else law
     if guess is None:
         name = getattr(law, "__name__", law)
@@ -166,7 +169,7 @@ def started(law: Start, runs: Sequence[BenchRun]) -> AbstractDamper:
     channels = {name: np.concatenate([getattr(run, name) for run in runs]) for name in ("velocity", "force", *asked)}
     with python_warnings.catch_warnings():
         python_warnings.simplefilter("ignore", np.exceptions.RankWarning)
-        return guess(channels.pop("velocity"), channels.pop("force"), **channels)
+        return without_fitted_ranges(guess(channels.pop("velocity"), channels.pop("force"), **channels))
 
 
 def weights(weighting: str | Sequence[float], runs: Sequence[BenchRun]) -> list[float]:

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 from jaxdamp.dampers.command import takes_command, with_command
 from jaxdamp.dampers.coverage import refuse_gaps
 from jaxdamp.rig import march
@@ -243,6 +243,7 @@ def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
 
 def predict_runs(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[np.ndarray]:
     """Force [N] of the law at every sample of every record."""
+    law = without_fitted_ranges(law)
     made, places = batches(law, runs, [1.0] * len(runs), None if is_memoryless(law) else PREDICTED_PER_CYCLE)
     forces = [np.asarray(_predict(batch, law)) for batch in made]
     spread = [

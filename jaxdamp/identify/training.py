@@ -15,7 +15,8 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, with_fitted_range
+from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.fitting import Start, started, weights
 from jaxdamp.identify.result import Score, score
 from jaxdamp.identify.traces import Batch, batches
@@ -161,7 +162,7 @@ def train(
                 stopped = f"stopped at step {done}, {patience} steps after the held-out error last fell"
                 break
 
-    trained = free.build(free.physical(best))
+    trained = with_fitted_range(free.build(free.physical(best)), covered_range(trained_on))
     percent, rmse, scores = score(trained, runs, np.isfinite(sigma))
     held_percent, held_rmse, held_scores = score(trained, held_out)
     return Training(

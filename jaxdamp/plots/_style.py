@@ -18,6 +18,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES = ("-", "--", ":", "-.")
 BLACK = "#222222"
 GREY = "#7F7F7F"
+SHADE = "#F5EEDF"  # behind what is extrapolated
 
 VELOCITY = "velocity [m/s]   (+ rebound, − compression)"
 STROKE = "stroke [mm]   (+ rebound, − compression)"

@@ -10,9 +10,9 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 from jaxdamp.parameters import FreeParameters, free_parameters
-from jaxdamp.plots import _style
+from jaxdamp.plots import _style, fitted_range
 from jaxdamp.rig import march
 
 
@@ -66,7 +66,8 @@ def law_card(
     The effect is p ∂F/∂p, by automatic differentiation through the law and its states: the change of the force [N] for
     a change of the parameter by its own value, over the cycle of the highest frequency. A parameter whose curve is flat
     cannot be found from such a test; two whose curves have one shape cannot be told apart. Parameters that are zero
-    have none. Of many numbers the eight with the largest effect are drawn.
+    have none. Of many numbers the eight with the largest effect are drawn. Velocities beyond those that the law was
+    fitted to are shaded.
 
     Arguments:
         law: any law.
@@ -77,12 +78,12 @@ def law_card(
     check_module("law", law, (AbstractDamper,), "law_card(law)")
     _checks.positive("amplitude", amplitude)
     _checks.positive("frequencies", np.asarray(frequencies))
-    loops = _loops(law, float(amplitude), frequencies)
+    loops = _loops(without_fitted_ranges(law), float(amplitude), frequencies)
     figure = _style.new_figure(13.0, 3.9)
     over_velocity, over_stroke, effects = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.15))
     for index, frequency in enumerate(frequencies):
         look = {"color": _style.graded(index, len(frequencies)), "linewidth": 1.6}
-        over_velocity.plot(loops.velocity[index], loops.force[index], **look)
+        fitted_range.curve(over_velocity, law, loops.velocity[index], loops.force[index], **look)
         over_stroke.plot(1e3 * loops.stroke[index], loops.force[index], label=f"{frequency:g} Hz", **look)
     fastest = int(np.argmax(frequencies))
     sizes = np.max(np.abs(loops.effects[fastest]), axis=0)
@@ -96,10 +97,14 @@ def law_card(
     _style.dress(over_velocity, "velocity [m/s]   (+ rebound)", "force [N]   (+ resists extension)")
     _style.dress(over_stroke, "stroke [mm]   (+ rebound)", "force [N]")
     _style.dress(effects, f"velocity [m/s] at {frequencies[fastest]:g} Hz", "effect p ∂F/∂p [N]")
+    reach = float(np.max(np.abs(loops.velocity)))
+    points = np.linspace(-reach, reach, 2001)
+    shaded = fitted_range.shade(over_velocity, [law], points)
+    fitted_range.shade(effects, [law], points, "_nolegend_")
     for axes in (over_velocity, over_stroke, effects):
         _style.cross(axes)
     _style.legend_beside(figure, effects.get_legend_handles_labels()[0], f"effect of{more}")
     heading = f"loops of ±{1e3 * amplitude:g} mm at"
-    _style.legend_beside(figure, over_stroke.get_legend_handles_labels()[0], heading, "lower")
+    _style.legend_beside(figure, [*over_stroke.get_legend_handles_labels()[0], *shaded], heading, "lower")
     figure.suptitle(title or _style.law_name(law), x=0.01, ha="left", fontsize="large", fontweight="bold")
     return figure

@@ -8,7 +8,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._types import VectorLike
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.plots import _style
+from jaxdamp.plots import _style, fitted_range
 from jaxdamp.rig import quasi_static
 from jaxdamp.tune import TuneResult
 
@@ -43,11 +43,13 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
         held = [quasi_static(law, points) for law in pair]
         old, new = (np.asarray(curve.force) for curve in held)
         gaps += [f"{name}{when}: {c.note}" for when, c in zip(("before", "after"), held, strict=True) if c.note]
-        curves.plot(points, old, "--", color=colour if len(pairs) > 1 else _style.BLACK, label=f"{name}before")
-        curves.plot(points, new, "-", color=colour, linewidth=1.8, label=f"{name}after")
+        earlier = colour if len(pairs) > 1 else _style.BLACK
+        fitted_range.curve(curves, pair[0], points, old, linestyle="--", color=earlier, label=f"{name}before")
+        fitted_range.curve(curves, pair[1], points, new, color=colour, linewidth=1.8, label=f"{name}after")
+    fitted_range.shade(curves, [law for pair in pairs.values() for law in pair], points)
     _style.dress(curves, _style.VELOCITY, _style.FORCE, "Damper law")
     _style.cross(curves)
-    curves.legend(loc="upper left", frameon=False)
+    curves.legend(loc="upper left", facecolor="white", edgecolor="none")
     _bars(bars, result)
     _search(search, result)
     _style.note_below(figure, gaps)

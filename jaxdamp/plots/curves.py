@@ -10,7 +10,7 @@ from jaxdamp import _checks
 from jaxdamp._types import VectorLike
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.plots import _style
+from jaxdamp.plots import _style, fitted_range
 from jaxdamp.plots.loops import last_cycle
 from jaxdamp.rig import quasi_static
 
@@ -31,7 +31,8 @@ def force_velocity(
     """Force over velocity of one law or several, over the samples and the peak-velocity points of records.
 
     A law with states is drawn at constant velocity, its states settled: the curve in the middle of its loops. Where it
-    has no settled or no finite force the curve has a gap, and a remark under the picture says why.
+    has no settled or no finite force the curve has a gap, and a remark under the picture says why. Beyond the
+    velocities that a law was fitted to (`law.fitted_to`) its curve is dotted; where that holds for all, shaded.
 
     Arguments:
         laws: a law, or laws by name.
@@ -59,6 +60,7 @@ def force_velocity(
     handles = _measured(axes, runs)
     curves, gaps = draw_laws(axes, laws, points, baseline)
     handles += curves
+    handles += fitted_range.shade(axes, laws.values(), points)
     _style.dress(axes, _style.VELOCITY, _style.FORCE)
     _style.cross(axes)
     axes.set_xlim(float(points.min()), float(points.max()))
@@ -83,7 +85,8 @@ def draw_laws(
             style = {"color": _style.BLACK, "linestyle": "--", "zorder": 2.5}
         else:
             style, number = _style.line_style(number), number + 1
-        handles += axes.plot(velocities, np.asarray(curve.force), linewidth=1.8, label=label, **style)
+        force = np.asarray(curve.force)
+        handles += fitted_range.curve(axes, law, velocities, force, linewidth=1.8, label=label, **style)
     return handles, gaps
 
 

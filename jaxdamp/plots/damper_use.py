@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jaxdamp import _checks, metrics
-from jaxdamp.plots import _style
+from jaxdamp.plots import _style, fitted_range
 from jaxdamp.rig import quasi_static
 from jaxdamp.simulation import Response
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 
-_BINS, _POINTS = 41, 81
+_BINS, _POINTS, _SHADE_POINTS = 41, 81, 2001
 
 
 def dampers_of(response: Response) -> tuple[str, ...]:
@@ -30,7 +30,7 @@ def damper_use(
     """Force over velocity during rides, each over its law at rest in velocity, and histograms of the velocity.
 
     The histograms are the share of time, and the share of the dissipated energy, in ranges of equal width: what of the
-    curve matters on this road.
+    curve matters on this road. Velocities beyond those that the laws were fitted to are shaded.
 
     Arguments:
         responses: a response, or responses by name, of one kind of vehicle.
@@ -50,7 +50,7 @@ def damper_use(
     records = {name: _record(response, damper) for name, response in responses.items()}
     reach = 1.02 * max(float(np.max(np.abs(velocity))) for velocity, _ in records.values())
     edges = np.linspace(-reach, reach, _BINS + 1)
-    middles, handles, gaps = 0.5 * (edges[1:] + edges[:-1]), [], []
+    middles, handles, laws, gaps = 0.5 * (edges[1:] + edges[:-1]), [], [], []
     for number, (name, (velocity, force)) in enumerate(records.items()):
         style = _style.line_style(number)
         law = responses[name].vehicle.elements()[responses[name].vehicle.frame().element_names.index(damper)]
@@ -58,16 +58,21 @@ def damper_use(
         trace.plot(velocity, force, color=style["color"], linewidth=0.5, alpha=0.5)
         curve = quasi_static(law, held)
         gaps += [f"{name or 'law'}: {curve.note}"] if curve.note else []
-        handles += trace.plot(held, np.asarray(curve.force), linewidth=1.8, label=name or "law", **style)
+        force_held = np.asarray(curve.force)
+        handles += fitted_range.curve(trace, law, held, force_held, linewidth=1.8, label=name or "law", **style)
+        laws.append(law)
         shares = metrics.velocity_histogram(velocity, edges), metrics.dissipation_histogram(force, velocity, edges)
         for axes, share in zip((time_share, energy_share), shares, strict=True):
             axes.step(middles, 100.0 * np.asarray(share), where="mid", linewidth=1.4, **style)
+    reached = np.linspace(-reach, reach, _SHADE_POINTS)
+    shaded = [fitted_range.shade(axes, laws, reached) for axes in (trace, time_share, energy_share)]
+    handles += shaded[0]
     words = f"{damper.replace('_', ' ')}: ride (thin), constant velocity (thick)"
     _style.dress(trace, _style.VELOCITY, _style.FORCE, words)
     _style.cross(trace)
     _style.dress(time_share, "velocity [m/s]", "share of time [%]", f"Time, {reach / _BINS * 2:.2g} m/s a step")
     _style.dress(energy_share, "velocity [m/s]", "share of dissipated energy [%]", "Energy")
-    if len(responses) > 1:
+    if len(responses) > 1 or shaded[0]:
         _style.legend_above(figure, handles)
     _style.note_below(figure, gaps)
     return figure

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks, metrics
-from jaxdamp.plots import _style
+from jaxdamp.plots import _style, fitted_range
 from jaxdamp.simulation import Response
 
 
@@ -32,7 +32,8 @@ def ride(
 ) -> "matplotlib.figure.Figure":
     """Channels over time and the power spectral density of the first of them, overlaid for several responses.
 
-    The legend gives the RMS of the first channel over the whole run.
+    The legend gives the RMS of the first channel over the whole run. Dampers that leave the range that their laws were
+    fitted to are named below; in a damper's velocity what lies beyond is shaded.
 
     Arguments:
         responses: a response, or responses by name, all of one kind of vehicle.
@@ -81,6 +82,7 @@ def ride(
             spectrum.loglog(frequency, gain**2 * density, ":", color=style["color"], linewidth=1.1)
         handles += spectrum.loglog(frequency, density, linewidth=1.3, label=label, **style)
     for axes, channel in zip(rows, channels, strict=True):
+        fitted_range.shade_channel(axes, responses.values(), channel)
         _style.dress(axes, "", _label(first, channel).replace("   ", "\n"))
         _style.cross(axes, vertical=False)
         axes.label_outer()
@@ -94,6 +96,7 @@ def ride(
     spectrum.grid(True, which="minor", color="0.95", linewidth=0.5)
     spectrum.set_xlim(*frequencies)
     _style.legend_above(figure, handles)
+    fitted_range.footnotes(figure, responses)
     return figure
 
 

@@ -11,6 +11,8 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks, metrics
 from jaxdamp._types import Scalar, ScalarLike, Signal
+from jaxdamp.dampers import RangeUse
+from jaxdamp.simulation.range_notes import range_sentences, range_uses
 from jaxdamp.simulation.wheels import AxleTiming
 from jaxdamp.vehicles import AbstractVehicle, Instant, RideMetric
 
@@ -172,6 +174,15 @@ class Response(eqx.Module):
             moved = moved - _middle(self.port_force) * (slope @ form.port_road.T)
         taken = jnp.sum(moved * dt[:, None], axis=0)
         return dict(zip(self.vehicle.frame().element_names, taken, strict=True))
+
+    def range_use(self) -> dict[str, list[RangeUse]]:
+        """What each damper did beside the range that its law was fitted to; only of laws that have one."""
+        return range_uses(self.vehicle, self.motion, self.road, self.road_rate, self.port_force)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know before trusting the run, in words: dampers outside the range they were fitted to."""
+        return range_sentences(self.range_use())
 
     def to_xarray(self) -> "xarray.Dataset":
         """All channels as an `xarray.Dataset` over time, with units."""

@@ -12,11 +12,14 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Scalar
 from jaxdamp.configuration import fuses_loops
+from jaxdamp.dampers import RangeUse, without_fitted_ranges
+from jaxdamp.dampers.fitted_range import has_fitted_range
 from jaxdamp.parameters import parameters, replace
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation._vectors import scalars
-from jaxdamp.simulation.exponential import settled
+from jaxdamp.simulation.exponential import exponential_steps, settled
 from jaxdamp.simulation.gauge import Gathered, Gauge
+from jaxdamp.simulation.range_notes import range_uses
 from jaxdamp.simulation.run import sampled
 from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.stepper import FOR_REVERSE, Ground, Now, Stepper
@@ -113,6 +116,19 @@ class Ride(eqx.Module):
     def side_by_side(self) -> "Ride":
         """The same, compiled for many cars at a time: for `jax.vmap`. `sweep` does it itself."""
         return eqx.tree_at(lambda ride: ride.many, self, True)
+
+    def range_use(self, point: Mapping[str, Any] | None = None) -> dict[str, list[RangeUse]]:
+        """What each damper does at a point beside the range that its law was fitted to; only of laws that have one.
+
+        It drives the run once more and keeps it: ask it of the few points that matter, not of a whole sweep.
+        `dampers.range_use` says what is compared; `RangeUse.outside` says whether a range is left.
+        """
+        vehicle = replace(self.vehicle, dict(point or {}))
+        if not has_fitted_range(vehicle):
+            return {}
+        heights, step = self.on_axles_of(vehicle).heights, jnp.asarray(self.dt, dtype=float)
+        saved = exponential_steps(without_fitted_ranges(vehicle), heights, step, None, self.substeps, 1)
+        return range_uses(vehicle, saved.motion, saved.road, saved.road_rate, saved.port_force)
 
     def __call__(self, point: Mapping[str, Any] | None = None) -> dict[str, Scalar]:
         """The metrics by name, with other values of the parameters at these paths."""

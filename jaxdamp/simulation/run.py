@@ -10,9 +10,12 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal
+from jaxdamp.dampers import without_fitted_ranges
 from jaxdamp.dampers.coverage import coverage
+from jaxdamp.dampers.range_use import warn_outside
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.exponential import exponential_steps
+from jaxdamp.simulation.range_notes import range_sentences
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
@@ -60,6 +63,9 @@ def simulate(
         every: save every so many-th instant only, of long runs. The motion is the same, but metrics and the energy
             balance then know no more than what is saved; `Ride` gathers metrics at every instant and saves none.
 
+    A damper that leaves the range that its law was fitted to (`law.fitted_to`) gives an `OutsideFittedRangeWarning`
+    and a sentence in `response.notes`; `response.range_use()` has the numbers.
+
     Returns:
         The response at `round(duration/dt) + 1` instants, or one in `every` of them and the first.
 
@@ -76,6 +82,7 @@ def simulate(
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "simulate(vehicle, road)")
     check_module("road", road, (AbstractRoad,), "simulate(vehicle, road)")
+    driven, vehicle = vehicle, without_fitted_ranges(vehicle)  # laws fitted to other records share one program
     time, heights = sampled(vehicle, road, duration, dt)
     _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)
@@ -99,7 +106,9 @@ def simulate(
             refuse_restless(vehicle)
         remedy = " ".join([*filter(None, map(coverage, vehicle.elements())), remedy])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
-    return Response(vehicle, time[::every], *saved, axle_timing(vehicle, road))
+    response = Response(driven, time[::every], *saved, axle_timing(vehicle, road))
+    warn_outside(range_sentences(response.range_use()))
+    return response
 
 
 def _strides(count: int, every: int, dt: float) -> None:

@@ -15,6 +15,7 @@ from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, moves_axles
+from jaxdamp.tune.range_notes import range_notes
 from jaxdamp.tune.result import Change, TuneResult, V
 from jaxdamp.vehicles import AbstractVehicle, RideMetric, linearise, stationary_rms, with_weightings
 
@@ -59,7 +60,7 @@ def minimise(
 
     Returns:
         The tuned vehicle, all metrics before and after, and warnings: a search that does not end well, or a limit that
-        cannot be met, says so there.
+        cannot be met, says so there, and so do dampers that leave the range that their laws were fitted to.
 
     Raises:
         ValueError: unknown metrics or parameters, a start outside its bounds.
@@ -110,8 +111,10 @@ def minimise(
             f"The search stopped where the metric could still fall{ended}: a change of the free numbers by their own"
             f" size would change it at a rate of {left:.1e} of itself. Start from the result, or allow more steps."
         )
+    tuned = free.build(jnp.asarray(values))
+    notes += range_notes(vehicle, tuned, road, duration, dt)
     return TuneResult(
-        free.build(jnp.asarray(values)),
+        tuned,
         vehicle,
         metric,
         changes,

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar, State
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 
 
 # One array, or a tuple of scalars; who calls knows which.
@@ -53,6 +53,7 @@ class Ports(eqx.Module):
     smooth: tuple[bool, ...] = eqx.field(static=True)  # of each kind, asked of one law: stacked ones cannot answer
 
     def __init__(self, laws: Sequence[AbstractDamper], *, apart: bool = False) -> None:
+        laws = [without_fitted_ranges(law) for law in laws]
         kinds: list[list[int]] = []
         for i, law in enumerate(laws):
             found = None if apart else next((kind for kind in kinds if _alike(laws[kind[0]], law)), None)

@@ -3,7 +3,7 @@ import csv
 import numpy as np
 import pytest
 
-from jaxdamp.dampers import Bilinear, Dahl, Lag, Linear, LuGre, Spring, Table
+from jaxdamp.dampers import Bilinear, Dahl, Lag, Linear, LuGre, Spring, Table, with_fitted_range
 from jaxdamp.export import to_csv
 
 
@@ -29,6 +29,25 @@ def test_hysteresis_is_said_to_be_missing(tmp_path):
     comments, _, (_, force) = read(to_csv(Lag(Bilinear(2600.0, 1200.0), 0.1), tmp_path / "fv.csv", [-0.5, 0.0, 0.5]))
     assert "hysteresis of the law's 1 state(s) is not in here" in comments[2]
     np.testing.assert_allclose(force, [-600.0, 0.0, 1300.0], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("velocities", "said"),
+    [
+        (np.linspace(-0.1, 0.2, 31), None),
+        (
+            np.linspace(-1.0, 1.0, 21),
+            "# extrapolated: rows below -0.1 m/s and above 0.2 m/s, 17 of 21, beyond all records",
+        ),
+        ([0.5, 1.0], "# extrapolated: all rows lie beyond the velocities that the law was fitted to"),
+    ],
+)
+def test_rows_beyond_the_fitted_range_are_named_in_the_header(tmp_path, velocities, said):
+    law = with_fitted_range(Bilinear(2600.0, 1200.0), velocity=(-0.1, 0.2), stroke=(-0.01, 0.01))
+    comments, header, (v, force) = read(to_csv(law, tmp_path / "fv.csv", np.array(velocities)))
+    assert comments[2] == "# fitted to: velocity −0.1 to 0.2 m/s, stroke −10 to 10 mm"
+    assert comments[3:] == ([] if said is None else [said])
+    assert header == ["velocity [m/s]", "force [N]"] and len(v) == len(force) == len(velocities)
 
 
 @pytest.mark.parametrize("velocities", [[], [0.0, 0.0], [1.0, 0.0], [[0.0, 1.0]]])

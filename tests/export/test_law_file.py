@@ -1,3 +1,4 @@
+import inspect
 import json
 from typing import Any
 
@@ -7,7 +8,19 @@ import numpy as np
 import pytest
 
 import jaxdamp.dampers
-from jaxdamp.dampers import AbstractMemoryless, CoulombFriction, Lag, Linear, MotionRatio, PiecewiseLinear, SeriesSpring
+from jaxdamp.dampers import (
+    AbstractDamper,
+    AbstractMemoryless,
+    CoulombFriction,
+    FittedRange,
+    Lag,
+    Linear,
+    MotionRatio,
+    PiecewiseLinear,
+    SeriesSpring,
+    Table,
+    with_fitted_range,
+)
 from jaxdamp.export import from_json, to_json
 from jaxdamp.parameters import get, parameter, positive, setting
 
@@ -143,7 +156,7 @@ def changed(change):
 READ_ERRORS = {
     "not JSON": ("{oops", "A law must be written in JSON, but the text is not: Expecting property name"),
     "another file": ('{"format": "PDF"}', '`path_or_text` must begin with "format": "jaxdamp law"'),
-    "version": (changed(lambda d: d.update(version=2)), "`version` must be 1, but is 2"),
+    "version": (changed(lambda d: d.update(version=3)), "`version` must be 1 or 2, but is 3"),
     "no law": (changed(lambda d: d.pop("law")), "`the law file` must hold format, version, law, but is lacks law"),
     "unknown law": (
         changed(lambda d: d["law"]["law"].update({"class": "Linaer"})),
@@ -194,5 +207,60 @@ def test_a_file_of_several_faults_is_named(tmp_path):
 def test_every_law_of_the_package_is_found_by_its_name():
     from jaxdamp.export.law_file import _classes
 
-    names = [n for n in jaxdamp.dampers.__all__ if n[0].isupper() and not n.startswith("Abstract")]
-    assert all(_classes()[n] is getattr(jaxdamp.dampers, n) for n in names)
+    public = {name: getattr(jaxdamp.dampers, name) for name in jaxdamp.dampers.__all__}
+    laws = {name: kind for name, kind in public.items() if isinstance(kind, type) and issubclass(kind, AbstractDamper)}
+    laws = {name: kind for name, kind in laws.items() if not inspect.isabstract(kind)}
+    assert len(laws) > 30 and all(_classes()[name] is kind for name, kind in laws.items())
+
+
+# ---- the range of the fitted records
+
+
+def test_a_range_stands_with_its_law_and_comes_back_in_all_digits():
+    slow = FittedRange(velocity=(-0.1 / 3, 0.2), stroke=(-0.02, 0.02), force=(-300.0, 500.0), frequency=(1.0, 3.0))
+    warm = FittedRange(temperature=(290.0, 310.0), command=(0.0, 2.0))
+    fitted = with_fitted_range(Lag(with_fitted_range(Linear(1500.0), slow), 0.004), warm)
+    document = json.loads(to_json(fitted))
+    assert document["version"] == 2 and document["law"]["fitted_to"] == {
+        "temperature": {"value": [290.0, 310.0], "unit": "K"},
+        "command": {"value": [0.0, 2.0], "unit": ""},
+    }
+    assert document["law"]["law"]["fitted_to"]["velocity"] == {"value": [-0.1 / 3, 0.2], "unit": "m/s"}
+    assert same(from_json(to_json(fitted)), fitted)
+
+
+def test_a_law_of_ones_own_and_one_with_an_init_keep_their_range():
+    for law in (Orifice(3.0), Table([-1.0, 0.0, 1.0], [-800.0, 0.0, 900.0])):
+        fitted = with_fitted_range(law, velocity=(-0.5, 0.5))
+        assert same(from_json(to_json(fitted)), fitted) and same(from_json(to_json(law)), law)
+
+
+def test_files_without_a_range_are_as_before_and_read_as_before():
+    assert json.loads(to_json(law()))["version"] == 1
+    text = (
+        '{"format": "jaxdamp law", "version": 1, "law": {"class": "Linear", "rate": {"value": 1.0, "unit": "N s/m"}}}'
+    )
+    assert from_json(text).fitted_to is None
+
+
+@pytest.mark.parametrize(
+    ("covered", "message"),
+    [
+        ([1.0, 2.0], "`Linear.fitted_to` must be written as"),
+        ({"velocty": {"value": [0.0, 1.0], "unit": "m/s"}}, "Did you mean 'velocity'"),
+        ({"velocity": {"value": [0.0, 1.0], "unit": "mm/s"}}, "`Linear.fitted_to.velocity` must be in 'm/s'"),
+        ({"velocity": {"value": [0.0], "unit": "m/s"}}, "be the lowest and the highest value"),
+        ({"velocity": {"value": [1.0, 0.0], "unit": "m/s"}}, "two finite numbers in order"),
+    ],
+)
+def test_a_range_that_makes_no_sense_is_refused(covered, message):
+    document = json.loads(to_json(with_fitted_range(Linear(1500.0), velocity=(-0.5, 0.5))))
+    document["law"]["fitted_to"] = covered
+    with pytest.raises(ValueError, match=message):
+        from_json(json.dumps(document))
+
+
+def test_a_range_in_a_file_of_the_first_version_is_refused():
+    document = json.loads(to_json(with_fitted_range(Linear(1500.0), velocity=(-0.5, 0.5))))
+    with pytest.raises(ValueError, match="have no 'fitted_to' in version 1"):
+        from_json(json.dumps(document | {"version": 1}))

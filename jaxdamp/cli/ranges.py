@@ -1,0 +1,47 @@
+"""What laws were fitted to, and by how much rides leave it, as tables."""
+
+import contextlib
+import warnings
+from collections.abc import Iterator, Mapping
+
+from jaxdamp.dampers import FittedRange, OutsideFittedRangeWarning
+from jaxdamp.report import Cell, Column, Table
+from jaxdamp.simulation import Response
+from jaxdamp.simulation.range_notes import range_sentences
+
+
+@contextlib.contextmanager
+def said_in_tables() -> Iterator[None]:
+    """No Python warnings of laws outside their range: the tables and remarks of the command say it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OutsideFittedRangeWarning)
+        yield
+
+
+def fitted_range_table(covered: FittedRange) -> Table:
+    """The range of the records that laws were fitted to."""
+    columns = (Column("quantity"), Column("unit"), Column("lowest", spec=".4g"), Column("highest", spec=".4g"))
+    rows = tuple((q.name, q.unit or "–", *q.limits) for q in covered.known())
+    return Table("Range of the fitted records; beyond it the laws are extrapolated", columns, rows)
+
+
+def range_use_table(responses: Mapping[str, Response]) -> Table | None:
+    """What each damper did beside the range of its law; none where no law has a range."""
+    columns = [Column("law"), Column("damper"), Column("quantity"), Column("unit")]
+    columns += [Column(name, spec=".3g") for name in ("lowest", "highest", "fitted from", "fitted to", "times")]
+    columns += [Column("time outside", "%", ".0f")]
+    rows: list[tuple[Cell, ...]] = []
+    for law, response in responses.items():
+        for damper, uses in response.range_use().items():
+            for use in uses:
+                share = None if use.share is None else 100 * use.share
+                ends = (*use.used, *use.fitted, use.times, share)
+                rows.append((law, damper.replace("_", " "), use.quantity, use.unit or "–", *ends))
+    if not rows:
+        return None
+    return Table("Use of the dampers beside the records of their laws", tuple(columns), tuple(rows))
+
+
+def range_remarks(responses: Mapping[str, Response]) -> list[str]:
+    """A sentence for each damper that leaves its range, after the name of its law."""
+    return [f"{name}: {text}" for name, one in responses.items() for text in range_sentences(one.range_use())]

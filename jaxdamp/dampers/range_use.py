@@ -1,0 +1,155 @@
+"""By how much a law is used outside the range that it was fitted to."""
+
+import warnings
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jaxdamp import _checks
+from jaxdamp.dampers._commands import commands_of
+from jaxdamp.dampers.base import AbstractDamper, AbstractMemoryless, parts
+from jaxdamp.dampers.fitted_range import OutsideFittedRangeWarning, has_fitted_range, shown_unit, span
+from jaxdamp.dampers.motion import Motion
+
+
+TOLERANCE = 0.05  # of the larger limit, by which a use may leave the range before it is said
+_ROUNDING = 1e-9  # of the larger limit
+
+
+class RangeUse(NamedTuple):
+    """One quantity of a law in use, beside the range of its records."""
+
+    law: str  # class of the law that has the range
+    quantity: str  # velocity, stroke, force, temperature or command
+    unit: str  # SI
+    used: tuple[float, float]  # lowest and highest value in use
+    fitted: tuple[float, float]
+    share: float | None  # of the time outside, where it changes with time
+
+    @property
+    def beyond(self) -> float:
+        """How far the use reaches beyond the range, in its unit; zero inside."""
+        return max(self.fitted[0] - self.used[0], self.used[1] - self.fitted[1], 0.0)
+
+    @property
+    def outside(self) -> bool:
+        """Whether that is more than the tolerance, a twentieth of the larger limit (of the width, for temperatures)."""
+        low, high = self.fitted
+        size = high - low if self.quantity == "temperature" else max(abs(low), abs(high))
+        return self.beyond > (TOLERANCE + _ROUNDING) * size
+
+    @property
+    def times(self) -> float | None:
+        """The largest value in use over the limit that it passes; `None` inside, and where that has no meaning."""
+        pairs = [(self.used[0], self.fitted[0], -1.0), (self.used[1], self.fitted[1], 1.0)]
+        ratios = [used / limit for used, limit, side in pairs if side * limit > 0 and side * (used - limit) > 0]
+        return None if not ratios or self.quantity in ("temperature", "command") else max(ratios)
+
+    def words(self) -> str:
+        """As in "velocity −0.41 to 0.54 m/s, fitted to −0.089 to 0.089 m/s (6.1 times), 41 % of the time outside"."""
+        at = self.used if self.used[0] < self.used[1] else self.used[:1]
+        used = span(self.quantity, self.used) if len(at) > 1 else _single(self.quantity, at[0])
+        text = f"{self.quantity} {used}, fitted to {span(self.quantity, self.fitted)}"
+        text += "" if self.times is None else f" ({self.times:.2g} times)"
+        return text if self.share is None else f"{text}, {_percent(self.share)} of the time outside"
+
+
+def _single(quantity: str, value: float) -> str:
+    low = span(quantity, (value, value)).split(" to ")[0]
+    return f"{low} {shown_unit(quantity)}".rstrip()
+
+
+def _percent(share: float) -> str:
+    percent = 100.0 * share
+    return "less than 1 %" if percent < 1.0 else f"{percent:.0f} %"
+
+
+def range_use(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
+    """Every quantity of a motion beside the range of the law, and of each law inside that has a range of its own.
+
+    Velocity and force are compared always, the stroke of laws that depend on it (a law of the velocity alone is no
+    worse at another stroke), temperature and command where the law knows them. A law inside is judged by its own
+    motion: behind a `MotionRatio` by the damper's stroke and velocity, in a `Scaled` law by the force before scaling.
+    Inside a `SeriesSpring`, a `Bushing` or a `Lag` the motion of the whole stands for it, which is mostly more.
+
+    Empty where no law has a range, or while JAX traces the law.
+    """
+    if not has_fitted_range(law) or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(law)):
+        return []
+    return list(dict.fromkeys(_uses(law, motion)))
+
+
+def _uses(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
+    """Own uses, then those of the laws inside."""
+    own = [] if law.fitted_to is None else _own_uses(law, motion)
+    inside = [use for part, inner in law.motion_inside(motion) for use in _uses(part, inner)]
+    return own + inside
+
+
+def _own_uses(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
+    assert law.fitted_to is not None
+    uses = []
+    stroke = motion.stroke if depends_on_stroke(law) else None
+    channels = {"velocity": motion.velocity, "stroke": stroke, "force": motion.force}
+    channels |= {"temperature": _temperatures(law, motion), "command": np.array(commands_of(law))}
+    for name, fitted, unit in law.fitted_to.known():
+        values = channels.get(name)
+        if values is None or not values.size or not np.all(np.isfinite(values)):
+            continue
+        used = float(values.min()), float(values.max())
+        outside = float(np.mean((values < fitted[0]) | (values > fitted[1])))
+        changing = name in ("velocity", "stroke", "force")
+        uses.append(RangeUse(type(law).__name__, name, unit, used, fitted, outside if changing else None))
+    return uses
+
+
+def _temperatures(law: AbstractDamper, motion: Motion) -> np.ndarray:
+    """The oil temperatures [K] that are set around a law and inside it."""
+    inside = [inner for _, inner in law.motion_inside(motion)]
+    deeper = [t for part, inner in law.motion_inside(motion) for t in _temperatures(part, inner)]
+    known = {motion.temperature, *(inner.temperature for inner in inside), *deeper} - {None}
+    return np.array(sorted(t for t in known if t is not None))
+
+
+def depends_on_stroke(law: AbstractDamper) -> bool:
+    """Whether the stroke matters to the kind of law; a law with memory feels its stroke since the last reversal."""
+    inside = parts(law)
+    return any(map(depends_on_stroke, inside)) if inside else not isinstance(law, AbstractMemoryless)
+
+
+def sentence(name: str, uses: Sequence[RangeUse]) -> str:
+    """By how much a damper of this name leaves the range of its laws; empty if it does not.
+
+    A force beyond the range is said where it does not simply follow from a velocity beyond it.
+    """
+    left = [use for use in uses if use.outside]
+    fast = {use.law for use in left if use.quantity == "velocity"}
+    left = [use for use in left if use.quantity != "force" or use.law not in fast]
+    several = len({use.law for use in left}) > 1
+    lines = dict.fromkeys(f"{use.law} {use.words()}" if several else use.words() for use in left)
+    return f"{name}: {'; '.join(lines)}." if left else ""
+
+
+def warn_outside(sentences: Sequence[str], stacklevel: int = 3) -> None:
+    """Warn of each damper that leaves its range, at the line of who called the caller."""
+    for text in filter(None, sentences):
+        warnings.warn(f"Extrapolated: {text}", OutsideFittedRangeWarning, stacklevel=stacklevel)
+
+
+def extrapolated(law: AbstractDamper, velocities: Float[np.ndarray, " points"]) -> Bool[np.ndarray, " points"]:
+    """At which velocities [m/s] the law, or a law inside, is outside the velocities that it was fitted to."""
+    velocities = np.asarray(velocities, dtype=float)
+    outside = np.zeros(velocities.shape, bool)
+    if not has_fitted_range(law):
+        return outside
+    if law.fitted_to is not None and law.fitted_to.velocity is not None:
+        low, high = law.fitted_to.velocity
+        rounding = _ROUNDING * max(abs(low), abs(high))
+        outside |= (velocities < low - rounding) | (velocities > high + rounding)
+    for part, inner in law.motion_inside(Motion(velocity=velocities)):
+        if inner.velocity is not None:
+            outside |= extrapolated(part, inner.velocity)
+    return outside

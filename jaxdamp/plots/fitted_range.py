@@ -1,0 +1,97 @@
+"""Where a law was fitted to records and where it is extrapolated, as pictures show it."""
+
+import textwrap
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jaxdamp.dampers import AbstractDamper, extrapolated
+from jaxdamp.plots import _style
+from jaxdamp.simulation import Response
+from jaxdamp.simulation.range_notes import range_sentences
+
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+
+
+LABEL = "extrapolated: beyond the fitted records"
+_MOST_LINES, _LINE_LENGTH = 4, 170  # of footnotes
+Points = Float[np.ndarray, " points"]
+
+
+def curve(axes: "matplotlib.axes.Axes", law: AbstractDamper, velocities: Points, force: Points, **style: Any) -> list:
+    """A curve of force over velocity, lighter and dotted where it is extrapolated; the handles of what was measured."""
+    outside = extrapolated(law, velocities)
+    handles = axes.plot(velocities, np.where(outside, np.nan, force), **style)
+    if outside.any():
+        light = style | {"linestyle": ":", "alpha": 0.6, "label": "_nolegend_"}
+        axes.plot(velocities, np.where(_widened(outside), force, np.nan), **light)
+    return handles
+
+
+def shade(axes: "matplotlib.axes.Axes", laws: Iterable[AbstractDamper], velocities: Points, label: str = LABEL) -> list:
+    """Shade the velocities at which every law that leaves its range is extrapolated; the handle for a legend.
+
+    Arguments:
+        axes: over velocity.
+        laws: those drawn.
+        velocities: the points of the curves [m/s], increasing.
+        label: for the legend.
+    """
+    masks = [mask for mask in (extrapolated(law, velocities) for law in laws) if mask.any()]
+    outside = np.logical_and.reduce(masks) if masks else np.zeros(velocities.size, bool)
+    spans = []
+    for start, stop in _stretches(outside):
+        low, high = velocities[max(start - 1, 0)], velocities[min(stop, velocities.size - 1)]
+        name = "_nolegend_" if spans else label
+        spans.append(axes.axvspan(low, high, color=_style.SHADE, linewidth=0.0, zorder=0.1, label=name))
+    return spans[:1]
+
+
+def shade_channel(axes: "matplotlib.axes.Axes", responses: Iterable[Response], channel: str) -> None:
+    """Shade what lies beyond the velocities of the records, where the channel over time is a damper's velocity."""
+    laws = [law for law in (_law_of(response, channel) for response in responses) if law is not None]
+    if not laws:
+        return
+    low, high = axes.get_ylim()
+    points = np.linspace(low, high, 2001)
+    outside = np.logical_and.reduce([extrapolated(law, points) for law in laws])
+    for start, stop in _stretches(outside):
+        axes.axhspan(points[start], points[stop - 1], color=_style.SHADE, linewidth=0.0, zorder=0.1)
+    axes.set_ylim(low, high)
+
+
+def _law_of(response: Response, channel: str) -> AbstractDamper | None:
+    """The law whose velocity a channel is."""
+    names = response.vehicle.frame().element_names
+    at = [i for i, name in enumerate(names) if channel == f"{name}_velocity"]
+    return response.vehicle.elements()[at[0]] if at else None
+
+
+def footnotes(figure: "matplotlib.figure.Figure", responses: Mapping[str, Response]) -> None:
+    """Below the picture, which dampers leave the range of their records and by how much."""
+    lines = [
+        f"{name + ': ' if name else ''}{text}"
+        for name, response in responses.items()
+        for text in range_sentences(response.range_use())
+    ]
+    more = [f"and {len(lines) - _MOST_LINES} more"] * (len(lines) > _MOST_LINES)
+    wrapped = [part for line in [*lines[:_MOST_LINES], *more] for part in textwrap.wrap(line, _LINE_LENGTH)]
+    if wrapped:
+        text = "\n".join(["Beyond the records that the laws were fitted to:", *wrapped])
+        figure.supxlabel(text, x=0.01, horizontalalignment="left", fontsize="small", color=_style.GREY)
+
+
+def _stretches(outside: Bool[np.ndarray, " points"]) -> list[tuple[int, int]]:
+    """First and one past the last index of each run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], outside, [False]]).astype(int)))
+    return [(int(start), int(stop)) for start, stop in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _widened(outside: Bool[np.ndarray, " points"]) -> Bool[np.ndarray, " points"]:
+    """One point more on each side, so that the two parts of a curve meet."""
+    return outside | np.append(False, outside[:-1]) | np.append(outside[1:], False)

@@ -1,0 +1,58 @@
+"""A fitted law says what its records covered."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from jaxdamp import bench, identify
+from jaxdamp.bench import BenchRun, SineTest
+from jaxdamp.dampers import Bilinear, Lag, Linear, Spring, with_fitted_range
+from jaxdamp.identify.covered import covered_range
+
+
+@pytest.fixture(scope="module")
+def runs() -> tuple[BenchRun, ...]:
+    dyno = bench.VirtualDyno(Bilinear(2600.0, 1200.0), sampling_rate=500.0, force_noise=5.0)
+    return tuple(
+        dyno.run([SineTest(0.01, 1.0, cycles=3), SineTest(0.02, 2.0, cycles=3), SineTest(0.02, 4.0, cycles=3)])
+    )
+
+
+def ends(runs: tuple[BenchRun, ...], channel: str) -> tuple[float, float]:
+    values = np.concatenate([getattr(run, channel) for run in runs])
+    return float(values.min()), float(values.max())
+
+
+@pytest.mark.parametrize("start", [Bilinear, Lag(Bilinear(2000.0, 1000.0), 0.002), Linear(1.0) + Spring(1.0, 0.0)])
+def test_a_fit_states_what_the_fitted_records_cover(runs, start):
+    covered: Any = identify.fit(start, runs, weighting=[1.0, 1.0, np.inf]).law.fitted_to
+    for channel in ("velocity", "stroke", "force"):
+        assert getattr(covered, channel) == ends(runs[:2], channel)
+    assert covered.frequency == pytest.approx((1.0, 2.0), rel=1e-3)
+    assert covered.temperature is covered.command is None
+
+
+def test_a_fit_forgets_the_range_of_its_start(runs):
+    start = Lag(with_fitted_range(Linear(1000.0), velocity=(-9.0, 9.0)), 0.002)
+    law: Any = identify.fit(start, runs[:1]).law
+    assert law.fitted_to.velocity == ends(runs[:1], "velocity") and law.law.fitted_to is None
+
+
+def test_temperature_and_command_are_those_of_the_records_that_state_them(runs):
+    stated = [
+        dataclasses.replace(run, temperature=np.full(len(run), 300.0 + 10.0 * i), command=float(i))
+        for i, run in enumerate(runs)
+    ]
+    covered = covered_range([runs[0], *stated[1:]])
+    assert covered.temperature == (310.0, 320.0) and covered.command == (1.0, 2.0)
+
+
+def test_training_and_cross_validation_state_it_too(runs):
+    start = Lag(Linear(1500.0), 0.002)
+    law: Any = identify.train(start, runs[:2], held_out=runs[2], weighting=[1.0, np.inf], steps=1).law
+    assert law.fitted_to.velocity == ends(runs[:1], "velocity")
+    for fold, out in zip(identify.cross_validate({"linear": Linear}, runs).folds, range(3), strict=True):
+        kept = tuple(run for i, run in enumerate(runs) if i != out)
+        assert fold.result.law.fitted_to.velocity == ends(kept, "velocity")

@@ -1,0 +1,40 @@
+"""A tuning says by how much its start and its result leave the range of their records."""
+
+import re
+
+import numpy as np
+import pytest
+
+from jaxdamp import dampers, roads, tune, vehicles
+from jaxdamp.vehicles import linearise, stationary_rms
+
+
+LAW = dampers.with_fitted_range(dampers.Linear(2500.0), velocity=(-0.02, 0.02))
+
+
+def test_on_a_white_road_velocities_reach_three_standard_deviations():
+    road = roads.white("C", speed=20.0)
+    car = vehicles.presets.quarter_car_000(LAW)
+    result = tune.minimise("rms_sprung_acceleration", car, road)
+    plain = tune.minimise("rms_sprung_acceleration", vehicles.presets.quarter_car_000(dampers.Linear(2500.0)), road)
+    assert result.after == plain.after and not plain.warnings
+    assert result.vehicle.elements()[0].fitted_to == LAW.fitted_to
+    whens = ("At the start (velocities of 3 standard deviations)", "After the tuning (velocities of 3 standard")
+    for when, vehicle, note in zip(whens, (result.start, result.vehicle), result.warnings, strict=True):
+        sigma = float(stationary_rms(linearise(vehicle), road.velocity_psd, speed=road.speed)["damper_velocity"])
+        assert note.startswith(when) and f"({3 * sigma / 0.02:.2g} times)" in note
+        percent = float(re.findall(r"(\d+) % of the time", note)[0])
+        inside = np.mean(np.abs(np.random.default_rng(0).normal(0.0, sigma, 100_000)) < 0.02)
+        assert percent == pytest.approx(100 * (1 - inside), abs=1.0)
+    assert f"warning: {result.warnings[0]}" in repr(result)
+
+
+def test_on_a_driven_road_the_run_itself_is_looked_at():
+    car = vehicles.presets.quarter_car_000(LAW)
+    road = roads.cosine_bump(0.05, start=0.2, duration=0.3)
+    result = tune.minimise("rms_sprung_acceleration", car, road, duration=1.0, dt=0.005, max_steps=1)
+    start, after = [note for note in result.warnings if "fitted to" in note]
+    for note, metrics in ((start, result.before), (after, result.after)):
+        times = float(re.findall(r"\(([\d.e+]+) times\)", note)[0])
+        assert times == pytest.approx(metrics["peak_damper_velocity"] / 0.02, rel=0.05)
+    assert start.startswith("At the start, damper:") and after.startswith("After the tuning, damper:")
