@@ -69,7 +69,7 @@ PAPER_LINEAR = "linear, 2500 N s/m"
 METRICS = {
     "rms_sprung_acceleration": "body acceleration, RMS",
     "working_space_rms": "travel, RMS",
-    "working_space_peak": "travel, peak to peak",
+    "working_space_peak_to_peak": "travel, peak to peak",
     "rms_dynamic_tyre_load": "tyre load, RMS",
 }
 ISO = "ISO 8608 class C at 20 m/s"
@@ -147,7 +147,7 @@ def improve(screen: Screen, findings: Findings, rides: Mapping[str, Response], s
     road = _roads(scenario)[ISO]
     paths = match_paths([p.path for p in parameters(car)], ["damper.*rate"])
     values = {p.path: float(p.value) for p in parameters(car) if p.path in paths}
-    travel = float(rides[scenario.true_name].metrics()["working_space_peak"])
+    travel = float(rides[scenario.true_name].metrics()["working_space_peak_to_peak"])
     with screen.stage("Tuning for comfort") as advance:
         return tune.minimise(
             COMFORT,
@@ -155,7 +155,7 @@ def improve(screen: Screen, findings: Findings, rides: Mapping[str, Response], s
             road,
             over=paths,
             bounds={path: (value / scenario.reach, value * scenario.reach) for path, value in values.items()},
-            limits={"working_space_peak": travel},
+            limits={"working_space_peak_to_peak": travel},
             duration=scenario.duration,
             max_steps=30,
             progress=lambda step, metric: advance(f"step {step}: {metric:.4f} m/s² RMS", step),

@@ -187,7 +187,7 @@ def test_metrics_are_those_of_the_channels():
         "rms_sprung_acceleration": np.sqrt(np.mean(acceleration**2)),
         "peak_sprung_acceleration": np.abs(acceleration).max(),
         "working_space_rms": np.sqrt(np.mean(stroke**2)),
-        "working_space_peak": np.ptp(stroke),
+        "working_space_peak_to_peak": np.ptp(stroke),
         "rms_dynamic_tyre_load": np.sqrt(np.mean(load**2)),
         "dynamic_load_coefficient": np.std(load) / (1325.0 * 9.80665),
         "peak_damper_velocity": np.abs(response["damper_velocity"]).max(),
