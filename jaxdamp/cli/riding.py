@@ -1,10 +1,10 @@
 """`jaxdamp ride`: a law in a vehicle on a road, beside a baseline."""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
-from jaxdamp import _checks, export, plots, roads, simulate, vehicles
+from jaxdamp import _checks, export, metrics, plots, roads, simulate, vehicles
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.results import results_folder, written
 from jaxdamp.dampers import AbstractDamper
@@ -77,6 +77,7 @@ def run_ride(
             tables = [metrics_table(responses), comfort_table(responses)]
         for table in tables:
             screen.table(table)
+        screen.points(notes_of(responses))
         title = f"{vehicle} on {road} at {speed:g} m/s"
         timing = next(iter(responses.values())).axle_timing
         if timing.kind != "one axle":
@@ -88,12 +89,16 @@ def run_ride(
     return responses
 
 
-def _compared(rows: Mapping[str, tuple[str, list[float]]]) -> tuple[tuple[Cell, ...], ...]:
+def _compared(
+    rows: Mapping[str, tuple[str, list[float]]], without_change: Collection[str] = ()
+) -> tuple[tuple[Cell, ...], ...]:
     """Rows of name, unit, a value for each law, and the change from the first to the last in percent."""
-    return tuple(
-        (name, unit, *values, *([100 * (values[-1] / values[0] - 1) if values[0] else None] if len(values) > 1 else []))
-        for name, (unit, values) in rows.items()
-    )
+
+    def change(name: str, values: list[float]) -> list[float | None]:
+        says = values[0] and name not in without_change
+        return [100 * (values[-1] / values[0] - 1) if says else None] if len(values) > 1 else []
+
+    return tuple((name, unit, *values, *change(name, values)) for name, (unit, values) in rows.items())
 
 
 def _columns(first: str, responses: Mapping[str, Response]) -> tuple[Column, ...]:
@@ -107,10 +112,16 @@ def _unit(unit: str) -> str:
 
 def metrics_table(responses: Mapping[str, Response]) -> Table:
     """The ride metrics of each law, and the change."""
-    units = next(iter(responses.values())).metric_units()
+    first = next(iter(responses.values()))
     found = [response.metrics() for response in responses.values()]
-    rows = {name: (_unit(unit), [float(metrics[name]) for metrics in found]) for name, unit in units.items()}
-    return Table("Ride metrics", _columns("metric", responses), _compared(rows))
+    rows = {name: (_unit(unit), [float(of[name]) for of in found]) for name, unit in first.metric_units().items()}
+    signed = [m.name for m in first.vehicle.ride_metrics if metrics.STATISTICS[m.statistic].signed]
+    return Table("Ride metrics", _columns("metric", responses), _compared(rows, signed))
+
+
+def notes_of(responses: Mapping[str, Response]) -> list[str]:
+    """What each response says of itself, after its name."""
+    return [f"{name}: {note}" for name, response in responses.items() for note in response.notes]
 
 
 def comfort_table(responses: Mapping[str, Response]) -> Table:
@@ -137,6 +148,8 @@ def _write(
     for name, law in laws.items():
         report.text(f"{name}: {law!r}")
         export.to_json(law, folder / f"{name}.json")
+    for note in notes_of(responses):
+        report.text(note)
     for file, table in zip(("metrics", "comfort"), tables, strict=True):
         (folder / f"{file}.csv").write_text(table.to_csv(), encoding="utf-8")
         report.table(table)

@@ -14,22 +14,24 @@ from jaxdamp import _checks
 # entry stays for one release.
 RENAMED = {"working_space_peak": "working_space_peak_to_peak"}
 
+_INSIDE = ("jaxdamp", "jaxtyping", "equinox", "jax")  # packages that a warning's place is not looked for in
+
 
 def current_name(name: str, known: Collection[str]) -> str:
     """The name that a metric has now: of a renamed one the new name, with a `FutureWarning`; else the name itself."""
     new = _new_name(name, known)
     if new is None:
         return name
-    warnings.warn(f"The metric {name!r} is now called {new!r}; use that name.", FutureWarning, stacklevel=_levels())
+    _warn(f"The metric {name!r} is now called {new!r}; use that name.")
     return new
 
 
-def _levels() -> int:
-    """How many calls lie between a warning and the code that uses this package, which the warning is to name."""
-    count, frame = 0, inspect.currentframe()
-    while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] == "jaxdamp":
-        count, frame = count + 1, frame.f_back
-    return count
+def _warn(text: str) -> None:
+    """Warn at the line of the code that uses this package."""
+    level, frame = 1, inspect.currentframe()
+    while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] in _INSIDE:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, FutureWarning, stacklevel=level)
 
 
 def _new_name(name: Any, known: Collection[str]) -> str | None:

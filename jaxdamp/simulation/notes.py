@@ -10,20 +10,24 @@ from jaxdamp.vehicles import AbstractVehicle
 from jaxdamp.vehicles.parts import prefixed
 
 
+LEAST = 1e-3  # of the static load, by which a load must be below zero
+
+
 def tyres_in_tension(
     vehicle: AbstractVehicle, time: Float[np.ndarray, " time"], channels: Mapping[str, Signal]
 ) -> tuple[str, ...]:
-    """Linear tyres that pulled on the road, how far below zero their load went, and when."""
-    notes = []
+    """Linear tyres that pulled on the road: how far below zero their load went, when, and for how long."""
+    pulled = []
     for wheel, static in zip(vehicle.frame().wheels, np.asarray(vehicle.static_wheel_loads()), strict=True):
         load = static + np.asarray(channels[prefixed(wheel.name, "dynamic_tyre_load")])
         worst = int(np.argmin(load))
-        if static > 0.0 and not wheel.lifts and load[worst] < -1e-3 * static:
-            called = f"The {wheel.name.replace('_', ' ')} tyre" if wheel.name else "The tyre"
+        if static > 0.0 and not wheel.lifts and load[worst] < -LEAST * static:
             share = 100.0 * float(np.mean(load < 0.0))
-            notes.append(
-                f"{called} pulled on the road in {share:.2g} % of the run: its load fell to {load[worst] / 1e3:.3g} kN "
-                f"at {time[worst]:.3f} s (static {static / 1e3:.3g} kN). A linear tyre does not let go; "
-                "give the vehicle `tyre_lifts=True` if it can leave the road."
+            pulled.append(
+                f"{wheel.name.replace('_', ' ') + ' ' if wheel.name else ''}{load[worst] / 1e3:.3g} kN at "
+                f"{time[worst]:.3f} s (static load {static / 1e3:.3g} kN, below zero in {share:.2g} % of the run)"
             )
-    return tuple(notes)
+    if not pulled:
+        return ()
+    remedy = "Pass `tyre_lifts=True` to the vehicle if its wheels can leave the road."
+    return (f"Wheel loads fell below zero, as linear tyres pull on the road: {'; '.join(pulled)}. {remedy}",)

@@ -1,5 +1,6 @@
 """What a vehicle did on a road: motion, forces, channels with units, energy, ride metrics."""
 
+import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, final
 
@@ -54,7 +55,7 @@ class Response(eqx.Module):
     final_state: list[Float[Array, " _state"]]
     axle_timing: AxleTiming
     whole: Any = None  # the response that this one is a part of, and the number of its first instant there
-    begin: int = eqx.field(static=True, default=0)
+    begin: Any = None
 
     def __repr__(self) -> str:
         name, time = type(self.vehicle).__name__, _checks.concrete(self.time)
@@ -83,9 +84,14 @@ class Response(eqx.Module):
         return self.vehicle.units
 
     @property
-    @eqx.filter_jit
     def channels(self) -> dict[str, Signal]:
         """All channels by name."""
+        if self.whole is None:
+            return self._channels()
+        return {name: self._of_this_part(values) for name, values in self.whole.channels.items()}
+
+    @eqx.filter_jit
+    def _channels(self) -> dict[str, Signal]:
         system, n = self.vehicle.port_form().first_order(), len(self.vehicle.coordinates)
         forces = self.port_force @ system.port_input.T + self.road @ system.road_input.T
         change = self.motion @ system.state_matrix.T + forces + self.road_rate @ system.road_rate_input.T
@@ -124,15 +130,20 @@ class Response(eqx.Module):
 
     def _dt(self) -> ScalarLike:
         """Spacing of the instants, as a plain number where it is known: then filters are made by NumPy."""
-        known = _checks.concrete(self.time)
-        return self.time[1] - self.time[0] if known is None else float(known[1] - known[0])
+        time = (self if self.whole is None else self.whole).time
+        known = _checks.concrete(time)
+        return time[1] - time[0] if known is None else float(known[1] - known[0])
 
     def _felt(self, name: str, dt: ScalarLike) -> Signal:
         """An acceleration weighted by ISO 2631-1 from the start of the run."""
         run = self if self.whole is None else self.whole
         weighting = metrics.weighting_of(self.units[name])
         felt = metrics.weighted_signal(run.channels[name], dt, weighting, method="step", remove_mean=False)
-        return felt[self.begin : self.begin + self.time.size]
+        return self._of_this_part(felt)
+
+    def _of_this_part(self, values: Float[Array, " whole"]) -> Signal:
+        """Values of the whole run, cut to the part of it that this is."""
+        return values if self.whole is None else jax.lax.dynamic_slice_in_dim(values, self.begin, self.time.size)
 
     def _at_rest(self) -> dict[str, Scalar]:
         """The channels in the static equilibrium on the first heights of the run, forces left out."""
@@ -169,10 +180,10 @@ class Response(eqx.Module):
             _checks.refuse("start, stop", must, f"{start:g} and {stop:g}")
         part, last = slice(inside[0], inside[-1] + 1), inside[-1] + 1 == time.size
         states = [state if last else jnp.full_like(state, jnp.nan) for state in self.final_state]
-        arrays = (self.motion, self.port_force, self.road, self.road_rate)
+        arrays = {name: getattr(self, name)[part] for name in ("time", "motion", "port_force", "road", "road_rate")}
         whole = self if self.whole is None else self.whole
-        begin = self.begin + int(inside[0])
-        return Response(self.vehicle, self.time[part], *[a[part] for a in arrays], states, whole, begin)
+        begin = jnp.asarray(inside[0] + (0 if self.whole is None else self.begin))
+        return dataclasses.replace(self, **arrays, final_state=states, whole=whole, begin=begin)
 
     def comfort(self) -> dict[str, Comfort]:
         """What of each acceleration of body, seats and places people feel, by ISO 2631-1, with the largest second.

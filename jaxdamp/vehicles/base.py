@@ -8,6 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import current_names
@@ -92,9 +93,12 @@ def chosen_metrics(vehicle: AbstractVehicle, names: Sequence[str] | None, argume
     """The ride metrics of these names, all of them if `names` is None; `argument` is what errors call the names.
 
     Raises:
-        ValueError: a name that no ride metric has, with the nearest one.
+        ValueError: a name that no ride metric has, with the nearest one; no name.
     """
     known = {m.name: m for m in vehicle.ride_metrics}
+    if names is not None and not len(names):
+        some = ", ".join(map(repr, list(known)[:3]))
+        _checks.refuse(argument, "name one or more", "empty", f"Write [{some}], or leave it out for all.")
     return [known[name] for name in (known if names is None else current_names(argument, names, known))]
 
 

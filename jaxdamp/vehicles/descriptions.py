@@ -22,14 +22,10 @@ def descriptions_of(frame: Frame) -> dict[str, str]:
             name = prefixed(part.name, element.name)
             found[f"{name}_force"] = f"force of {name}{_share(element, part)}, positive where it resists extension"
     for wheel in frame.wheels:
-        where, sides = (f" under {wheel.name}" if wheel.name else ""), _together(wheel)
+        where, of = (f" under {wheel.name}" if wheel.name else ""), _together(wheel)
         found[f"z_{prefixed(wheel.name, 'road')}"] = f"height of the road{where}, up"
-        found[prefixed(wheel.name, "dynamic_tyre_load")] = (
-            f"wheel load{where}{sides} less the static load, more is positive"
-        )
-        found[prefixed(wheel.name, "relative_tyre_load")] = (
-            f"wheel load{where} less the static load, over the static load"
-        )
+        found[prefixed(wheel.name, "dynamic_tyre_load")] = f"load{where} less the static load{of}, more load positive"
+        found[prefixed(wheel.name, "relative_tyre_load")] = f"load{where} less the static load, over the static load"
     return found
 
 
@@ -51,4 +47,4 @@ def _share(element: Element, part: Link | Wheel) -> str:
 
 
 def _together(part: Link | Wheel) -> str:
-    return f", {part.sides} sides of the vehicle together" if part.sides > 1 else ""
+    return f", {'both' if part.sides == 2 else part.sides} sides together" if part.sides > 1 else ""

@@ -183,3 +183,23 @@ def test_what_people_feel_can_be_tuned_on_both_kinds_of_road():
 def test_counts_have_no_slope_to_follow():
     with pytest.raises(ValueError, match="must have a slope, but is 'lift_off_fraction', a count"):
         tune.minimise("lift_off_fraction", CAR, roads.cosine_bump(0.06, start=0.2, duration=0.25), duration=1.0)
+
+
+def test_an_old_name_of_a_metric_still_tunes_and_limits():
+    road = roads.cosine_bump(0.06, start=0.1, duration=0.25)
+    with pytest.warns(FutureWarning, match="'working_space_peak' is now called 'working_space_peak_to_peak'"):
+        result = tune.minimise(
+            "working_space_peak", CAR, road, limits={"working_space_peak": 1.0}, duration=0.5, max_steps=2
+        )
+    assert result.metric == "working_space_peak_to_peak" and list(result.limits) == ["working_space_peak_to_peak"]
+    with pytest.warns(FutureWarning, match="is now called"):
+        assert result.after["working_space_peak"] == result.after["working_space_peak_to_peak"]
+    assert "working_space_mean" not in result.after and "peak_sprung_displacement" in result.after
+
+
+def test_a_displacement_is_tuned_on_a_bump_and_refused_on_a_white_road():
+    road = roads.cosine_bump(0.06, start=0.1, duration=0.25)
+    result = tune.minimise("peak_sprung_displacement", CAR, road, duration=0.5, max_steps=3)
+    assert result.after["peak_sprung_displacement"] < result.before["peak_sprung_displacement"]
+    with pytest.raises(ValueError, match="must be one of 'rms_sprung_acceleration'"):
+        tune.minimise("rms_sprung_displacement", CAR, roads.white("C", 20.0))
