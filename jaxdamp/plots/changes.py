@@ -34,7 +34,7 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
         reach = 1.1 * max(peaks) or 1.0
         velocities = np.linspace(-reach, reach, 401)
     pairs = _changed(result)
-    figure = _style.new_figure(12.0, 6.0)
+    figure = _style.new_figure(12.0, max(6.0, 0.38 * len(result.before)))  # a line of text for each metric
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.0), height_ratios=(1.8, 1.0))
     curves, bars, search = (figure.add_subplot(at) for at in (grid[:, 0], grid[0, 1], grid[1, 1]))
     points = np.asarray(velocities, dtype=float)

@@ -60,7 +60,10 @@ class Response(eqx.Module):
     def __repr__(self) -> str:
         name, time = type(self.vehicle).__name__, _checks.concrete(self.time)
         several = "" if self.axle_timing.kind == "one axle" else f"; {self.axle_timing}"
-        length = "" if time is None or time.ndim != 1 else f" over {time[-1]:g} s, {time.size} instants"
+        length = ""
+        if time is not None and time.ndim == 1:
+            begins = "over" if self.whole is None else f"from {time[0]:g} to"
+            length = f" {begins} {time[-1]:g} s, {time.size} instants"
         return f"Response of a {name}{length}, {len(self.units)} channels{several}"
 
     @property

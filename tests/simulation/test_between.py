@@ -18,6 +18,7 @@ def run():
 def test_a_part_has_the_channels_and_metrics_of_its_time(run):
     part, inside = run.between(0.5, 1.5), slice(500, 1501)
     np.testing.assert_array_equal(part.time, run.time[inside])
+    assert "from 0.5 to 1.5 s, 1001 instants" in repr(part)
     for name in ("stroke", "sprung_acceleration", "damper_force"):
         np.testing.assert_array_equal(part[name], run[name][inside], err_msg=name)
     found, stroke = part.metrics(), np.asarray(run["stroke"])[inside]

@@ -235,7 +235,7 @@ def test_displacements_count_from_the_static_equilibrium():
 
 
 def test_old_and_wrong_names_of_metrics():
-    car, bump = half_car_002(), roads.cosine_bump(0.05, start=0.1, duration=0.1)
+    car, bump = half_car_002(), roads.cosine_bump(0.05, start=0.1, length=2.0, speed=20.0)
     with pytest.warns(FutureWarning, match="'rear_working_space_peak' is now called 'rear_working_space_peak_to_peak'"):
         ride = Ride(car, bump, metrics=["rear_working_space_peak"], duration=0.3)
     found = ride()
