@@ -154,6 +154,11 @@ def one_of(argument: str, value: str, choices: Iterable[str]) -> None:
     """Refuse a word that is not among the choices; suggest the nearest one."""
     choices = list(choices)
     if value not in choices:
-        near = get_close_matches(value, choices, 1)
-        hint = f"Did you mean {near[0]!r}?" if near else ""
+        near = nearest(value, choices)
+        hint = f"Did you mean {near!r}?" if near else ""
         refuse(argument, f"be one of {', '.join(map(repr, choices))}", repr(value), hint)
+
+
+def nearest(value: str, choices: Iterable[str]) -> str | None:
+    """The choice that a mistyped word is most like, if any is like it."""
+    return next(iter(get_close_matches(value, list(choices), 1)), None)

@@ -42,7 +42,7 @@ ANSWERS = {  # call: words that its refusal holds
     "respond(dampers.Linear, time, stroke)": ("`law` must be a damper law", "the class Linear", "`Linear(...)`"),
     "vehicles.presets.quarter_car_000(1500.0)": ("`QuarterCar.damper` must be a damper law", "dampers.Linear(1500.0)"),
     "vehicles.presets.half_car_002(car)": ("`Corner.damper` must be a damper law", "is a QuarterCar"),
-    "vehicles.presets.truck_001(damper=1000.0)": ("`damper` must be a damper law", "dampers.Linear(1000.0)"),
+    "vehicles.presets.truck_001(damper=1000.0)": ("`Corner.damper` must be a damper law", "dampers.Linear(1000.0)"),
     "vehicles.HalfCar(500.0, 800.0, 1.0, 1.0, law, law)": ("`HalfCar.front` must be a Corner", "is a Linear"),
     "vehicles.QuarterCar(300.0, 40.0, 2e4, 2e5, law, bump_stop=3)": ("`QuarterCar.bump_stop` must be a damper law",),
     "vehicles.modes(road)": ("`vehicle` must be a vehicle", "is an Iso8608"),

@@ -15,7 +15,7 @@ from jaxdamp.cli.console import Screen
 from jaxdamp.cli.fit_files import draw_findings, velocities, write_findings, write_table
 from jaxdamp.cli.fitted import Findings
 from jaxdamp.cli.fitting import fit_laws
-from jaxdamp.cli.ranges import range_remarks, said_in_tables
+from jaxdamp.cli.ranges import notes_of, said_in_tables
 from jaxdamp.cli.results import Results, results_folder
 from jaxdamp.dampers import AbstractDamper, Besinger, Linear, SeriesSpring
 from jaxdamp.identify import FitResult
@@ -74,7 +74,7 @@ PAPER_LINEAR = "linear, 2500 N s/m"
 METRICS = {
     "rms_sprung_acceleration": "body acceleration, RMS",
     "working_space_rms": "travel, RMS",
-    "working_space_peak": "travel, peak to peak",
+    "working_space_peak_to_peak": "travel, peak to peak",
     "rms_dynamic_tyre_load": "tyre load, RMS",
 }
 ISO = "ISO 8608 class C at 20 m/s"
@@ -159,7 +159,7 @@ def improve(screen: Screen, findings: Findings, rides: Mapping[str, Response], s
     road = _roads(scenario)[ISO]
     paths = match_paths([p.path for p in parameters(car)], ["damper.*rate"])
     values = {p.path: float(p.value) for p in parameters(car) if p.path in paths}
-    travel = float(rides[scenario.true_name].metrics()["working_space_peak"])
+    travel = float(rides[scenario.true_name].metrics()["working_space_peak_to_peak"])
     with screen.stage("Tuning for comfort") as advance:
         return tune.minimise(
             COMFORT,
@@ -167,7 +167,7 @@ def improve(screen: Screen, findings: Findings, rides: Mapping[str, Response], s
             road,
             over=paths,
             bounds={path: (value / scenario.reach, value * scenario.reach) for path, value in values.items()},
-            limits={"working_space_peak": travel},
+            limits={"working_space_peak_to_peak": travel},
             duration=scenario.duration,
             max_steps=30,
             progress=lambda step, metric: advance(f"step {step}: {metric:.4f} m/s² RMS", step),
@@ -235,7 +235,7 @@ def show_rides(screen: Screen, rides: Mapping[str, Mapping[str, Response]]) -> N
         screen.table(ride_table(title, responses))
         if index == 0:
             screen.say(ride_verdict(responses))
-        screen.points(range_remarks(responses), style="yellow")
+        screen.points(notes_of(responses), style="yellow")
 
 
 def tuning_tables(tuned: TuneResult) -> tuple[Table, Table]:
@@ -335,7 +335,7 @@ def _draw_rides(folder: Path, rides: Mapping[str, Mapping[str, Response]], repor
         report.table(ride_table(title, responses))
         if index == 0:
             report.text(ride_verdict(responses))
-        report.points(range_remarks(responses))
+        report.points(notes_of(responses))
         shown = {name: responses[name] for name in (PAPER_LINEAR, *list(responses)[1:][-3:])}
         with attempts.part(f"The picture ride_{index + 1}.png"):
             report.picture(plots.ride(shown), f"Quarter car on {title}", folder / f"ride_{index + 1}.png")

@@ -1,4 +1,4 @@
-"""What laws were fitted to, and by how much rides leave it, as tables."""
+"""What laws were fitted to, by how much rides leave it, and what else rides say of themselves."""
 
 import contextlib
 import warnings
@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 from jaxdamp.dampers import FittedRange, OutsideFittedRangeWarning
 from jaxdamp.report import Cell, Column, Table
 from jaxdamp.simulation import Response
-from jaxdamp.simulation.range_notes import range_sentences
 
 
 @contextlib.contextmanager
@@ -42,6 +41,6 @@ def range_use_table(responses: Mapping[str, Response]) -> Table | None:
     return Table("Use of the dampers beside the records of their laws", tuple(columns), tuple(rows))
 
 
-def range_remarks(responses: Mapping[str, Response]) -> list[str]:
-    """A sentence for each damper that leaves its range, after the name of its law."""
-    return [f"{name}: {text}" for name, one in responses.items() for text in range_sentences(one.range_use())]
+def notes_of(responses: Mapping[str, Response]) -> list[str]:
+    """What each response says of itself, after its name."""
+    return [f"{name}: {note}" for name, response in responses.items() for note in response.notes]

@@ -1,14 +1,14 @@
 """`jaxdamp ride`: a law in a vehicle on a road, beside a baseline."""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
-from jaxdamp import _checks, export, plots, roads, simulate, vehicles
+from jaxdamp import _checks, export, metrics, plots, roads, simulate, vehicles
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.attempts import Attempts
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.ranges import range_remarks, range_use_table, said_in_tables
+from jaxdamp.cli.ranges import notes_of, range_use_table, said_in_tables
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.unusual import unusual
 from jaxdamp.dampers import AbstractDamper
@@ -91,7 +91,7 @@ def run_ride(
             uses = [table for table in [range_use_table(responses)] if table is not None]
         for table in [*tables, *uses]:
             screen.table(table)
-        screen.points(range_remarks(responses), style="yellow")
+        screen.points(notes_of(responses), style="yellow")
         interrupt.keep()
         title = f"{vehicle} on {road} at {speed:g} m/s"
         timing = next(iter(responses.values())).axle_timing
@@ -107,12 +107,16 @@ def run_ride(
     return responses
 
 
-def _compared(rows: Mapping[str, tuple[str, list[float]]]) -> tuple[tuple[Cell, ...], ...]:
+def _compared(
+    rows: Mapping[str, tuple[str, list[float]]], without_change: Collection[str] = ()
+) -> tuple[tuple[Cell, ...], ...]:
     """Rows of name, unit, a value for each law, and the change from the first to the last in percent."""
-    return tuple(
-        (name, unit, *values, *([100 * (values[-1] / values[0] - 1) if values[0] else None] if len(values) > 1 else []))
-        for name, (unit, values) in rows.items()
-    )
+
+    def change(name: str, values: list[float]) -> list[float | None]:
+        says = values[0] and name not in without_change
+        return [100 * (values[-1] / values[0] - 1) if says else None] if len(values) > 1 else []
+
+    return tuple((name, unit, *values, *change(name, values)) for name, (unit, values) in rows.items())
 
 
 def _columns(first: str, responses: Mapping[str, Response]) -> tuple[Column, ...]:
@@ -126,10 +130,11 @@ def _unit(unit: str) -> str:
 
 def metrics_table(responses: Mapping[str, Response]) -> Table:
     """The ride metrics of each law, and the change."""
-    units = next(iter(responses.values())).metric_units()
+    first = next(iter(responses.values()))
     found = [response.metrics() for response in responses.values()]
-    rows = {name: (_unit(unit), [float(metrics[name]) for metrics in found]) for name, unit in units.items()}
-    return Table("Ride metrics", _columns("metric", responses), _compared(rows))
+    rows = {name: (_unit(unit), [float(of[name]) for of in found]) for name, unit in first.metric_units().items()}
+    signed = [m.name for m in first.vehicle.ride_metrics if metrics.STATISTICS[m.statistic].signed]
+    return Table("Ride metrics", _columns("metric", responses), _compared(rows, signed))
 
 
 def comfort_table(responses: Mapping[str, Response]) -> Table:
@@ -182,7 +187,7 @@ def _draw(
         report.text(f"{name}: {law!r}{'.' * bool(covered)}{covered}")
     for table in tables:
         report.table(table)
-    report.points(range_remarks(responses))
+    report.points(notes_of(responses))
     with attempts.part("The picture ride.png"):
         report.picture(plots.ride(responses, weighting="Wk"), title, folder / "ride.png")
     for damper in dampers_of(next(iter(responses.values()))):

@@ -11,7 +11,8 @@ signal gives NaN. Only what answers in words (`evaluation_method`, `comfort_reac
   `weighted_rms`, `max_transient_value`, `vibration_dose_value`, `estimated_vibration_dose_value`,
   `motion_sickness_dose`, `motion_sickness_percentage`, `shock_ratios`, `evaluation_method`, `vibration_total_value`,
   `total_vibration`, `comfort_reaction`.
-- Suspension travel: `working_space_rms`, `working_space_peak`, `working_space_exceedance`, `gaussian_exceedance`.
+- Suspension travel: `working_space_rms` (about the mean), `working_space_mean`, `working_space_peak_to_peak`,
+  `working_space_exceedance`, `gaussian_exceedance`.
 - Free motion: `settling_time`, `smooth_settling_time`, `logarithmic_decrement`, `damping_ratio`.
 - Tyre load: `dynamic_load_coefficient`, `road_stress_factor`, `lift_off_fraction`, `aggregate_force`,
   `aggregate_force_percentile`.
@@ -19,7 +20,7 @@ signal gives NaN. Only what answers in words (`evaluation_method`, `comfort_reac
   `dissipation_histogram`, `temperature_rise`, `damper_temperature`.
 - Fatigue: `spectral_moments`, `spectral_damage`.
 - Road: `international_roughness_index`, `international_roughness_by_segment`.
-- Gathered while a simulation runs: `STATISTICS`.
+- Gathered while a simulation runs: `STATISTICS`; values by name: `MetricValues`.
 
 >>> import jax
 >>> import jax.numpy as jnp
@@ -32,6 +33,8 @@ signal gives NaN. Only what answers in words (`evaluation_method`, `comfort_reac
 >>> jax.vmap(metrics.rms)(amplitudes[:, None] * acceleration[None, :]).round(6)
 Array([0.707107, 1.414214, 2.828427], dtype=float64)
 """
+
+from typing import Any
 
 from jaxdamp.metrics._linear_system import StateSpace
 from jaxdamp.metrics.aggregate_force import aggregate_force, aggregate_force_percentile
@@ -49,6 +52,7 @@ from jaxdamp.metrics.evaluation import Evaluation, ShockRatios, evaluation_metho
 from jaxdamp.metrics.fatigue import spectral_damage, spectral_moments
 from jaxdamp.metrics.heat import damper_temperature, temperature_rise
 from jaxdamp.metrics.histogram import dissipation_histogram, velocity_histogram
+from jaxdamp.metrics.names import RENAMED, MetricValues, current_name, current_names
 from jaxdamp.metrics.roughness_index import (
     RoughnessBySegment,
     international_roughness_by_segment,
@@ -64,7 +68,8 @@ from jaxdamp.metrics.weighting import weighting_factor, weighting_response, weig
 from jaxdamp.metrics.working_space import (
     gaussian_exceedance,
     working_space_exceedance,
-    working_space_peak,
+    working_space_mean,
+    working_space_peak_to_peak,
     working_space_rms,
 )
 
@@ -73,6 +78,7 @@ __all__ = [
     "AXES",
     "STATISTICS",
     "Evaluation",
+    "MetricValues",
     "RoughnessBySegment",
     "ShockRatios",
     "StateSpace",
@@ -82,6 +88,8 @@ __all__ = [
     "coherence",
     "comfort_reaction",
     "crest_factor",
+    "current_name",
+    "current_names",
     "damper_temperature",
     "damping_ratio",
     "dissipated_energy",
@@ -123,6 +131,14 @@ __all__ = [
     "weighting_response",
     "weighting_state_space",
     "working_space_exceedance",
-    "working_space_peak",
+    "working_space_mean",
+    "working_space_peak_to_peak",
     "working_space_rms",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """A function by the name that it had before."""
+    if name in RENAMED:
+        return globals()[current_name(name, RENAMED.values())]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -16,7 +16,7 @@ from jaxdamp.metrics.amplitude import peak, rms
 from jaxdamp.metrics.dissipation import dissipated_power
 from jaxdamp.metrics.dose import vibration_dose_value
 from jaxdamp.metrics.tyre_load import lift_off_fraction, road_stress_factor
-from jaxdamp.metrics.working_space import working_space_peak
+from jaxdamp.metrics.working_space import working_space_mean, working_space_peak_to_peak, working_space_rms
 
 
 Kept: TypeAlias = tuple[Scalar, ...]
@@ -34,6 +34,7 @@ class Statistic(NamedTuple):
         weighted: whether the record is weighted by ISO 2631-1 first.
         of_rms: it, from the RMS of a stationary Gaussian record without mean; None where that does not say.
         differentiable: whether its slope says anything; a count has none.
+        signed: whether it may be negative, so that a change of it in percent says nothing.
     """
 
     of: Callable[[Signal, ScalarLike], Scalar]
@@ -44,6 +45,7 @@ class Statistic(NamedTuple):
     weighted: bool = False
     of_rms: Callable[[Scalar], Scalar] | None = None
     differentiable: bool = True
+    signed: bool = False
 
 
 _ON_THE_ROAD = -1.0 + 1e-9  # relative tyre load; rounding counts as lifted
@@ -102,13 +104,20 @@ STATISTICS: dict[str, Statistic] = {
         lambda kept, *_: kept[0],
     ),
     "peak_to_peak": Statistic(
-        lambda record, _: working_space_peak(record),
+        lambda record, _: working_space_peak_to_peak(record),
         lambda y: (y, y),
         lambda kept, y: (at_most(kept[0], y), at_least(kept[1], y)),
         lambda kept, *_: kept[1] - kept[0],
     ),
     "standard_deviation": Statistic(
-        lambda record, _: rms(record - jnp.mean(record)), _from_zero, _spread, _deviation, of_rms=lambda value: value
+        lambda record, _: working_space_rms(record), _from_zero, _spread, _deviation, of_rms=lambda value: value
+    ),
+    "mean": Statistic(
+        lambda record, _: working_space_mean(record),
+        lambda y: (y,),
+        lambda kept, y: (kept[0] + y,),
+        lambda kept, count, _: kept[0] / count,
+        signed=True,
     ),
     "road_stress_factor": Statistic(
         _of_relative_load(road_stress_factor),

@@ -15,9 +15,10 @@ from jaxdamp.metrics.amplitude import rms
 def working_space_rms(deflection: SignalLike) -> Scalar:
     """Root mean square of the suspension deflection about its own mean [m], sqrt(mean((d - mean(d))^2)).
 
-    Without the mean, a sensor offset or a ride height changes nothing. An asymmetric damper shifts the mean ("jacking
-    down"): that part of the travel is not in this number; look at the mean as well. The gradient for a constant
-    deflection is zero.
+    It is the standard deviation of the deflection, the usual measure of the working space: of a stationary ride the
+    deflection leaves mean +- 3 times this for 0.3 % of the time. A sensor offset or a ride height changes nothing. An
+    asymmetric damper shifts the mean ("jacking down"); that is `working_space_mean`. The ride metric of this name is
+    the same number. The gradient for a constant deflection is zero.
 
     >>> import jax.numpy as jnp
     >>> d = 0.2 + 0.03 * jnp.sin(2.0 * jnp.pi * jnp.arange(100.0) / 100)
@@ -34,13 +35,33 @@ def working_space_rms(deflection: SignalLike) -> Scalar:
     return rms(deflection - jnp.mean(deflection))
 
 
-def working_space_peak(deflection: SignalLike) -> Scalar:
+def working_space_mean(deflection: SignalLike) -> Scalar:
+    """Mean suspension deflection [m]: how far the body rides above (positive) or below its static position.
+
+    A damper that is stiffer in rebound than in compression pulls the body down on a rough road ("jacking down"): the
+    mean is negative, and that travel in compression is lost. Counted from the static position, which the deflection of
+    a measured record must be too.
+
+    >>> import jax.numpy as jnp
+    >>> round(float(working_space_mean(jnp.array([0.0, -0.02, 0.01, -0.03]))), 6)
+    -0.01
+
+    Args:
+        deflection: Suspension deflection z_sprung - z_unsprung from the static position [m], shape [time].
+
+    Raises:
+        ValueError: If the signal is empty or has more than one axis.
+    """
+    return jnp.mean(as_signal("deflection", deflection))
+
+
+def working_space_peak_to_peak(deflection: SignalLike) -> Scalar:
     """Peak-to-peak suspension deflection [m], max(d) - min(d): the travel that the wheel has used. Not half of it.
 
     Independent of offsets. Only the two extreme samples have a gradient.
 
     >>> import jax.numpy as jnp
-    >>> round(float(working_space_peak(jnp.array([0.0, 0.04, -0.02, 0.01]))), 6)
+    >>> round(float(working_space_peak_to_peak(jnp.array([0.0, 0.04, -0.02, 0.01]))), 6)
     0.06
 
     Args:

@@ -11,6 +11,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.rig import quasi_static
 from jaxdamp.tune import TuneResult
+from jaxdamp.vehicles import AbstractVehicle
 
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
         reach = 1.1 * max(peaks) or 1.0
         velocities = np.linspace(-reach, reach, 401)
     pairs = _changed(result)
-    figure = _style.new_figure(12.0, 6.0)
+    figure = _style.new_figure(12.0, max(6.0, 0.38 * len(result.before)))  # a line of text for each metric
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.0), height_ratios=(1.8, 1.0))
     curves, bars, search = (figure.add_subplot(at) for at in (grid[:, 0], grid[0, 1], grid[1, 1]))
     points = np.asarray(velocities, dtype=float)
@@ -58,9 +59,15 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
 
 def _changed(result: TuneResult) -> dict[str, tuple[AbstractDamper, AbstractDamper]]:
     """The laws of both vehicles by a name to put before "before" and "after": those that differ, or the first."""
-    pairs = list(zip(result.start.elements(), result.vehicle.elements(), strict=True))
+    pairs = list(zip(*(_own_laws(vehicle) for vehicle in (result.start, result.vehicle)), strict=True))
     differing = [i for i, (old, new) in enumerate(pairs) if not eqx.tree_equal(old, new)] or [0]
     return {f"damper {i + 1} " if len(differing) > 1 else "": pairs[i] for i in differing}
+
+
+def _own_laws(vehicle: AbstractVehicle) -> list[AbstractDamper]:
+    """The laws of a vehicle, of several that act together that of one; those of lifting tyres left out."""
+    frame = vehicle.frame()
+    return [element.law for part in (*frame.links, *frame.wheels) for element in part.elements]
 
 
 def _bars(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:

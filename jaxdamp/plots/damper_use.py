@@ -53,7 +53,7 @@ def damper_use(
     middles, handles, laws, gaps = 0.5 * (edges[1:] + edges[:-1]), [], [], []
     for number, (name, (velocity, force)) in enumerate(records.items()):
         style = _style.line_style(number)
-        law = responses[name].vehicle.elements()[responses[name].vehicle.frame().element_names.index(damper)]
+        law = responses[name].vehicle.frame().element(damper).law
         held = np.linspace(velocity.min(), velocity.max(), _POINTS)
         trace.plot(velocity, force, color=style["color"], linewidth=0.5, alpha=0.5)
         curve = quasi_static(law, held)

@@ -85,6 +85,7 @@ class Gathered(NamedTuple):
     channels: tuple[Scalar, ...]
     felt: tuple[tuple[Scalar, ...], ...]
     kept: tuple[Kept, ...]
+    rest: tuple[Scalar, ...]  # channels that count from the static equilibrium, as they are there
 
 
 class Gauge:
@@ -93,36 +94,45 @@ class Gauge:
     def __init__(self, vehicle: AbstractVehicle, metrics: Sequence[RideMetric], dt: float, *, apart: bool) -> None:
         pairs = [name for m in metrics for name in (m.channel, m.by) if name]
         self.names, self.metrics, self.dt = list(dict.fromkeys(pairs)), metrics, dt
+        self.from_rest = list(dict.fromkeys(m.channel for m in metrics if m.from_rest))
         self.outputs = Outputs.of(vehicle, self.names, apart=apart)
         felt = dict.fromkeys(m.channel for m in metrics if STATISTICS[m.statistic].weighted)
         units = vehicle.units
         self.weighted = {name: Filter(*discrete_weighting(weighting_of(units[name]), dt)) for name in felt}
 
     def begin(self, now: Now, ground: Ground) -> Gathered:
-        """At the first instant, with weightings at rest."""
+        """At the first instant, the vehicle in its static equilibrium and weightings at rest."""
         values = self.outputs(now, ground)
         still = tuple((jnp.zeros_like(values[0]),) * f.output.size for f in self.weighted.values())
-        records = self._records(values, still)
-        return Gathered(values, still, tuple(STATISTICS[m.statistic].begin(y) for m, y in records))
+        rest = tuple(values[self.names.index(name)] for name in self.from_rest)
+        records = self._records(values, still, rest)
+        return Gathered(values, still, tuple(STATISTICS[m.statistic].begin(y) for m, y in records), rest)
 
     def add(self, old: Gathered, now: Now, ground: Ground) -> Gathered:
         """One instant more."""
         values = self.outputs(now, ground)
         inputs = [(old.channels[i], values[i]) for i in map(self.names.index, self.weighted)]
         felt = tuple(f(s, *u) for f, s, u in zip(self.weighted.values(), old.felt, inputs, strict=True))
-        pairs = zip(self._records(values, felt), old.kept, strict=True)
-        return Gathered(values, felt, tuple(STATISTICS[m.statistic].add(kept, y) for (m, y), kept in pairs))
+        pairs = zip(self._records(values, felt, old.rest), old.kept, strict=True)
+        kept = tuple(STATISTICS[m.statistic].add(before, y) for (m, y), before in pairs)
+        return Gathered(values, felt, kept, old.rest)
 
     def end(self, gathered: Gathered, count: int) -> dict[str, Scalar]:
         """The metrics of so many instants."""
         pairs = zip(self.metrics, gathered.kept, strict=True)
         return {m.name: STATISTICS[m.statistic].end(kept, count, self.dt) for m, kept in pairs}
 
-    def _records(self, values: Sequence[Scalar], felt: Sequence[Vector]) -> list[tuple[RideMetric, Scalar]]:
+    def _records(
+        self, values: Sequence[Scalar], felt: Sequence[Vector], rest: Sequence[Scalar]
+    ) -> list[tuple[RideMetric, Scalar]]:
         """The sample of each metric's record."""
         weighted = {name: f.of(s) for (name, f), s in zip(self.weighted.items(), felt, strict=True)}
         plain = dict(zip(self.names, values, strict=True))
-        return [
-            (m, (weighted if STATISTICS[m.statistic].weighted else plain)[m.channel] * (plain[m.by] if m.by else 1.0))
-            for m in self.metrics
-        ]
+        moved = {name: plain[name] - level for name, level in zip(self.from_rest, rest, strict=True)}
+
+        def sample(m: RideMetric) -> Scalar:
+            if m.from_rest:
+                return moved[m.channel]
+            return (weighted if STATISTICS[m.statistic].weighted else plain)[m.channel]
+
+        return [(m, sample(m) * (plain[m.by] if m.by else 1.0)) for m in self.metrics]

@@ -1,7 +1,8 @@
 """What a vehicle did on a road: motion, forces, channels with units, energy, ride metrics."""
 
+import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -12,9 +13,11 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks, metrics
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.dampers import RangeUse
+from jaxdamp.metrics import MetricValues
+from jaxdamp.simulation.notes import tyres_in_tension
 from jaxdamp.simulation.range_notes import range_sentences, range_uses
 from jaxdamp.simulation.wheels import AxleTiming
-from jaxdamp.vehicles import AbstractVehicle, Instant, RideMetric
+from jaxdamp.vehicles import AbstractVehicle, Instant, RideMetric, chosen_metrics, rest_position
 
 
 if TYPE_CHECKING:
@@ -41,7 +44,8 @@ class Response(eqx.Module):
     The road's rate is the mean of its slopes before and after an instant. `axle_timing`, printed with the response,
     says when each axle met the road.
 
-    `response["sprung_acceleration"]` is a channel; `response.units` and `response.channels` say which there are.
+    `response["sprung_acceleration"]` is a channel; `response.units` lists them, `response.descriptions` says what each
+    one is, and `response.notes` what to know beside the numbers. `response.between(1.0, 3.0)` is a part of the run.
     """
 
     vehicle: AbstractVehicle
@@ -52,12 +56,35 @@ class Response(eqx.Module):
     road_rate: Float[Array, "time wheels"]
     final_state: list[Float[Array, " _state"]]
     axle_timing: AxleTiming
+    whole: Any = None  # the response that this one is a part of, and the number of its first instant there
+    begin: Any = None
 
     def __repr__(self) -> str:
         name, time = type(self.vehicle).__name__, _checks.concrete(self.time)
         several = "" if self.axle_timing.kind == "one axle" else f"; {self.axle_timing}"
-        length = "" if time is None or time.ndim != 1 else f" over {time[-1]:g} s, {time.size} instants"
+        length = ""
+        if time is not None and time.ndim == 1:
+            begins = "over" if self.whole is None else f"from {time[0]:g} to"
+            length = f" {begins} {time[-1]:g} s, {time.size} instants"
         return f"Response of a {name}{length}, {len(self.units)} channels{several}"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to know of this run beside its numbers, a sentence each.
+
+        Tyres that pulled on the road, and dampers that left the range that their laws were fitted to.
+
+        Empty if there is nothing to say, and while JAX traces.
+        """
+        if _checks.concrete(self.motion) is None:
+            return ()
+        tyres = tyres_in_tension(self.vehicle, np.asarray(self.time), self.channels)
+        return (*tyres, *range_sentences(self.range_use()))
+
+    @property
+    def descriptions(self) -> dict[str, str]:
+        """What each channel is, its positive direction, and of how many dampers or wheels it is."""
+        return self.vehicle.descriptions
 
     @property
     def units(self) -> dict[str, str]:
@@ -65,9 +92,14 @@ class Response(eqx.Module):
         return self.vehicle.units
 
     @property
-    @eqx.filter_jit
     def channels(self) -> dict[str, Signal]:
         """All channels by name."""
+        if self.whole is None:
+            return self._channels()
+        return {name: self._of_this_part(values) for name, values in self.whole.channels.items()}
+
+    @eqx.filter_jit
+    def _channels(self) -> dict[str, Signal]:
         system, n = self.vehicle.port_form().first_order(), len(self.vehicle.coordinates)
         forces = self.port_force @ system.port_input.T + self.road @ system.road_input.T
         change = self.motion @ system.state_matrix.T + forces + self.road_rate @ system.road_rate_input.T
@@ -79,25 +111,24 @@ class Response(eqx.Module):
         return self.channels[channel]
 
     def metrics(self, names: Sequence[str] | None = None) -> dict[str, Scalar]:
-        """The vehicle's ride metrics by name, or those of these names, over the whole run.
+        """The vehicle's ride metrics by name, or those of these names, over the run or the part of it that this is.
 
         Weighted ones take heights by Wk and angles by We, exactly for accelerations straight from sample to sample; the
         ride starts from rest, so its mean counts. Differentiable but for peaks, which have the slope of one instant,
         and counts, which have none.
         """
-        known = {m.name: m for m in self.vehicle.ride_metrics}
-        for name in names or ():
-            _checks.one_of("names", name, known)
-        return self._metrics([known[name] for name in (known if names is None else names)], self._dt())
+        return MetricValues(self._metrics(chosen_metrics(self.vehicle, names, "names"), self._dt()))
 
     @eqx.filter_jit
     def _metrics(self, chosen: Sequence[RideMetric], dt: ScalarLike) -> dict[str, Scalar]:
         channels, found = self.channels, {}
         weighted = {m.channel for m in chosen if metrics.STATISTICS[m.statistic].weighted}
-        felt = {name: self._felt(channels[name], name, dt) for name in sorted(weighted)}
+        felt = {name: self._felt(name, dt) for name in sorted(weighted)}
+        rest = self._at_rest() if any(m.from_rest for m in chosen) else {}
         for m in chosen:
             statistic = metrics.STATISTICS[m.statistic]
             record = (felt if statistic.weighted else channels)[m.channel]
+            record = record - rest[m.channel] if m.from_rest else record
             found[m.name] = statistic.of(record * channels[m.by] if m.by else record, dt)
         return found
 
@@ -107,13 +138,60 @@ class Response(eqx.Module):
 
     def _dt(self) -> ScalarLike:
         """Spacing of the instants, as a plain number where it is known: then filters are made by NumPy."""
-        known = _checks.concrete(self.time)
-        return self.time[1] - self.time[0] if known is None else float(known[1] - known[0])
+        time = (self if self.whole is None else self.whole).time
+        known = _checks.concrete(time)
+        return time[1] - time[0] if known is None else float(known[1] - known[0])
 
-    def _felt(self, acceleration: Signal, name: str, dt: ScalarLike) -> Signal:
-        """An acceleration weighted by ISO 2631-1."""
+    def _felt(self, name: str, dt: ScalarLike) -> Signal:
+        """An acceleration weighted by ISO 2631-1 from the start of the run."""
+        run = self if self.whole is None else self.whole
         weighting = metrics.weighting_of(self.units[name])
-        return metrics.weighted_signal(acceleration, dt, weighting, method="step", remove_mean=False)
+        felt = metrics.weighted_signal(run.channels[name], dt, weighting, method="step", remove_mean=False)
+        return self._of_this_part(felt)
+
+    def _of_this_part(self, values: Float[Array, " whole"]) -> Signal:
+        """Values of the whole run, cut to the part of it that this is."""
+        return values if self.whole is None else jax.lax.dynamic_slice_in_dim(values, self.begin, self.time.size)
+
+    def _at_rest(self) -> dict[str, Scalar]:
+        """The channels in the static equilibrium on the first heights of the run, forces left out."""
+        road = (self if self.whole is None else self.whole).road[0]
+        form = self.vehicle.port_form()
+        position = rest_position(form, self.vehicle.elements(), road)
+        still, force = jnp.zeros_like(position), jnp.zeros(form.ports.shape[0])
+        return self.vehicle.channels(Instant(position, still, still, road, jnp.zeros_like(road), force))
+
+    def between(self, start: float, stop: float) -> "Response":
+        """The part of the run from `start` to `stop` [s], both instants included, with the times of the run.
+
+        Its channels, metrics, comfort, energy balance and pictures are of that part. Weightings still run from the
+        start of the run, and displacements still count from the static equilibrium on its first heights. The states of
+        the laws at the end of a part are known only where it ends with the run; else `final_state` is NaN.
+
+        >>> from jaxdamp import roads, simulate, vehicles
+        >>> bump = roads.cosine_bump(0.05, start=0.5, duration=0.25)
+        >>> response = simulate(vehicles.presets.quarter_car_000(), bump, duration=2.0)
+        >>> float(response.between(0.0, 0.4).metrics()["peak_sprung_acceleration"]) < 1e-9
+        True
+
+        Raises:
+            ValueError: a part outside the run, or of fewer than two instants; a run that JAX traces.
+        """
+        time = _checks.concrete(self.time)
+        if time is None:
+            remedy = "Inside compiled code, cut the channels by the numbers of their instants."
+            _checks.refuse("between", "be asked of a run whose times are known", "traced", remedy)
+        slack = 0.01 * float(time[1] - time[0])
+        inside = np.flatnonzero((time >= start - slack) & (time <= stop + slack))
+        if start < time[0] - slack or stop > time[-1] + slack or inside.size < 2:
+            must = f"be two instants or more of the run, {time[0]:g} to {time[-1]:g} s"
+            _checks.refuse("start, stop", must, f"{start:g} and {stop:g}")
+        part, last = slice(inside[0], inside[-1] + 1), inside[-1] + 1 == time.size
+        states = [state if last else jnp.full_like(state, jnp.nan) for state in self.final_state]
+        arrays = {name: getattr(self, name)[part] for name in ("time", "motion", "port_force", "road", "road_rate")}
+        whole = self if self.whole is None else self.whole
+        begin = jnp.asarray(inside[0] + (0 if self.whole is None else self.begin))
+        return dataclasses.replace(self, **arrays, final_state=states, whole=whole, begin=begin)
 
     def comfort(self) -> dict[str, Comfort]:
         """What of each acceleration of body, seats and places people feel, by ISO 2631-1, with the largest second.
@@ -124,9 +202,9 @@ class Response(eqx.Module):
 
     @eqx.filter_jit
     def _comfort(self, dt: ScalarLike) -> dict[str, Comfort]:
-        channels, found = self.channels, {}
+        found = {}
         for name in dict.fromkeys(m.channel for m in self.vehicle.ride_metrics if m.channel.endswith("_acceleration")):
-            felt = self._felt(channels[name], name, dt)
+            felt = self._felt(name, dt)
             transient = metrics.max_transient_value(felt, dt, None)
             dose = metrics.vibration_dose_value(felt, dt, None)
             found[name] = Comfort(metrics.rms(felt), transient, dose)
@@ -165,7 +243,10 @@ class Response(eqx.Module):
 
     @eqx.filter_jit
     def absorbed_by(self) -> dict[str, Scalar]:
-        """Energy that each element has taken in [J], ∫ F ė dt, by its name."""
+        """Energy that each element has taken in [J], ∫ F ė dt, by its name.
+
+        Where an element is several dampers that act together, it is that of all; force and power channels are of one.
+        """
         form, n = self.vehicle.port_form(), len(self.vehicle.coordinates)
         dt = jnp.diff(self.time)
         moved = _middle(self.port_force * (self.motion[:, n:] @ form.ports.T))
@@ -179,17 +260,13 @@ class Response(eqx.Module):
         """What each damper did beside the range that its law was fitted to; only of laws that have one."""
         return range_uses(self.vehicle, self.motion, self.road, self.road_rate, self.port_force)
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a user should know before trusting the run, in words: dampers outside the range they were fitted to."""
-        return range_sentences(self.range_use())
-
     def to_xarray(self) -> "xarray.Dataset":
         """All channels as an `xarray.Dataset` over time, with units."""
         import xarray
 
         channels = {
-            name: ("time", np.asarray(values), {"units": self.units[name]}) for name, values in self.channels.items()
+            name: ("time", np.asarray(values), {"units": self.units[name], "description": self.descriptions[name]})
+            for name, values in self.channels.items()
         }
         times = {"time": ("time", np.asarray(self.time), {"units": "s"})}
         return xarray.Dataset(channels, times, {"axles": str(self.axle_timing)})

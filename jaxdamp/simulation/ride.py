@@ -8,12 +8,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Scalar
 from jaxdamp.configuration import fuses_loops
 from jaxdamp.dampers import RangeUse, without_fitted_ranges
 from jaxdamp.dampers.fitted_range import has_fitted_range
+from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import parameters, replace
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation._vectors import scalars
@@ -24,7 +24,7 @@ from jaxdamp.simulation.run import sampled
 from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.stepper import FOR_REVERSE, Ground, Now, Stepper
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
-from jaxdamp.vehicles import AbstractVehicle, RideMetric
+from jaxdamp.vehicles import AbstractVehicle, RideMetric, chosen_metrics
 
 
 Carry: TypeAlias = tuple[Now, Gathered, Ground, tuple[Array, Array]]
@@ -58,9 +58,9 @@ class Ride(eqx.Module):
     >>> from jaxdamp import roads, vehicles
     >>> car = vehicles.presets.quarter_car_000()
     >>> bump = roads.cosine_bump(0.05, start=0.5, duration=0.25)
-    >>> ride = Ride(car, bump, metrics=["working_space_peak"], duration=3.0)
+    >>> ride = Ride(car, bump, metrics=["working_space_peak_to_peak"], duration=3.0)
     >>> {name: round(float(value), 3) for name, value in ride({"damper.rate": 2500.0}).items()}
-    {'working_space_peak': 0.072}
+    {'working_space_peak_to_peak': 0.072}
     """
 
     vehicle: AbstractVehicle
@@ -83,14 +83,11 @@ class Ride(eqx.Module):
     ) -> None:
         check_module("vehicle", vehicle, (AbstractVehicle,), "Ride(vehicle, road)")
         check_module("road", road, (AbstractRoad,), "Ride(vehicle, road)")
-        known = {m.name: m for m in vehicle.ride_metrics}
-        for name in metrics or ():
-            _checks.one_of("metrics", name, known)
         self.vehicle, self.dt, self.many = vehicle, dt, False
         _, self.heights = sampled(vehicle, road, duration, dt)
         self.road = road if delays_by_itself(vehicle, road) else None
         self.substeps = substeps_needed(vehicle, dt) if substeps is None else substeps
-        self.metrics = tuple(known.values() if metrics is None else [known[name] for name in metrics])
+        self.metrics = tuple(chosen_metrics(vehicle, metrics, "metrics"))
 
     @property
     def units(self) -> dict[str, str]:
@@ -132,7 +129,7 @@ class Ride(eqx.Module):
 
     def __call__(self, point: Mapping[str, Any] | None = None) -> dict[str, Scalar]:
         """The metrics by name, with other values of the parameters at these paths."""
-        return _drive(self, dict(point or {}))
+        return MetricValues(_drive(self, dict(point or {})))
 
 
 @eqx.filter_jit

@@ -77,7 +77,7 @@ def simulate(
     >>> from jaxdamp import roads, vehicles
     >>> car = vehicles.presets.quarter_car_000()
     >>> response = simulate(car, roads.cosine_bump(0.05, start=0.5, duration=0.25), duration=3.0)
-    >>> round(float(response.metrics()["working_space_peak"]), 3)
+    >>> round(float(response.metrics()["working_space_peak_to_peak"]), 3)
     0.072
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "simulate(vehicle, road)")

@@ -51,7 +51,8 @@ def minimise(
         over: the parameters to change, by path, last part or pattern; all of the damper by default.
         freeze: parameters among these to leave alone.
         bounds: extra limits `{parameter: (lower, upper)}` in its unit; the start must lie between them.
-        limits: hard limits `{metric: largest value}` in the metric's unit, such as `{"working_space_peak": 0.1}`.
+        limits: hard limits `{metric: largest value}` in the metric's unit, such as
+            `{"working_space_peak_to_peak": 0.1}`.
         duration: length of the run [s], as in `simulate`.
         dt: step [s], as in `simulate`.
         max_steps: of the search.
@@ -74,7 +75,9 @@ def minimise(
     _checks.instance("metric", metric, str, "be the name of a ride metric", f"The call is `{call}`.")
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
     check_module("road", road, (AbstractRoad, WhiteRoad), call)
-    limits = dict(limits or {})
+    known = [m.name for m in vehicle.ride_metrics]
+    metric = metrics.current_name(metric, known)
+    limits = {metrics.current_name(name, known): top for name, top in (limits or {}).items()}
     chosen = chosen_metrics(vehicle, road, (metric, *limits))
     white = isinstance(road, WhiteRoad)
     free = free_parameters(vehicle, over=over, freeze=freeze, bounds=bounds)
@@ -118,8 +121,8 @@ def minimise(
         vehicle,
         metric,
         changes,
-        before,
-        after,
+        metrics.MetricValues(before),
+        metrics.MetricValues(after),
         {m.name: m.unit(vehicle.units) for m in chosen},
         limits,
         tuple(notes),
@@ -131,17 +134,18 @@ def minimise(
 def chosen_metrics(vehicle: AbstractVehicle, road: AbstractRoad | WhiteRoad, wanted: Sequence[str]) -> list[RideMetric]:
     """The ride metrics that are wanted, and all others that this kind of road gives without weighting or counting.
 
-    A white road gives what follows from an RMS, so no peaks.
+    A white road gives what follows from an RMS, so no peaks. Means, which may be negative, only if they are wanted.
     """
-    white, kinds = isinstance(road, WhiteRoad), metrics.STATISTICS
-    known = [m for m in vehicle.ride_metrics if not white or kinds[m.statistic].of_rms]
+    white, kinds, units = isinstance(road, WhiteRoad), metrics.STATISTICS, vehicle.units
+    known = [m for m in vehicle.ride_metrics if not white or m.is_stationary(units)]
     for name in wanted:
         _checks.one_of("metric", name, [m.name for m in known])
     still = [m.name for m in known if not kinds[m.statistic].differentiable]
     for name in wanted:
         if name in still:
             _checks.refuse("metric", "have a slope", f"{name!r}, a count", "Tune on the dynamic load coefficient.")
-    others = [m for m in known if m.name not in still and not kinds[m.statistic].weighted]
+    plain = [m for m in known if not (kinds[m.statistic].weighted or kinds[m.statistic].signed)]
+    others = [m for m in plain if m.name not in still]
     return [m for m in known if m in others or m.name in wanted]
 
 

@@ -11,7 +11,7 @@ z is up, pitch positive nose up, roll positive left side up.
 
 from jaxdamp.vehicles import presets
 from jaxdamp.vehicles.axle import Axle
-from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle
+from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle, chosen_metrics
 from jaxdamp.vehicles.cab import Cab
 from jaxdamp.vehicles.channels import Instant, RideMetric
 from jaxdamp.vehicles.corner import Corner
@@ -72,6 +72,7 @@ __all__ = [
     "WalkingBeam",
     "Wheel",
     "assemble",
+    "chosen_metrics",
     "frequency_response",
     "linearise",
     "lyapunov",

@@ -1,16 +1,20 @@
 """What every vehicle offers, all from its frame of parts."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.metrics import current_names
 from jaxdamp.parameters import check_parameters, readable
 from jaxdamp.vehicles.channels import Instant, RideMetric, channels_of, ride_metrics_of, units_of
+from jaxdamp.vehicles.descriptions import descriptions_of
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
 
@@ -55,6 +59,11 @@ class AbstractVehicle(eqx.Module):
         return units_of(self.frame())
 
     @property
+    def descriptions(self) -> dict[str, str]:
+        """What each channel is, its positive direction, and of how many dampers or wheels it is."""
+        return descriptions_of(self.frame())
+
+    @property
     def ride_metrics(self) -> tuple[RideMetric, ...]:
         """The numbers that say how the vehicle rides."""
         return ride_metrics_of(self.frame())
@@ -80,12 +89,29 @@ class AbstractVehicle(eqx.Module):
         return jnp.max(offsets) - jnp.min(offsets)
 
 
+def chosen_metrics(vehicle: AbstractVehicle, names: Sequence[str] | None, argument: str) -> list[RideMetric]:
+    """The ride metrics of these names, all of them if `names` is None; `argument` is what errors call the names.
+
+    Raises:
+        ValueError: a name that no ride metric has, with the nearest one; no name.
+    """
+    known = {m.name: m for m in vehicle.ride_metrics}
+    if names is not None and not len(names):
+        some = ", ".join(map(repr, list(known)[:3]))
+        _checks.refuse(argument, "name one or more", "empty", f"Write [{some}], or leave it out for all.")
+    return [known[name] for name in (known if names is None else current_names(argument, names, known))]
+
+
 @final
 class LumpedVehicle(AbstractVehicle):
     """A vehicle that is a list of parts and nothing else, for one of its own kind.
 
     Its parameters are those of the parts, such as `parts.links.0.stiffness`. To give parameters names of your own,
     derive a class from `AbstractVehicle` (`docs/vehicles.md` shows both).
+
+    Arguments:
+        parts: bodies, links, wheels and places.
+        tyre_lifts: whether all wheels can leave the road; a single `Wheel` can say so itself (`lifts`).
 
     >>> from jaxdamp.dampers import Linear
     >>> from jaxdamp.vehicles import Body, Element, Link, Wheel
@@ -97,7 +123,8 @@ class LumpedVehicle(AbstractVehicle):
     """
 
     parts: Frame
+    tyre_lifts: bool = eqx.field(static=True, default=False)
 
     def frame(self) -> Frame:
         """The parts."""
-        return self.parts
+        return self.parts.lifting(self.tyre_lifts)

@@ -20,8 +20,8 @@ class Cab(AbstractPart):
         rear_distance: rear mount behind it [m].
         front_rate: spring rate of the front mount, both sides together [N/m].
         rear_rate: of the rear mount [N/m].
-        front_damper: law at the front mount.
-        rear_damper: law at the rear mount.
+        front_damper: law at the front mount, both sides together.
+        rear_damper: law at the rear mount, both sides together.
     """
 
     mass: Number = parameter("kg", "mass of the cab", positive)
@@ -42,7 +42,7 @@ class Cab(AbstractPart):
             ("cab_rear", -self.rear_distance, self.rear_rate, self.rear_damper),
         )
         links = tuple(
-            Link(name, cab.at(x) - body.at(self.ahead + x), rate, elements=(Element("damper", law),))
+            Link(name, cab.at(x) - body.at(self.ahead + x), rate, elements=(Element("damper", law),), sides=2)
             for name, x, rate, law in mounts
         )
         return (cab,), links

@@ -32,16 +32,22 @@ class RideMetric(NamedTuple):
         channel: what it is made of.
         statistic: how, one of `metrics.STATISTICS`.
         by: a second channel, which the first is multiplied with.
+        from_rest: whether the channel is counted from its value in the static equilibrium on the road's first heights.
     """
 
     name: str
     channel: str
     statistic: str
     by: str = ""
+    from_rest: bool = False
 
     def unit(self, units: Mapping[str, str]) -> str:
         """Its unit, from those of the channels."""
         return STATISTICS[self.statistic].unit(units[self.channel])
+
+    def is_stationary(self, units: Mapping[str, str]) -> bool:
+        """Whether the RMS of its channel on a white road gives it; a height wanders with the road and has none."""
+        return STATISTICS[self.statistic].of_rms is not None and not (self.from_rest and units[self.channel] == "m")
 
 
 def _acceleration(coordinate: str) -> str:
@@ -102,37 +108,62 @@ def channels_of(frame: Frame, instant: Instant) -> dict[str, Scalar]:
         found[f"z_{prefixed(wheel.name, 'road')}"] = instant.road[i]
         found[prefixed(wheel.name, "dynamic_tyre_load")] = -pull
         found[prefixed(wheel.name, "relative_tyre_load")] = -pull / loads[i]
-    found |= {f"{name}_force": force for name, force in forces.items() if not name.endswith("lift_off")}
+    for part in [*frame.links, *frame.wheels]:
+        for element in part.elements:  # several that act together: the force of one
+            name = prefixed(part.name, element.name)
+            found[f"{name}_force"] = forces[name] if element.count == 1 else forces[name] / element.count
     return found
 
 
 def ride_metrics_of(frame: Frame) -> tuple[RideMetric, ...]:
+    """What a ride is judged by, in groups: bodies and places, suspensions, tyres."""
+    return (*_of_bodies(frame), *_of_elements(frame), *_of_tyres(frame))
+
+
+def _of_bodies(frame: Frame) -> list[RideMetric]:
     """Accelerations of the bodies that are not wheels and of the places, as they are and as people feel them.
 
-    Working space, damper velocity and the power that each element takes; tyre loads, and how often a wheel lifts off.
+    Displacements and angles of these bodies, from the static equilibrium.
     """
     on_wheels = {name for wheel in frame.wheels for name in wheel.point.terms}
     riding = [b for b in frame.bodies if b.name == frame.main_body.name or on_wheels.isdisjoint(b.masses)]
-    channels = [_acceleration(name) for body in riding for name in body.masses]
-    channels += [f"{place.name}_acceleration" for place in frame.places]
+    coordinates = [name for body in riding for name in body.masses]
+    channels = [_acceleration(name) for name in coordinates] + [f"{place.name}_acceleration" for place in frame.places]
     of_acceleration = ("rms", "peak", "weighted_rms", "vibration_dose_value")
     metrics = [RideMetric(f"{statistic}_{c}", c, statistic) for c in channels for statistic in of_acceleration]
+    for name in coordinates:
+        word = f"{name[2:]}_displacement" if name.startswith("z_") else f"{name}_angle"
+        metrics += [RideMetric(f"{statistic}_{word}", name, statistic, from_rest=True) for statistic in ("rms", "peak")]
+    return metrics
+
+
+def _of_elements(frame: Frame) -> list[RideMetric]:
+    """Working space and velocity of every link with laws, and the power that each law takes."""
+    metrics: list[RideMetric] = []
     parts: list[Link | Wheel] = [*frame.links, *frame.wheels]
     for part in parts:
         stroke, velocity = prefixed(part.name, "stroke"), prefixed(part.name, "damper_velocity")
         if part.elements:
+            space = prefixed(part.name, "working_space")
             metrics += [
-                RideMetric(prefixed(part.name, "working_space_rms"), stroke, "rms"),
-                RideMetric(prefixed(part.name, "working_space_peak"), stroke, "peak_to_peak"),
+                RideMetric(f"{space}_rms", stroke, "standard_deviation"),
+                RideMetric(f"{space}_mean", stroke, "mean", from_rest=True),
+                RideMetric(f"{space}_peak_to_peak", stroke, "peak_to_peak"),
                 RideMetric(f"peak_{velocity}", velocity, "peak"),
             ]
         for element in part.elements:
             name = prefixed(part.name, element.name)
             metrics.append(RideMetric(f"{name}_dissipated_power", f"{name}_force", "dissipated_power", velocity))
+    return metrics
+
+
+def _of_tyres(frame: Frame) -> list[RideMetric]:
+    """Variation of the tyre loads, and how often a wheel lifts off."""
+    metrics: list[RideMetric] = []
     for wheel in frame.wheels:
         load, relative = prefixed(wheel.name, "dynamic_tyre_load"), prefixed(wheel.name, "relative_tyre_load")
         coefficient = prefixed(wheel.name, "dynamic_load_coefficient")
         metrics += [RideMetric(f"rms_{load}", load, "rms"), RideMetric(coefficient, relative, "standard_deviation")]
         of_load = ("road_stress_factor", "lift_off_fraction")
         metrics += [RideMetric(prefixed(wheel.name, statistic), relative, statistic) for statistic in of_load]
-    return tuple(metrics)
+    return metrics

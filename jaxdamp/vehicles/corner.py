@@ -27,6 +27,8 @@ class Corner(AbstractPart):
         bump_stop: law such as `dampers.BumpStop`.
         friction: law such as `dampers.CoulombFriction`.
         tyre_lifts: whether the tyre can leave the road.
+        damper_count: how many dampers like `damper` act together, two where the corner is a whole axle with one on
+            each side; the channel of the damper's force and its power are of one.
     """
 
     unsprung_mass: Number = parameter("kg", "mass of wheel and hub", positive)
@@ -38,6 +40,7 @@ class Corner(AbstractPart):
     bump_stop: AbstractDamper | None = None
     friction: AbstractDamper | None = None
     tyre_lifts: bool = eqx.field(static=True, default=False)
+    damper_count: int = eqx.field(static=True, default=1)
 
 
 @runtime_checkable
@@ -49,6 +52,7 @@ class HasCorner(Protocol):
     tyre_stiffness: Any
     tyre_damping: Any
     tyre_lifts: bool
+    damper_count: int
 
     damper: Any
     extra_spring: Any
@@ -57,7 +61,14 @@ class HasCorner(Protocol):
 
 
 def suspend(
-    corner: HasCorner, name: str, mount: Point, *, behind: Any = 0.0, left: Any = 0.0, beside: bool = False
+    corner: HasCorner,
+    name: str,
+    mount: Point,
+    *,
+    behind: Any = 0.0,
+    left: Any = 0.0,
+    beside: bool = False,
+    sides: int = 1,
 ) -> tuple[Body, Link, Wheel]:
     """The parts of a corner under a point of the body: its wheel, its suspension and its tyre.
 
@@ -68,6 +79,7 @@ def suspend(
         behind: distance behind the front axle [m].
         left: distance to the left of the middle [m].
         beside: on the axle of the wheel before it.
+        sides: of the vehicle that the corner stands for.
     """
     wheel = Body(prefixed(name, "unsprung"), corner.unsprung_mass)
     laws = {
@@ -76,8 +88,9 @@ def suspend(
         "bump_stop": corner.bump_stop,
         "friction": corner.friction,
     }
-    elements = tuple(Element(kind, law) for kind, law in laws.items() if law is not None)
-    suspension = Link(name, mount - wheel.at(), corner.spring_rate, elements=elements)
+    counts = {"damper": corner.damper_count}
+    elements = tuple(Element(kind, law, counts.get(kind, 1)) for kind, law in laws.items() if law is not None)
+    suspension = Link(name, mount - wheel.at(), corner.spring_rate, elements=elements, sides=sides)
     lifts = corner.tyre_lifts
-    tyre = Wheel(name, wheel.at(), corner.tyre_stiffness, corner.tyre_damping, behind, left, (), lifts, beside)
+    tyre = Wheel(name, wheel.at(), corner.tyre_stiffness, corner.tyre_damping, behind, left, (), lifts, beside, sides)
     return wheel, suspension, tyre

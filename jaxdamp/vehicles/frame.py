@@ -1,5 +1,6 @@
 """A vehicle as a list of parts, and its matrices, elements and static loads."""
 
+import dataclasses
 from collections.abc import Sequence
 from functools import reduce
 from operator import or_
@@ -23,7 +24,7 @@ from jaxdamp.dampers import (
     TemperatureScaled,
 )
 from jaxdamp.dampers.base import parts
-from jaxdamp.vehicles.lift_off import LiftOff
+from jaxdamp.vehicles.lift_off import LiftOff, LiftOffWithLaws
 from jaxdamp.vehicles.parts import SPRUNG, Body, Element, Link, Place, Wheel
 from jaxdamp.vehicles.points import Point
 from jaxdamp.vehicles.port_form import Connection, PortForm, assemble
@@ -102,11 +103,24 @@ class Frame(eqx.Module):
 
     def elements(self) -> tuple[AbstractDamper, ...]:
         """The law at each port."""
-        own = tuple(element.law for _, _, element in self._elements())
+        own = tuple(element.together for _, _, element in self._elements())
         if not any(wheel.lifts for wheel in self.wheels):
             return own
         pairs = zip(self.wheels, self.static_wheel_loads(), strict=True)
-        return (*own, *[LiftOff(wheel.stiffness, wheel.damping, load) for wheel, load in pairs if wheel.lifts])
+        return (*own, *[lift_off(wheel, load) for wheel, load in pairs if wheel.lifts])
+
+    def element(self, name: str) -> Element:
+        """The element of a name, with the law of one where several act together."""
+        known = {known: element for known, _, element in self._elements()}
+        _checks.one_of("name", name, known)
+        return known[name]
+
+    def lifting(self, lifts: bool = True) -> "Frame":
+        """The same with wheels that can all leave the road, if `lifts`."""
+        if not lifts:
+            return self
+        wheels = tuple(dataclasses.replace(wheel, lifts=True) for wheel in self.wheels)
+        return Frame(self.bodies, self.links, wheels, self.places)
 
     def port_form(self) -> PortForm:
         """The matrices."""
@@ -138,7 +152,7 @@ class Frame(eqx.Module):
         shared as if all springs were free of load on the same level ground before: K_t q = −weight, with the springs
         of the laws in the tangent stiffness K_t.
         """
-        own = [element.law for _, _, element in self._elements()]
+        own = [element.together for _, _, element in self._elements()]
         form = self._assembled([part for _, part, _ in self._elements()])
         weight = jnp.zeros(len(self.coordinates)).at[jnp.array(self._heights())].set(STANDARD_GRAVITY)
         stiffness = tangent_stiffness(form, own, jnp.zeros(len(self.coordinates)))
@@ -163,6 +177,13 @@ class Frame(eqx.Module):
     def main_body(self) -> Body:
         """The body named "sprung", or the first."""
         return next((body for body in self.bodies if body.name == SPRUNG), self.bodies[0])
+
+
+def lift_off(wheel: Wheel, static_load: Scalar) -> AbstractDamper:
+    """What a wheel that can leave the road has beside its spring, dashpot and laws."""
+    linear = LiftOff(wheel.stiffness, wheel.damping, static_load)
+    laws = tuple(element.together for element in wheel.elements)
+    return LiftOffWithLaws(linear, Sum(laws)) if laws else linear
 
 
 def holds_no_stroke(law: AbstractDamper) -> bool:

@@ -2,6 +2,8 @@
 
 from typing import final
 
+import equinox as eqx
+
 from jaxdamp._types import Number
 from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles.axle import Axle, carry
@@ -27,6 +29,7 @@ class FullCar(AbstractVehicle):
         rear: axle at `rear_distance`.
         places: where on the body accelerations are of interest.
         seats: on the body.
+        tyre_lifts: whether all tyres can leave the road; a single corner can say so itself.
 
     >>> from jaxdamp.vehicles.presets import full_car_jazar
     >>> full_car_jazar().wheel_names
@@ -42,6 +45,7 @@ class FullCar(AbstractVehicle):
     rear: Axle  # pyright: ignore[reportGeneralTypeIssues]
     places: tuple[Place, ...] = ()
     seats: tuple[Seat, ...] = ()
+    tyre_lifts: bool = eqx.field(static=True, default=False)
 
     def frame(self) -> Frame:
         """Coordinates z_sprung, pitch, roll, then wheels (front left, front right, rear left, rear right), seats."""
@@ -52,4 +56,4 @@ class FullCar(AbstractVehicle):
         bodies, links = seated(self.seats, body)
         return Frame(
             (body, *front[0], *rear[0], *bodies), (*front[1], *rear[1], *links), front[2] + rear[2], self.places
-        )
+        ).lifting(self.tyre_lifts)

@@ -2,6 +2,8 @@
 
 from typing import final
 
+import equinox as eqx
+
 from jaxdamp._types import Number
 from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles.base import AbstractVehicle
@@ -30,6 +32,7 @@ class HalfCar(AbstractVehicle):
         rear: corner at l_b.
         places: where on the body accelerations are of interest.
         seats: on the body.
+        tyre_lifts: whether all tyres can leave the road; a single corner can say so itself.
 
     >>> from jaxdamp.vehicles.presets import half_car_002
     >>> car = half_car_002()
@@ -45,6 +48,7 @@ class HalfCar(AbstractVehicle):
     rear: Corner  # pyright: ignore[reportGeneralTypeIssues]
     places: tuple[Place, ...] = ()
     seats: tuple[Seat, ...] = ()
+    tyre_lifts: bool = eqx.field(static=True, default=False)
 
     def frame(self) -> Frame:
         """Coordinates z_sprung, pitch, z_front_unsprung, z_rear_unsprung, then seats; wheels front, rear."""
@@ -53,4 +57,5 @@ class HalfCar(AbstractVehicle):
         front = suspend(self.front, "front", body.at(self.front_distance))
         rear = suspend(self.rear, "rear", body.at(-self.rear_distance), behind=wheelbase)
         bodies, links = seated(self.seats, body)
-        return Frame((body, front[0], rear[0], *bodies), (front[1], rear[1], *links), (front[2], rear[2]), self.places)
+        suspensions, tyres = (front[1], rear[1], *links), (front[2], rear[2])
+        return Frame((body, front[0], rear[0], *bodies), suspensions, tyres, self.places).lifting(self.tyre_lifts)

@@ -5,8 +5,8 @@ from typing import final
 import jax.numpy as jnp
 
 from jaxdamp._smooth import ramp
-from jaxdamp._types import Number, Scalar, ScalarLike
-from jaxdamp.dampers import AbstractStateless
+from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers import AbstractDamper, AbstractStateless
 from jaxdamp.parameters import nonnegative, positive, setting
 
 
@@ -35,10 +35,53 @@ class LiftOff(AbstractStateless):
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] beside the linear tyre at deflection x [m], positive when stretched, and rate v [m/s]."""
-        linear, width = self.tyre_stiffness * x + self.tyre_damping * v, self.width * self.static_load
-        return ramp(-self.static_load, width) - ramp(linear - self.static_load, width)
+        return self.beside(self.tyre_stiffness * x + self.tyre_damping * v)
+
+    def beside(self, force: ScalarLike) -> Scalar:
+        """Force [N] beside one that would pull the wheel and the road together, so that both only push."""
+        width = self.width * self.static_load
+        return ramp(-self.static_load, width) - ramp(force - self.static_load, width)
 
     def contact_force(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force between tyre and road [N], never negative."""
         linear = self.tyre_stiffness * x + self.tyre_damping * v
         return jnp.asarray(ramp(self.static_load - linear, self.width * self.static_load))
+
+
+@final
+class LiftOffWithLaws(AbstractDamper):
+    """What a wheel with laws between it and the road has beside them and its spring: all together, they only push.
+
+    As `LiftOff`, with the sum of the linear force and of the laws D in place of the linear force alone,
+    F = −r(L + D − W) + r(−W). The laws run here a second time, with states that are those of the laws themselves.
+
+    A wheel without mass, as of a `TrackedHull`, carries nothing in the air: this is its force on the vehicle. The laws
+    are driven as if the wheel still followed the ground, so in the air their own channels say nothing, and the wheel
+    touches down where the force becomes a push again.
+
+    Arguments:
+        linear: of the linear spring and dashpot.
+        laws: beside them.
+    """
+
+    linear: LiftOff
+    laws: AbstractDamper
+
+    def initial_state(self) -> State:
+        """Those of the laws."""
+        return self.laws.initial_state()
+
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Force [N]."""
+        spring = self.linear.tyre_stiffness * x + self.linear.tyre_damping * v
+        return self.linear.beside(spring + self.laws.force(x, v, state))
+
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """Rates of the laws."""
+        return self.laws.state_rate(x, v, state)
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """The step of the laws."""
+        return self.laws.advance(x0, v0, x1, v1, state, dt)

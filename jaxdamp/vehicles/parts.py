@@ -101,10 +101,32 @@ class Body(AbstractPart):
 
 @final
 class Element(AbstractPart):
-    """A law at a port, under a name: `Element("damper", law)` gives the channel `damper_force`."""
+    """A law at a port, under a name: `Element("damper", law)` gives the channel `damper_force`.
+
+    Where `count` of them act together, such as the dampers of both sides of a truck seen from the side, the vehicle
+    carries the force of all; the channel and the dissipated power are of one.
+
+    Arguments:
+        name: of the element.
+        law: of one of them.
+        count: how many alike act together.
+
+    Raises:
+        ValueError: a count below one.
+    """
 
     name: str = eqx.field(static=True)
     law: AbstractDamper
+    count: int = eqx.field(static=True, default=1)
+
+    def __check_init__(self) -> None:
+        if self.count < 1:
+            _checks.refuse("count", "be 1 or more", self.count, "It is how many laws alike act together.")
+
+    @property
+    def together(self) -> AbstractDamper:
+        """The law of all of them, as the vehicle has it at the port."""
+        return self.law if self.count == 1 else float(self.count) * self.law
 
 
 @final
@@ -121,6 +143,7 @@ class Link(AbstractPart):
         stiffness: of the linear spring.
         damping: of the linear dashpot.
         elements: laws beside them.
+        sides: of the vehicle that it stands for, two where left and right are one; only for descriptions.
     """
 
     name: str = eqx.field(static=True)
@@ -128,6 +151,7 @@ class Link(AbstractPart):
     stiffness: Number = parameter("N/m", "stiffness of the linear spring", nonnegative, default=0.0)
     damping: Number = parameter("N s/m", "coefficient of the linear dashpot", nonnegative, default=0.0)
     elements: tuple[Element, ...] = ()
+    sides: int = eqx.field(static=True, default=1)
 
 
 @final
@@ -147,6 +171,7 @@ class Wheel(AbstractPart):
         elements: laws between point and road.
         lifts: whether the tyre can leave the road (`LiftOff`).
         beside: whether it is on the axle of the wheel before it.
+        sides: of the vehicle that it stands for, two where left and right are one; only for descriptions.
     """
 
     name: str = eqx.field(static=True)
@@ -158,6 +183,7 @@ class Wheel(AbstractPart):
     elements: tuple[Element, ...] = ()
     lifts: bool = eqx.field(static=True, default=False)
     beside: bool = eqx.field(static=True, default=False)
+    sides: int = eqx.field(static=True, default=1)
 
 
 @final

@@ -20,8 +20,8 @@ class QuarterCar(AbstractVehicle):
 
     m_s z̈_s = −k_s (z_s − z_u) − F,  m_u z̈_u = k_s (z_s − z_u) + F − F_t, F_t = k_t (z_u − z_r) + c_t (ż_u − ż_r), with
     the force F of the damper and of the other laws at stroke z_s − z_u. Heights are measured from static equilibrium,
-    z up. Unless `tyre_lifts`, the tyre stays on the road (its load may become negative on paper: watch
-    `dynamic_tyre_load`). For any law, at every instant and with c_t = 0, m_s z̈_s + m_u z̈_u = −k_t (z_u − z_r).
+    z up. Unless `tyre_lifts`, the tyre stays on the road, and its load may become negative on paper
+    (`Response.notes` says so). For any law, at every instant and with c_t = 0, m_s z̈_s + m_u z̈_u = −k_t (z_u − z_r).
 
     Arguments:
         damper: law at the wheel; `dampers.MotionRatio(law, ratio)` for one that moves less or more.
@@ -30,6 +30,7 @@ class QuarterCar(AbstractVehicle):
         friction: law such as `dampers.CoulombFriction`.
         tyre_lifts: whether the tyre can leave the road (see `LiftOff`).
         seats: on the body.
+        damper_count: how many dampers like `damper` act together; the channel of the force and the power are of one.
 
     >>> from jaxdamp.dampers import Linear
     >>> car = QuarterCar(1200.0, 125.0, 60e3, 220e3, Linear(2500.0))
@@ -48,6 +49,7 @@ class QuarterCar(AbstractVehicle):
     friction: AbstractDamper | None = None
     tyre_lifts: bool = eqx.field(static=True, default=False)
     seats: tuple[Seat, ...] = ()
+    damper_count: int = eqx.field(static=True, default=1)
 
     def static_tyre_load(self) -> Scalar:
         """Load of the tyre at rest [N], the weight of all masses."""

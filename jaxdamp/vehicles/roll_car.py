@@ -2,6 +2,8 @@
 
 from typing import final
 
+import equinox as eqx
+
 from jaxdamp._types import Number
 from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles.axle import Axle, carry
@@ -24,6 +26,7 @@ class RollCar(AbstractVehicle):
         axle: the two corners and the bar between them.
         places: where on the body accelerations are of interest.
         seats: on the body.
+        tyre_lifts: whether all tyres can leave the road; a single corner can say so itself.
 
     >>> from jaxdamp.vehicles.presets import full_car_jazar
     >>> full = full_car_jazar()
@@ -37,10 +40,12 @@ class RollCar(AbstractVehicle):
     axle: Axle  # pyright: ignore[reportGeneralTypeIssues]
     places: tuple[Place, ...] = ()
     seats: tuple[Seat, ...] = ()
+    tyre_lifts: bool = eqx.field(static=True, default=False)
 
     def frame(self) -> Frame:
         """Coordinates z_sprung, roll, z_left_unsprung, z_right_unsprung, then seats; wheels left, right."""
         body = Body("sprung", self.sprung_mass, roll_inertia=self.roll_inertia)
         wheels, suspensions, tyres = carry(self.axle, "", body)
         bodies, links = seated(self.seats, body)
-        return Frame((body, *wheels, *bodies), (*suspensions, *links), tyres, self.places)
+        frame = Frame((body, *wheels, *bodies), (*suspensions, *links), tyres, self.places)
+        return frame.lifting(self.tyre_lifts)

@@ -28,7 +28,7 @@ class WalkingBeam(AbstractPart):
         spread: s, between the two axles [m].
         spring_rate: of the leaf spring, both sides together [N/m].
         tyre_stiffness: k_t of each axle [N/m].
-        damper: law over the middle.
+        damper: law over the middle, both sides together.
         tyre_damping: of each axle [N s/m].
         tyre_lifts: whether the tyres can leave the road.
     """
@@ -46,7 +46,7 @@ class WalkingBeam(AbstractPart):
         """The beam under a point `ahead` of the centre of gravity, its middle `behind` the front axle [m]."""
         beam, half = Body("beam", self.mass, pitch_inertia=self.pitch_inertia), 0.5 * self.spread
         elements = (Element("damper", self.damper),)
-        leaf = Link("tandem", body.at(ahead) - beam.at(), self.spring_rate, elements=elements)
+        leaf = Link("tandem", body.at(ahead) - beam.at(), self.spring_rate, elements=elements, sides=2)
         tyres = tuple(
             Wheel(
                 f"tandem_{i}",
@@ -55,6 +55,7 @@ class WalkingBeam(AbstractPart):
                 self.tyre_damping,
                 behind - forward,
                 lifts=self.tyre_lifts,
+                sides=2,
             )
             for i, forward in ((1, half), (2, -half))
         )
@@ -77,7 +78,7 @@ class IndependentTandem(AbstractPart):
         """The axles about a point `ahead` of the centre of gravity, `behind` the front axle [m]."""
         half = 0.5 * self.spread
         axles = [
-            suspend(self.axle, f"tandem_{i}", body.at(ahead + forward), behind=behind - forward)
+            suspend(self.axle, f"tandem_{i}", body.at(ahead + forward), behind=behind - forward, sides=2)
             for i, forward in ((1, half), (2, -half))
         ]
         bodies, links, tyres = zip(*axles, strict=True)

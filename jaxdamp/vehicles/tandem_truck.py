@@ -2,6 +2,8 @@
 
 from typing import final
 
+import equinox as eqx
+
 from jaxdamp._types import Number
 from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles.base import AbstractVehicle
@@ -20,7 +22,8 @@ class TandemTruck(AbstractVehicle):
         m z̈ = −F_f − P,   J θ̈ = −l_f F_f + l_t P,
 
     l_f ahead of and l_t behind the centre of gravity, P the force of the tandem. Masses and rates are those of both
-    sides together. The wheels are front, first and second axle of the tandem.
+    sides together, and so are the laws; with `Corner.damper_count` the law is that of one damper of an axle, and so are
+    its channels. `vehicle.descriptions` says it of each. The wheels are front, first and second axle of the tandem.
 
     Arguments:
         front: the front axle.
@@ -28,6 +31,7 @@ class TandemTruck(AbstractVehicle):
         cab: on mounts of its own, if it is wanted.
         places: where on the body, or on the cab (`body="cab"`), accelerations are of interest.
         seats: on the sprung mass.
+        tyre_lifts: whether all tyres can leave the road; a single corner can say so itself.
 
     >>> from jaxdamp.vehicles.presets import truck_001
     >>> truck_001().coordinates
@@ -43,11 +47,12 @@ class TandemTruck(AbstractVehicle):
     cab: Cab | None = None
     places: tuple[Place, ...] = ()
     seats: tuple[Seat, ...] = ()
+    tyre_lifts: bool = eqx.field(static=True, default=False)
 
     def frame(self) -> Frame:
         """Coordinates z_sprung, pitch, then front axle, tandem, cab, seats; wheels front, tandem_1, tandem_2."""
         body = Body("sprung", self.sprung_mass, pitch_inertia=self.pitch_inertia)
-        front, suspension, tyre = suspend(self.front, "front", body.at(self.front_distance))
+        front, suspension, tyre = suspend(self.front, "front", body.at(self.front_distance), sides=2)
         behind = self.front_distance + self.tandem_distance
         axles, leaves, tyres = self.tandem.parts(body, -self.tandem_distance, behind)
         cab, mounts = ((), ()) if self.cab is None else self.cab.parts(body)
@@ -57,4 +62,4 @@ class TandemTruck(AbstractVehicle):
             (suspension, *leaves, *mounts, *links),
             (tyre, *tyres),
             self.places,
-        )
+        ).lifting(self.tyre_lifts)

@@ -28,7 +28,7 @@ METRICS = {
     "crest_factor": (metrics.crest_factor, 0),
     "running_rms": (lambda x: jnp.sum(metrics.running_rms(x, DT, 0.333)), 1),
     "working_space_rms": (metrics.working_space_rms, 1),
-    "working_space_peak": (metrics.working_space_peak, 1),
+    "working_space_peak_to_peak": (metrics.working_space_peak_to_peak, 1),
     "working_space_exceedance": (lambda x: metrics.working_space_exceedance(x, -1.0, 1.5), None),
     "gaussian_exceedance": (lambda x: metrics.gaussian_exceedance(x[3], metrics.rms(x), -1.0, 1.5), None),
     "dynamic_load_coefficient": (lambda x: metrics.dynamic_load_coefficient(x, 5.0), 1),
@@ -188,7 +188,7 @@ ONE_SIGNAL = {
     "frequency": [lambda x: metrics.spectral_damage(x, x, 4.0)],
     "deflection": [
         metrics.working_space_rms,
-        metrics.working_space_peak,
+        metrics.working_space_peak_to_peak,
         lambda x: metrics.working_space_exceedance(x, -1.0, 1.0),
     ],
     "tyre_load_variation": [

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from jaxdamp.metrics import gaussian_exceedance, working_space_exceedance, working_space_peak, working_space_rms
+from jaxdamp.metrics import gaussian_exceedance, working_space_exceedance, working_space_peak_to_peak, working_space_rms
 
 
 TRAVEL = 0.04 * np.sin(2 * np.pi * np.arange(128) / 128)
@@ -12,10 +12,10 @@ TRAVEL = 0.04 * np.sin(2 * np.pi * np.arange(128) / 128)
 
 def test_sine():
     assert float(working_space_rms(TRAVEL)) == pytest.approx(0.04 / np.sqrt(2), rel=1e-13)
-    assert float(working_space_peak(TRAVEL)) == pytest.approx(0.08, rel=1e-13)
+    assert float(working_space_peak_to_peak(TRAVEL)) == pytest.approx(0.08, rel=1e-13)
 
 
-@pytest.mark.parametrize("metric", [working_space_rms, working_space_peak])
+@pytest.mark.parametrize("metric", [working_space_rms, working_space_peak_to_peak])
 def test_offset_changes_nothing(metric):
     assert float(metric(TRAVEL + 0.35)) == pytest.approx(float(metric(TRAVEL)), rel=1e-12)
 
@@ -27,7 +27,9 @@ def test_constant_deflection_uses_no_space():
 
 
 def test_gradient_of_peak_is_at_the_extremes():
-    np.testing.assert_array_equal(jax.grad(working_space_peak)(jnp.array([0.0, 0.04, -0.02, 0.01])), [0, 1, -1, 0])
+    np.testing.assert_array_equal(
+        jax.grad(working_space_peak_to_peak)(jnp.array([0.0, 0.04, -0.02, 0.01])), [0, 1, -1, 0]
+    )
 
 
 def test_exceedance_counts_samples():

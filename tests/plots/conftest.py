@@ -32,13 +32,13 @@ def responses() -> dict[str, Response]:
 def tuned() -> TuneResult:
     car = vehicles.presets.quarter_car_000()
     road = roads.cosine_bump(0.05, start=0.2, duration=0.3)
-    travel = float(simulate(car, road, duration=2.0, dt=0.005).metrics()["working_space_peak"])
+    travel = float(simulate(car, road, duration=2.0, dt=0.005).metrics()["working_space_peak_to_peak"])
     return tune.minimise(
         "rms_sprung_acceleration",
         car,
         road,
         bounds={"damper.rate": (1000.0, 4000.0)},
-        limits={"working_space_peak": 1.2 * travel},
+        limits={"working_space_peak_to_peak": 1.2 * travel},
         duration=2.0,
         dt=0.005,
     )

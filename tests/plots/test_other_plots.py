@@ -168,7 +168,7 @@ def test_tuning_draws_laws_metrics_and_search(tuned: TuneResult) -> None:
     widths = [bar.get_width() for bar in bars.patches if isinstance(bar, Rectangle)]
     assert widths == pytest.approx(change)
     names = [label.get_text() for label in bars.get_yticklabels()]
-    assert "rms sprung acceleration (minimised)" in names and "working space peak (limited)" in names
+    assert "rms sprung acceleration (minimised)" in names and "working space peak to peak (limited)" in names
     assert bars.get_xlabel() == "change [%]   (less is better)"
     history = np.asarray(search.get_lines()[0].get_ydata())
     np.testing.assert_allclose(history, [tuned.before[tuned.metric], *tuned.history])

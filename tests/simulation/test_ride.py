@@ -187,3 +187,71 @@ def test_refuses_what_is_not_there():
         Ride(quarter_car_000(dampers.CoulombFriction(1e3, 1e-6)), ROUGH, duration=1.0)
     units = Ride(car, ROUGH, duration=1.0).units
     assert units["rate"] == units["damper.rate"] == "N s/m" and units["rms_sprung_acceleration"] == "m/s^2"
+
+
+def test_working_space_is_the_deviation_from_the_mean_in_a_ride_and_of_a_record():
+    """An asymmetric damper pulls the body down: the two numbers are one, and the mean has a name of its own."""
+    car = quarter_car_000(dampers.Bilinear(5000.0, 1000.0))
+    names = ["working_space_rms", "working_space_mean"]
+    stroke = simulate(car, ROUGH, duration=2.0)["stroke"]
+    ride = Ride(car, ROUGH, duration=2.0, metrics=names)
+    found = ride()
+    assert float(found["working_space_rms"]) == pytest.approx(float(metrics.working_space_rms(stroke)), rel=1e-10)
+    assert float(found["working_space_rms"]) == pytest.approx(float(jnp.std(stroke)), rel=1e-10)
+    assert float(found["working_space_mean"]) == pytest.approx(float(jnp.mean(stroke)), rel=1e-10)
+    assert float(found["working_space_mean"]) < -0.3 * float(found["working_space_rms"])
+
+    def spread(rate):
+        return ride({"damper.rebound_rate": rate})["working_space_rms"]
+
+    slope = float(jax.jit(jax.grad(spread))(5000.0))
+    assert float(jax.jit(jax.jacfwd(spread))(5000.0)) == pytest.approx(slope, rel=1e-9)
+    spread = jax.jit(spread)
+    assert slope == pytest.approx(float(spread(5005.0) - spread(4995.0)) / 10.0, rel=1e-4)
+
+
+@pytest.mark.parametrize(("name", "exact"), [("standard_deviation", np.std), ("mean", np.mean)])
+def test_the_working_space_keeps_its_digits_in_single_precision(name, exact, rng):
+    """A small motion far from zero, as of a body that a road has lifted: sums of squares alone would lose it."""
+    record = jnp.asarray((3.0 + 1e-3 * rng.normal(size=20_000)).astype(np.float32))
+    statistic = metrics.STATISTICS[name]
+    last, _ = jax.lax.scan(lambda kept, y: (statistic.add(kept, y), None), statistic.begin(record[0]), record[1:])
+    found = statistic.end(last, record.size, 0.01)
+    assert found.dtype == jnp.float32
+    assert float(found) == pytest.approx(exact(np.asarray(record, float)), rel=1e-4)
+
+
+def test_displacements_count_from_the_static_equilibrium():
+    """Of a car on a gas spring that waits on a road 0.3 m high; and of a run that is released elsewhere."""
+    gas = dampers.GasSpring(8e6, 1e-4, 3e-4)
+    car = vehicles.QuarterCar(300.0, 40.0, 20e3, 180e3, dampers.Linear(1500.0), extra_spring=gas)
+    level = roads.from_profile(np.arange(3) * 0.1, np.full(3, 0.3))
+    names = ["rms_sprung_displacement", "peak_sprung_displacement", "working_space_mean"]
+    still = Ride(car, level, duration=0.2, metrics=names)()
+    assert [float(still[name]) for name in names] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+    rest = vehicles.static_equilibrium(car, [0.3])
+    released = simulate(car, level, duration=0.2, start={"z_sprung": float(rest["z_sprung"]) + 0.02}).metrics(names)
+    assert float(released["peak_sprung_displacement"]) == pytest.approx(0.02, rel=1e-9)
+
+
+def test_old_and_wrong_names_of_metrics():
+    car, bump = half_car_002(), roads.cosine_bump(0.05, start=0.1, length=2.0, speed=20.0)
+    with pytest.warns(FutureWarning, match="'rear_working_space_peak' is now called 'rear_working_space_peak_to_peak'"):
+        ride = Ride(car, bump, metrics=["rear_working_space_peak"], duration=0.3)
+    found = ride()
+    assert list(found) == ["rear_working_space_peak_to_peak"]
+    with pytest.warns(FutureWarning, match="is now called"):
+        assert found["rear_working_space_peak"] == found["rear_working_space_peak_to_peak"]
+    with pytest.raises(ValueError, match=r"`metrics` must be one of .* Did you mean 'rms_sprung_acceleration'"):
+        Ride(car, bump, metrics=["rms_sprung_accel"], duration=0.3)
+    with pytest.raises(ValueError, match=r"Write `metrics=\['rms_sprung_acceleration'\]`"):
+        Ride(car, bump, metrics="rms_sprung_acceleration", duration=0.3)
+    with pytest.raises(ValueError, match=r"`metrics` must name one or more, but is empty. Write \['rms_sprung_acc"):
+        Ride(car, bump, metrics=[], duration=0.3)
+    response = simulate(car, bump, duration=0.3)
+    with pytest.raises(KeyError, match="did you mean 'rms_sprung_acceleration'"):
+        response.metrics()["rms_sprung_accel"]
+    with pytest.warns(FutureWarning, match="is now called"):
+        assert response.metrics(["front_working_space_peak"])["front_working_space_peak_to_peak"] > 0
+    with pytest.raises(ValueError, match=r"`channel` must be one of .* Did you mean 'front_stroke'"):
+        response["front_strok"]

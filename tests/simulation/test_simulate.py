@@ -183,11 +183,15 @@ def test_metrics_are_those_of_the_channels():
     response = simulate(quarter_car_000(BESINGER), roads.iso8608("C", 20.0, seed=2), duration=5.0)
     found, acceleration = response.metrics(), np.asarray(response["sprung_acceleration"])
     stroke, load = np.asarray(response["stroke"]), np.asarray(response["dynamic_tyre_load"])
+    moved = np.asarray(response["z_sprung"]) - float(response["z_sprung"][0])  # it starts at rest
     expected = {
         "rms_sprung_acceleration": np.sqrt(np.mean(acceleration**2)),
         "peak_sprung_acceleration": np.abs(acceleration).max(),
-        "working_space_rms": np.sqrt(np.mean(stroke**2)),
-        "working_space_peak": np.ptp(stroke),
+        "working_space_rms": np.std(stroke),
+        "working_space_mean": np.mean(stroke),
+        "working_space_peak_to_peak": np.ptp(stroke),
+        "rms_sprung_displacement": np.sqrt(np.mean(moved**2)),
+        "peak_sprung_displacement": np.abs(moved).max(),
         "rms_dynamic_tyre_load": np.sqrt(np.mean(load**2)),
         "dynamic_load_coefficient": np.std(load) / (1325.0 * 9.80665),
         "peak_damper_velocity": np.abs(response["damper_velocity"]).max(),
@@ -208,6 +212,7 @@ def test_to_xarray_carries_units_and_time():
     response = simulate(quarter_car_000(), BUMP, duration=0.5)
     dataset = response.to_xarray()
     assert dataset["sprung_acceleration"].attrs["units"] == "m/s^2"
+    assert dataset["damper_force"].attrs["description"] == "force of damper, positive where it resists extension"
     assert dataset["time"].attrs["units"] == "s"
     np.testing.assert_array_equal(dataset["damper_force"], response["damper_force"])
 

@@ -74,21 +74,25 @@ def test_hard_limit_is_met_and_active():
     road = roads.cosine_bump(0.06, start=0.2, duration=0.25)
     car = vehicles.presets.quarter_car_000(dampers.Bilinear(2500.0, 2500.0))
     free = tune.minimise("rms_sprung_acceleration", car, road, duration=2.0)
-    top = 0.93 * free.after["working_space_peak"]
-    result = tune.minimise("rms_sprung_acceleration", car, road, limits={"working_space_peak": top}, duration=2.0)
+    top = 0.93 * free.after["working_space_peak_to_peak"]
+    result = tune.minimise(
+        "rms_sprung_acceleration", car, road, limits={"working_space_peak_to_peak": top}, duration=2.0
+    )
     assert result.converged, result
-    assert result.after["working_space_peak"] == pytest.approx(top, rel=1e-5)
+    assert result.after["working_space_peak_to_peak"] == pytest.approx(top, rel=1e-5)
     assert result.after["rms_sprung_acceleration"] > free.after["rms_sprung_acceleration"]
     again = simulate(result.vehicle, road, duration=2.0).metrics(list(result.after))
     assert {k: float(v) for k, v in again.items()} == pytest.approx(result.after, rel=1e-9)
-    assert "limit" in repr(result) and "working_space_peak" in repr(result)
+    assert "limit" in repr(result) and "working_space_peak_to_peak" in repr(result)
 
 
 def test_limit_that_cannot_be_met_is_said():
     road = roads.cosine_bump(0.06, start=0.2, duration=0.25)
-    result = tune.minimise("rms_sprung_acceleration", CAR, road, limits={"working_space_peak": 1e-3}, duration=1.0)
+    result = tune.minimise(
+        "rms_sprung_acceleration", CAR, road, limits={"working_space_peak_to_peak": 1e-3}, duration=1.0
+    )
     assert not result.converged
-    assert any("working_space_peak <= 0.001 is not met" in w for w in result.warnings)
+    assert any("working_space_peak_to_peak <= 0.001 is not met" in w for w in result.warnings)
 
 
 def test_bounds_hold_and_are_said():
@@ -138,7 +142,7 @@ def test_progress_and_history_follow_the_search():
     ("change", "message"),
     [
         ({"metric": "rms_acceleration"}, "Did you mean 'rms_sprung_acceleration'"),
-        ({"metric": "working_space_peak"}, "must be one of 'rms_sprung_acceleration'"),
+        ({"metric": "working_space_peak_to_peak"}, "must be one of 'rms_sprung_acceleration'"),
         ({"limits": {"travel": 0.1}}, "`metric` must be one of .* but is 'travel'"),
         ({"over": ["damper.rat"]}, "did you mean 'damper.rate'"),
         ({"bounds": {"damper.rate": (3000.0, 9000.0)}}, "Start inside the bounds or widen them"),
@@ -179,3 +183,23 @@ def test_what_people_feel_can_be_tuned_on_both_kinds_of_road():
 def test_counts_have_no_slope_to_follow():
     with pytest.raises(ValueError, match="must have a slope, but is 'lift_off_fraction', a count"):
         tune.minimise("lift_off_fraction", CAR, roads.cosine_bump(0.06, start=0.2, duration=0.25), duration=1.0)
+
+
+def test_an_old_name_of_a_metric_still_tunes_and_limits():
+    road = roads.cosine_bump(0.06, start=0.1, duration=0.25)
+    with pytest.warns(FutureWarning, match="'working_space_peak' is now called 'working_space_peak_to_peak'"):
+        result = tune.minimise(
+            "working_space_peak", CAR, road, limits={"working_space_peak": 1.0}, duration=0.5, max_steps=2
+        )
+    assert result.metric == "working_space_peak_to_peak" and list(result.limits) == ["working_space_peak_to_peak"]
+    with pytest.warns(FutureWarning, match="is now called"):
+        assert result.after["working_space_peak"] == result.after["working_space_peak_to_peak"]
+    assert "working_space_mean" not in result.after and "peak_sprung_displacement" in result.after
+
+
+def test_a_displacement_is_tuned_on_a_bump_and_refused_on_a_white_road():
+    road = roads.cosine_bump(0.06, start=0.1, duration=0.25)
+    result = tune.minimise("peak_sprung_displacement", CAR, road, duration=0.5, max_steps=3)
+    assert result.after["peak_sprung_displacement"] < result.before["peak_sprung_displacement"]
+    with pytest.raises(ValueError, match="must be one of 'rms_sprung_acceleration'"):
+        tune.minimise("rms_sprung_displacement", CAR, roads.white("C", 20.0))

@@ -27,10 +27,14 @@ def test_required_damping_and_its_damping_ratio(decrement, mean, ratio):
 
 
 @pytest.mark.parametrize(
-    ("compression", "rebound", "decrement"), [(11.5e3, 23e3, 18.23), (12.5e3, 20.5e3, 15.66), (16e3, 16e3, 14.18)]
+    ("compression", "rebound", "decrement", "with_heave"),
+    [(11.5e3, 23e3, 18.23, 17.14), (12.5e3, 20.5e3, 15.66, 15.09), (16e3, 16e3, 14.18, 14.05)],
 )
-def test_decrements_by_formula_and_by_free_decay(compression, rebound, decrement):
-    """Simulated with a hull too heavy to heave: amplitudes at the turning points of pitch, from nose up."""
+def test_decrements_by_formula_and_by_free_decay(compression, rebound, decrement, with_heave):
+    """Simulated with a hull too heavy to heave: amplitudes at the turning points of pitch, from nose up.
+
+    And with one that heaves: the docstring of `pitch_decay` says by how much the formula is above that.
+    """
     decay = HULL.pitch_decay(compression, rebound)
     assert float(decay.whole) == pytest.approx(decrement, abs=6e-3)
     heavy = replace(m113_003(dampers.Bilinear(rebound, compression)), {"sprung_mass": 1e12})
@@ -42,6 +46,9 @@ def test_decrements_by_formula_and_by_free_decay(compression, rebound, decrement
     assert 0.02 / -down == pytest.approx(float(decay.nose_down), rel=2e-3)
     assert -down / up == pytest.approx(float(decay.nose_up), rel=2e-3)
     assert 0.02 / up == pytest.approx(decrement, rel=2e-3)
+    free = replace(heavy, {"sprung_mass": HULL.sprung_mass})
+    pitch = np.asarray(simulate(free, tracks(np.zeros((1401, 5))), start={"pitch": 0.02})["pitch"])
+    assert 0.02 / pitch[np.argmin(pitch) :].max() == pytest.approx(with_heave, abs=6e-3)
 
 
 def test_split_keeps_the_decay_of_the_nose_down_half_only():
