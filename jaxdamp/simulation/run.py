@@ -82,7 +82,7 @@ def simulate(
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "simulate(vehicle, road)")
     check_module("road", road, (AbstractRoad,), "simulate(vehicle, road)")
-    driven, vehicle = vehicle, without_fitted_ranges(vehicle)  # compiled without: see there
+    driven, vehicle = vehicle, without_fitted_ranges(vehicle)  # laws fitted to other records share one program
     time, heights = sampled(vehicle, road, duration, dt)
     _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)

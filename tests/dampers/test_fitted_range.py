@@ -116,14 +116,17 @@ def test_dataclasses_replace_keeps_a_range():
 
 
 def test_wrappers_and_sums_keep_what_is_inside():
+    slow: Any
+    fast: Any
     slow, fast = with_fitted_range(Linear(1500.0), SLOW), with_fitted_range(Spring(100.0, 0.0), FAST)
-    assert (2.0 * slow).law.fitted_to == SLOW and Lag(slow, 0.01).law.fitted_to == SLOW
+    doubled: Any = 2.0 * slow
+    assert doubled.law.fitted_to == SLOW and Lag(slow, 0.01).law.fitted_to == SLOW
     assert [term.fitted_to for term in (slow + fast).terms] == [SLOW, FAST]
 
 
 def test_what_a_sum_was_fitted_to_holds_for_its_terms_but_for_the_force():
-    fitted = with_fitted_range(Linear(1500.0) + Spring(100.0, 0.0), SLOW)
-    longer = fitted + Linear(1.0)
+    fitted: Any = with_fitted_range(Linear(1500.0) + Spring(100.0, 0.0), SLOW)
+    longer: Any = fitted + Linear(1.0)
     assert [term.fitted_to and term.fitted_to.words() for term in longer.terms] == [
         "velocity −0.1 to 0.2 m/s, stroke −20 to 20 mm",
         "velocity −0.1 to 0.2 m/s, stroke −20 to 20 mm",

@@ -1,6 +1,7 @@
 """By how much a use leaves the fitted range: the numbers, inside wrappers too, and the words."""
 
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,7 +34,9 @@ from jaxdamp.dampers.range_use import sentence
 
 FITTED = with_fitted_range(Linear(1500.0), velocity=(-0.1, 0.2), stroke=(-0.02, 0.02), force=(-150.0, 300.0))
 TIME = np.linspace(0.0, 1.0, 4001)
-MOTION = Motion(0.05 * np.sin(20 * TIME), 0.5 * np.cos(40 * TIME), 750.0 * np.cos(40 * TIME))
+VELOCITY = 0.5 * np.cos(40 * TIME)
+MOTION = Motion(0.05 * np.sin(20 * TIME), VELOCITY, 1500.0 * VELOCITY)
+SHARE = np.mean((VELOCITY < -0.1) | (VELOCITY > 0.2))
 
 
 def uses(law: AbstractDamper, motion: Motion = MOTION) -> dict[str, RangeUse]:
@@ -44,7 +47,7 @@ def test_velocity_beyond_the_range_is_counted():
     use = uses(FITTED)["velocity"]
     assert use.used == (pytest.approx(-0.5, abs=1e-4), pytest.approx(0.5, abs=1e-4)) and use.fitted == (-0.1, 0.2)
     assert use.outside and use.times == pytest.approx(5.0, rel=1e-3) and use.beyond == pytest.approx(0.4, rel=1e-3)
-    assert use.share == pytest.approx(np.mean((MOTION.velocity < -0.1) | (MOTION.velocity > 0.2)))
+    assert use.share == pytest.approx(SHARE)
 
 
 def test_inside_the_range_nothing_is_said():
@@ -72,7 +75,7 @@ def test_the_stroke_counts_for_laws_that_depend_on_it():
     [
         (MotionRatio(FITTED, 0.5), 0.25, 1500.0),
         (2.0 * FITTED, 0.5, 375.0),
-        (-1.0 * FITTED, 0.5, 750.0),
+        (Scaled(FITTED, -1.0, allow_active=True), 0.5, 750.0),
         (SeriesSpring(FITTED, 1e6), 0.5, 750.0),
         (Bushing(FITTED, 1e6, 1e6, 100.0), 0.5, 750.0),
         (TemperatureScaled(FITTED, 343.15, 293.15, 0.004), 0.5, 750.0 / 0.8),
@@ -100,14 +103,14 @@ def test_each_term_has_its_own_range_and_equal_ones_are_said_once():
 
 
 def test_temperature_is_judged_inside_and_around():
-    covered = {"temperature": (290.0, 310.0), "velocity": (-1.0, 1.0)}
-    inside = TemperatureScaled(with_fitted_range(Linear(1500.0), **covered), 353.15, 293.15, 0.002)
-    around = with_fitted_range(TemperatureScaled(Linear(1500.0), 353.15, 293.15, 0.002), **covered)
+    covered = FittedRange(temperature=(290.0, 310.0), velocity=(-1.0, 1.0))
+    inside = TemperatureScaled(with_fitted_range(Linear(1500.0), covered), 353.15, 293.15, 0.002)
+    around = with_fitted_range(TemperatureScaled(Linear(1500.0), 353.15, 293.15, 0.002), covered)
     for law in (inside, around, Lag(inside, 0.01)):
         use = uses(law)["temperature"]
         assert use.outside and use.used == (353.15, 353.15) and use.share is None
         assert sentence("damper", range_use(law, MOTION)) == "damper: temperature 80 °C, fitted to 16.9 to 36.9 °C."
-    warm = TemperatureScaled(with_fitted_range(Linear(1500.0), **covered), 300.0, 293.15, 0.002)
+    warm = TemperatureScaled(with_fitted_range(Linear(1500.0), covered), 300.0, 293.15, 0.002)
     assert not uses(warm)["temperature"].outside
 
 
@@ -119,7 +122,7 @@ def test_a_command_beyond_the_records_is_warned_of():
         with_command(fitted, 2.0)
         with_command(law, 4.0)
     with pytest.warns(OutsideFittedRangeWarning, match="command 3.5, fitted to 0 to 2"):
-        changed = with_command(fitted, 3.5)
+        changed: Any = with_command(fitted, 3.5)
     assert changed.law.fitted_to == fitted.law.fitted_to
     with pytest.raises(ValueError, match="between the levels 0 and 4"):
         with_command(fitted, 5.0)
@@ -129,7 +132,7 @@ def test_a_command_beyond_the_records_is_warned_of():
 
 def test_the_sentence():
     text = sentence("front damper", range_use(FITTED, MOTION))
-    share = f"{100 * np.mean((MOTION.velocity < -0.1) | (MOTION.velocity > 0.2)):.0f} %"
+    share = f"{100 * SHARE:.0f} %"
     velocity = "velocity −0.5 to 0.5 m/s, fitted to −0.1 to 0.2 m/s (5 times)"
     assert text == f"front damper: {velocity}, {share} of the time outside."
     slow = Motion(velocity=0.1 * np.sin(TIME), force=900.0 * np.sin(TIME))

@@ -1,6 +1,7 @@
 """A fitted law says what its records covered."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ def ends(runs: tuple[BenchRun, ...], channel: str) -> tuple[float, float]:
 
 @pytest.mark.parametrize("start", [Bilinear, Lag(Bilinear(2000.0, 1000.0), 0.002), Linear(1.0) + Spring(1.0, 0.0)])
 def test_a_fit_states_what_the_fitted_records_cover(runs, start):
-    covered = identify.fit(start, runs, weighting=[1.0, 1.0, np.inf]).law.fitted_to
+    covered: Any = identify.fit(start, runs, weighting=[1.0, 1.0, np.inf]).law.fitted_to
     for channel in ("velocity", "stroke", "force"):
         assert getattr(covered, channel) == ends(runs[:2], channel)
     assert covered.frequency == pytest.approx((1.0, 2.0), rel=1e-3)
@@ -35,7 +36,7 @@ def test_a_fit_states_what_the_fitted_records_cover(runs, start):
 
 def test_a_fit_forgets_the_range_of_its_start(runs):
     start = Lag(with_fitted_range(Linear(1000.0), velocity=(-9.0, 9.0)), 0.002)
-    law = identify.fit(start, runs[:1]).law
+    law: Any = identify.fit(start, runs[:1]).law
     assert law.fitted_to.velocity == ends(runs[:1], "velocity") and law.law.fitted_to is None
 
 
@@ -50,7 +51,7 @@ def test_temperature_and_command_are_those_of_the_records_that_state_them(runs):
 
 def test_training_and_cross_validation_state_it_too(runs):
     start = Lag(Linear(1500.0), 0.002)
-    law = identify.train(start, runs[:2], held_out=runs[2], weighting=[1.0, np.inf], steps=1).law
+    law: Any = identify.train(start, runs[:2], held_out=runs[2], weighting=[1.0, np.inf], steps=1).law
     assert law.fitted_to.velocity == ends(runs[:1], "velocity")
     for fold, out in zip(identify.cross_validate({"linear": Linear}, runs).folds, range(3), strict=True):
         kept = tuple(run for i, run in enumerate(runs) if i != out)

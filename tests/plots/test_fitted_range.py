@@ -1,5 +1,7 @@
 """Pictures show where a law is extrapolated: its curve goes on lighter, what lies beyond is shaded and named."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -17,9 +19,11 @@ VELOCITY = np.linspace(-0.5, 0.5, 101)
 
 def _shaded(axes: Axes, along: int = 0) -> list[tuple[float, float]]:
     """Lower and upper end of each shaded span, over x (0) or over y (1)."""
-    boxes = [patch for patch in axes.patches if patch.get_facecolor()[:3] == pytest.approx(_colour(), abs=1e-6)]
+    boxes: list[Any] = [
+        patch for patch in axes.patches if patch.get_facecolor()[:3] == pytest.approx(_colour(), abs=1e-6)
+    ]
     ends = [np.asarray(box.get_xy()) for box in boxes]
-    size = [box.get_width() if along == 0 else box.get_height() for box in boxes]  # type: ignore[attr-defined]
+    size = [box.get_width() if along == 0 else box.get_height() for box in boxes]
     return [(float(end[along]), float(end[along] + s)) for end, s in zip(ends, size, strict=True)]
 
 

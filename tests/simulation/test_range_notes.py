@@ -1,13 +1,22 @@
 """A run says by how much it takes dampers outside the range of their records, and costs nothing where none has one."""
 
 import warnings
+from typing import Any
 
 import jax
 import numpy as np
 import pytest
 
 from jaxdamp import Ride, respond, roads, simulate
-from jaxdamp.dampers import Bilinear, FittedRange, Linear, MotionRatio, OutsideFittedRangeWarning, with_fitted_range
+from jaxdamp.dampers import (
+    AbstractDamper,
+    Bilinear,
+    FittedRange,
+    Linear,
+    MotionRatio,
+    OutsideFittedRangeWarning,
+    with_fitted_range,
+)
 from jaxdamp.simulation import range_notes
 from jaxdamp.vehicles import AbstractVehicle, presets
 
@@ -16,10 +25,10 @@ LAW = Bilinear(2600.0, 1200.0)
 SLOW = FittedRange(velocity=(-0.1, 0.2), stroke=(-0.001, 0.001))
 WIDE = FittedRange(velocity=(-10.0, 10.0), force=(-1e5, 1e5))
 BUMP = roads.cosine_bump(0.05, start=0.2, length=3.0, speed=15.0)
-TIMES = {"duration": 1.0, "dt": 0.004}
+TIMES: dict[str, Any] = {"duration": 1.0, "dt": 0.004}
 
 
-def half_car(law: AbstractVehicle | Bilinear | MotionRatio | Linear) -> tuple[AbstractVehicle, roads.AbstractRoad]:
+def half_car(law: AbstractDamper) -> tuple[AbstractVehicle, roads.AbstractRoad]:
     car = presets.half_car_002(law)
     return car, roads.delayed(BUMP, positions=car.axle_positions, speed=15.0)
 
@@ -60,8 +69,10 @@ def test_a_range_changes_no_number_and_compiles_nothing_anew():
     plain = simulate(*half_car(LAW), **TIMES)
     ranged = simulate(*half_car(with_fitted_range(LAW, WIDE)), **TIMES)
 
-    def listener(event: str, _: float, **__) -> None:
-        compiled.append(event) if event.endswith("backend_compile_duration") else None
+    def listener(event: str, duration_secs: float, **rest: Any) -> None:
+        del duration_secs, rest
+        if event.endswith("backend_compile_duration"):
+            compiled.append(event)
 
     jax.monitoring.register_event_duration_secs_listener(listener)
     try:
