@@ -6,13 +6,15 @@ from typing import Any, TypeAlias, final
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._many_points import outside_domains
 from jaxdamp._types import Scalar
 from jaxdamp.configuration import fuses_loops
-from jaxdamp.parameters import parameters, replace
+from jaxdamp.parameters import match_paths, parameters, replace
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation._vectors import scalars
 from jaxdamp.simulation.exponential import settled
@@ -114,9 +116,26 @@ class Ride(eqx.Module):
         """The same, compiled for many cars at a time: for `jax.vmap`. `sweep` does it itself."""
         return eqx.tree_at(lambda ride: ride.many, self, True)
 
+    def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
+        return outside_domains(self.vehicle, columns)
+
     def __call__(self, point: Mapping[str, Any] | None = None) -> dict[str, Scalar]:
         """The metrics by name, with other values of the parameters at these paths."""
-        return _drive(self, dict(point or {}))
+        point = dict(point or {})
+        for name, value in point.items():
+            if np.shape(value) != ():
+                self._check_shape(name, np.shape(value))
+        return _drive(self, point)
+
+    def _check_shape(self, name: str, shape: tuple[int, ...]) -> None:
+        """Refuse several numbers for one, which would be several cars."""
+        known = {p.path: p.value.shape for p in parameters(self.vehicle)}
+        for path in match_paths(list(known), [name]):
+            if known[path] != shape:
+                must = "be one number for one car" if known[path] == () else f"be of shape {known[path]}"
+                remedy = "For several cars use `jaxdamp.sweep(ride, {...})`, or `jax.vmap` of `ride.side_by_side()`."
+                _checks.refuse(f"point[{name!r}]", must, f"of shape {shape}", remedy)
 
 
 @eqx.filter_jit
