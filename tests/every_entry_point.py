@@ -33,8 +33,8 @@ def fits(runs):
     trained = identify.train(start, runs.select("sine_1Hz"), held_out=runs.select("sine_2Hz"), steps=50)
     errors = ladder.best.result.covariance
     return {
-        "fit, closed form": [e.value for e in ladder["linear"].result.parameters],
-        "fit, search": [e.value for e in ladder["besinger"].result.parameters[:3]],
+        "fit, closed form": [e.value for e in ladder["linear"].parameters],
+        "fit, search": [e.value for e in ladder["besinger"].parameters[:3]],
         "fit, standard errors": np.sqrt(np.diag(np.asarray(errors))[:3]),
         "fit, law with a state": lagged.parameters[0].value,
         "cross_validate": [fold.rmse for fold in crossed.folds],

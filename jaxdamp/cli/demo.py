@@ -75,7 +75,7 @@ METRICS = {
     "working_space_rms": "travel, RMS",
     "rms_dynamic_tyre_load": "tyre load, RMS",
 }
-EVENT = 3.0  # s: length of a ride over a bump
+EVENT = 2.0  # s: length of a ride over a bump
 JUDGED = "rms_sprung_acceleration"
 ISO = "ISO 8608 class C at 20 m/s"
 BUMP = "a bump, 60 mm high and 2 m long, at 10 m/s"
@@ -224,10 +224,12 @@ def ride_verdict(responses: Mapping[str, Response]) -> str:
     """What the choice of a law costs in the prediction of a ride, in words."""
     errors = _ride_errors(responses)
     best, worst = (choose(errors, key=lambda name: abs(errors[name])) for choose in (min, max))
-    return (
-        f"With the law {worst} the predicted body acceleration is {errors[worst]:+.1f} % off that of the true damper, "
-        f"with {best} {errors[best]:+.1f} %."
-    )
+    return f"The body acceleration predicted with {worst} is {_off(errors[worst])}, with {best} {_off(errors[best])}."
+
+
+def _off(error: float) -> str:
+    """An error of so many percent in words."""
+    return "right to 0.1 %" if abs(error) < 0.1 else f"{abs(error):.1f} % too {'high' if error > 0 else 'low'}"
 
 
 def show_rides(screen: Screen, rides: Mapping[str, Mapping[str, Response]]) -> None:

@@ -11,7 +11,6 @@ GRIP = "rms_dynamic_tyre_load"
 WORDS = {
     COMFORT: "body acceleration as people feel it (ISO 2631-1, Wk)",
     GRIP: "tyre load variation",
-    "working_space_rms": "travel",
 }
 
 
@@ -33,13 +32,14 @@ def outcome(tuned: TuneResult) -> str:
     """What the tuning gained, what stopped it, and what it cost."""
     gain = 100 * (1 - tuned.after[COMFORT] / tuned.before[COMFORT])
     bounds = [f"{c.name} is {c.note}" for c in tuned.parameters if c.note]
-    stops = [f"the limit of the {WORDS[n]} is reached, and is what stops it" for n in tuned.active_limits if n in WORDS]
-    stops += bounds or ["all coefficients end inside their bounds"]
+    stops = [f"the {WORDS.get(n, n)} is at its limit" for n in tuned.active_limits]
+    stops += bounds or ["all coefficients lie inside their bounds"]
     others = [n for n in tuned.before if n not in (COMFORT, *tuned.limits) and tuned.before[n]]
     shares = {n: 100 * (tuned.after[n] / tuned.before[n] - 1) for n in others}
     worse = ", ".join(f"{n.replace('_', ' ')} {s:+.0f} %" for n, s in shares.items() if s >= 1)
     cost = f"The price: {worse}." if worse else "Nothing else gets worse."
-    return f"The body shakes {gain:.0f} % less; {', '.join(stops)}. {cost}"
+    stop = "; ".join(stops)
+    return f"The body shakes {gain:.0f} % less. What ends the search: {stop}. {cost}"
 
 
 def tuning_tables(tuned: TuneResult) -> tuple[Table, Table]:
@@ -91,6 +91,6 @@ def fresh_verdict(fresh: Rescore) -> str:
     held = int(np.sum(gain < 0))
     return (
         f"On {held} of {fresh.roads} fresh roads the body shakes less, by {-gain.mean():.0f} % on average "
-        f"({-gain.max():.0f} to {-gain.min():.0f} %); the tyre load varies by {cost.mean():+.0f} % "
-        f"({cost.min():+.0f} to {cost.max():+.0f} %)."
+        f"({-gain.max():.0f} to {-gain.min():.0f} %); the {WORDS[GRIP]} changes by "
+        f"{cost.mean():+.0f} % ({cost.min():+.0f} to {cost.max():+.0f} %)."
     )

@@ -99,14 +99,14 @@ def _map(
     if min(values.shape) < 2:
         _checks.refuse("data", "have two or more values along each axis of a map", values.shape, "Choose one axis.")
     shown = np.ma.masked_invalid(values)
-    if shown.count() and np.ptp(shown) > 0:
+    if shown.count() and shown.max() > shown.min():
         filled = plot.contourf(x, y, shown, LEVELS, cmap="viridis")
         figure.colorbar(filled, ax=plot, label=_label(data, metric))
         row, column = np.unravel_index(np.ma.argmin(shown), shown.shape)
         least = f"smallest: {_style.short(float(values[row, column]))}{_unit(data, metric)}"
         plot.plot(x[column], y[row], "o", color="white", markeredgecolor=_style.BLACK, label=least, clip_on=False)
-    plot.set_facecolor("0.93")
     if failed.any():
+        plot.patch.set(facecolor="0.95", edgecolor="0.75", hatch="///")
         rows, columns = np.nonzero(failed)
         plot.plot(x[columns], y[rows], "x", color=_style.BLACK, markersize=4.0, label="failed", clip_on=False)
     _style.dress(plot, _label(data, over[0]), _label(data, over[1]))

@@ -41,14 +41,16 @@ class Rescore:
         return np.divide(after, before, out=np.full(len(before), np.nan), where=before != 0.0) - 1.0
 
     def __repr__(self) -> str:
-        head = f"{f'mean of {self.roads} roads':<42}{'before':>12}{'after':>12}{'change':>9}   smallest to largest"
+        labels = {name: f"{name} [{unit or '-'}]" for name, unit in self.units.items()}
+        width = max(map(len, labels.values()))
+        head = f"{f'mean of {self.roads} roads':<{width}}{'before':>12}{'after':>12}{'change':>9}   smallest to largest"
         lines = [head]
         for name, before in self.before.items():
             change = 100.0 * self.change(name)
             numbers = f"{before.mean():>12.5g}{self.after[name].mean():>12.5g}"
             spread = f"{change.mean():+8.1f}%   {change.min():+.1f}% to {change.max():+.1f}%"
             mark = "  <- minimised" if name == self.metric else ""
-            lines.append(f"{f'{name} [{self.units[name]}]':<42}{numbers}{spread if before.any() else ''}{mark}")
+            lines.append(f"{labels[name]:<{width}}{numbers}{spread if before.any() else ''}{mark}")
         return "\n".join(lines)
 
 

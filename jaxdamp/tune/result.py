@@ -76,19 +76,22 @@ class TuneResult(Generic[V]):
         return f"{self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
 
     def __repr__(self) -> str:
-        lines = [self.summary, f"{'':<34}{'before':>12}{'after':>12}{'change':>9}"]
+        metrics = {name: f"{name} [{unit or '-'}]" for name, unit in self.units.items()}
+        numbers = {p.name: f"{p.name} [{p.unit or '-'}]" for p in self.parameters}
+        width = max(map(len, [*metrics.values(), *numbers.values()]))
+        lines = [self.summary, f"{'':<{width}}{'before':>12}{'after':>12}{'change':>9}"]
         for name, before in self.before.items():
             after, mark = self.after[name], "  <- minimised" if name == self.metric else ""
             if name in self.limits:
                 mark += f"  <- limit {self.limits[name]:.4g}" + ", reached" * (name in self.active_limits)
-            lines.append(_row(f"{name} [{self.units[name]}]", before, after) + mark)
+            lines.append(f"{metrics[name]:<{width}}{_before_after(before, after)}{mark}")
         for p in self.parameters:
-            note = f", {p.note}" if p.note else ""
-            lines.append(_row(f"{p.name} [{p.unit}]", p.before, p.after) + f"  ({p.lower:.5g} to {p.upper:.5g}{note})")
+            bounds = f"  ({p.lower:.5g} to {p.upper:.5g}{', ' * bool(p.note)}{p.note})"
+            lines.append(f"{numbers[p.name]:<{width}}{_before_after(p.before, p.after)}{bounds}")
         return "\n".join(lines + [f"warning: {warning}" for warning in self.warnings])
 
 
-def _row(label: str, before: float, after: float) -> str:
-    """A line of the table, with the relative change."""
+def _before_after(before: float, after: float) -> str:
+    """Two numbers and the relative change."""
     share = f"{100 * (after / before - 1):+8.1f}%" if before else ""
-    return f"{label:<34}{before:>12.5g}{after:>12.5g}{share:>9}"
+    return f"{before:>12.5g}{after:>12.5g}{share:>9}"
