@@ -268,9 +268,12 @@ def test_a_sweep_over_one_axis_has_a_curve_for_each_value_of_another() -> None:
         plots.sweep(jaxdamp.sweep(lambda p: {"y": p["a"]}, sweeps.points({"a": [1.0, 2.0]})), "y")
 
 
-def test_a_reference_is_a_broad_line_beneath_the_others(response: Response) -> None:
-    figure = plots.ride({"other": response, "truth": response}, reference="truth")
-    widths = [line.get_linewidth() for line in figure.axes[0].get_lines()[:2]]
-    assert sorted(widths) == [1.2, 3.5]
-    with pytest.raises(ValueError, match="Did you mean 'truth'"):
-        plots.ride({"truth": response}, reference="trut")
+def test_a_reference_is_a_broad_line_beneath_the_others(responses: dict[str, Response]) -> None:
+    axes = plots.ride(responses, reference="firm").axes[0]
+    firm = [line for line in axes.get_lines() if line.get_linewidth() == 3.5]
+    np.testing.assert_allclose(
+        np.max(firm[0].get_ydata()), np.max(np.asarray(responses["firm"]["sprung_acceleration"]))
+    )
+    assert len(firm) == 1
+    with pytest.raises(ValueError, match="Did you mean 'firm'"):
+        plots.ride(responses, reference="frm")
