@@ -13,8 +13,8 @@ import pytest
 
 ENTRIES = Path(__file__).with_name("every_entry_point.py")
 
-# Relative to the largest number of each entry; 1e-3 if it is not named. Errors of a fit follow from small differences.
-TOLERANCE = {"fit, standard errors": 0.1, "minimise, parameters": 0.02, "train": 0.01, "sweep, derivatives": 5e-3}
+# Relative to the largest number of each entry, some five times what was measured; 1e-4 if it is not named.
+TOLERANCE = {"minimise, parameters": 1e-3, "sweep, derivatives": 5e-4}
 
 
 @pytest.mark.slow
@@ -29,5 +29,5 @@ def test_every_entry_point_works_without_configuring():
     for name, expected in double.items():
         size = np.max(np.abs(expected))
         np.testing.assert_allclose(
-            single[name], expected, rtol=0.0, atol=TOLERANCE.get(name, 1e-3) * size, err_msg=name
+            single[name], expected, rtol=0.0, atol=TOLERANCE.get(name, 1e-4) * size, err_msg=name
         )

@@ -60,7 +60,7 @@ def rescore(
     """Drive the start and the tuned vehicle over other roads, and gather all ride metrics.
 
     A tuning knows one road. What it gains there and loses elsewhere shows on others, such as the same class with
-    another seed.
+    another seed. Runs of a few seconds hold few waves of the body's slow motion, and scatter accordingly.
 
     Arguments:
         result: of `minimise`.
@@ -73,9 +73,9 @@ def rescore(
 
     >>> from jaxdamp import tune, vehicles
     >>> from jaxdamp.roads import iso8608, white
-    >>> result = tune.minimise("rms_sprung_acceleration", vehicles.presets.quarter_car_000(), white("C", 20.0))
+    >>> result = tune.minimise("rms_dynamic_tyre_load", vehicles.presets.quarter_car_000(), white("C", 20.0))
     >>> fresh = rescore(result, [iso8608("C", speed=20.0, seed=seed) for seed in (1, 2)], duration=5.0)
-    >>> bool(np.all(fresh.change("rms_sprung_acceleration") < -0.05))
+    >>> bool(np.all(fresh.change("rms_dynamic_tyre_load") < -0.05))
     True
     """
     if not roads:
