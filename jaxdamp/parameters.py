@@ -8,7 +8,7 @@ parameter inside a composition. Freezing and extra bounds are arguments of a fit
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from typing import Any
@@ -50,6 +50,7 @@ __all__ = [
     "increasing_negative",
     "interval",
     "match_paths",
+    "name_patterns",
     "nonnegative",
     "ordered_interval",
     "parameter",
@@ -225,6 +226,22 @@ def match_paths(known: Sequence[str], patterns: Sequence[str]) -> list[str]:
     return [p for p in known if p in chosen]
 
 
+def name_patterns(argument: str, names: Any) -> list[str]:
+    """Names or patterns of parameters as a list.
+
+    Raises:
+        ValueError: anything else, such as a mapping to values, which would be ignored.
+    """
+    if isinstance(names, Mapping):
+        remedy = "It takes no values: set those by `jaxdamp.parameters.replace`, and ranges by `bounds`."
+        _checks.refuse(argument, "be names of parameters", repr(names), remedy)
+    listed = [names] if isinstance(names, str) else list(names) if isinstance(names, Iterable) else None
+    if listed is None or not all(isinstance(name, str) for name in listed):
+        remedy = "Write ['damper.rate'], or a pattern such as ['damper.*_rate']."
+        _checks.refuse(argument, "be names of parameters", repr(names), remedy)
+    return listed
+
+
 class FreeParameters(eqx.Module):
     """The free parameters of a tree as one vector, and back.
 
@@ -285,6 +302,25 @@ def _scale(p: Parameter) -> Array:
     return jnp.where(magnitude > floor, magnitude, jnp.where(largest == 0, 1.0, largest))
 
 
+def _limits_by_path(
+    known: Sequence[str], free: Sequence[str], bounds: Mapping[str, Any]
+) -> dict[str, tuple[float, float]]:
+    """Extra limits by path, checked. Of two names for one parameter the later counts."""
+    if not isinstance(bounds, Mapping):
+        _checks.refuse("bounds", "be a mapping as {'rate': (1000.0, 5000.0)}", repr(bounds))
+    limits = {}
+    for name, pair in bounds.items():
+        if np.shape(pair) != (2,) or not np.all(np.isfinite(pair)) or not pair[0] < pair[1]:
+            remedy = "A side that should stay open gets a number that is never reached."
+            _checks.refuse(f"bounds[{name!r}]", "be two finite numbers in increasing order", pair, remedy)
+        named = match_paths(known, [name])
+        if free and not set(named) & set(free):
+            remedy = "Take it out of `freeze`, or leave out its bounds: what stays as it is needs none."
+            _checks.refuse(f"bounds[{name!r}]", "bound a parameter that is free", "one that is not", remedy)
+        limits |= dict.fromkeys(named, (float(pair[0]), float(pair[1])))
+    return limits
+
+
 def free_parameters(
     tree: Any,
     *,
@@ -301,19 +337,14 @@ def free_parameters(
         bounds: extra limits `{path: (lower, upper)}` in the parameter's unit.
 
     Raises:
-        ValueError: a name that fits no parameter; nothing left to change; a start value outside its bounds.
+        ValueError: a name that fits no parameter; nothing left to change; bounds of a parameter that is not free, or of
+            a wrong shape; a start value outside its bounds; a mapping where names belong.
     """
     all_parameters = parameters(tree)
     known = [p.path for p in all_parameters]
-    keep = match_paths(known, over) if over is not None else known
-    frozen = match_paths(known, freeze)
-    limits: dict[str, tuple[float, float]] = {}
-    for name, pair in (bounds or {}).items():
-        if len(pair) != 2 or not np.all(np.isfinite(pair)) or not pair[0] < pair[1]:
-            remedy = "A side that should stay open gets a number that is never reached."
-            _checks.refuse(f"bounds[{name!r}]", "be two finite numbers in increasing order", pair, remedy)
-        for path in match_paths(known, [name]):
-            limits[path] = pair
+    keep = match_paths(known, name_patterns("over", over)) if over is not None else known
+    frozen = match_paths(known, name_patterns("freeze", freeze))
+    limits = _limits_by_path(known, [path for path in keep if path not in frozen], bounds or {})
     chosen = []
     for p in all_parameters:
         if p.path not in keep or p.path in frozen:

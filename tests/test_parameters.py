@@ -18,6 +18,7 @@ from jaxdamp.parameters import (
     increasing_negative,
     interval,
     match_paths,
+    name_patterns,
     nonnegative,
     ordered_interval,
     parameters,
@@ -305,3 +306,24 @@ def test_free_parameters_refuse(arguments, message):
     pattern = message if "\\" in message else re.escape(message)
     with pytest.raises(ValueError, match=pattern):
         free_parameters(Bilinear(2600.0, 1200.0), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        ({"rate": 3000.0}, "`freeze` must be names of parameters.*It takes no values"),
+        ([("rate", (1.0, 2.0))], r"`freeze` must be names of parameters.*Write \['damper.rate'\]"),
+        (3000.0, "`freeze` must be names of parameters"),
+    ],
+)
+def test_names_that_carry_values_are_refused(names, message):
+    with pytest.raises(ValueError, match=message):
+        name_patterns("freeze", names)
+    assert name_patterns("freeze", "rate") == ["rate"] and name_patterns("freeze", ("a", "b*")) == ["a", "b*"]
+
+
+def test_bounds_of_what_is_not_free_are_refused():
+    law = Bilinear(2600.0, 1400.0)
+    with pytest.raises(ValueError, match=r"`bounds\['rebound_rate'\]` must bound a parameter that is free"):
+        free_parameters(law, freeze=["rebound_rate"], bounds={"rebound_rate": (1.0, 1e4)})
+    assert free_parameters(law, freeze=["rebound_rate"], bounds={"*_rate": (1.0, 1e4)}).names == ["compression_rate"]

@@ -12,18 +12,19 @@ from jaxdamp.cli import findings as tables
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.attempts import Attempts
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.demo_tuning import COMFORT, fresh_table, fresh_verdict, limits, outcome, purpose, tuning_tables
 from jaxdamp.cli.fit_files import draw_findings, velocities, write_findings, write_table
 from jaxdamp.cli.fitted import Findings
 from jaxdamp.cli.fitting import fit_laws
 from jaxdamp.cli.ranges import notes_of, said_in_tables
 from jaxdamp.cli.results import Results, results_folder
-from jaxdamp.dampers import AbstractDamper, Besinger, Linear, SeriesSpring
+from jaxdamp.dampers import AbstractDamper, Besinger, SeriesSpring
 from jaxdamp.identify import FitResult
-from jaxdamp.parameters import match_paths, parameters
 from jaxdamp.report import Column, Report, Table
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
-from jaxdamp.tune import TuneResult
+from jaxdamp.tune import Rescore, TuneResult
+from jaxdamp.vehicles import AbstractVehicle
 
 
 def _true_law() -> AbstractDamper:
@@ -54,7 +55,8 @@ class Scenario:
         force_noise: of the bench [N].
         stroke_noise: of the bench [m].
         duration: of the rides [s].
-        reach: factor by which the tuning may raise or lower a damping coefficient.
+        tyre_load: factor by which the tuning may raise the RMS variation of the tyre load.
+        fresh_roads: number of roads on which the tuned car is tried that the tuning has not seen.
         seed: of all noise and roads.
     """
 
@@ -66,19 +68,23 @@ class Scenario:
     force_noise: float = 20.0
     stroke_noise: float = 1e-5
     duration: float = 10.0
-    reach: float = 3.0
+    tyre_load: float = 1.1
+    fresh_roads: int = 5
     seed: int = 0
 
 
-PAPER_LINEAR = "linear, 2500 N s/m"
+TRUE = "true damper"
 METRICS = {
     "rms_sprung_acceleration": "body acceleration, RMS",
+    "weighted_rms_sprung_acceleration": "weighted by Wk",
     "working_space_rms": "travel, RMS",
     "working_space_peak_to_peak": "travel, peak to peak",
     "rms_dynamic_tyre_load": "tyre load, RMS",
 }
+EVENT = 2.0  # s: length of a ride over a bump
+JUDGED = "rms_sprung_acceleration"
 ISO = "ISO 8608 class C at 20 m/s"
-COMFORT = "rms_sprung_acceleration"
+BUMP = "a bump, 60 mm high and 2 m long, at 10 m/s"
 
 
 def run_demo(screen: Screen, scenario: Scenario, *, out: Path, replace: bool = False) -> None:
@@ -96,16 +102,18 @@ def run_demo(screen: Screen, scenario: Scenario, *, out: Path, replace: bool = F
         rides = {name: ride(screen, name, road, findings, scenario) for name, road in _roads(scenario).items()}
         show_rides(screen, rides)
         tuned = improve(screen, findings, rides[ISO], scenario) if _has_truth(findings, scenario) else None
-        if tuned is not None:
-            show_tuning(screen, tuned)
-        _save_rides(results, rides, tuned, velocities(findings.comparison), attempts)
+        fresh = None if tuned is None else try_fresh_roads(screen, tuned, scenario)
+        if tuned is not None and fresh is not None:
+            show_tuning(screen, tuned, fresh, scenario)
+        _save_rides(results, rides, tuned, fresh, velocities(findings.comparison), attempts)
         with screen.stage("Pictures and report"):
             _introduce(report, scenario)
             draw_findings(results.draft, findings, report, attempts)
             _report_truth(findings, scenario, report)
             _draw_rides(results.draft, rides, report, attempts)
-            if tuned is not None:
-                _draw_tuning(results.draft, tuned, rides[ISO][scenario.true_name], scenario, report, attempts)
+            if tuned is not None and fresh is not None:
+                before = rides[ISO][scenario.true_name]
+                _draw_tuning(results.draft, tuned, fresh, before, scenario, report, attempts)
             report.points(attempts.troubles)
             report.write(results.draft / "report.html")
     screen.files(out, results.published)
@@ -130,48 +138,53 @@ def record(screen: Screen, scenario: Scenario, folder: Path) -> BenchSet:
         return bench.read([folder / "records" / f"{name}.csv" for name in made.names])
 
 
+def _iso_road(seed: int) -> AbstractRoad:
+    return roads.iso8608("C", speed=20.0, seed=seed)
+
+
 def _roads(scenario: Scenario) -> dict[str, AbstractRoad]:
-    """The road of paper 000, and a real one."""
-    flat = roads.band_limited(0.1, 50.0, peak_to_peak=0.01, duration=scenario.duration, dt=0.002, seed=scenario.seed)
-    return {
-        "paper 000: random, 0.1 to 50 Hz, 10 mm peak to peak": flat,
-        ISO: roads.iso8608("C", speed=20.0, seed=scenario.seed),
-    }
+    """A random road and an event."""
+    return {ISO: _iso_road(scenario.seed), BUMP: roads.cosine_bump(0.06, start=0.5, duration=0.2)}
+
+
+def _car(law: AbstractDamper) -> AbstractVehicle:
+    """The corner of a car that is ridden and tuned: 300 kg of body, 1.2 Hz."""
+    return vehicles.presets.quarter_car_mathworks(law)
 
 
 def ride(screen: Screen, title: str, road: AbstractRoad, findings: Findings, scenario: Scenario) -> dict[str, Response]:
-    """The quarter car of paper 000 with every fitted law, and with the paper's own."""
-    laws: dict[str, AbstractDamper] = {PAPER_LINEAR: Linear(2500.0)}
-    laws |= {rung.name: rung.result.law for rung in findings.comparison.rungs}
+    """The quarter car with the true damper and with every fitted law."""
+    laws = {TRUE: scenario.law} | {rung.name: rung.result.law for rung in findings.comparison.rungs}
+    duration = scenario.duration if title == ISO else min(scenario.duration, EVENT)
     responses = {}
     with screen.stage(f"Quarter car on {title}", len(laws)) as advance:
         for done, (name, law) in enumerate(laws.items()):
             advance(name, done)
-            car = vehicles.presets.quarter_car_000(law)
             with said_in_tables():
-                responses[name] = simulate(car, road, duration=scenario.duration)
+                responses[name] = simulate(_car(law), road, duration=duration)
     return responses
 
 
 def improve(screen: Screen, findings: Findings, rides: Mapping[str, Response], scenario: Scenario) -> TuneResult:
-    """Tune the damping coefficients for comfort, with no more travel than before."""
-    car = vehicles.presets.quarter_car_000(findings.comparison[scenario.true_name].law)
-    road = _roads(scenario)[ISO]
-    paths = match_paths([p.path for p in parameters(car)], ["damper.*rate"])
-    values = {p.path: float(p.value) for p in parameters(car) if p.path in paths}
-    travel = float(rides[scenario.true_name].metrics()["working_space_peak_to_peak"])
+    """Tune the damping coefficients of the fitted damper for comfort, without giving up the grip of the tyre."""
+    before = {name: float(value) for name, value in rides[scenario.true_name].metrics().items()}
     with screen.stage("Tuning for comfort") as advance:
         return tune.minimise(
             COMFORT,
-            car,
-            road,
-            over=paths,
-            bounds={path: (value / scenario.reach, value * scenario.reach) for path, value in values.items()},
-            limits={"working_space_peak_to_peak": travel},
+            _car(findings.comparison[scenario.true_name].law),
+            _roads(scenario)[ISO],
+            over=["damper.*rate"],
+            limits=limits(before, scenario.tyre_load),
             duration=scenario.duration,
-            max_steps=30,
-            progress=lambda step, metric: advance(f"step {step}: {metric:.4f} m/s² RMS", step),
+            progress=lambda step, metric: advance(f"step {step}: {metric:.4f} m/s²", step),
         )
+
+
+def try_fresh_roads(screen: Screen, tuned: TuneResult, scenario: Scenario) -> Rescore:
+    """Drive the cars before and after the tuning over roads of the same class that it has not seen."""
+    fresh = [_iso_road(scenario.seed + 1 + index) for index in range(scenario.fresh_roads)]
+    with screen.stage(f"The tuned car on {len(fresh)} fresh roads"):
+        return tune.rescore(tuned, fresh, duration=scenario.duration)
 
 
 # ---- what they found
@@ -209,67 +222,50 @@ def truth_verdict(scenario: Scenario, result: FitResult) -> str:
 
 
 def ride_table(title: str, responses: Mapping[str, Response]) -> Table:
-    """Ride metrics of each law, and the acceleration over that of the paper's linear damper."""
+    """Ride metrics of each law, and how far the acceleration is from that with the true damper."""
     units = next(iter(responses.values())).metric_units()
     columns = [Column("law"), *(Column(name, units[m].replace("^2", "²")) for m, name in METRICS.items())]
     found = {name: {m: float(v) for m, v in r.metrics().items()} for name, r in responses.items()}
-    base = found[PAPER_LINEAR][COMFORT]
-    rows = [(name, *(values[m] for m in METRICS), values[COMFORT] / base) for name, values in found.items()]
-    return Table(title, (*columns, Column("acceleration over linear", spec=".3f")), tuple(rows))
+    errors = _ride_errors(responses)
+    rows = [(name, *(values[m] for m in METRICS), errors.get(name)) for name, values in found.items()]
+    return Table(title, (*columns, Column("error of the acceleration", "%", "+.1f")), tuple(rows))
+
+
+def _ride_errors(responses: Mapping[str, Response]) -> dict[str, float]:
+    """How far the RMS acceleration with each fitted law is from that with the true damper [%]."""
+    rms = {name: float(response.metrics()[JUDGED]) for name, response in responses.items()}
+    return {name: 100 * (value / rms[TRUE] - 1) for name, value in rms.items() if name != TRUE}
 
 
 def ride_verdict(responses: Mapping[str, Response]) -> str:
-    """The paper's claim, beside what is found here."""
-    claim = (
-        "Paper 000 has 30 % less RMS body acceleration with its linear damper than with its power law, a ratio of 1.43"
-    )
-    if "power_law" not in responses:
-        return f"{claim}."
-    power, linear = (float(responses[name].metrics()[COMFORT]) for name in ("power_law", PAPER_LINEAR))
-    return f"{claim}; here the ratio is {power / linear:.2f}. It depends on how stiff the law is at low velocity."
+    """What the choice of a law costs in the prediction of a ride, in words."""
+    errors = _ride_errors(responses)
+    best, worst = (choose(errors, key=lambda name: abs(errors[name])) for choose in (min, max))
+    return f"The body acceleration predicted with {worst} is {_off(errors[worst])}, with {best} {_off(errors[best])}."
+
+
+def _off(error: float) -> str:
+    """An error of so many percent in words."""
+    return "right to 0.1 %" if abs(error) < 0.1 else f"{abs(error):.1f} % too {'high' if error > 0 else 'low'}"
 
 
 def show_rides(screen: Screen, rides: Mapping[str, Mapping[str, Response]]) -> None:
     """Ride metrics on each road."""
-    for index, (title, responses) in enumerate(rides.items()):
+    for title, responses in rides.items():
         screen.table(ride_table(title, responses))
-        if index == 0:
-            screen.say(ride_verdict(responses))
+        screen.say(ride_verdict(responses))
         screen.points(notes_of(responses), style="yellow")
 
 
-def tuning_tables(tuned: TuneResult) -> tuple[Table, Table]:
-    """Parameters and metrics before and after."""
-    sides = (Column("before"), Column("after"))
-    changed = tuple(
-        (p.name, p.unit, p.before, p.after, 100 * (p.after / p.before - 1), p.note) for p in tuned.parameters
-    )
-    parameters_changed = Table(
-        "Parameters",
-        (Column("parameter"), Column("unit"), *sides, Column("change", "%", "+.1f"), Column("note")),
-        changed,
-    )
-    marks = {tuned.metric: "minimised"} | {name: f"limit {top:.4g}" for name, top in tuned.limits.items()}
-    rows = tuple(
-        (
-            name,
-            tuned.units[name].replace("^2", "²") or "–",
-            before,
-            tuned.after[name],
-            100 * (tuned.after[name] / before - 1) if before else None,
-            marks.get(name, ""),
-        )
-        for name, before in tuned.before.items()
-    )
-    columns = (Column("metric"), Column("unit"), *sides, Column("change", "%", "+.1f"), Column("note"))
-    return parameters_changed, Table("Ride metrics", columns, rows)
-
-
-def show_tuning(screen: Screen, tuned: TuneResult) -> None:
-    """What the tuning did."""
+def show_tuning(screen: Screen, tuned: TuneResult, fresh: Rescore, scenario: Scenario) -> None:
+    """What the tuning did, on its road and on others."""
+    screen.say(purpose(scenario.tyre_load))
     for table in tuning_tables(tuned):
         screen.table(table)
+    screen.say(outcome(tuned))
     screen.points(tuned.warnings, style="yellow")
+    screen.table(fresh_table(fresh))
+    screen.say(fresh_verdict(fresh))
 
 
 # ---- what is written
@@ -300,6 +296,7 @@ def _save_rides(
     results: Results,
     rides: Mapping[str, Mapping[str, Response]],
     tuned: TuneResult | None,
+    fresh: Rescore | None,
     velocities: np.ndarray,
     attempts: Attempts,
 ) -> None:
@@ -311,6 +308,8 @@ def _save_rides(
         if tuned is not None:
             for name, table in zip(("tuned_parameters", "tuned_metrics"), tuning_tables(tuned), strict=True):
                 write_table(results.draft, name, table)
+            if fresh is not None:
+                write_table(results.draft, "tuned_on_fresh_roads", fresh_table(fresh))
             law = tuned.vehicle.elements()[0]
             with attempts.part("tuned_law.json"):
                 export.to_json(law, results.draft / "tuned_law.json")
@@ -333,27 +332,35 @@ def _draw_rides(folder: Path, rides: Mapping[str, Mapping[str, Response]], repor
     report.heading("The ride on each law")
     for index, (title, responses) in enumerate(rides.items()):
         report.table(ride_table(title, responses))
-        if index == 0:
-            report.text(ride_verdict(responses))
+        report.text(ride_verdict(responses))
         report.points(notes_of(responses))
-        shown = {name: responses[name] for name in (PAPER_LINEAR, *list(responses)[1:][-3:])}
+        names = sorted(_ride_errors(responses), key=lambda name: abs(_ride_errors(responses)[name]))
+        shown = {name: responses[name] for name in dict.fromkeys((TRUE, names[-1], names[0]))}
+        words = f"Quarter car on {title}: the true damper, the law furthest from it and the nearest"
         with attempts.part(f"The picture ride_{index + 1}.png"):
-            report.picture(plots.ride(shown), f"Quarter car on {title}", folder / f"ride_{index + 1}.png")
+            report.picture(plots.ride(shown, reference=TRUE), words, folder / f"ride_{index + 1}.png")
 
 
 def _draw_tuning(
-    folder: Path, tuned: TuneResult, before: Response, scenario: Scenario, report: Report, attempts: Attempts
+    folder: Path,
+    tuned: TuneResult,
+    fresh: Rescore,
+    before: Response,
+    scenario: Scenario,
+    report: Report,
+    attempts: Attempts,
 ) -> None:
     report.heading("A better damper")
-    report.text(
-        "The damping coefficients were tuned for the least RMS body acceleration, with no more travel than before."
-    )
+    report.text(purpose(scenario.tyre_load))
     for table in tuning_tables(tuned):
         report.table(table)
+    report.text(outcome(tuned))
     report.points(tuned.warnings)
+    report.table(fresh_table(fresh))
+    report.text(fresh_verdict(fresh))
     with attempts.part("The picture tuning.png"):
         report.picture(plots.tuning(tuned), "Before and after the tuning", folder / "tuning.png")
-    with attempts.part("The picture tuning_ride.png"):
+    with attempts.part("The picture tuning_ride.png"), said_in_tables():
         after = simulate(tuned.vehicle, _roads(scenario)[ISO], duration=scenario.duration)
         figure = plots.ride({"before": before, "after": after})
         report.picture(figure, f"Quarter car on {ISO}, before and after", folder / "tuning_ride.png")

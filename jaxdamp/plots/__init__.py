@@ -13,6 +13,7 @@ from jaxdamp.plots.history import training_history
 from jaxdamp.plots.loops import fit_loops
 from jaxdamp.plots.rides import ride
 from jaxdamp.plots.roughness import roughness_by_segment
+from jaxdamp.plots.sweeps import sweep
 from jaxdamp.plots.validation import cross_validation
 
 
@@ -25,6 +26,7 @@ __all__ = [
     "law_card",
     "ride",
     "roughness_by_segment",
+    "sweep",
     "training_history",
     "tuning",
 ]

@@ -1,5 +1,6 @@
 """A tuning: the law before and after, what it did to every ride metric, and how the search went."""
 
+import textwrap
 from typing import TYPE_CHECKING
 
 import equinox as eqx
@@ -51,6 +52,7 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
     _style.dress(curves, _style.VELOCITY, _style.FORCE, "Damper law")
     _style.cross(curves)
     curves.legend(loc="upper left", facecolor="white", edgecolor="none")
+    figure.suptitle("\n".join(textwrap.wrap(result.summary, 130)), fontsize="medium")
     _bars(bars, result)
     _search(search, result)
     _style.note_below(figure, gaps)
@@ -89,13 +91,14 @@ def _bars(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
             verticalalignment="center",
             fontsize="small",
         )
-    marks = [" (minimised)" * (n == result.metric) + " (limited)" * (n in result.limits) for n in names]
+    reached = {n: " (limit reached)" if n in result.active_limits else " (limited)" for n in result.limits}
+    marks = [" (minimised)" if n == result.metric else reached.get(n, "") for n in names]
     axes.set_yticks(rows, [n.replace("_", " ") + mark for n, mark in zip(names, marks, strict=True)])
     axes.invert_yaxis()
     lower, upper = min(*change, 0.0), max(*change, 0.0)
     spread = max(upper - lower, 1.0)
     axes.set_xlim(lower - 0.05 * spread, upper + 0.95 * spread)
-    _style.dress(axes, "change [%]   (less is better)", "", "Ride metrics")
+    _style.dress(axes, "change [%]", "", "Ride metrics")
     axes.grid(False, axis="y")
     _style.cross(axes, horizontal=False)
 

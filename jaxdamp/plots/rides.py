@@ -1,7 +1,7 @@
 """Rides over a road: time histories and the spectrum of the body's acceleration."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 
+WINDOW = 3.0  # s that are drawn over time: in more, a wheel's oscillations at 10 Hz cannot be told apart
 _WORDS = {
     "sprung_acceleration": "body acceleration [m/s²]   (+ up)",
     "stroke": "stroke [mm]   (+ rebound)",
@@ -28,6 +29,7 @@ def ride(
     channels: Sequence[str] | None = None,
     weighting: str | None = None,
     window: tuple[float | int, float | int] | None = None,
+    reference: str | None = None,
     frequencies: tuple[float | int, float | int] = (0.3, 30.0),
 ) -> "matplotlib.figure.Figure":
     """Channels over time and the power spectral density of the first of them, overlaid for several responses.
@@ -41,8 +43,10 @@ def ride(
             first stroke and the first dynamic tyre load.
         weighting: a frequency weighting of ISO 2631-1, such as "Wk": the spectrum weighted by it is drawn dotted, and
             the legend adds the weighted RMS.
-        window: part of the run to draw over time [s]; if left out, the whole run, or of a long one the 5 s around its
+        window: part of the run to draw over time [s]; if left out, the whole run, or of a long one the 3 s around its
             largest first channel. The spectrum and the RMS are of the whole run.
+        reference: name of the response that the others are held against: a broad grey line beneath them, so that what
+            lies on it can be seen.
         frequencies: range of the spectrum [Hz].
 
     Raises:
@@ -55,6 +59,8 @@ def ride(
     channels = ride_channels(first) if channels is None else channels
     for channel in channels:
         _checks.one_of("channels", channel, first.units)
+    if reference is not None:
+        _checks.one_of("reference", reference, responses)
     start, stop = _window(first, channels[0]) if window is None else window
     figure = _style.new_figure(12.0, 2.2 * len(channels) + 0.6)
     grid = figure.add_gridspec(len(channels), 2, width_ratios=(1.4, 1.0))
@@ -62,15 +68,16 @@ def ride(
     rows += [figure.add_subplot(grid[i, 0], sharex=rows[0]) for i in range(1, len(channels))]
     spectrum = figure.add_subplot(grid[:, 1])
     handles = []
-    for number, (name, response) in enumerate(responses.items()):
-        style = _style.line_style(number)
+    styles = _line_styles(responses, reference)
+    for name, response in responses.items():
+        style = styles[name]
         time, found = np.asarray(response.time), response.channels
         values = {channel: np.asarray(found[channel]) for channel in channels}
         seen = (time >= start) & (time <= stop)
         if not seen.any():
             _checks.refuse("window", f"hold instants of the run, 0 to {time[-1]:g} s", (start, stop))
         for axes, channel in zip(rows, channels, strict=True):
-            axes.plot(time[seen], _factor(first, channel) * values[channel][seen], linewidth=1.1, **style)
+            axes.plot(time[seen], _factor(first, channel) * values[channel][seen], **style)
         rms = float(metrics.rms(values[channels[0]]))
         label = f"{name + ': ' if name else ''}RMS {_style.short(rms)} {_unit(first, channels[0])}"
         frequency, density = _spectrum(values[channels[0]], time, frequencies)
@@ -80,7 +87,7 @@ def ride(
             label += f", {weighting} {_style.short(float(felt))}"
             gain = np.asarray(metrics.weighting_factor(frequency, weighting))
             spectrum.loglog(frequency, gain**2 * density, ":", color=style["color"], linewidth=1.1)
-        handles += spectrum.loglog(frequency, density, linewidth=1.3, label=label, **style)
+        handles += spectrum.loglog(frequency, density, label=label, **style)
     for axes, channel in zip(rows, channels, strict=True):
         fitted_range.shade_channel(axes, responses.values(), channel)
         _style.dress(axes, "", _label(first, channel).replace("   ", "\n"))
@@ -100,6 +107,13 @@ def ride(
     return figure
 
 
+def _line_styles(names: Iterable[str], reference: str | None) -> dict[str, dict[str, Any]]:
+    """How to draw each response: the later over the earlier, the reference broad beneath all."""
+    others = [name for name in names if name != reference]
+    styles = {name: _style.line_style(number) | {"linewidth": 1.2} for number, name in enumerate(others)}
+    return styles if reference is None else {reference: {"color": "0.7", "linewidth": 3.5}} | styles
+
+
 def ride_channels(response: Response) -> tuple[str, ...]:
     """The channels that say most of a ride: body acceleration, first stroke, first dynamic tyre load."""
     acceleration = next(m.channel for m in response.vehicle.ride_metrics if m.channel.endswith("acceleration"))
@@ -108,10 +122,10 @@ def ride_channels(response: Response) -> tuple[str, ...]:
 
 
 def _window(response: Response, channel: str) -> tuple[float, float]:
-    """The whole run, or the 5 s around its largest value."""
+    """The whole run, or of a long one the seconds around its largest value."""
     time = np.asarray(response.time)
-    end, length = float(time[-1]), 5.0
-    if end <= 2 * length:
+    end, length = float(time[-1]), WINDOW
+    if end <= length:
         return 0.0, end
     centre = float(time[np.argmax(np.abs(np.asarray(response[channel])))])
     start = min(max(centre - 0.5 * length, 0.0), end - length)

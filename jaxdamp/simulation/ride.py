@@ -6,15 +6,17 @@ from typing import Any, TypeAlias, final
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp._field_types import check_module
+from jaxdamp._many_points import outside_domains
 from jaxdamp._types import Scalar
 from jaxdamp.configuration import fuses_loops
 from jaxdamp.dampers import RangeUse, without_fitted_ranges
 from jaxdamp.dampers.fitted_range import has_fitted_range
 from jaxdamp.metrics import MetricValues
-from jaxdamp.parameters import parameters, replace
+from jaxdamp.parameters import match_paths, parameters, replace
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation._vectors import scalars
 from jaxdamp.simulation.exponential import exponential_steps, settled
@@ -127,9 +129,26 @@ class Ride(eqx.Module):
         saved = exponential_steps(without_fitted_ranges(vehicle), heights, step, None, self.substeps, 1)
         return range_uses(vehicle, saved.motion, saved.road, saved.road_rate, saved.port_force)
 
+    def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
+        return outside_domains(self.vehicle, columns)
+
     def __call__(self, point: Mapping[str, Any] | None = None) -> dict[str, Scalar]:
         """The metrics by name, with other values of the parameters at these paths."""
-        return MetricValues(_drive(self, dict(point or {})))
+        point = dict(point or {})
+        for name, value in point.items():
+            if np.shape(value) != ():
+                self._check_shape(name, np.shape(value))
+        return MetricValues(_drive(self, point))
+
+    def _check_shape(self, name: str, shape: tuple[int, ...]) -> None:
+        """Refuse several numbers for one, which would be several cars."""
+        known = {p.path: p.value.shape for p in parameters(self.vehicle)}
+        for path in match_paths(list(known), [name]):
+            if known[path] != shape:
+                must = "be one number for one car" if known[path] == () else f"be of shape {known[path]}"
+                remedy = "For several cars use `jaxdamp.sweep(ride, {...})`, or `jax.vmap` of `ride.side_by_side()`."
+                _checks.refuse(f"point[{name!r}]", must, f"of shape {shape}", remedy)
 
 
 @eqx.filter_jit

@@ -54,7 +54,8 @@ class SweepFile:
         if processes.largest(refusal is not None)[0]:
             raise refusal or ValueError(f"The first process refuses the file {self.path}: see its message.")
         table = self._table
-        table.values, table.done, table.failed = processes.of_first((table.values, table.done, table.failed))
+        table.values, table.done, table.reason = processes.of_first((table.values, table.done, table.reason))
+        table.reasons = json.loads(processes.text_of_first(json.dumps(table.reasons)))
 
     def _load(self) -> None:
         import xarray
@@ -74,12 +75,16 @@ class SweepFile:
         for name, values in table.values.items():
             table.values[name] = np.array(kept[name].values, values.dtype).reshape(values.shape)
         table.done = np.array(kept["done"].values, bool).ravel()
-        table.failed = np.array(kept["failed"].values, bool).ravel()
+        reasons = np.array(kept["reason"].values, str).ravel()
+        for reason in dict.fromkeys(reasons[reasons != ""]):
+            table.give_reasons(np.flatnonzero(reasons == reason), str(reason))
 
     def _differences(self, kept: "xarray.Dataset") -> list[str]:
         """What keeps the file from being a part of this sweep, in words."""
         if MARK not in kept.attrs or "done" not in kept:
             return ["it was not written by `jaxdamp.sweep`"]
+        if "reason" not in kept.coords:
+            return ["an older jaxdamp wrote it, which did not note why points fail"]
         mine, found = self._table.label(), []
         axes = json.loads(kept.attrs[AXES])
         if kept["failed"].dims != mine["failed"].dims or axes != self._table.points.names:

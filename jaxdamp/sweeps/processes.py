@@ -52,3 +52,12 @@ def of_first(tree: Any) -> Any:
 
         return jax.tree.map(np.array, multihost_utils.broadcast_one_to_all(tree))
     return tree
+
+
+def text_of_first(text: str) -> str:
+    """What the first process says, as a text."""
+    if not several():
+        return text
+    size = int(largest(len(text.encode()))[0])  # arrays that are sent must be equally long everywhere
+    padded = np.frombuffer(text.encode().ljust(size), np.uint8)
+    return np.asarray(of_first(padded)).tobytes().decode().rstrip()

@@ -16,7 +16,7 @@ from jaxdamp.sweeps import processes
 from jaxdamp.sweeps.axes import AbstractPoints, as_points
 from jaxdamp.sweeps.file import SweepFile
 from jaxdamp.sweeps.program import Program, forget_errors, prepare, quiet, with_chunk
-from jaxdamp.sweeps.table import Table
+from jaxdamp.sweeps.table import Table, extent
 from jaxdamp.sweeps.tracing import trace
 
 
@@ -41,8 +41,9 @@ def sweep(
     """Compute a function at every point of a grid, a list or a sample: all cores, or all GPUs, many points at a time.
 
     A point at which a result is not finite, or at which the function raises while it runs (`equinox.error_if`), does
-    not stop the sweep: what is not finite becomes NaN, and a warning at the end says how many points failed and where.
-    The coordinate `failed` marks them, `attrs["failed_points"]` counts them.
+    not stop the sweep: what is not finite becomes NaN, and a warning at the end says how many points failed, where and
+    why. The coordinate `failed` marks them, `reason` says why, `attrs["failed_points"]` counts them. Points that the
+    function itself calls out of its domain, as a `Ride` does with a negative mass, are not computed, and fail too.
 
     A processor counts as one device until `jaxdamp.configure()` is called, before anything is computed. In several
     processes joined by `jax.distributed`, every process makes the same call and gets all the results.
@@ -52,7 +53,8 @@ def sweep(
             numbers, or arrays of fixed shape. An equinox module that is called so is compiled once for all values of
             its arrays; arrays that a plain function closes over are compiled in. If it has `units`, a mapping from
             names of results and axes, they label the results; if it has `lanes`, so many points are computed side by
-            side on a CPU; what its `side_by_side()` gives is compiled in its place.
+            side on a CPU; what its `side_by_side()` gives is compiled in its place; and its
+            `out_of_domain(columns)` gives a text for each of many points, empty for those that can be computed.
         over: values for each axis, whose every combination is taken (the last axis runs fastest); or
             `jaxdamp.sweeps.points`, `random` or `sobol`. The function gets them as floating numbers.
         chunk: points computed side by side on one device; chosen to fit into the memory if left out.
@@ -68,8 +70,8 @@ def sweep(
         The results by name with the axes as dimensions (for a list, along `point`).
 
     Raises:
-        ValueError: axes that are no numbers, a function that does not know an axis or returns no named numbers, a file
-            of another sweep.
+        ValueError: axes that are no numbers, a function that does not know an axis or returns no named numbers, no
+            point inside the function's domain, a file of another sweep.
 
     >>> data = sweep(lambda p: {"product": p["a"] * p["b"]}, {"a": [1.0, 2.0], "b": [3.0, 4.0, 5.0]})
     >>> float(data["product"].sel(a=2.0, b=5.0))
@@ -87,13 +89,14 @@ def sweep(
     kept = None if file is None else SweepFile(file, table)
     if kept is not None:
         kept.resume()
-    left, first_error = np.flatnonzero(~table.done), ""
+    _leave_out(function, table)
+    left = np.flatnonzero(~table.done)
     if left.size:
         runner = _Runner(prepare(traced, len(left), chunk, devices, getattr(function, "lanes", None)), points)
         with Progress("Sweeping") as shown, quiet():
             try:
                 for indices, results in runner.results(left):
-                    table.fill(indices, results)
+                    table.fill(indices, results, runner.error)
                     if kept is not None:
                         kept.save()
                     _tell(progress, shown, int(table.done.sum()), points.count, runner.rate)
@@ -101,9 +104,22 @@ def sweep(
                 if kept is not None:
                     kept.save(now=True)
             runner.close()
-        first_error = runner.first_error
-    table.warn(first_error)
+    table.warn()
     return table.label()
+
+
+def _leave_out(function: Any, table: Table) -> None:
+    """Mark the points that the function cannot take; refuse if that is all of them."""
+    judge = getattr(function, "out_of_domain", None)
+    if judge is None:
+        return
+    columns = table.points.columns(np.arange(table.points.count))
+    reasons = np.asarray(judge(columns), dtype=object)
+    if np.all(reasons != ""):
+        remedy = "Sweep over values that it can have."
+        must = f"hold a point that can be computed ({'; '.join(dict.fromkeys(reasons))})"
+        _checks.refuse("over", must, f"{extent(columns)}, all outside", remedy)
+    table.leave_out(reasons)
 
 
 def _tell(progress: Callable[[int, int], None] | None, shown: Progress, done: int, total: int, rate: float) -> None:
@@ -124,7 +140,7 @@ class _Runner:
         self._program, self._points = program, points
         self._rounds = 1
         self._raised = False
-        self.rate, self.first_error = 1.0, ""
+        self.rate, self.error = 1.0, ""  # points a second; what the function raised last
 
     def results(self, left: np.ndarray) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray] | None]]:
         """The points in pieces with their results; None where the function raises."""
@@ -159,7 +175,7 @@ class _Runner:
             self._program = with_chunk(old.traced, old.layout.mesh, old.layout.chunk // 2)
             self._rounds = 1
         self._raised = True
-        self.first_error = self.first_error or _last_line(error)
+        self.error = _last_line(error)
         return None, bool(some_full)
 
     def close(self) -> None:

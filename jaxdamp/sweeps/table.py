@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from jaxdamp.sweeps.axes import PARAMETER, AbstractPoints
+from jaxdamp.sweeps.axes import PARAMETER, AbstractPoints, Columns
 from jaxdamp.sweeps.tracing import Traced
 
 
@@ -15,34 +15,61 @@ if TYPE_CHECKING:
     import xarray
 
 
+MOST_REASONS = 4  # that a warning names
+
+
 @final
 @dataclasses.dataclass
 class Table:
-    """Results by name, the points along the first axis; NaN where there is none (yet)."""
+    """Results by name, the points along the first axis; NaN where there is none (yet).
+
+    `reason` holds for each point the number of a text in `reasons`, the first of which is empty: nothing failed.
+    """
 
     points: AbstractPoints
     traced: Traced
     units: Mapping[str, str]
     values: dict[str, np.ndarray]
     done: np.ndarray
-    failed: np.ndarray
+    reason: np.ndarray
+    reasons: list[str]
 
     @classmethod
     def empty(cls, points: AbstractPoints, traced: Traced, units: Mapping[str, str]) -> "Table":
         """Nothing is done."""
         count = points.count
         values = {name: np.full((count, *r.shape), np.nan, r.dtype) for name, r in traced.results.items()}
-        return cls(points, traced, units, values, np.zeros(count, bool), np.zeros(count, bool))
+        return cls(points, traced, units, values, np.zeros(count, bool), np.zeros(count, np.int32), [""])
 
-    def fill(self, indices: np.ndarray, results: Mapping[str, np.ndarray] | None) -> None:
-        """Enter the results of some points: finite numbers stay; None says that there are none."""
+    @property
+    def failed(self) -> np.ndarray:
+        """The points that are done but lack a result."""
+        return self.reason > 0
+
+    def fill(self, indices: np.ndarray, results: Mapping[str, np.ndarray] | None, error: str = "") -> None:
+        """Enter the results of some points: finite numbers stay; None says that there are none, because of an error."""
         for name, found in (results or {}).items():
             finite = np.isfinite(found)
             self.values[name][indices] = np.where(finite, found, np.nan)
-            self.failed[indices] |= ~np.all(finite, axis=tuple(range(1, found.ndim)))
+            bad = indices[~np.all(finite, axis=tuple(range(1, found.ndim)))]
+            self.give_reasons(bad[~self.failed[bad]], f"{name} is not finite")
         if results is None:
-            self.failed[indices] = True
+            self.give_reasons(indices, f"the function raised: {error}" if error else "the function raised")
         self.done[indices] = True
+
+    def leave_out(self, reasons: np.ndarray) -> None:
+        """Mark points that are not to be computed, by a text for each; an empty one leaves a point alone."""
+        for reason in dict.fromkeys(reasons[reasons != ""]):
+            indices = np.flatnonzero(reasons == reason)
+            self.give_reasons(indices, reason)
+            self.done[indices] = True
+
+    def give_reasons(self, indices: np.ndarray, reason: str) -> None:
+        """Enter the text that says why these points failed."""
+        if indices.size:
+            if reason not in self.reasons:
+                self.reasons.append(reason)
+            self.reason[indices] = self.reasons.index(reason)
 
     def label(self) -> "xarray.Dataset":
         """The results with the names, values and units of the axes."""
@@ -59,6 +86,7 @@ class Table:
             name: (along, values, self._about(name)) for name, (along, values) in self.points.coordinates.items()
         }
         coordinates["failed"] = (dims, self.failed.reshape(lengths))
+        coordinates["reason"] = (dims, np.array(self.reasons, dtype=object)[self.reason].reshape(lengths))
         if self.traced.slopes:
             coordinates[PARAMETER] = (PARAMETER, np.array(self.points.names))
         return xarray.Dataset(variables, coordinates, {"failed_points": int(self.failed.sum())})
@@ -71,19 +99,28 @@ class Table:
                 return {"long_name": f"derivative of {result} by the parameter", **unit}
         return {"units": self.units[name]} if name in self.units else {}
 
-    def warn(self, first_error: str) -> None:
-        """Say how many points failed, and where."""
+    def warn(self) -> None:
+        """Say how many points failed, where, and why."""
         count, total = int(self.failed.sum()), len(self.failed)
         if not count:
             return
         columns = self.points.columns(np.flatnonzero(self.failed))
-        where = [
-            f"{name} = {c.min():.6g}" if c.min() == c.max() else f"{name} from {c.min():.6g} to {c.max():.6g}"
-            for name, c in columns.items()
-        ]
-        error = f" The first error was: {first_error}" if first_error else ""
+        numbers = np.bincount(self.reason, minlength=len(self.reasons))
+        by_count = sorted(range(1, len(self.reasons)), key=lambda i: -numbers[i])
+        why = [f"{self.reasons[i]} ({numbers[i]})" for i in by_count[:MOST_REASONS]]
+        why += ["and others"] * (len(by_count) > MOST_REASONS)
         warnings.warn(
             f"{count} of {total} points of the sweep failed: what is not finite there is NaN. They lie at "
-            f"{', '.join(where)}. Look at them with `data.where(data.failed, drop=True)`.{error}",
+            f"{extent(columns)}. Why: {'; '.join(why)}. Look at them with `data.where(data.failed, drop=True)`, and at "
+            "`data.reason`.",
             stacklevel=3,
         )
+
+
+def extent(columns: Columns) -> str:
+    """The range of some points along each axis, in words."""
+    where = [
+        f"{name} = {c.min():.6g}" if c.min() == c.max() else f"{name} from {c.min():.6g} to {c.max():.6g}"
+        for name, c in columns.items()
+    ]
+    return ", ".join(where)

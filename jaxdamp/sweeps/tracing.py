@@ -19,7 +19,7 @@ from jaxdamp._jacobian import Mode, choose_mode, value_and_jacobian
 from jaxdamp.sweeps.axes import PARAMETER, POINT
 
 
-RESERVED = (POINT, PARAMETER, "failed", "done")
+RESERVED = (POINT, PARAMETER, "failed", "reason", "done")
 
 
 @final

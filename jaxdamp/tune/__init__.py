@@ -1,7 +1,8 @@
-"""From a ride metric to a better damper: `minimise`."""
+"""From a ride metric to a better damper: `minimise`; and whether it is better on other roads: `rescore`."""
 
 from jaxdamp.tune.minimising import minimise
+from jaxdamp.tune.rescoring import Rescore, rescore
 from jaxdamp.tune.result import Change, TuneResult
 
 
-__all__ = ["Change", "TuneResult", "minimise"]
+__all__ = ["Change", "Rescore", "TuneResult", "minimise", "rescore"]

@@ -1,27 +1,25 @@
 """`minimise`: the best ride that the free parameters allow, by exact gradients."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 
 from jaxdamp import _checks, metrics
 from jaxdamp._field_types import check_module
 from jaxdamp._progress import Progress
 from jaxdamp._types import Scalar
-from jaxdamp.parameters import FreeParameters, free_parameters
+from jaxdamp.parameters import FreeParameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, moves_axles
 from jaxdamp.tune.range_notes import range_notes
-from jaxdamp.tune.result import Change, TuneResult, V
+from jaxdamp.tune.ranges import search_range
+from jaxdamp.tune.result import TuneResult, V
+from jaxdamp.tune.searching import Evaluator, Measured, active, search
+from jaxdamp.tune.wording import bound_notes, changes_of, early_end
 from jaxdamp.vehicles import AbstractVehicle, RideMetric, linearise, stationary_rms, with_weightings
-
-
-INSIDE = 1e-6  # share of its start by which a parameter stays off the ends of its domain
-Measured = Callable[[AbstractVehicle], dict[str, Scalar]]
 
 
 def minimise(
@@ -29,9 +27,9 @@ def minimise(
     vehicle: V,
     road: AbstractRoad | WhiteRoad,
     *,
-    over: Sequence[str] = ("damper*",),
+    over: Sequence[str] | Mapping[str, Any] = ("damper*",),
     freeze: Sequence[str] = (),
-    bounds: Mapping[str, tuple[float, float]] | None = None,
+    bounds: Mapping[str, Any] | None = None,
     limits: Mapping[str, float] | None = None,
     duration: float | None = None,
     dt: float = 1e-3,
@@ -41,16 +39,30 @@ def minimise(
     """Make a ride metric of a vehicle as small as its free parameters allow.
 
     Sequential quadratic programming with exact first derivatives, taken forward through every step of the simulation
-    for all parameters at once. It finds a local optimum: start from a sensible vehicle.
+    for all parameters at once. It finds a local optimum: start from a sensible vehicle. The search itself is in double
+    precision; a vehicle in single precision (see `jaxdamp.configure`) is tuned to about a thousandth of its numbers.
+
+    Every number is searched within bounds, so that the result stays near a damper that can be built. Those that nobody
+    gives follow from its start and its domain:
+
+    - numbers that keep their sign (rates, stiffnesses, forces, velocities, exponents, knots): a third to three times
+      the start;
+    - numbers of either sign (coefficients, offsets): from −1 to 3 times the start;
+    - zeros and weights of networks: what their domain allows.
+
+    Domains hold in any case. A result at a bound is named in its `warnings`: the optimum may lie beyond it.
 
     Arguments:
         metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`.
         vehicle: where to start.
         road: a road to drive over, the same in every step; or `roads.white(...)`, for the stationary response of the
             linearised vehicle, which has no peaks.
-        over: the parameters to change, by path, last part or pattern; all of the damper by default.
+        over: the parameters to change, by path, last part or pattern; all of the damper by default. A mapping
+            `{parameter: (lower, upper)}` gives their bounds too, as `bounds` does.
         freeze: parameters among these to leave alone.
-        bounds: extra limits `{parameter: (lower, upper)}` in its unit; the start must lie between them.
+        bounds: bounds `{parameter: (lower, upper)}` in its unit, in place of those above; the start must lie between
+            them. None in place of a side or of both frees it: `bounds={"*": None}` leaves the domains only. Of two
+            names for one parameter the later counts.
         limits: hard limits `{metric: largest value}` in the metric's unit, such as
             `{"working_space_peak_to_peak": 0.1}`.
         duration: length of the run [s], as in `simulate`.
@@ -64,12 +76,16 @@ def minimise(
         cannot be met, says so there, and so do dampers that leave the range that their laws were fitted to.
 
     Raises:
-        ValueError: unknown metrics or parameters, a start outside its bounds.
+        ValueError: unknown metrics or parameters; bounds of a wrong shape, of a parameter that is not free, given in
+            both places, or without the start between them.
 
     >>> from jaxdamp import roads, vehicles
     >>> result = minimise("rms_sprung_acceleration", vehicles.presets.quarter_car_000(), roads.white("C", 20.0))
     >>> round(float(result.vehicle.damper.rate), 1)
     4656.4
+    >>> bounded = minimise("rms_sprung_acceleration", result.start, roads.white("C", 20.0), over={"rate": (1500, 4000)})
+    >>> bounded.parameters[0].note
+    'at its upper bound'
     """
     call = "minimise(metric, vehicle, road)"
     _checks.instance("metric", metric, str, "be the name of a ride metric", f"The call is `{call}`.")
@@ -78,56 +94,44 @@ def minimise(
     known = [m.name for m in vehicle.ride_metrics]
     metric = metrics.current_name(metric, known)
     limits = {metrics.current_name(name, known): top for name, top in (limits or {}).items()}
+    if max_steps < 1:
+        _checks.refuse("max_steps", "be 1 or more", max_steps)
     chosen = chosen_metrics(vehicle, road, (metric, *limits))
     white = isinstance(road, WhiteRoad)
-    free = free_parameters(vehicle, over=over, freeze=freeze, bounds=bounds)
-    ride = stationary_ride(road, chosen) if white else driven_ride(vehicle, road, chosen, duration, dt, free)
-    names = [m.name for m in chosen]
-    table = _Table(ride, free, names)
-    before, _ = table.at(np.asarray(free.values))
+    space = search_range(vehicle, over, freeze, bounds)
+    ride = stationary_ride(road, chosen) if white else driven_ride(vehicle, road, chosen, duration, dt, space.free)
+    evaluator = Evaluator(ride, space.free, [m.name for m in chosen])
+    before, _ = evaluator.at(space.start)
     if not np.all(np.isfinite(list(before.values()))):
         remedy = "`simulate` it on this road, which says what the step or the law lacks."
         _checks.refuse("vehicle", "have finite metrics to start from", f"{metric} = {before[metric]}", remedy)
-    scale = np.array([abs(v) if v else 1.0 for v in np.asarray(free.values)])
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {metric} {value:.5g}"))
-        values, history, message = _search(table, free, scale, metric, limits, before, max_steps, progress)
-    after, slopes = table.at(values)
-    lower, upper = free.limits()
-    bounded = (values <= lower + 2 * INSIDE * scale) | (values >= upper - 2 * INSIDE * scale)
-    units = [p.unit for p in free.chosen for _ in range(max(p.value.size, 1))]
-    changes = tuple(
-        Change(name, float(a), float(b), unit, "at a bound" if hit else "")
-        for name, a, b, unit, hit in zip(free.names, free.values, values, units, bounded, strict=True)
-    )
-    over_limit = [n for n, top in limits.items() if after[n] > top * (1 + 1e-6)]
-    tight = [n for n, top in limits.items() if after[n] > top * (1 - 1e-6)]
-    left = _steepness(slopes, metric, tight, bounded, scale) / max(abs(after[metric]), 1e-300)
-    converged = left < 1e-4 and not over_limit
-    notes = [
-        f"The limit {n} <= {limits[n]:.4g} is not met: {after[n]:.4g}. Loosen it, or free more." for n in over_limit
-    ]
-    notes += [f"{c.name} ended at a bound, {c.after:.5g} {c.unit}." for c in changes if c.note]
-    if not converged and not over_limit:
-        ended = "" if message.startswith("Optimization terminated successfully") else f", saying: {message}"
-        notes.append(
-            f"The search stopped where the metric could still fall{ended}: a change of the free numbers by their own"
-            f" size would change it at a rate of {left:.1e} of itself. Start from the result, or allow more steps."
-        )
-    tuned = free.build(jnp.asarray(values))
+        ended = search(evaluator, space, metric, limits, max_steps, progress)
+    after, _ = evaluator.at(ended.values)
+    reached = active(limits, after, evaluator.tolerance)
+    missed = [name for name in reached if after[name] > limits[name] * (1 + evaluator.tolerance.limit)]
+    changes = changes_of(space, ended.values)
+    converged = ended.slope_left < evaluator.tolerance.slope and not missed
+    notes = [f"The limit {n} <= {limits[n]:.4g} is not met: {after[n]:.4g}. Loosen it, or free more." for n in missed]
+    notes += bound_notes(space, changes)
+    if not converged and not missed:
+        notes.append(early_end(ended, max_steps))
+    tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
     notes += range_notes(vehicle, tuned, road, duration, dt)
     return TuneResult(
-        tuned,
-        vehicle,
-        metric,
-        changes,
-        metrics.MetricValues(before),
-        metrics.MetricValues(after),
-        {m.name: m.unit(vehicle.units) for m in chosen},
-        limits,
-        tuple(notes),
-        converged,
-        tuple(history),
+        vehicle=tuned,
+        start=vehicle,
+        metric=metric,
+        parameters=changes,
+        before=metrics.MetricValues(before),
+        after=metrics.MetricValues(after),
+        units={m.name: m.unit(vehicle.units) for m in chosen},
+        limits=limits,
+        active_limits=reached,
+        warnings=tuple(notes),
+        converged=converged,
+        history=ended.history,
     )
 
 
@@ -180,103 +184,3 @@ def driven_ride(
     if driven.road is not None and free is not None and moves_axles(free.build, free.values):
         return lambda vehicle: driven.on_axles_of(vehicle)()
     return lambda vehicle: eqx.tree_at(lambda ride: ride.vehicle, driven, vehicle)()
-
-
-class _Table:
-    """Metrics and their slopes at a point, computed together and kept for the last point asked for."""
-
-    def __init__(self, ride: Measured, free: FreeParameters, names: Sequence[str]) -> None:
-        self.names = list(names)
-
-        @eqx.filter_jit
-        def evaluate(free: FreeParameters, values: Array) -> tuple[Array, Array]:
-            def measured(values: Array) -> tuple[Array, Array]:
-                found = ride(free.build(values))
-                stacked = jnp.stack([found[name] for name in self.names])
-                return stacked, stacked
-
-            slopes, found = jax.jacfwd(measured, has_aux=True)(values)
-            return found, slopes
-
-        self._evaluate = lambda values: evaluate(free, jnp.asarray(values))
-        self._last: tuple[bytes, dict[str, float], dict[str, np.ndarray]] = (b"", {}, {})
-
-    def at(self, values: Float[np.ndarray, " free"]) -> tuple[dict[str, float], dict[str, np.ndarray]]:
-        """Metrics, and their derivatives with respect to the physical values."""
-        if self._last[0] != values.tobytes():
-            found, slopes = (np.asarray(a) for a in self._evaluate(values))
-            self._last = (
-                values.tobytes(),
-                {name: float(x) for name, x in zip(self.names, found, strict=True)},
-                dict(zip(self.names, slopes, strict=True)),
-            )
-        return self._last[1], self._last[2]
-
-
-def _search(
-    table: _Table,
-    free: FreeParameters,
-    scale: np.ndarray,
-    metric: str,
-    limits: Mapping[str, float],
-    before: Mapping[str, float],
-    max_steps: int,
-    progress: Callable[[int, float], None],
-) -> tuple[np.ndarray, list[float], str]:
-    """SLSQP in values divided by their start, objective divided by its start."""
-    import scipy.optimize
-
-    level = abs(before[metric]) or 1.0
-    history: list[float] = []
-
-    def note(u: np.ndarray) -> None:
-        history.append(table.at(u * scale)[0][metric])
-        progress(len(history), history[-1])
-
-    constraints = [
-        {
-            "type": "ineq",
-            "fun": lambda u, n=name, top=top: 1.0 - table.at(u * scale)[0][n] / top,
-            "jac": lambda u, n=name, top=top: -table.at(u * scale)[1][n] * scale / top,
-        }
-        for name, top in limits.items()
-    ]
-    constraints += _orders(free, scale)
-    lower, upper = free.limits()
-    solved = scipy.optimize.minimize(
-        lambda u: table.at(u * scale)[0][metric] / level,
-        np.asarray(free.values) / scale,
-        jac=lambda u: table.at(u * scale)[1][metric] * scale / level,
-        method="SLSQP",
-        bounds=scipy.optimize.Bounds(lower / scale + INSIDE, upper / scale - INSIDE, keep_feasible=True),  # type: ignore[arg-type]
-        constraints=constraints,
-        callback=note,
-        options={"ftol": 1e-15, "maxiter": max_steps},
-    )
-    return np.asarray(solved.x) * scale, history, str(solved.message)
-
-
-def _orders(free: FreeParameters, scale: np.ndarray) -> list[dict]:
-    """Vectors that must increase stay in order."""
-    orders, start = [], 0
-    for p in free.chosen:
-        size = max(p.value.size, 1)
-        if p.domain.name.startswith("strictly increasing"):
-            rows = np.zeros((size - 1, len(scale)))
-            for i in range(size - 1):
-                rows[i, start + i], rows[i, start + i + 1] = -scale[start + i], scale[start + i + 1]
-            gap = 1e-6 * scale[start : start + size].max()
-            orders.append({"type": "ineq", "fun": lambda u, r=rows, g=gap: r @ u - g, "jac": lambda u, r=rows: r})
-        start += size
-    return orders
-
-
-def _steepness(
-    slopes: Mapping[str, np.ndarray], metric: str, tight: Sequence[str], bounded: np.ndarray, scale: np.ndarray
-) -> float:
-    """Length of the scaled gradient that neither a bound nor an active limit holds back."""
-    gradient = (slopes[metric] * scale)[~bounded]
-    if tight and gradient.size:
-        walls = np.stack([(slopes[name] * scale)[~bounded] for name in tight], axis=1)
-        gradient = gradient - walls @ np.linalg.lstsq(walls, gradient, rcond=None)[0]
-    return float(np.linalg.norm(gradient))

@@ -20,7 +20,9 @@ class Change(NamedTuple):
     before: float
     after: float
     unit: str
-    note: str  # "" or "at a bound"
+    note: str  # "", "at its lower bound" or "at its upper bound"
+    lower: float
+    upper: float
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -36,6 +38,7 @@ class TuneResult(Generic[V]):
         after: all ride metrics of the tuned vehicle.
         units: unit of each metric.
         limits: largest allowed value of metrics, as asked for.
+        active_limits: the metrics among these that are at their limit, or beyond.
         warnings: what a user should know, in words.
         converged: whether the search ended at a point where the gradient says optimum.
         history: the metric after each step of the search.
@@ -49,6 +52,7 @@ class TuneResult(Generic[V]):
     after: dict[str, float]
     units: dict[str, str]
     limits: dict[str, float]
+    active_limits: tuple[str, ...]
     warnings: tuple[str, ...]
     converged: bool
     history: tuple[float, ...]
@@ -59,15 +63,35 @@ class TuneResult(Generic[V]):
 
         return tuning(self, **options)
 
+    @property
+    def summary(self) -> str:
+        """What was reached and what stopped it, in a sentence."""
+        before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
+        share = f" ({100 * (after / before - 1):+.1f} %)" if before else ""
+        stops = [f"{name} at its limit" for name in self.active_limits]
+        stops += [f"{change.name} {change.note}" for change in self.parameters if change.note]
+        inside = "all parameters inside their bounds" if not any(c.note for c in self.parameters) else ""
+        state = "an optimum" if self.converged else "not an optimum"
+        parts = [f"{state} after {len(self.history)} steps", *stops, *[inside] * bool(inside)]
+        return f"{self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
+
     def __repr__(self) -> str:
-        lines = [f"{'':<34}{'before':>12}{'after':>12}{'change':>9}"]
+        metrics = {name: f"{name} [{unit or '-'}]" for name, unit in self.units.items()}
+        numbers = {p.name: f"{p.name} [{p.unit or '-'}]" for p in self.parameters}
+        width = max(map(len, [*metrics.values(), *numbers.values()]))
+        lines = [self.summary, f"{'':<{width}}{'before':>12}{'after':>12}{'change':>9}"]
         for name, before in self.before.items():
-            after, mark = self.after[name], " <- minimised" if name == self.metric else ""
+            after, mark = self.after[name], "  <- minimised" if name == self.metric else ""
             if name in self.limits:
-                mark += f" <- limit {self.limits[name]:.4g}"
-            share = f"{100 * (after / before - 1):+8.1f}%" if before else ""
-            lines.append(f"{name + ' [' + self.units[name] + ']':<34}{before:>12.5g}{after:>12.5g}{share:>9}{mark}")
+                mark += f"  <- limit {self.limits[name]:.4g}" + ", reached" * (name in self.active_limits)
+            lines.append(f"{metrics[name]:<{width}}{_before_after(before, after)}{mark}")
         for p in self.parameters:
-            note = f" ({p.note})" if p.note else ""
-            lines.append(f"{p.name + ' [' + p.unit + ']':<34}{p.before:>12.5g}{p.after:>12.5g}{note}")
+            bounds = f"  ({p.lower:.5g} to {p.upper:.5g}{', ' * bool(p.note)}{p.note})"
+            lines.append(f"{numbers[p.name]:<{width}}{_before_after(p.before, p.after)}{bounds}")
         return "\n".join(lines + [f"warning: {warning}" for warning in self.warnings])
+
+
+def _before_after(before: float, after: float) -> str:
+    """Two numbers and the relative change."""
+    share = f"{100 * (after / before - 1):+8.1f}%" if before else ""
+    return f"{before:>12.5g}{after:>12.5g}{share:>9}"

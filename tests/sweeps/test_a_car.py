@@ -38,3 +38,21 @@ def test_a_ride_is_swept_with_its_units():
     backward = jaxdamp.sweep(ride, {"rate": [3000.0], "sprung_mass": [1400.0]}, gradients="reverse")
     forward = data["d_working_space_rms"].sel(rate=3000.0, sprung_mass=1400.0)
     np.testing.assert_allclose(forward, backward["d_working_space_rms"][0, 0], rtol=1e-9)
+
+
+def test_cars_that_cannot_exist_fail_with_a_reason():
+    car, road = vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05)
+    ride = jaxdamp.Ride(car, road, metrics=["working_space_rms"], duration=0.1, dt=2e-3)
+    with pytest.warns(UserWarning, match="4 of 6 points of the sweep failed"):
+        data = jaxdamp.sweep(ride, {"rate": [-1000.0, 1000.0], "sprung_mass": [0.0, 1000.0, 1200.0]})
+    rate, mass = "damper.rate must be positive [N s/m]", "sprung_mass must be positive [kg]"
+    assert data["reason"].values.tolist() == [[rate, rate, rate], [mass, "", ""]]
+    np.testing.assert_array_equal(data["failed"], data["working_space_rms"].isnull())
+    with pytest.raises(ValueError, match=r"damper\.rate must be positive \[N s/m\].* but is rate from -2 to -1"):
+        jaxdamp.sweep(ride, {"rate": [-2.0, -1.0]})
+
+
+def test_a_ride_takes_one_number_for_each_parameter():
+    ride = jaxdamp.Ride(vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05), duration=0.1)
+    with pytest.raises(ValueError, match=r"point\['rate'\]` must be one number for one car, .*`jaxdamp\.sweep"):
+        ride({"rate": (5000, 9000)})

@@ -1,3 +1,4 @@
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -164,6 +165,7 @@ def test_what_is_not_finite_is_nan_and_counted():
     np.testing.assert_array_equal(data["root"], [np.nan, np.nan, 0.0, 1.0, 2.0])
     np.testing.assert_array_equal(data["twice"], [-4.0, -2.0, 0.0, 2.0, 8.0])
     np.testing.assert_array_equal(data["failed"], [True, True, False, False, False])
+    np.testing.assert_array_equal(data["reason"], ["root is not finite"] * 2 + [""] * 3)
     assert data.attrs["failed_points"] == 2
     assert data.where(data.failed, drop=True).sizes == {"a": 2}
 
@@ -171,13 +173,18 @@ def test_what_is_not_finite_is_nan_and_counted():
 @pytest.mark.parametrize("chunk", [None, 4])
 def test_points_that_raise_are_found(chunk, capfd):
     axes = {"a": np.linspace(0.0, 3.0, 11), "b": np.linspace(-0.1, 1.1, 13)}
-    with pytest.warns(UserWarning, match="The first error was: too much of both"):
+    with pytest.warns(
+        UserWarning,
+        match="Why: the function raised: too much of both .*b.*is not finite|Why: y is not finite .*raised: too much",
+    ):
         data = jaxdamp.sweep(failing, axes, chunk=chunk)
     a, b = np.meshgrid(axes["a"], axes["b"], indexing="ij")
     bad = a * b > 3.0
     assert 0 < bad.sum() < 20
     np.testing.assert_allclose(data["y"], np.where(bad | (b < 0), np.nan, b * np.exp(-a)), rtol=1e-14)
     np.testing.assert_array_equal(data["failed"], bad | (b < 0))
+    reasons = np.where(b < 0, "y is not finite", np.where(bad, "the function raised: too much of both", ""))
+    np.testing.assert_array_equal(data["reason"].values.astype(str), reasons)
     np.testing.assert_allclose(data["pair"][..., 0], np.where(bad, np.nan, a))
     assert data.attrs["failed_points"] == np.sum(bad | (b < 0))
     assert capfd.readouterr().err == ""
@@ -188,6 +195,47 @@ def test_all_points_may_fail():
     with pytest.warns(UserWarning, match="3 of 3 points"):
         data = jaxdamp.sweep(failing, {"a": [10.0], "b": [1.0, 2.0, 3.0]})
     assert data["y"].isnull().all()
+
+
+class Bounded(eqx.Module):
+    """A function that says itself where it has values."""
+
+    def out_of_domain(self, columns):
+        return np.where(columns["a"] < 0.0, "a must not be negative", "")
+
+    def __call__(self, point):
+        return {"y": point["a"] + point["b"]}
+
+
+@pytest.mark.parametrize(
+    "over",
+    [
+        {"a": [-2.0, -1.0, 0.0, 1.0], "b": [1.0, 2.0]},
+        points({"a": [-1.0, 1.0, -2.0], "b": [1.0, 2.0, 3.0]}),
+        random({"a": (-1.0, 1.0), "b": (0.0, 1.0)}, 20),
+        sobol({"a": (-1.0, 1.0), "b": (0.0, 1.0)}, 16),
+    ],
+)
+def test_points_outside_a_domain_are_not_computed(over, tmp_path):
+    with pytest.warns(UserWarning, match=r"points of the sweep failed: .* Why: a must not be negative \(\d+\)"):
+        data = jaxdamp.sweep(Bounded(), over, gradients=True, file=tmp_path / "a.nc")
+    a, b = xarray.broadcast(data["a"], data["b"])
+    outside = a.values < 0.0
+    assert 0 < outside.sum() < outside.size
+    np.testing.assert_array_equal(data["failed"], outside)
+    np.testing.assert_array_equal(data["reason"].values.astype(str), np.where(outside, "a must not be negative", ""))
+    np.testing.assert_allclose(data["y"], np.where(outside, np.nan, a + b), rtol=1e-15)
+    np.testing.assert_array_equal(np.isnan(data["d_y"]).all("parameter"), outside)
+    with pytest.warns(UserWarning, match="Why: a must not be negative"):
+        again = jaxdamp.sweep(Bounded(), over, gradients=True, file=tmp_path / "a.nc")
+    xarray.testing.assert_identical(again, data)
+
+
+def test_a_sweep_with_no_point_inside_the_domain_is_refused():
+    with pytest.raises(
+        ValueError, match=r"`over` must hold a point .*\(a must not be negative\), but is a from -2 to -1"
+    ):
+        jaxdamp.sweep(Bounded(), {"a": [-2.0, -1.0], "b": [1.0]})
 
 
 # ---- static mistakes

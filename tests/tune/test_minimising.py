@@ -5,6 +5,7 @@ import pytest
 
 from jaxdamp import dampers, parameters, roads, simulate, tune, vehicles
 from jaxdamp.tune.minimising import driven_ride
+from jaxdamp.tune.ranges import search_range
 
 
 CAR = vehicles.presets.quarter_car_000()
@@ -25,7 +26,7 @@ BEST_TYRE = np.sqrt(M * K**2 / KT - 2 * MU * MS * K / M + MU * MS**2 * KT / M**2
 )
 def test_finds_the_closed_form_optimum_on_a_white_road(metric, best, start):
     car = vehicles.presets.quarter_car_000(dampers.Linear(start))
-    result = tune.minimise(metric, car, roads.white("C", speed=20.0))
+    result = tune.minimise(metric, car, roads.white("C", speed=20.0), bounds={"damper.rate": None})
     assert float(parameters.get(result.vehicle, "damper.rate")) == pytest.approx(best, rel=1e-6)
     assert result.converged and not result.warnings
     assert result.after[metric] < result.before[metric]
@@ -100,9 +101,66 @@ def test_bounds_hold_and_are_said():
         "rms_sprung_acceleration", CAR, roads.white("C", 20.0), bounds={"damper.rate": (1000.0, 4000.0)}
     )
     assert float(parameters.get(result.vehicle, "damper.rate")) == pytest.approx(4000.0, rel=1e-5)
-    assert result.parameters[0].note == "at a bound"
-    assert any("ended at a bound" in w for w in result.warnings)
+    assert result.parameters[0].note == "at its upper bound"
+    (warning,) = result.warnings
+    assert "damper.rate ended at its upper bound, 4000 N s/m (as given)" in warning
     assert result.converged
+
+
+def test_a_mapping_of_parameters_gives_their_bounds():
+    road = roads.white("C", 20.0)
+    bounds = {"damper.rate": (1000.0, 4000.0)}
+    result = tune.minimise("rms_sprung_acceleration", CAR, road, over=bounds)
+    assert result.parameters == tune.minimise("rms_sprung_acceleration", CAR, road, bounds=bounds).parameters
+    assert result.parameters[0].after == pytest.approx(4000.0, rel=1e-5)
+    assert (result.parameters[0].lower, result.parameters[0].upper) == (1000.0, 4000.0)
+    half_open = tune.minimise("rms_sprung_acceleration", CAR, road, over={"*.rate": (None, 9000.0)})
+    assert half_open.parameters[0].after == pytest.approx(BEST_ACCELERATION, rel=1e-6)
+
+
+@pytest.mark.parametrize(("start", "side", "best"), [(1200.0, "upper", 3600.0), (18_000.0, "lower", 6000.0)])
+def test_left_alone_a_rate_stays_within_a_third_and_three_times_its_start(start, side, best):
+    car = vehicles.presets.quarter_car_000(dampers.Linear(start))
+    result = tune.minimise("rms_sprung_acceleration", car, roads.white("C", 20.0))
+    assert result.parameters[0].after == pytest.approx(best, rel=1e-5)
+    assert result.parameters[0].note == f"at its {side} bound"
+    assert f"damper.rate at its {side} bound" in result.summary and result.summary in repr(result)
+    (warning,) = result.warnings
+    assert "by default" in warning and "`bounds={'damper.rate': (lower, upper)}`" in warning
+
+
+def test_default_bounds_follow_the_domain_of_each_number():
+    law = dampers.PiecewiseLinear(jnp.array([-0.2, 0.0, 0.3]), jnp.array([900.0, 2500.0, 2600.0, 1500.0]))
+    spring = dampers.Spring(1500.0, -90.0)
+    car = vehicles.presets.quarter_car_000(law + dampers.BoucWen(1000.0, 500.0, 2e5, 300.0) + spring)
+    space = search_range(car, ["damper.*"], [], None)
+    found = dict(zip(space.free.names, zip(space.lower, space.upper, strict=True), strict=True))
+    assert found["damper.terms.0.slopes[1]"] == pytest.approx((2500 / 3, 7500.0))
+    assert found["damper.terms.0.knots[0]"] == pytest.approx((-0.6, -0.2 / 3))
+    assert found["damper.terms.0.knots[1]"] == (-np.inf, np.inf)
+    assert found["damper.terms.1.exponent"] == pytest.approx((1.0, 6.0), abs=1e-5)
+    preload = next(p.path for p in parameters.parameters(car) if p.unit == "N" and float(np.max(p.value)) < 0)
+    assert found[preload] == pytest.approx((-270.0, 90.0))
+    free = search_range(car, ["damper.*"], [], {"*": None})
+    assert np.isinf(free.upper[:7]).all() and (free.lower[3:7] > 0.0).all()
+
+
+def test_without_double_precision_a_search_still_ends_at_the_optimum():
+    narrow = jax.tree.map(lambda x: x.astype(jnp.float32) if isinstance(x, jax.Array) else x, CAR)
+    with jax.enable_x64(False):
+        result = tune.minimise("rms_sprung_acceleration", narrow, roads.white("C", 20.0))
+    assert result.converged and result.vehicle.damper.rate.dtype == jnp.float32
+    assert result.parameters[0].after == pytest.approx(BEST_ACCELERATION, rel=2e-3)
+
+
+def test_a_search_that_runs_out_of_steps_says_so():
+    law = dampers.Bilinear(2500.0, 2500.0)
+    result = tune.minimise(
+        "rms_sprung_acceleration", vehicles.presets.quarter_car_000(law), roads.white("C", 20.0), max_steps=1
+    )
+    assert not result.converged and len(result.history) == 1
+    assert any("stopped after 1 steps, before an optimum" in w and "`max_steps`" in w for w in result.warnings)
+    assert "terminated successfully" not in " ".join(result.warnings)
 
 
 def test_several_parameters_of_any_kind_can_be_free():
@@ -146,6 +204,17 @@ def test_progress_and_history_follow_the_search():
         ({"limits": {"travel": 0.1}}, "`metric` must be one of .* but is 'travel'"),
         ({"over": ["damper.rat"]}, "did you mean 'damper.rate'"),
         ({"bounds": {"damper.rate": (3000.0, 9000.0)}}, "Start inside the bounds or widen them"),
+        (
+            {"over": {"damper.rate": (5000, 9000)}},
+            r"`damper\.rate` must start between 5000 and 9000 \[N s/m\], but is 2500",
+        ),
+        ({"over": {"damper.rate": 5000.0}}, r"over\['damper\.rate'\]` must be a lower and an upper bound.*`freeze`"),
+        ({"over": {"damper.rate": (9000.0, 2000.0)}}, "have a lower bound below the upper one"),
+        ({"over": {"damper.rate": ("1", "x")}}, "A side that should stay open is None"),
+        ({"over": {"damper.rat": (1.0, 2.0)}}, "did you mean 'damper.rate'"),
+        ({"over": {"damper.rate": (1.0, 1e4)}, "bounds": {"rate": (1.0, 1e4)}}, "Give the bounds in one place"),
+        ({"bounds": {"sprung_mass": (1e3, 2e3)}}, r"`bounds\['sprung_mass'\]` must bound a parameter that is free"),
+        ({"max_steps": 0}, "`max_steps` must be 1 or more"),
     ],
 )
 def test_refuses_names_and_starts_that_do_not_fit(change, message):

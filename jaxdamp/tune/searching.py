@@ -1,0 +1,165 @@
+"""The search of a tuning: sequential quadratic programming in double precision, whatever the vehicle computes in."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple, final
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp._types import Scalar
+from jaxdamp.parameters import FreeParameters
+from jaxdamp.tune.ranges import SearchRange
+from jaxdamp.vehicles import AbstractVehicle
+
+
+class Tolerance(NamedTuple):
+    """What counts as reached: the scaled gradient left at an optimum, and the relative distance to a limit."""
+
+    slope: float
+    limit: float
+
+
+DOUBLE, SINGLE = Tolerance(1e-4, 1e-6), Tolerance(1e-2, 1e-4)
+Measured = Callable[[AbstractVehicle], dict[str, Scalar]]
+Slopes = Mapping[str, np.ndarray]
+OUT_OF_STEPS = 9  # SLSQP's own code
+RESTARTS = 2  # with a fresh curvature, where the search ends on a slope
+
+
+class Ended(NamedTuple):
+    """Where and how a search ended."""
+
+    values: np.ndarray
+    history: tuple[float, ...]
+    out_of_steps: bool
+    slope_left: float  # length of the scaled gradient, relative to the metric, that no bound or limit holds back
+
+
+@final
+class Evaluator:
+    """Metrics and their slopes at a point, computed together and kept for the last point asked for."""
+
+    def __init__(self, ride: Measured, free: FreeParameters, names: Sequence[str]) -> None:
+        self.names = list(names)
+        dtype = free.values.dtype
+        self.tolerance = DOUBLE if dtype == np.float64 else SINGLE
+
+        @eqx.filter_jit
+        def evaluate(free: FreeParameters, values: Array) -> tuple[Array, Array]:
+            def measured(values: Array) -> tuple[Array, Array]:
+                found = ride(free.build(values))
+                stacked = jnp.stack([found[name] for name in self.names])
+                return stacked, stacked
+
+            slopes, found = jax.jacfwd(measured, has_aux=True)(values)
+            return found, slopes
+
+        self._evaluate = lambda values: evaluate(free, jnp.asarray(values, dtype))
+        self._last: tuple[bytes, dict[str, float], dict[str, np.ndarray]] = (b"", {}, {})
+
+    def at(self, values: Float[np.ndarray, " free"]) -> tuple[dict[str, float], dict[str, np.ndarray]]:
+        """Metrics, and their derivatives with respect to the physical values."""
+        if self._last[0] != values.tobytes():
+            found, slopes = (np.asarray(a, np.float64) for a in self._evaluate(values))
+            self._last = (
+                values.tobytes(),
+                {name: float(x) for name, x in zip(self.names, found, strict=True)},
+                dict(zip(self.names, slopes, strict=True)),
+            )
+        return self._last[1], self._last[2]
+
+
+def search(
+    evaluator: Evaluator,
+    space: SearchRange,
+    metric: str,
+    limits: Mapping[str, float],
+    max_steps: int,
+    progress: Callable[[int, float], None],
+) -> Ended:
+    """SLSQP in values divided by their start, objective divided by its start.
+
+    If it ends on a slope, its estimate of the curvature is out of date or a kink has stopped it: it begins again there.
+    """
+    import scipy.optimize
+
+    scale = space.scale
+    level = abs(evaluator.at(space.start)[0][metric]) or 1.0
+    history: list[float] = []
+
+    def note(u: np.ndarray) -> None:
+        history.append(evaluator.at(u * scale)[0][metric])
+        progress(len(history), history[-1])
+
+    def attempt(begin: np.ndarray) -> Ended:
+        solved = scipy.optimize.minimize(
+            lambda u: evaluator.at(u * scale)[0][metric] / level,
+            begin,
+            jac=lambda u: evaluator.at(u * scale)[1][metric] * scale / level,
+            method="SLSQP",
+            bounds=scipy.optimize.Bounds(space.lower / scale, space.upper / scale, keep_feasible=True),  # type: ignore[arg-type]
+            constraints=_constraints(evaluator, space, limits),
+            callback=note,
+            options={"ftol": 1e-15, "maxiter": max_steps - len(history)},
+        )
+        values = np.clip(np.asarray(solved.x, np.float64) * scale, space.lower, space.upper)
+        left = _slope_left(evaluator, space, values, metric, limits)
+        return Ended(values, tuple(history), solved.status == OUT_OF_STEPS, left)
+
+    ended = attempt(space.start / scale)
+    for _ in range(RESTARTS):
+        if ended.slope_left < evaluator.tolerance.slope or len(history) >= max_steps:
+            break
+        ended = attempt(ended.values / scale)
+    return ended
+
+
+def active(limits: Mapping[str, float], values: Mapping[str, float], tolerance: Tolerance) -> tuple[str, ...]:
+    """The limits that a vehicle is at, or beyond."""
+    return tuple(name for name, top in limits.items() if values[name] > top * (1 - tolerance.limit))
+
+
+def _constraints(evaluator: Evaluator, space: SearchRange, limits: Mapping[str, float]) -> list[dict]:
+    """Metrics below their limits, and vectors that must increase in order."""
+    scale = space.scale
+    below = [
+        {
+            "type": "ineq",
+            "fun": lambda u, n=name, top=top: 1.0 - evaluator.at(u * scale)[0][n] / top,
+            "jac": lambda u, n=name, top=top: -evaluator.at(u * scale)[1][n] * scale / top,
+        }
+        for name, top in limits.items()
+    ]
+    return below + _orders(space.free, scale)
+
+
+def _orders(free: FreeParameters, scale: np.ndarray) -> list[dict]:
+    """Vectors that must increase stay in order."""
+    orders, start = [], 0
+    for p in free.chosen:
+        size = p.value.size
+        if p.domain.steps is not None:
+            rows = np.zeros((size - 1, len(scale)))
+            for i in range(size - 1):
+                rows[i, start + i], rows[i, start + i + 1] = -scale[start + i], scale[start + i + 1]
+            gap = 1e-6 * scale[start : start + size].max()
+            orders.append({"type": "ineq", "fun": lambda u, r=rows, g=gap: r @ u - g, "jac": lambda u, r=rows: r})
+        start += size
+    return orders
+
+
+def _slope_left(
+    evaluator: Evaluator, space: SearchRange, values: np.ndarray, metric: str, limits: Mapping[str, float]
+) -> float:
+    """Length of the scaled gradient that neither a bound nor an active limit holds back, relative to the metric."""
+    found, slopes = evaluator.at(values)
+    unbound = np.array([not side for side in space.side(values)])
+    gradient = (slopes[metric] * space.scale)[unbound]
+    tight = active(limits, found, evaluator.tolerance)
+    if tight and gradient.size:
+        walls = np.stack([(slopes[name] * space.scale)[unbound] for name in tight], axis=1)
+        gradient = gradient - walls @ np.linalg.lstsq(walls, gradient, rcond=None)[0]
+    return float(np.linalg.norm(gradient)) / max(abs(found[metric]), 1e-300)
