@@ -7,7 +7,7 @@ import tempfile
 import numpy as np
 
 import jaxdamp
-from jaxdamp import bench, dampers, export, identify, metrics, plots, roads, sweeps, tune, vehicles
+from jaxdamp import bench, dampers, export, identify, metrics, parameters, plots, roads, sweeps, tune, vehicles
 
 
 LAW = dampers.Besinger(1600.0, 4200.0, 900.0, limit_velocity=0.13, transition_velocity=0.05)
@@ -39,7 +39,7 @@ def fits(runs):
         "fit, law with a state": lagged.parameters[0].value,
         "cross_validate": [fold.rmse for fold in crossed.folds],
         "train": trained.rmse,
-        "export": float(export.from_json(export.to_json(ladder.best.result.law)).rebound_rate),
+        "export": float(parameters.get(export.from_json(export.to_json(ladder.best.result.law)), "rebound_rate")),
     }
 
 

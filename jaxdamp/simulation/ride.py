@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._many_points import outside_domains
 from jaxdamp._types import Scalar

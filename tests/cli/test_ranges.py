@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from jaxdamp import roads, simulate, vehicles
-from jaxdamp.cli.ranges import fitted_range_table, range_remarks, range_use_table, said_in_tables
+from jaxdamp.cli.ranges import fitted_range_table, notes_of, range_use_table, said_in_tables
 from jaxdamp.dampers import Bilinear, FittedRange, Linear, with_fitted_range
 from jaxdamp.export import from_json, to_json
 
@@ -54,5 +54,5 @@ def test_tables_and_remarks() -> None:
     table = range_use_table({"fitted": run, "plain": plain})
     assert table is not None and {row[0] for row in table.rows} == {"fitted"}
     assert range_use_table({"plain": plain}) is None
-    assert range_remarks({"fitted": run, "plain": plain}) == [f"fitted: {note}" for note in run.notes]
+    assert notes_of({"fitted": run, "plain": plain}) == [f"fitted: {note}" for note in run.notes]
     assert fitted_range_table(SLOW).rows[1] == ("stroke", "m", -0.01, 0.01)

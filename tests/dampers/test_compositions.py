@@ -83,7 +83,7 @@ def test_every_guess_is_a_law_near_its_data(kind, low):
 
 def test_a_negative_factor_must_be_asked_for():
     with pytest.raises(ValueError, match=r"`factor` must not be negative, but is -2.0.*allow_active=True"):
-        -2.0 * Linear(1500.0)
+        _ = -2.0 * Linear(1500.0)
     law = Scaled(Linear(1500.0), -2.0, allow_active=True)
     assert float(law.force(0.0, 1.0, law.initial_state())) == -3000.0
     assert "allow_active=True" in repr(law)

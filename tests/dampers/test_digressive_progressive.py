@@ -1,3 +1,5 @@
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,7 +11,7 @@ from jaxdamp.identify import fit
 from jaxdamp.parameters import get
 
 
-NUMBERS = {
+NUMBERS: dict[str, Any] = {
     "rebound_bleed_rate": 8000.0,
     "rebound_blow_off_velocity": 0.1,
     "rebound_blow_off_rate": 900.0,
@@ -66,7 +68,7 @@ def test_guess_and_fit():
 
 def test_known_blow_off_velocities_give_a_closed_form():
     runs = VirtualDyno(DigressiveProgressive(**NUMBERS), force_noise=5.0, seed=2).run(SineTest(0.02, 8.0))
-    begin = {name: value if name.endswith("velocity") else 1.0 for name, value in NUMBERS.items()}
+    begin: dict[str, Any] = {name: value if name.endswith("velocity") else 1.0 for name, value in NUMBERS.items()}
     result = fit(DigressiveProgressive(**begin), runs, freeze=["*blow_off_velocity"])
     v, force = (np.concatenate([np.asarray(getattr(run, name)) for run in runs]) for name in ("velocity", "force"))
     columns = []

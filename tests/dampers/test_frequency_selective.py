@@ -1,6 +1,7 @@
 """The frequency-selective damper: the published equations by SciPy, closed forms, what it is for."""
 
 import json
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -152,7 +153,7 @@ def test_single_precision():
 
 @pytest.mark.parametrize("name", ["high", "low"])
 def test_laws_with_states_are_refused(name):
-    laws = {"high": Linear(1.0), "low": Linear(1.0)} | {name: Lag(Linear(1.0), 0.01)}
+    laws: dict[str, Any] = {"high": Linear(1.0), "low": Linear(1.0)} | {name: Lag(Linear(1.0), 0.01)}
     with pytest.raises(ValueError, match=rf"`{name}` must be without states, but is a Lag"):
         FrequencySelective(**laws, filter_time=0.04, response_time=0.001)
 
