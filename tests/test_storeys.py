@@ -19,7 +19,7 @@ STOREYS = [
     {"simulation", "bench"},
     {"identify", "tune", "sweeps"},
     {"plots", "export"},
-    {"cli", "report"},
+    {"cli", "report", "__main__"},
 ]
 TOP = len(STOREYS) - 1
 # A result draws itself: `.plot()` loads the plots when it is called.
@@ -30,7 +30,7 @@ LATE = ["matplotlib", "xarray", "pint", "typer", "rich", "pandas", "scipy.optimi
 
 def storey(part: str) -> int:
     """The storey of a module or package at the top of jaxdamp."""
-    if part.startswith("_"):
+    if part.startswith("_") and part != "__main__":
         return 0
     found = [i for i, parts in enumerate(STOREYS) if part in parts]
     assert found, f"jaxdamp.{part} has no storey: put it into the table of tests/test_storeys.py"

@@ -1,5 +1,6 @@
 """The command line: `jaxdamp fit`, `demo` and `ride`, the jobs that need no code, and lists of laws and vehicles."""
 
+import signal
 from typing import TYPE_CHECKING, Any
 
 from jaxdamp.cli import interrupt
@@ -14,7 +15,7 @@ __all__ = ["app", "main"]
 
 def main() -> None:
     """Run the command line as a program of its own; Ctrl-C is answered from the first import on."""
-    with interrupt.watched():
+    with interrupt.watched(then=signal.SIG_IGN):  # nothing is left to stop while the process ends
         from jaxdamp.cli.commands import app
 
         app(prog_name="jaxdamp")

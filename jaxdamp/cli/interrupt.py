@@ -13,6 +13,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
 EXIT_CODE = 130  # 128 + SIGINT, as shells have it
@@ -91,11 +92,14 @@ def undisturbed() -> Iterator[None]:
 
 
 @contextmanager
-def watched() -> Iterator[None]:
+def watched(then: Any = signal.default_int_handler) -> Iterator[None]:
     """Take over Ctrl-C while this lasts.
 
     Nothing changes where a command is called from a program that handles Ctrl-C itself or ignores it, from another
     thread than the first, or from a command.
+
+    Arguments:
+        then: what answers Ctrl-C afterwards.
     """
     first = threading.current_thread() is threading.main_thread()
     if not first or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -112,7 +116,7 @@ def watched() -> Iterator[None]:
         yield
     finally:
         signal.set_wakeup_fd(before)
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, then)
         mouth.close()
         thread.join()
         ears.close()

@@ -58,6 +58,7 @@ class Results:
             text = json.dumps(manifest, indent=1, ensure_ascii=False) + "\n"
             (self.draft / MANIFEST).write_text(text, encoding="utf-8")
             self._move(files)
+            shutil.rmtree(self.draft, ignore_errors=True)
             if missing:
                 self.draft = self._new_draft()
 

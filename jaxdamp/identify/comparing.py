@@ -75,7 +75,7 @@ class Comparison:
             if rung.name == name:
                 return rung.result
         why = "".join(f" {failure.name} failed: {failure.reason}" for failure in self.failed if failure.name == name)
-        raise KeyError(f"No fitted law is named {name!r}; there are {', '.join(r.name for r in self.rungs)}.{why}")
+        raise KeyError(f"No law is named {name!r}; there are {', '.join(r.name for r in self.rungs)}.{why}")
 
     def __repr__(self) -> str:
         head = f"{'law':<24}{'free':>5}{'fit %':>8}{'RMSE N':>9}" + f"{'held-out %':>12}{'RMSE N':>9}" * bool(

@@ -13,20 +13,17 @@ from jaxdamp.export import from_json
 
 
 LIMIT = 300  # s, for a process that hangs
+AS_FROM_A_TERMINAL = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
 
 
 def _interrupted(words: Sequence[str | Path], *marks: str) -> tuple[int, str]:
-    """Exit code and output of a Python process that gets Ctrl-C as soon as each of the marks was printed."""
-
-    def as_from_a_terminal() -> None:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-
+    """Exit code and output of a Python program that gets Ctrl-C as soon as each of the marks was printed."""
+    program, *arguments = map(str, words)
     process = subprocess.Popen(
-        [sys.executable, "-u", *map(str, words)],
+        [sys.executable, "-u", "-c", AS_FROM_A_TERMINAL + program, *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        preexec_fn=as_from_a_terminal,
     )
     assert process.stdout is not None
     output = ""
@@ -61,7 +58,7 @@ def _script(folder: Path, body: str) -> list[str]:
                 sys.exit(interrupt.EXIT_CODE)
     """
     body = textwrap.indent(textwrap.dedent(body), "    ").strip()
-    return ["-c", textwrap.dedent(text).format(body="    " + body, folder=str(folder))]
+    return [textwrap.dedent(text).format(body="    " + body, folder=str(folder))]
 
 
 def test_with_nothing_to_keep_it_stops_in_the_middle_of_the_work(tmp_path: Path) -> None:
@@ -122,7 +119,8 @@ def test_nothing_stops_what_is_being_saved(tmp_path: Path) -> None:
 )
 def test_a_fit_can_be_stopped_at_any_stage(records: Path, tmp_path: Path, mark: str, kept: list[str] | None) -> None:
     out = tmp_path / "fit"
-    words = ["-m", "jaxdamp", "fit", records, "--law", "linear,besinger_lag", "--out", out]
+    program = "import runpy; runpy.run_module('jaxdamp', run_name='__main__')"
+    words = [program, "fit", records, "--law", "linear,besinger_lag", "--out", out]
     code, output = _interrupted(words, mark)
     assert code == 130 and ("Interrupted." in output or "Stopped." in output)
     if out.exists():  # even an early Ctrl-C may come when a law is finished already

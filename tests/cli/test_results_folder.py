@@ -93,6 +93,7 @@ def test_an_interruption_keeps_what_is_finished(tmp_path: Path) -> None:
         raise Interrupted
     assert "Not written: the pictures" in str(stop.value)
     assert written(target) == ["UNFINISHED.txt", "law.json", "manifest.json", "one.png"]
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
     with pytest.raises(Interrupted, match="Nothing was written"), results_folder(tmp_path / "two", "test"):
         raise Interrupted
     assert not (tmp_path / "two").exists()
