@@ -35,7 +35,7 @@ def in_calls(call, arguments):
     return counts
 
 
-ROAD = roads.cosine_bump(0.03, start=0.0, duration=0.03)
+ROAD = roads.delayed(roads.cosine_bump(0.03, start=0.0, duration=0.03), positions=[0.0, 0.2], speed=20.0)
 TIME = 1e-3 * np.arange(101)
 CALLS = {
     "simulate": lambda rate: simulate(half_car_002(Lag(Bilinear(rate, 900.0), 4e-3)), ROAD, duration=0.05).motion,

@@ -43,9 +43,8 @@ def ends(names):
 
 def car(front, rear):
     """Symmetric but for its laws."""
-    corners = {"front": front, "rear": rear}
-    ends = {name: Corner(40.0, 23.5e3, 190e3, **laws) for name, laws in corners.items()}
-    return HalfCar(580.0, 1100.0, 1.2, 1.2, ends["front"], ends["rear"])
+    ahead, behind = (Corner(40.0, 23.5e3, 190e3, **laws) for laws in (front, rear))
+    return HalfCar(580.0, 1100.0, 1.2, 1.2, ahead, behind)
 
 
 def road(heights):
