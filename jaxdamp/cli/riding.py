@@ -1,6 +1,7 @@
 """`jaxdamp ride`: a law in a vehicle on a road, beside a baseline."""
 
 import inspect
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots.damper_use import dampers_of
 from jaxdamp.report import Cell, Column, Report, Table
 from jaxdamp.roads import AbstractRoad
-from jaxdamp.simulation import Response
+from jaxdamp.simulation import CoarseStepWarning, Response
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -68,13 +69,19 @@ def run_ride(
     laws = {name: export.from_json(path) for name, path in files.items()}
     with results_folder(out, "ride", force=force) as folder:
         responses: dict[str, Response] = {}
+        remarks: list[str] = []
         with screen.stage("Driving", total=len(laws)) as advance:
             for done, (name, found) in enumerate(laws.items()):
                 advance(name, done)
                 car = make(damper=found)
                 under = parse_road(road, speed=speed, duration=duration or USUAL, seed=seed)
-                responses[name] = simulate(car, under, duration=duration or under.duration or USUAL, dt=dt)
+                length = duration or under.duration or USUAL
+                responses[name], said = with_step_warnings(
+                    lambda car=car, u=under, t=length: simulate(car, u, duration=t, dt=dt)
+                )
+                remarks += [f"{name}: {text}" for text in said]
             tables = [metrics_table(responses), comfort_table(responses)]
+        screen.points(remarks, style="yellow")
         for table in tables:
             screen.table(table)
         title = f"{vehicle} on {road} at {speed:g} m/s"
@@ -82,10 +89,24 @@ def run_ride(
         if timing.kind != "one axle":
             screen.say(f"Axles: {timing}.")
         with screen.stage("Pictures and tables"):
-            _write(folder, title, laws, responses, tables)
+            _write(folder, title, laws, responses, tables, remarks)
         names = written(folder)
     screen.files(out, names)
     return responses
+
+
+def with_step_warnings(drive: Callable[[], Response]) -> tuple[Response, list[str]]:
+    """A run, and what it warns of its step in the words of the command line; other warnings pass."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", CoarseStepWarning)
+        response = drive()
+    texts = []
+    for warning in caught:
+        if issubclass(warning.category, CoarseStepWarning):
+            texts.append(str(warning.message).replace("`dt=", "`--dt "))
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+    return response, texts
 
 
 def _compared(rows: Mapping[str, tuple[str, list[float]]]) -> tuple[tuple[Cell, ...], ...]:
@@ -128,12 +149,18 @@ def comfort_table(responses: Mapping[str, Response]) -> Table:
 
 
 def _write(
-    folder: Path, title: str, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response], tables: list[Table]
+    folder: Path,
+    title: str,
+    laws: Mapping[str, AbstractDamper],
+    responses: Mapping[str, Response],
+    tables: list[Table],
+    remarks: list[str],
 ) -> None:
     report = Report(title)
     timing = next(iter(responses.values())).axle_timing
     if timing.kind != "one axle":
         report.text(f"Axles: {timing}.")
+    report.points(remarks)
     for name, law in laws.items():
         report.text(f"{name}: {law!r}")
         export.to_json(law, folder / f"{name}.json")

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._types import Scalar, Signal
+from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper, AbstractStateful, Sum
 from jaxdamp.dampers.base import parts
 from jaxdamp.vehicles import AbstractVehicle, PortForm
@@ -140,7 +140,9 @@ def _largest(values: np.ndarray) -> float:
 
 
 @eqx.filter_jit
-def _slopes_over_step(law: AbstractDamper, velocity: Signal, dt: Scalar) -> Float[Array, " velocities"]:
+def _slopes_over_step(
+    law: AbstractDamper, velocity: Float[Array, " velocities"], dt: Scalar
+) -> Float[Array, " velocities"]:
     """Slope of the force after a step by the velocity at its end [N s/m], of a law whose states are extrapolated."""
 
     def force(end: Scalar, v: Scalar) -> Scalar:
@@ -151,7 +153,9 @@ def _slopes_over_step(law: AbstractDamper, velocity: Signal, dt: Scalar) -> Floa
 
 
 @eqx.filter_jit
-def _slopes_at_instant(law: AbstractDamper, velocity: Signal, stroke: Signal) -> tuple[Array, Array, Array]:
+def _slopes_at_instant(
+    law: AbstractDamper, velocity: Float[Array, " velocities"], stroke: Float[Array, " strokes"]
+) -> tuple[Array, Array, Array]:
     """∂F/∂v [N s/m] and Σ ∂F/∂s ∂ṡ/∂v [N/m] at velocities, and ∂F/∂x [N/m] at strokes, with the states of rest."""
     start, zero = law.initial_state(), jnp.zeros_like(velocity[0])
 
@@ -179,6 +183,8 @@ def _has_explicit_step(law: AbstractDamper) -> bool:
 
 
 @eqx.filter_jit
-def _slopes_of_rates(law: AbstractDamper, velocity: Signal) -> Float[Array, "velocities states states"]:
+def _slopes_of_rates(
+    law: AbstractDamper, velocity: Float[Array, " velocities"]
+) -> Float[Array, "velocities states states"]:
     zero = jnp.zeros_like(velocity[0])
     return jax.vmap(lambda v: jax.jacfwd(lambda s: law.state_rate(zero, v, s))(law.initial_state()))(velocity)

@@ -62,7 +62,9 @@ def step_error(
     if start is None:
         start = settled(vehicle, coarse[0])
     long, short = (
-        np.asarray(_driven(vehicle, _padded(z), start, jnp.asarray(step, float), jnp.asarray(substeps), names))[: len(z)]
+        np.asarray(_driven(vehicle, _padded(z), start, jnp.asarray(step, float), jnp.asarray(substeps), names))[
+            : len(z)
+        ]
         for z, step in ((coarse, dt), (fine, 0.5 * dt))
     )
     size, difference = (np.sqrt(np.mean(y * y, axis=0)) for y in (short, long - short[::2]))

@@ -57,9 +57,9 @@ def checked_substeps(
       with half the step on a stretch of the run (`step_error`): above 1 % a warning states it, above 20 % the run is
       refused.
 
-    Beside that a record of the road with fewer than 5 samples a period of that mode is warned of. An adaptive engine chooses its own steps; what the instants miss of the road stays missed, and is judged alike.
-    Ordinary cars at 1 ms pass the first two, which cost no run. Where numbers are traced nothing is known of them, and
-    what needs them is left out.
+    Beside that a record of the road with fewer than 5 samples a period of that mode is warned of. An adaptive engine
+    chooses its own steps; what the instants miss of the road stays missed, and is judged alike. Ordinary cars at 1 ms
+    pass without a run. Where numbers are traced nothing is known of them, and what needs them is left out.
 
     Arguments:
         vehicle: any vehicle.
@@ -115,23 +115,23 @@ def _judge(estimate: StepError, dt: float) -> None:
     if estimate.error > REFUSED:
         said = f"{100 * estimate.error:.0f} %" if np.isfinite(estimate.error) else "without bound"
         must = f"be so short that the error stays below {100 * REFUSED:.0f} % of the RMS of every channel"
-        value = f"{dt:g} s, where that of `{estimate.channel}` is estimated at {said} by a comparison with half the step"
+        value = (
+            f"{dt:g} s, where that of `{estimate.channel}` is estimated at {said} by a comparison with half the step"
+        )
         _checks.refuse("dt", must, value, f"Pass `dt={shorter:g}`.")
-    warnings.warn(
+    _warn(
         f"A step of dt = {dt:g} s is coarse for this vehicle on this road: the error of `{estimate.channel}` is "
         f"estimated at {100 * estimate.error:.2g} % of its RMS, by a comparison with half the step. "
-        f"`dt={shorter:g}` makes it less than 1 %.",
-        CoarseStepWarning,
-        stacklevel=_caller(),
+        f"`dt={shorter:g}` makes it less than 1 %."
     )
 
 
-def _caller() -> int:
-    """The stack level of the line outside this package that asked for the run, for a warning of the function above."""
-    frame, level = inspect.currentframe(), 0
+def _warn(text: str) -> None:
+    """Warn at the line outside this package that asked for the run."""
+    frame, level = inspect.currentframe(), 1
     while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] in INSIDE:
         frame, level = frame.f_back, level + 1
-    return max(level, 1)
+    warnings.warn(text, CoarseStepWarning, stacklevel=level)
 
 
 def _refuse_unresolved(mode: FastestMode, dt: float) -> None:
@@ -155,13 +155,11 @@ def _warn_of_samples(mode: FastestMode, grid: float) -> None:
     if per_period >= LEAST_PER_PERIOD:
         return
     finer = rounded_down(1.0 / (LEAST_PER_PERIOD * mode.frequency))
-    warnings.warn(
+    _warn(
         f"The road's samples lie {grid:.4g} s apart, {per_period:.2g} to a period of the fastest mode that follows it "
         f"({mode.frequency:.4g} Hz, mostly `{mode.coordinate}`). It is straight between them, and its kinks shake this "
         f"mode whatever the step. Give it samples every {finer:g} s (a profile resampled by a smooth curve), or soften "
-        "what stands on the road (`tyre_stiffness`).",
-        CoarseStepWarning,
-        stacklevel=_caller(),
+        "what stands on the road (`tyre_stiffness`)."
     )
 
 
@@ -178,7 +176,9 @@ def fastest_mode(vehicle: AbstractVehicle, form: PortForm, stiffness: Sequence[f
         return None
     mass, springs, road, ports, standing = numbers
     assert mass is not None and springs is not None and road is not None and ports is not None
-    slopes = np.array(stiffness)[:, None]
+    if not np.all(np.isfinite(mass)) or np.any(np.linalg.eigvalsh(mass) <= 0.0):
+        return None  # no vehicle: whoever drives it finds that its response is not finite
+    slopes = np.nan_to_num(np.array(stiffness))[:, None]
     stiffened = springs + ports.T @ (slopes * ports)
     driven = road if standing is None else road + ports.T @ (slopes * standing)
     root = np.linalg.inv(np.linalg.cholesky(mass))
@@ -190,5 +190,6 @@ def fastest_mode(vehicle: AbstractVehicle, form: PortForm, stiffness: Sequence[f
         return None
     fastest = int(np.flatnonzero(follows)[-1])
     return FastestMode(
-        float(np.sqrt(squares[fastest]) / (2.0 * np.pi)), vehicle.coordinates[int(np.argmax(np.abs(shapes[:, fastest])))]
+        float(np.sqrt(squares[fastest]) / (2.0 * np.pi)),
+        vehicle.coordinates[int(np.argmax(np.abs(shapes[:, fastest])))],
     )

@@ -1,5 +1,6 @@
 """`minimise`: the best ride that the free parameters allow, by exact gradients."""
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 
 import equinox as eqx
@@ -14,7 +15,7 @@ from jaxdamp._progress import Progress
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import Ride, moves_axles
+from jaxdamp.simulation import CoarseStepWarning, Ride, moves_axles
 from jaxdamp.tune.result import Change, TuneResult, V
 from jaxdamp.vehicles import AbstractVehicle, RideMetric, linearise, stationary_rms, with_weightings
 
@@ -106,8 +107,11 @@ def minimise(
     notes += [f"{c.name} ended at a bound, {c.after:.5g} {c.unit}." for c in changes if c.note]
     if not converged and not over_limit:
         notes.append(f"The search ended before an optimum ({message}); the scaled gradient left is {left:.1e}.")
+    tuned = free.build(jnp.asarray(values))
+    if not isinstance(road, WhiteRoad):
+        notes += _step_notes(vehicle, tuned, road, names, duration, dt)
     return TuneResult(
-        free.build(jnp.asarray(values)),
+        tuned,
         vehicle,
         metric,
         changes,
@@ -169,6 +173,36 @@ def driven_ride(
     if driven.road is not None and free is not None and moves_axles(free.build, free.values):
         return lambda vehicle: driven.on_axles_of(vehicle)()
     return lambda vehicle: eqx.tree_at(lambda ride: ride.vehicle, driven, vehicle)()
+
+
+def _step_notes(
+    start: AbstractVehicle,
+    tuned: AbstractVehicle,
+    road: AbstractRoad,
+    names: Sequence[str],
+    duration: float | None,
+    dt: float,
+) -> list[str]:
+    """What the tuned vehicle says of the step, which was chosen for the start."""
+
+    def substeps(vehicle: AbstractVehicle) -> int:
+        return Ride(vehicle, road, metrics=names, duration=duration, dt=dt).substeps
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("ignore")
+        taken = substeps(start)
+        warnings.simplefilter("always", CoarseStepWarning)
+        try:
+            needed = substeps(tuned)
+        except ValueError as error:
+            return [f"The tuned vehicle does not bear the step of {dt:g} s. {error}"]
+    notes = [str(warning.message) for warning in caught]
+    if needed > taken:
+        notes.append(
+            f"The tuned laws need {needed} steps between two instants, and the search took {taken}: tune again from "
+            "this result."
+        )
+    return notes
 
 
 class _Table:
