@@ -29,12 +29,12 @@ class Need(NamedTuple):
     """What the laws of a vehicle ask of a step.
 
     Arguments:
-        count: steps between two instants.
+        substeps: steps between two instants.
         by_travel: the largest share of a velocity's error that comes back in one undivided step through the travel,
             as from a spring; laws of the velocity alone, such as friction, are accurate even where they are divided.
     """
 
-    count: int
+    substeps: int
     by_travel: float
 
 
@@ -56,7 +56,7 @@ class Slopes(NamedTuple):
 
 def substeps_needed(vehicle: AbstractVehicle, dt: float) -> int:
     """Steps of the exponential engine between instants dt [s] apart that keep every law stable: see `step_need`."""
-    return step_need(vehicle, vehicle.port_form(), law_slopes(vehicle, dt), dt).count
+    return step_need(vehicle, vehicle.port_form(), law_slopes(vehicle, dt), dt).substeps
 
 
 def law_slopes(vehicle: AbstractVehicle, dt: float) -> list[Slopes]:
@@ -127,10 +127,10 @@ def _of_term(law: AbstractDamper, dt: float) -> Slopes:
     if is_smooth(law):
         found = _checks.concrete(_slopes_over_step(law, velocity, jnp.asarray(dt, dtype=float)))
         return Slopes() if found is None else Slopes(2.0 * _largest(found), rate=rate)
-    found = [_checks.concrete(a) for a in _slopes_at_instant(law, velocity, jnp.asarray(_STROKES))]
-    if any(a is None for a in found):
+    found = _slopes_at_instant(law, velocity, jnp.asarray(_STROKES))
+    damping, by_velocity, by_stroke = (_checks.concrete(a) for a in found)
+    if damping is None or by_velocity is None or by_stroke is None:
         return Slopes()
-    damping, by_velocity, by_stroke = found
     at_rest = float(np.nan_to_num(by_stroke[_STROKES.size // 2]))
     return Slopes(_largest(damping), _largest(by_velocity) + _largest(np.abs(by_stroke)), at_rest, rate)
 

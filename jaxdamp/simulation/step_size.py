@@ -83,11 +83,11 @@ def checked_substeps(
         _warn_of_samples(mode, grid)
     if exponential:
         need = step_need(vehicle, form, slopes, dt)
-        count = need.count if substeps is None else _allowed(substeps, need, dt)
-        doubtful = per_period < ENOUGH_PER_PERIOD or need.by_travel > STEEP or count < need.count
+        count = need.substeps if substeps is None else _allowed(substeps, need, dt)
+        doubtful = per_period < ENOUGH_PER_PERIOD or need.by_travel > STEEP or count < need.substeps
     else:
         try:
-            count = min(4 * step_need(vehicle, form, slopes, dt).count, MOST)  # so many that only the road differs
+            count = min(4 * step_need(vehicle, form, slopes, dt).substeps, MOST)  # so many that only the road differs
         except ValueError:  # too steep for the engine that estimates the error
             return 1
         doubtful = per_period < ENOUGH_PER_PERIOD
@@ -101,8 +101,8 @@ def _allowed(substeps: int, need: Need, dt: float) -> int:
     """The caller's number of substeps, refused where a law would blow up."""
     if not isinstance(substeps, int | np.integer) or substeps < 1:
         _checks.refuse("substeps", "be a whole number, 1 or more", repr(substeps))
-    if substeps < LARGEST * need.count:  # stable up to a share of one
-        remedy = f"The steepest law needs {need.count} in {dt:g} s: leave `substeps` out, or pass a shorter `dt`."
+    if substeps < LARGEST * need.substeps:  # stable up to a share of one
+        remedy = f"The steepest law needs {need.substeps} in {dt:g} s: leave `substeps` out, or pass a shorter `dt`."
         _checks.refuse("substeps", "keep every law stable", substeps, remedy)
     return int(substeps)
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, dampers, roads, simulate
+from jaxdamp._types import Number
 from jaxdamp.parameters import parameter, positive, replace
 from jaxdamp.simulation import CoarseStepWarning
 from jaxdamp.simulation.stability import substeps_needed
@@ -81,8 +82,8 @@ def test_light_masses_between_stiff_springs_do_not_count():
 class OwnLag(dampers.AbstractStateful):
     """τ Ḟ = c v − F, carried on by the explicit step of `AbstractStateful`."""
 
-    rate: jax.Array = parameter("N s/m", "damping coefficient", positive)
-    lag_time: jax.Array = parameter("s", "time constant", positive)
+    rate: Number = parameter("N s/m", "damping coefficient", positive)
+    lag_time: Number = parameter("s", "time constant", positive)
 
     def initial_state(self):
         return jnp.zeros(1)
