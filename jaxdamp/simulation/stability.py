@@ -64,7 +64,9 @@ def law_slopes(vehicle: AbstractVehicle, dt: float) -> list[Slopes]:
     return [_steepest(law, dt) for law in vehicle.elements()]
 
 
-def step_need(vehicle: AbstractVehicle, form: PortForm, slopes: Sequence[Slopes], dt: float) -> Need:
+def step_need(
+    vehicle: AbstractVehicle, form: PortForm, slopes: Sequence[Slopes], dt: float, *, most: float = MOST
+) -> Need:
     """Steps of the exponential engine between instants dt [s] apart that keep every law stable.
 
     A force that grows by c [N s/m] with the velocity at the end of a step, and by k [N/m] with the travel within it,
@@ -76,7 +78,7 @@ def step_need(vehicle: AbstractVehicle, form: PortForm, slopes: Sequence[Slopes]
     traced their slopes are not known, and one step is taken.
 
     Raises:
-        ValueError: more than 64 would be needed.
+        ValueError: more than `most` would be needed.
     """
     mass, ports = _checks.concrete(form.mass), _checks.concrete(form.ports)
     if mass is None or ports is None or not any(any(s) for s in slopes):
@@ -87,8 +89,8 @@ def step_need(vehicle: AbstractVehicle, form: PortForm, slopes: Sequence[Slopes]
     # the least n with by_rate/n + by_travel/n² <= LARGEST
     counts = 0.5 * (by_rate + np.sqrt(by_rate * by_rate + 4.0 * LARGEST * by_travel)) / LARGEST
     counts = np.maximum(counts, dt * np.array([s.rate for s in slopes]) / HEUN)
-    count, worst = max(1, math.ceil(float(counts.max()))), int(counts.argmax())
-    if count > MOST:
+    count, worst = max(1, math.ceil(min(float(counts.max()), 1e9))), int(counts.argmax())
+    if count > most:
         _refuse_law(vehicle.frame().element_names[worst], slopes[worst], dt, count)
     return Need(count, float(by_travel.max()))
 

@@ -61,6 +61,8 @@ def step_error(
     names = tuple(dict.fromkeys(m.channel for m in vehicle.ride_metrics if m.statistic == "rms"))
     if start is None:
         start = settled(vehicle, coarse[0])
+        if not np.all(np.isfinite(np.asarray(start))):  # no equilibrium, which the run will say
+            return StepError(names[0], 0.0)
     long, short = (
         np.asarray(_driven(vehicle, _padded(z), start, jnp.asarray(step, float), jnp.asarray(substeps), names))[
             : len(z)

@@ -82,7 +82,7 @@ def checked_substeps(
     if mode is not None and grid is not None and SAMPLES * grid < dt * heights.shape[0]:
         _warn_of_samples(mode, grid)
     if exponential:
-        need = step_need(vehicle, form, slopes, dt)
+        need = step_need(vehicle, form, slopes, dt, most=MOST if substeps is None else np.inf)
         count = need.substeps if substeps is None else _allowed(substeps, need, dt)
         doubtful = per_period < ENOUGH_PER_PERIOD or need.by_travel > STEEP or count < need.substeps
     else:
