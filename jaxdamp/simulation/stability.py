@@ -65,7 +65,7 @@ def law_slopes(vehicle: AbstractVehicle, dt: float) -> list[Slopes]:
 
 
 def step_need(
-    vehicle: AbstractVehicle, form: PortForm, slopes: Sequence[Slopes], dt: float, *, most: float = MOST
+    vehicle: AbstractVehicle, form: PortForm, slopes: Sequence[Slopes], dt: float, *, most: int | float = MOST
 ) -> Need:
     """Steps of the exponential engine between instants dt [s] apart that keep every law stable.
 

@@ -18,6 +18,7 @@ LEAST_PER_PERIOD = 5.0  # instants a period of the fastest mode that follows the
 ENOUGH_PER_PERIOD = 30.0  # from here on the error of a car on a road is below a percent, and is not estimated
 FOLLOWS = 0.1  # share of the road's height that a mode takes at rest, from which on the road must resolve it
 STEEP = 0.25  # share of a velocity's error that comes back through the travel, from which on the error is estimated
+SAMPLES_PER_PERIOD = 3.0  # of a record of the road; the tyre of a real wheel smooths what lies between them
 SAMPLES = 32  # in a run, from which on a road of samples is taken for a record, and not for a few straight pieces
 WARNED, REFUSED = 0.01, 0.2  # estimated RMS of the error over the RMS of a channel
 INSIDE = ("jaxdamp", "equinox", "jaxtyping", "beartype", "contextlib")  # modules that no user wrote
@@ -57,7 +58,7 @@ def checked_substeps(
       with half the step on a stretch of the run (`step_error`): above 1 % a warning states it, above 20 % the run is
       refused.
 
-    Beside that a record of the road with fewer than 5 samples a period of that mode is warned of. An adaptive engine
+    Beside that a record of the road with fewer than 3 samples a period of that mode is warned of. An adaptive engine
     chooses its own steps; what the instants miss of the road stays missed, and is judged alike. Ordinary cars at 1 ms
     pass without a run. Where numbers are traced nothing is known of them, and what needs them is left out.
 
@@ -152,7 +153,7 @@ def _refuse_unresolved(mode: FastestMode, dt: float) -> None:
 def _warn_of_samples(mode: FastestMode, grid: float) -> None:
     """Warn of a record of the road whose samples lie too far apart for the fastest mode that follows it."""
     per_period = 1.0 / (mode.frequency * grid)
-    if per_period >= LEAST_PER_PERIOD:
+    if per_period >= SAMPLES_PER_PERIOD:
         return
     finer = rounded_down(1.0 / (LEAST_PER_PERIOD * mode.frequency))
     _warn(

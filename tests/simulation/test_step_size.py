@@ -67,6 +67,20 @@ def test_a_record_of_the_road_too_coarse_for_a_stiff_tyre_is_warned_of():
     assert Ride(stiff_car(), ramp, dt=5e-5, metrics=RMS).substeps == 1
 
 
+def test_no_metrics_are_refused_with_some_names():
+    with pytest.raises(ValueError, match=r"`metrics` must name one or more, .*'rms_sprung_acceleration'.*leave it out"):
+        Ride(quarter_car_000(), BUMP, metrics=[], duration=1.0)
+
+
+def test_a_car_without_damping():
+    with pytest.raises(
+        ValueError, match=r"`Linear.rate` must be positive \[N s/m\], but is 0.0.*write `Linear\(1e-6\)`"
+    ):
+        dampers.Linear(0.0)
+    ratios = modes(quarter_car_000(dampers.Linear(1e-6))).damping_ratio
+    assert np.all((ratios > 0) & (ratios < 1e-8))
+
+
 def test_light_masses_between_stiff_springs_do_not_count():
     car = presets.quarter_car_000()
     form = car.port_form()

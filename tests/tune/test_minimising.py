@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers, parameters, roads, simulate, tune, vehicles
-from jaxdamp.tune.minimising import driven_ride
+from jaxdamp.tune.minimising import _step_notes, driven_ride
 
 
 CAR = vehicles.presets.quarter_car_000()
@@ -179,3 +179,17 @@ def test_what_people_feel_can_be_tuned_on_both_kinds_of_road():
 def test_counts_have_no_slope_to_follow():
     with pytest.raises(ValueError, match="must have a slope, but is 'lift_off_fraction', a count"):
         tune.minimise("lift_off_fraction", CAR, roads.cosine_bump(0.06, start=0.2, duration=0.25), duration=1.0)
+
+
+def test_a_tuned_vehicle_that_the_step_does_not_suit_is_noted():
+    start, road = vehicles.presets.quarter_car_000(), roads.cosine_bump(0.05, start=0.1, duration=0.25)
+    names = ["rms_sprung_acceleration"]
+    notes = [
+        _step_notes(start, parameters.replace(start, change), road, names, 0.5, 1e-3)
+        for change in ({"damper.rate": 2000.0}, {"damper.rate": 1e6}, {"tyre_stiffness": 1e9})
+    ]
+    assert notes[0] == []
+    assert "need 9 steps between two instants, and the search took 1" in notes[1][0]
+    assert "does not bear the step of 0.001 s" in notes[2][0]
+    (coarse,) = _step_notes(start, start, road, names, 0.5, 0.02)
+    assert "coarse" in coarse
