@@ -128,7 +128,9 @@ def ride(
     speed: Annotated[float, typer.Option(help="Of the vehicle [m/s].")] = 20.0,
     baseline: Annotated[Path | None, typer.Option(help="Another law to compare with, as JSON.")] = None,
     duration: Annotated[float | None, typer.Option(help="Of the ride [s]; the road's own, or 10.")] = None,
-    dt: Annotated[float, typer.Option(help="Step [s].")] = 1e-3,
+    dt: Annotated[
+        float, typer.Option(help="Step [s]; 1 ms is right for cars, a coarse one is warned of or refused.")
+    ] = 1e-3,
     seed: Annotated[int, typer.Option(help="Of a random road.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-ride"),
     replace: Replace = False,

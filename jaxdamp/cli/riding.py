@@ -1,6 +1,7 @@
 """`jaxdamp ride`: a law in a vehicle on a road, beside a baseline."""
 
 import inspect
+import warnings
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots.damper_use import dampers_of
 from jaxdamp.report import Cell, Column, Report, Table
 from jaxdamp.roads import AbstractRoad
-from jaxdamp.simulation import Response
+from jaxdamp.simulation import CoarseStepWarning, Response
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -80,18 +81,24 @@ def run_ride(
     attempts = Attempts()
     with results_folder(out, "ride", replace=replace) as results:
         responses: dict[str, Response] = {}
+        remarks: list[str] = []
         with screen.stage("Driving", total=len(laws)) as advance:
             for done, (name, found) in enumerate(laws.items()):
                 advance(name, done)
                 car = make(damper=found)
                 under = parse_road(road, speed=speed, duration=duration or USUAL, seed=seed)
+                length = duration or under.duration or USUAL
                 with said_in_tables():
-                    responses[name] = simulate(car, under, duration=duration or under.duration or USUAL, dt=dt)
+                    responses[name], said = with_step_warnings(
+                        lambda car=car, u=under, t=length: simulate(car, u, duration=t, dt=dt)
+                    )
+                remarks += [f"{name}: {text}" for text in said]
             tables = [metrics_table(responses), comfort_table(responses)]
             uses = [table for table in [range_use_table(responses)] if table is not None]
+            remarks += notes_of(responses)
         for table in [*tables, *uses]:
             screen.table(table)
-        screen.points(notes_of(responses), style="yellow")
+        screen.points(remarks, style="yellow")
         interrupt.keep()
         title = f"{vehicle} on {road} at {speed:g} m/s"
         timing = next(iter(responses.values())).axle_timing
@@ -101,10 +108,24 @@ def run_ride(
             _write(results.draft, laws, responses, tables, uses)
             results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
-            _draw(results.draft, title, laws, responses, [*tables, *uses], attempts)
+            _draw(results.draft, title, laws, responses, [*tables, *uses], remarks, attempts)
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
     return responses
+
+
+def with_step_warnings(drive: Callable[[], Response]) -> tuple[Response, list[str]]:
+    """A run, and what it warns of its step in the words of the command line; other warnings pass."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", CoarseStepWarning)
+        response = drive()
+    texts = []
+    for warning in caught:
+        if issubclass(warning.category, CoarseStepWarning):
+            texts.append(str(warning.message).replace("`dt=", "`--dt "))
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+    return response, texts
 
 
 def _compared(
@@ -175,6 +196,7 @@ def _draw(
     laws: Mapping[str, AbstractDamper],
     responses: Mapping[str, Response],
     tables: list[Table],
+    remarks: list[str],
     attempts: Attempts,
 ) -> None:
     """Pictures, and the report with them."""
@@ -182,12 +204,12 @@ def _draw(
     timing = next(iter(responses.values())).axle_timing
     if timing.kind != "one axle":
         report.text(f"Axles: {timing}.")
+    report.points(remarks)
     for name, law in laws.items():
         covered = f" Fitted to: {law.fitted_to.words()}." if law.fitted_to is not None else ""
         report.text(f"{name}: {law!r}{'.' * bool(covered)}{covered}")
     for table in tables:
         report.table(table)
-    report.points(notes_of(responses))
     with attempts.part("The picture ride.png"):
         report.picture(plots.ride(responses, weighting="Wk"), title, folder / "ride.png")
     for damper in dampers_of(next(iter(responses.values()))):

@@ -43,7 +43,8 @@ class MonoTube(AbstractDamper):
     The step is the two-stage SDIRK method (second order, L-stable) with one monotone scalar equation a stage: stable
     at any step. Steps of 1 ms are good to 0.3 % of the peak force (RMS, `reference()`, 12.5 Hz, 10 mm): the front of
     the force after a reversal takes about 1 ms. Where a cavity closes within a step they are good to 3 % only (20 mm),
-    steps of 0.25 ms to 0.03 %: take `substeps=4` on the rig, or `dt=2.5e-4` in a vehicle.
+    steps of 0.25 ms to 0.03 %: take `substeps=4` on the rig, or `dt=2.5e-4` in a vehicle. A vehicle divides
+    longer steps, and warns where the error shows.
 
     Valid within `stroke_limits`, which `respond` insists on; beyond, the chamber above the piston keeps 5 % of its
     volume and the gas its tangent, so that forces stay finite. Stops are other laws: add a `BumpStop`.

@@ -2,6 +2,7 @@
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Array, Int
 
 from jaxdamp import _checks
 from jaxdamp._limits import largest
@@ -62,13 +63,34 @@ def running_rms(
 
 @jax.jit
 def _moving(signal: Signal, intervals: Scalar) -> Signal:
-    """Root mean square over the last so many intervals, from the integral of the square up to the end of each."""
-    integral = jnp.concatenate([jnp.zeros(1, signal.dtype), jnp.cumsum(signal * signal)])
-    whole = jnp.floor(intervals)
-    part = intervals - whole
-    oldest = jnp.arange(1, signal.size + 1) - whole.astype(int)
-    newer, older = integral[jnp.maximum(oldest, 0)], integral[jnp.maximum(oldest - 1, 0)]
-    return root((integral[1:] - newer - part * (older - newer)) / intervals)
+    """Root mean square over the last so many intervals, at the end of each."""
+    square, whole = signal * signal, jnp.floor(intervals)
+    count = whole.astype(int)
+    oldest = _delayed(square, count)
+    return root((_moving_sum(square, count) + (intervals - whole) * oldest) / intervals)
+
+
+def _moving_sum(values: Signal, count: Int[Array, ""]) -> Signal:
+    """Sum of the last so many values at each, zeros before the first.
+
+    From sums over 1, 2, 4, ... values, those that the binary digits of the count name. No sum is the difference of two
+    larger ones, as those of a cumulative sum are, which after a loud stretch leave nothing of a quiet one in single
+    precision.
+    """
+    total, taken, block = jnp.zeros_like(values), jnp.zeros_like(count), values
+    for digit in range(values.size.bit_length()):
+        length = 1 << digit
+        has = (count & length) != 0
+        total = jnp.where(has, total + _delayed(block, taken), total)
+        taken = taken + jnp.where(has, length, 0)
+        block = block.at[length:].add(block[:-length])
+    return total
+
+
+def _delayed(values: Signal, count: Int[Array, ""]) -> Signal:
+    """The values so many places later, with zeros before."""
+    padded = jnp.concatenate([jnp.zeros_like(values), values])
+    return jax.lax.dynamic_slice(padded, (values.size - count,), (values.size,))
 
 
 def max_transient_value(

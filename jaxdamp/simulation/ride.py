@@ -1,5 +1,6 @@
 """`Ride`: a vehicle on a road as one function of its parameters, the metrics gathered while it drives."""
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias, final
 
@@ -23,8 +24,8 @@ from jaxdamp.simulation._vectors import scalars
 from jaxdamp.simulation.exponential import exponential_steps, settled
 from jaxdamp.simulation.gauge import Gathered, Gauge
 from jaxdamp.simulation.range_notes import range_uses
-from jaxdamp.simulation.run import sampled
-from jaxdamp.simulation.stability import substeps_needed
+from jaxdamp.simulation.run import half_sampled, sampled
+from jaxdamp.simulation.step_size import checked_substeps
 from jaxdamp.simulation.stepper import FOR_REVERSE, Ground, Now, Stepper
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
 from jaxdamp.vehicles import AbstractVehicle, RideMetric, chosen_metrics
@@ -52,8 +53,9 @@ class Ride(eqx.Module):
         road: as in `simulate`.
         metrics: names among `vehicle.ride_metrics`; all of them if left out. Fewer are faster.
         duration: as in `simulate`.
-        dt: as in `simulate`.
-        substeps: of the engine between two instants; as many as the laws need if left out.
+        dt: as in `simulate`; it is checked here, with the numbers of this vehicle. Points far from it, of a sweep for
+            instance, are driven with the same steps unchecked.
+        substeps: of the engine between two instants; as many as the laws of this vehicle need if left out.
 
     Raises:
         ValueError: an unknown metric or parameter; what `simulate` refuses.
@@ -89,7 +91,8 @@ class Ride(eqx.Module):
         self.vehicle, self.dt, self.many = vehicle, dt, False
         _, self.heights = sampled(vehicle, road, duration, dt)
         self.road = road if delays_by_itself(vehicle, road) else None
-        self.substeps = substeps_needed(vehicle, dt) if substeps is None else substeps
+        half = functools.partial(half_sampled, vehicle, road, self.heights.shape[0] - 1, dt)
+        self.substeps = checked_substeps(vehicle, self.heights, half, dt, substeps=substeps, grid=road.grid)
         self.metrics = tuple(chosen_metrics(vehicle, metrics, "metrics"))
 
     @property

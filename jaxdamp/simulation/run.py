@@ -1,5 +1,6 @@
 """`simulate`: a vehicle on a road."""
 
+import functools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.exponential import exponential_steps
 from jaxdamp.simulation.range_notes import range_sentences
 from jaxdamp.simulation.response import Response
-from jaxdamp.simulation.stability import substeps_needed
+from jaxdamp.simulation.step_size import checked_substeps
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
 from jaxdamp.vehicles import AbstractVehicle, static_equilibrium
 from jaxdamp.vehicles.equilibrium import refuse_restless
@@ -52,13 +53,15 @@ def simulate(
             delays, `roads.in_phase` none. Motions over time alone have a column for each of `vehicle.wheel_names`.
         duration: length of the run [s]; the road's own if it has one and this is left out.
         dt: spacing of the instants [s], for the exponential engine also its step (third order, second where laws
-            have kinks or states; 1 ms is right for cars).
+            have kinks or states; 1 ms is right for cars). Where it is coarse a `CoarseStepWarning` states the
+            estimated error; what the vehicle cannot bear is refused.
         method: `"exponential"`, the fixed-step engine; `"diffrax"`, adaptive Tsit5; or any diffrax solver, such as
             `diffrax.Kvaerno5()` for a stiff law.
         rtol: relative tolerance of the adaptive methods.
         atol: absolute tolerance of the adaptive methods, in the units of the states.
-        substeps: of the exponential engine between two instants; as many as the steepest law without states needs
-            (friction at standstill) if left out, so that every step is stable.
+        substeps: of the exponential engine between two instants; as many as the steepest law needs (friction at
+            standstill, a bristle, oil) if left out, so that every step is stable. The road stays straight between
+            instants.
         start: coordinates [m, rad] at time zero that differ from the equilibrium, such as `{"pitch": 0.05}`; at rest.
         every: save every so many-th instant only, of long runs. The motion is the same, but metrics and the energy
             balance then know no more than what is saved; `Ride` gathers metrics at every instant and saves none.
@@ -70,9 +73,9 @@ def simulate(
         The response at `round(duration/dt) + 1` instants, or one in `every` of them and the first.
 
     Raises:
-        ValueError: a step longer than the spacing of a sampled road, no duration, a road of other tracks than wheels,
-            a road without a speed under several axles, an unknown coordinate, a vehicle without equilibrium, instants
-            that cannot be divided by `every`, a run that diverged.
+        ValueError: a step longer than the spacing of a sampled road, or too long for the vehicle; no duration, a road
+            of other tracks than wheels, a road without a speed under several axles, an unknown coordinate, a vehicle
+            without equilibrium, instants that cannot be divided by `every`, a run that diverged.
 
     >>> from jaxdamp import roads, vehicles
     >>> car = vehicles.presets.quarter_car_000()
@@ -86,8 +89,12 @@ def simulate(
     time, heights = sampled(vehicle, road, duration, dt)
     _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)
-    if method == "exponential":
-        count = substeps_needed(vehicle, dt) if substeps is None else substeps
+    fixed = method == "exponential"
+    half = functools.partial(half_sampled, vehicle, road, time.size - 1, dt)
+    count = checked_substeps(
+        vehicle, heights, half, dt, substeps=substeps, start=begin, grid=road.grid, exponential=fixed
+    )
+    if fixed:
         saved = exponential_steps(vehicle, heights, jnp.asarray(dt, dtype=float), begin, count, every)
         remedy = f"Take a shorter step than {dt:g} s, or an implicit solver, `method=diffrax.Kvaerno5()`."
     else:
@@ -137,6 +144,11 @@ def sampled(
     count = round(duration / dt)
     time = jnp.arange(count + 1, dtype=float) * dt
     return time, heights_under_wheels(vehicle, road, time)
+
+
+def half_sampled(vehicle: AbstractVehicle, road: AbstractRoad, count: int, dt: float) -> Float[Array, "fine wheels"]:
+    """The heights under the wheels of a run of so many steps at twice as many instants."""
+    return sampled(vehicle, road, count * dt, 0.5 * dt)[1]
 
 
 def _displaced(

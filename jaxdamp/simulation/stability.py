@@ -1,7 +1,8 @@
-"""How many steps between two instants the steepest law of a vehicle needs."""
+"""How many steps between two instants the laws of a vehicle need."""
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -10,74 +11,182 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._types import Scalar, Signal
-from jaxdamp.dampers import AbstractDamper, Sum
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp._types import Scalar
+from jaxdamp.dampers import AbstractDamper, AbstractStateful, Sum
+from jaxdamp.dampers.base import parts
+from jaxdamp.vehicles import AbstractVehicle, PortForm
 from jaxdamp.vehicles.ports import is_smooth
 
 
 LARGEST = 0.5  # of the share below; the corrected step is stable up to 1
 MOST = 64
+HEUN = 1.0  # largest rate of a state times the step for the explicit step of slow states, which is stable up to 2
 _VELOCITIES = np.concatenate([-np.geomspace(3.0, 1e-4, 14), [0.0], np.geomspace(1e-4, 3.0, 14)])  # m/s
+_STROKES = np.array([-0.05, 0.0, 0.05])  # m
+
+
+class Need(NamedTuple):
+    """What the laws of a vehicle ask of a step.
+
+    Arguments:
+        substeps: steps between two instants.
+        by_travel: the largest share of a velocity's error that comes back in one undivided step through the travel,
+            as from a spring; laws of the velocity alone, such as friction, are accurate even where they are divided.
+    """
+
+    substeps: int
+    by_travel: float
+
+
+class Slopes(NamedTuple):
+    """The largest slopes of a law.
+
+    Arguments:
+        damping: of the force by the velocity at the end of a step [N s/m].
+        stiffness: of the force by the travel within a step, through the stroke and the states [N/m].
+        at_rest: of the force by the stroke at rest [N/m], the states held.
+        rate: of states that an explicit step carries on [1/s].
+    """
+
+    damping: float = 0.0
+    stiffness: float = 0.0
+    at_rest: float = 0.0
+    rate: float = 0.0
 
 
 def substeps_needed(vehicle: AbstractVehicle, dt: float) -> int:
-    """Steps of the exponential engine between instants dt [s] apart.
+    """Steps of the exponential engine between instants dt [s] apart that keep every law stable: see `step_need`."""
+    return step_need(vehicle, vehicle.port_form(), law_slopes(vehicle, dt), dt).substeps
 
-    A force that grows by c [N s/m] with the velocity and acts on a mass m takes back the share c dt/(2m) of an error of
-    the predicted velocity in one step; here m is what the port feels, 1/m = P M⁻¹ Pᵀ. The steepest slope over a step
-    counts of every law without states, such as that of friction at standstill, and twice of a law whose states are
-    extrapolated, such as a lag much shorter than the step. Other laws with states bring stable steps of their own.
-    Where parameters are traced their slopes are not known, and one step is taken.
+
+def law_slopes(vehicle: AbstractVehicle, dt: float) -> list[Slopes]:
+    """The largest slopes of the law of each element, over a step of dt [s] where they depend on it."""
+    return [_steepest(law, dt) for law in vehicle.elements()]
+
+
+def step_need(
+    vehicle: AbstractVehicle, form: PortForm, slopes: Sequence[Slopes], dt: float, *, most: int | float = MOST
+) -> Need:
+    """Steps of the exponential engine between instants dt [s] apart that keep every law stable.
+
+    A force that grows by c [N s/m] with the velocity at the end of a step, and by k [N/m] with the travel within it,
+    takes back the share (c + k dt/2) dt/(2m) of an error of the predicted velocity; here m is what the port feels,
+    1/m = P M⁻¹ Pᵀ. The steepest slopes count, such as that of friction at standstill, and k also through the states:
+    a law in which a fast state follows the travel is a spring over a short step, whatever its own step makes of it.
+    Laws whose states are extrapolated, such as a lag much shorter than the step, count twice. Slow states, carried on
+    by the explicit step of `AbstractStateful`, also need a step shorter than their time constant. Where parameters are
+    traced their slopes are not known, and one step is taken.
 
     Raises:
-        ValueError: more than 64 would be needed.
+        ValueError: more than `most` would be needed.
     """
-    slopes = [_steepest(law, dt) for law in vehicle.elements()]
-    if not any(slopes):
-        return 1
-    form = vehicle.port_form()
     mass, ports = _checks.concrete(form.mass), _checks.concrete(form.ports)
-    if mass is None or ports is None:
-        return 1
+    if mass is None or ports is None or not any(any(s) for s in slopes):
+        return Need(1, 0.0)
     felt = np.diag(ports @ np.linalg.solve(mass, ports.T))
-    shares = 0.5 * dt * np.array(slopes) * felt
-    count = max(1, math.ceil(float(shares.max()) / LARGEST))
-    if count > MOST:
-        name = vehicle.frame().element_names[int(shares.argmax())]
-        remedy = (
-            f"Pass `dt={_rounded_down(dt * MOST / count):g}` or less, widen the velocity over which its force changes "
-            "sign, or take an implicit solver, `method=diffrax.Kvaerno5()`."
-        )
+    by_rate = 0.5 * dt * np.array([s.damping for s in slopes]) * felt
+    by_travel = 0.25 * dt * dt * np.array([s.stiffness for s in slopes]) * felt
+    # the least n with by_rate/n + by_travel/n² <= LARGEST
+    counts = 0.5 * (by_rate + np.sqrt(by_rate * by_rate + 4.0 * LARGEST * by_travel)) / LARGEST
+    counts = np.maximum(counts, dt * np.array([s.rate for s in slopes]) / HEUN)
+    count, worst = max(1, math.ceil(min(float(counts.max()), 1e9))), int(counts.argmax())
+    if count > most:
+        _refuse_law(vehicle.frame().element_names[worst], slopes[worst], dt, count)
+    return Need(count, float(by_travel.max()))
+
+
+def _refuse_law(name: str, slopes: Slopes, dt: float, count: int) -> None:
+    remedy = (
+        f"Pass `dt={rounded_down(dt * MOST / count):g}` or less, widen the velocity over which its force changes "
+        "sign, or take an implicit solver, `method=diffrax.Kvaerno5()`."
+    )
+    if dt * slopes.rate / HEUN > MOST:
+        must, value = f"have states that {MOST} steps in {dt:g} s can follow", f"{slopes.rate:.3g} 1/s fast"
+    elif 0.5 * dt * slopes.stiffness > slopes.damping:
+        must, value = f"have a stiffness that {MOST} steps in {dt:g} s can follow", f"{slopes.stiffness:.3g} N/m stiff"
+    else:
         must = f"have a slope that {MOST} steps in {dt:g} s can follow"
-        _checks.refuse(name, must, f"{max(slopes):.3g} N s/m steep at some velocity", remedy)
-    return count
+        value = f"{slopes.damping:.3g} N s/m steep at some velocity"
+    _checks.refuse(name, must, value, remedy)
 
 
-def _rounded_down(value: float) -> float:
+def rounded_down(value: float) -> float:
     """To one digit."""
     unit = 10.0 ** math.floor(math.log10(value))
-    return math.floor(value / unit) * unit
+    return math.floor(value / unit * (1.0 + 1e-12)) * unit
 
 
-def _steepest(law: AbstractDamper, dt: float) -> float:
-    """Largest slope of the force after a step by the velocity at its end [N s/m]; zero where it is not known."""
+def _steepest(law: AbstractDamper, dt: float) -> Slopes:
+    """Largest slopes of a law, or of the terms of a sum together; zero where they are not known."""
     terms = law.terms if isinstance(law, Sum) else (law,)
-    total = 0.0
-    for term in terms:
-        size, foreseen = term.initial_state().size, is_smooth(term)
-        known = all(_checks.concrete(leaf) is not None for leaf in jax.tree.leaves(eqx.filter(term, eqx.is_array)))
-        if known and (foreseen or not size):
-            slopes = _checks.concrete(_slopes(term, jnp.asarray(_VELOCITIES), jnp.asarray(dt, dtype=float)))
-            largest = 0.0 if slopes is None else float(np.max(np.nan_to_num(slopes), initial=0.0))
-            total += 2.0 * largest if foreseen else largest
-    return total
+    return Slopes(*map(sum, zip(*(_of_term(term, dt) for term in terms), strict=True)))
+
+
+def _of_term(law: AbstractDamper, dt: float) -> Slopes:
+    if any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(eqx.filter(law, eqx.is_array))):
+        return Slopes()
+    velocity, rate = jnp.asarray(_VELOCITIES), _state_rate(law)
+    if is_smooth(law):
+        found = _checks.concrete(_slopes_over_step(law, velocity, jnp.asarray(dt, dtype=float)))
+        return Slopes() if found is None else Slopes(2.0 * _largest(found), rate=rate)
+    found = _slopes_at_instant(law, velocity, jnp.asarray(_STROKES))
+    damping, by_velocity, by_stroke = (_checks.concrete(a) for a in found)
+    if damping is None or by_velocity is None or by_stroke is None:
+        return Slopes()
+    at_rest = float(np.nan_to_num(by_stroke[_STROKES.size // 2]))
+    return Slopes(_largest(damping), _largest(by_velocity) + _largest(np.abs(by_stroke)), at_rest, rate)
+
+
+def _largest(values: np.ndarray) -> float:
+    return float(np.max(np.nan_to_num(values), initial=0.0))
 
 
 @eqx.filter_jit
-def _slopes(law: AbstractDamper, velocity: Signal, dt: Scalar) -> Float[Array, " time"]:
-    def force(end: Scalar, v: Scalar) -> Any:
+def _slopes_over_step(
+    law: AbstractDamper, velocity: Float[Array, " velocities"], dt: Scalar
+) -> Float[Array, " velocities"]:
+    """Slope of the force after a step by the velocity at its end [N s/m], of a law whose states are extrapolated."""
+
+    def force(end: Scalar, v: Scalar) -> Scalar:
         still = jnp.zeros_like(v)
         return law.force(still, end, law.advance(still, v, still, end, law.initial_state(), dt))
 
     return jax.vmap(jax.grad(force))(velocity, velocity)
+
+
+@eqx.filter_jit
+def _slopes_at_instant(
+    law: AbstractDamper, velocity: Float[Array, " velocities"], stroke: Float[Array, " strokes"]
+) -> tuple[Array, Array, Array]:
+    """∂F/∂v [N s/m] and Σ ∂F/∂s ∂ṡ/∂v [N/m] at velocities, and ∂F/∂x [N/m] at strokes, with the states of rest."""
+    start, zero = law.initial_state(), jnp.zeros_like(velocity[0])
+
+    def at(v: Scalar) -> tuple[Scalar, Scalar]:
+        damping = jax.jvp(lambda v: law.force(zero, v, start), (v,), (jnp.ones_like(v),))[1]
+        if not start.size:
+            return damping, jnp.zeros_like(damping)
+        change = jax.jvp(lambda v: law.state_rate(zero, v, start), (v,), (jnp.ones_like(v),))[1]
+        return damping, jax.jvp(lambda s: law.force(zero, v, s), (start,), (change,))[1]
+
+    by_stroke = jax.vmap(lambda x: jax.jvp(lambda x: law.force(x, zero, start), (x,), (jnp.ones_like(x),))[1])(stroke)
+    return *jax.vmap(at)(velocity), by_stroke
+
+
+def _state_rate(law: AbstractDamper) -> float:
+    """Fastest rate of the states of a law [1/s], if an explicit step carries some of them on."""
+    if not law.initial_state().size or not _has_explicit_step(law):
+        return 0.0
+    slopes = _checks.concrete(_slopes_of_rates(law, jnp.asarray(_VELOCITIES)))
+    return 0.0 if slopes is None else float(np.max(np.abs(np.linalg.eigvals(np.nan_to_num(slopes)))))
+
+
+def _has_explicit_step(law: AbstractDamper) -> bool:
+    return isinstance(law, AbstractStateful) or any(map(_has_explicit_step, parts(law)))
+
+
+@eqx.filter_jit
+def _slopes_of_rates(
+    law: AbstractDamper, velocity: Float[Array, " velocities"]
+) -> Float[Array, "velocities states states"]:
+    zero = jnp.zeros_like(velocity[0])
+    return jax.vmap(lambda v: jax.jacfwd(lambda s: law.state_rate(zero, v, s))(law.initial_state()))(velocity)

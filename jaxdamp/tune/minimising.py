@@ -18,6 +18,7 @@ from jaxdamp.tune.range_notes import range_notes
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import TuneResult, V
 from jaxdamp.tune.searching import Evaluator, Measured, active, search
+from jaxdamp.tune.step_notes import step_notes
 from jaxdamp.tune.wording import bound_notes, changes_of, early_end
 from jaxdamp.vehicles import AbstractVehicle, RideMetric, linearise, stationary_rms, with_weightings
 
@@ -118,7 +119,10 @@ def minimise(
     if not converged and not missed:
         notes.append(early_end(ended, max_steps))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
-    notes += range_notes(vehicle, tuned, road, duration, dt)
+    coarse = [] if white else step_notes(vehicle, tuned, road, [m.name for m in chosen], duration, dt)
+    notes += coarse
+    if white or not any("does not bear" in note for note in coarse):
+        notes += range_notes(vehicle, tuned, road, duration, dt)
     return TuneResult(
         vehicle=tuned,
         start=vehicle,

@@ -1,12 +1,14 @@
 """By how much a tuning's start and its result leave the ranges that their laws were fitted to."""
 
+import warnings
+
 import numpy as np
 import scipy.special
 
 from jaxdamp.dampers import Motion, RangeUse, range_use
 from jaxdamp.dampers.fitted_range import has_fitted_range
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import Ride
+from jaxdamp.simulation import CoarseStepWarning, Ride
 from jaxdamp.simulation.range_notes import named_laws, range_sentences
 from jaxdamp.vehicles import AbstractVehicle, linearise, stationary_rms
 
@@ -39,7 +41,10 @@ def range_notes(
         if isinstance(road, WhiteRoad):
             uses = _stationary_use(vehicle, road)
         else:
-            uses = Ride(vehicle, road, metrics=[vehicle.ride_metrics[0].name], duration=duration, dt=dt).range_use()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", CoarseStepWarning)  # the notes on the step say it
+                ride = Ride(vehicle, road, metrics=[vehicle.ride_metrics[0].name], duration=duration, dt=dt)
+            uses = ride.range_use()
         notes += [f"{when}{reach}, {sentence}" for sentence in range_sentences(uses)]
     return notes
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import roads, simulate, vehicles
-from jaxdamp.cli.riding import comfort_table, metrics_table, parse_road, presets
+from jaxdamp.cli.riding import comfort_table, metrics_table, parse_road, presets, with_step_warnings
 from jaxdamp.dampers import AbstractDamper, Bilinear, Linear
 from jaxdamp.export import to_json
 
@@ -54,10 +54,18 @@ def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
         (["--road", "bump:3"], "Option --road must read like bump:HEIGHT:LENGTH"),
         (["--road", "nothing.csv"], "a file that is there, but is 'nothing.csv'"),
         (["--speed", "-3"], "Option --speed must be positive"),
+        (["--dt", "0.1"], "a fifth of the period of the fastest mode that follows the road"),
     ],
 )
 def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], message: str) -> None:
     assert message in refused(tmp_path, "ride", law, *words, "--out", tmp_path / "out")
+
+
+def test_a_coarse_step_is_said_in_the_words_of_the_command_line() -> None:
+    car, bump = vehicles.presets.quarter_car_000(), roads.cosine_bump(0.05, start=0.1, duration=0.25)
+    _, said = with_step_warnings(lambda: simulate(car, bump, duration=1.0, dt=0.02))
+    assert len(said) == 1 and "estimated at" in said[0] and "`--dt 0.00" in said[0]
+    assert with_step_warnings(lambda: simulate(car, bump, duration=1.0, dt=0.002))[1] == []
 
 
 def test_roads_from_files_go_under_every_axle(tmp_path: Path) -> None:

@@ -62,6 +62,17 @@ def test_rest_after_a_shock_is_rest(rng):
     assert np.all(np.isfinite(jax.grad(lambda x: jnp.sum(running_rms(x, 0.01)))(jnp.asarray(signal))))
 
 
+@pytest.mark.parametrize("window", [0.5, 1.0, 1.237])
+def test_single_precision_hears_a_quiet_stretch_after_a_loud_one(rng, window):
+    signal = np.concatenate([30.0 * rng.standard_normal(3000), 1e-3 * rng.standard_normal(2000)])
+    exact = running_rms(signal, 1e-3, window)
+    found = running_rms(jnp.asarray(signal, jnp.float32), 1e-3, window)
+    np.testing.assert_allclose(found[1:], exact[1:], rtol=2e-6 if window < 1.1 else 2e-5)
+    brute = [np.sqrt(np.mean(signal[end - 500 : end] ** 2)) for end in (500, 2999, 3400, 5000)]
+    if window == 0.5:
+        np.testing.assert_allclose(exact[np.array([499, 2998, 3399, 4999])], brute, rtol=1e-12)
+
+
 def test_time_constant_may_be_traced_and_has_a_slope():
     signal = jnp.asarray(np.sin(2.0 * np.arange(400) * 0.01) + 0.2)
 

@@ -70,7 +70,7 @@ def test_the_response_says_when_each_axle_met_the_road():
     assert str(axle_timing(m113_003(), GROUND)).startswith("axles 0, 0.0334, 0.0667, 0.1, 0.133 s behind the front of")
     assert str(axle_timing(FULL, GROUND)) == "rear axle 0.144 s behind the front (2.87 m at 20 m/s)"
     assert str(axle_timing(quarter_car_000(), GROUND)) == "one axle"
-    response = simulate(HALF, GROUND, duration=0.5, dt=0.005)
+    response = simulate(HALF, GROUND, duration=0.5, dt=0.002)
     sentence = next(iter(said))
     assert repr(response).endswith(f"; {sentence}") and response.to_xarray().attrs["axles"] == sentence
 
@@ -124,12 +124,12 @@ NAMES = ["rms_sprung_acceleration", "rms_pitch_acceleration"]
 
 
 def test_ride_means_the_same_and_follows_axles_that_move():
-    ride = Ride(HALF, GROUND, metrics=NAMES, duration=0.5, dt=0.005)
+    ride = Ride(HALF, GROUND, metrics=NAMES, duration=0.5, dt=0.002)
     for point in ({}, {"front_distance": 1.5, "front.damper.rate": 900.0}):
-        expected = simulate(replace(HALF, point), GROUND, duration=0.5, dt=0.005).metrics(NAMES)
+        expected = simulate(replace(HALF, point), GROUND, duration=0.5, dt=0.002).metrics(NAMES)
         for name, value in ride(point).items():
             assert float(value) == pytest.approx(float(expected[name]), rel=1e-9), (point, name)
-    fixed = Ride(HALF, roads.delayed(GROUND, positions=HALF.axle_positions), metrics=NAMES, duration=0.5, dt=0.005)
+    fixed = Ride(HALF, roads.delayed(GROUND, positions=HALF.axle_positions), metrics=NAMES, duration=0.5, dt=0.002)
     np.testing.assert_array_equal(fixed.heights, ride.heights)
     np.testing.assert_array_equal(fixed.on_axles_of(replace(HALF, {"rear_distance": 2.4})).heights, ride.heights)
 
@@ -137,9 +137,9 @@ def test_ride_means_the_same_and_follows_axles_that_move():
 def test_a_tuning_follows_axles_that_move():
     free = free_parameters(HALF, over=["rear_distance"])
     chosen = [metric for metric in HALF.ride_metrics if metric.name in NAMES]
-    measured = driven_ride(HALF, GROUND, chosen, 0.5, 0.005, free)
+    measured = driven_ride(HALF, GROUND, chosen, 0.5, 0.002, free)
     moved = free.build(jnp.array([2.4]))
-    expected = simulate(moved, GROUND, duration=0.5, dt=0.005).metrics(NAMES)
+    expected = simulate(moved, GROUND, duration=0.5, dt=0.002).metrics(NAMES)
     for name, value in measured(moved).items():
         assert float(value) == pytest.approx(float(expected[name]), rel=1e-9)
 

@@ -6,6 +6,7 @@ import pytest
 from jaxdamp import dampers, parameters, roads, simulate, tune, vehicles
 from jaxdamp.tune.minimising import driven_ride
 from jaxdamp.tune.ranges import search_range
+from jaxdamp.tune.step_notes import step_notes
 
 
 CAR = vehicles.presets.quarter_car_000()
@@ -272,3 +273,17 @@ def test_a_displacement_is_tuned_on_a_bump_and_refused_on_a_white_road():
     assert result.after["peak_sprung_displacement"] < result.before["peak_sprung_displacement"]
     with pytest.raises(ValueError, match="must be one of 'rms_sprung_acceleration'"):
         tune.minimise("rms_sprung_displacement", CAR, roads.white("C", 20.0))
+
+
+def test_a_tuned_vehicle_that_the_step_does_not_suit_is_noted():
+    start, road = vehicles.presets.quarter_car_000(), roads.cosine_bump(0.05, start=0.1, duration=0.25)
+    names = ["rms_sprung_acceleration"]
+    notes = [
+        step_notes(start, parameters.replace(start, change), road, names, 0.5, 1e-3)
+        for change in ({"damper.rate": 2000.0}, {"damper.rate": 1e6}, {"tyre_stiffness": 1e9})
+    ]
+    assert notes[0] == []
+    assert "need 9 steps between two instants, and the search took 1" in notes[1][0]
+    assert "does not bear the step of 0.001 s" in notes[2][0]
+    (coarse,) = step_notes(start, start, road, names, 0.5, 0.02)
+    assert "coarse" in coarse
