@@ -9,7 +9,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import ScalarLike
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.parameters import as_float, check_parameters, get
+from jaxdamp.parameters import as_float, check_invariants, get
 
 
 def _paths(tree: Any, prefix: str = "") -> list[str]:
@@ -50,7 +50,5 @@ def with_command(law: AbstractDamper, command: ScalarLike) -> AbstractDamper:
     value = as_float(command)
     changed = eqx.tree_at(lambda t: [get(t, path) for path in paths], law, [value] * len(paths))
     for path in paths:
-        owner = get(changed, path.rpartition(".")[0])
-        check_parameters(owner)
-        owner.__check_init__()
+        check_invariants(get(changed, path.rpartition(".")[0]))
     return changed

@@ -15,7 +15,7 @@ from jaxdamp import _checks
 from jaxdamp._types import Number
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._write import write_whole
-from jaxdamp.parameters import as_float
+from jaxdamp.parameters import as_float, check_invariants
 
 
 FORMAT = "jaxdamp law"
@@ -187,9 +187,7 @@ def _law(plain: Any, where: str) -> AbstractDamper:
         if field.type is Number and np.ndim(value):
             _checks.refuse(here, "be one number", value)
         object.__setattr__(law, field.name, value)
-    for base in kind.__mro__:
-        if "__check_init__" in base.__dict__:
-            base.__dict__["__check_init__"](law)
+    check_invariants(law)
     return law
 
 
