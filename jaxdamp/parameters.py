@@ -42,6 +42,7 @@ __all__ = [
     "Parameter",
     "around_zero",
     "as_float",
+    "check_invariants",
     "check_parameters",
     "ends",
     "free_parameters",
@@ -199,7 +200,8 @@ def get(tree: Any, path: str) -> Any:
 def replace(tree: Any, values: Mapping[str, Any]) -> Any:
     """The same tree with other values at the given paths (last parts and patterns as in `free_parameters`).
 
-    Values outside their domain are refused.
+    Values outside their domain are refused, and so is what a module on the path refuses when it is built: a condition
+    between several of its parameters, or one that a wrapper puts on the law inside.
 
     >>> from jaxdamp.dampers import Linear
     >>> float(replace(Linear(1500.0), {"rate": 2000.0}).rate)
@@ -208,9 +210,22 @@ def replace(tree: Any, values: Mapping[str, Any]) -> Any:
     known = [p.path for p in parameters(tree)]
     chosen = {path: as_float(value) for name, value in values.items() for path in match_paths(known, [name])}
     changed = eqx.tree_at(lambda t: [get(t, path) for path in chosen], tree, list(chosen.values()))
-    for path in chosen:
-        check_parameters(get(changed, path.rpartition(".")[0]))
+    for place in _places(chosen):
+        check_invariants(get(changed, place))
     return changed
+
+
+def _places(paths: Iterable[str]) -> list[str]:
+    """The paths of all modules that hold these parameters, innermost first."""
+    held = {".".join(parts[:count]) for parts in (path.split(".") for path in paths) for count in range(len(parts))}
+    return sorted(held, key=lambda place: (-len(place.split(".")), place == "", place))
+
+
+def check_invariants(module: Any) -> None:
+    """Run the checks that a module's constructor runs, for one whose values were replaced."""
+    for kind in type(module).__mro__:
+        if "__check_init__" in kind.__dict__:
+            kind.__dict__["__check_init__"](module)
 
 
 def match_paths(known: Sequence[str], patterns: Sequence[str]) -> list[str]:
@@ -284,6 +299,15 @@ class FreeParameters(eqx.Module):
         """The tree with these physical values."""
         paths = [p.path for p in self.chosen]
         return eqx.tree_at(lambda t: [get(t, p) for p in paths], self.tree, self._split(values))
+
+    def started_at(self, values: Float[np.ndarray, " free"]) -> "FreeParameters":
+        """The same parameters with other values to start from."""
+        ends = np.cumsum([p.value.size for p in self.chosen])[:-1]
+        pieces = zip(self.chosen, np.split(values, ends), strict=True)
+        placed = [jnp.asarray(piece.reshape(p.value.shape), p.value.dtype) for p, piece in pieces]
+        chosen = tuple(eqx.tree_at(lambda p: p.value, p, piece) for p, piece in zip(self.chosen, placed, strict=True))
+        tree = eqx.tree_at(lambda t: [get(t, p.path) for p in chosen], self.tree, placed)
+        return FreeParameters(tree, chosen, tuple(_scale(p) for p in chosen))
 
     def limits(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper limit of each number, as its domain or an extra bound gives them."""

@@ -4,6 +4,7 @@ Stroke and velocity are positive in extension (rebound), force is positive when 
 """
 
 from jaxdamp.bench import programmes
+from jaxdamp.bench.contradictions import Contradiction, contradictions, contradictions_in_words
 from jaxdamp.bench.programmes import RandomTest, SineTest
 from jaxdamp.bench.read import read
 from jaxdamp.bench.runs import BenchRun
@@ -15,10 +16,13 @@ from jaxdamp.bench.virtual_dyno import VirtualDyno
 __all__ = [
     "BenchRun",
     "BenchSet",
+    "Contradiction",
     "RandomTest",
     "SineTest",
     "VirtualDyno",
     "as_runs",
+    "contradictions",
+    "contradictions_in_words",
     "estimate_velocity",
     "programmes",
     "read",

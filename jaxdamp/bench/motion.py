@@ -55,10 +55,10 @@ def cycle_instants(time: Samples, stroke: Samples) -> Float[np.ndarray, " instan
     begins or ends in the middle of the stroke has a full cycle before the first or behind the last passage too.
     """
     period = 1 / dominant_frequency(time, stroke)
-    return max((_extended(time, stroke, instants, period) for instants in crossings(time, stroke)), key=len)
+    return max((extended(time, stroke, instants, period) for instants in crossings(time, stroke)), key=len)
 
 
-def _extended(
+def extended(
     time: Samples, stroke: Samples, instants: Float[np.ndarray, " instants"], period: float
 ) -> Float[np.ndarray, " more"]:
     """The passages with one more at either end if the record holds another cycle of motion there."""

@@ -6,9 +6,10 @@ extension: a passive law takes in energy, ∮ F v dt ≥ 0. One instance is one 
 
 import dataclasses
 from abc import abstractmethod
-from typing import Any, ClassVar, TypeVar, final
+from typing import Any, ClassVar, NamedTuple, TypeVar, final
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -21,6 +22,22 @@ from jaxdamp.parameters import check_parameters, nonnegative, parameter, readabl
 
 
 L = TypeVar("L")
+
+
+class Condition(NamedTuple):
+    """A lower limit of one parameter of a law that depends on its other parameters."""
+
+    parameter: str
+    least: Any  # in the unit of the parameter
+    formula: str  # the limit in words
+    reason: str  # what goes wrong below it, a sentence
+
+
+class Reach(NamedTuple):
+    """How far records go."""
+
+    stroke: float  # half the range [m]
+    velocity: float  # largest magnitude [m/s]
 
 
 class AbstractDamper(eqx.Module):
@@ -42,6 +59,7 @@ class AbstractDamper(eqx.Module):
         if "fitted_to" not in vars(self):  # as after an `__init__` written by hand; trees need the field to be there
             object.__setattr__(self, "fitted_to", None)
         check_parameters(self)
+        _check_conditions(self)
 
     def __repr__(self) -> str:
         return readable(self)
@@ -82,6 +100,48 @@ class AbstractDamper(eqx.Module):
         """
         return [(part, motion.with_force(None)) for part in parts(self)]
 
+    def conditions(self) -> tuple[Condition, ...]:
+        """What must hold between several parameters of this law, beside the domain of each; of laws inside not.
+
+        The constructor refuses a law that breaks one, and a fit keeps inside. Written with operators only, so that
+        NumPy's numbers stay NumPy's.
+        """
+        return ()
+
+    @classmethod
+    def has_conditions(cls) -> bool:
+        """Whether there are any, known without computing them."""
+        return cls.conditions is not AbstractDamper.conditions
+
+    def other_starts(self, reach: Reach) -> list[dict[str, float]]:
+        """Values of own parameters from which a fit may end in another minimum than from this law's own values.
+
+        A sum of squares has several minima where a parameter says at which velocity, stroke or time the force curve
+        bends. So each positive number in m/s, m or s in which the force is not linear is tried at a quarter and at four
+        times its value, kept between a hundredth of the reach of the records and all of it. A law for which that is
+        not enough brings its own list; one whose sum of squares has one minimum gives an empty one.
+
+        Arguments:
+            reach: how far the records to be fitted go.
+
+        Returns:
+            One mapping of names of fields to values for each start; fields left out keep their values. Laws inside
+            give their own, and the starts of a composition change one law at a time.
+        """
+        spans = {"m/s": reach.velocity, "m": reach.stroke}
+        starts = []
+        for field in dataclasses.fields(self):
+            declared = field.metadata.get("parameter")
+            if declared is None or declared["unit"] not in ("m/s", "m", "s") or declared["linear"]:
+                continue
+            value = np.asarray(getattr(self, field.name))
+            if value.ndim or not value > 0:
+                continue
+            span = spans.get(declared["unit"], np.inf)
+            least = 0.0 if np.isinf(span) else 0.01 * span
+            starts += [{field.name: float(np.clip(factor * value, least, span))} for factor in (0.25, 4.0)]
+        return starts
+
     def __add__(self, other: "AbstractDamper") -> "AbstractDamper":
         """Two laws side by side: forces add."""
         if not isinstance(other, AbstractDamper):
@@ -95,6 +155,17 @@ class AbstractDamper(eqx.Module):
         return Scaled(self, factor)
 
     __rmul__ = __mul__
+
+
+def _check_conditions(law: AbstractDamper) -> None:
+    """Refuse parameters that break a condition between them (traced values pass)."""
+    if not law.has_conditions() or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(law)):
+        return
+    for condition in jax.tree.map(np.asarray, law).conditions():
+        value = np.asarray(getattr(law, condition.parameter))
+        if not np.all(value > condition.least):
+            must = f"be above {condition.formula}, {np.array2string(np.asarray(condition.least), precision=4)}"
+            _checks.refuse(f"{type(law).__name__}.{condition.parameter}", must, value, condition.reason)
 
 
 class AbstractStateless(AbstractDamper):
@@ -197,6 +268,17 @@ def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Li
     for name, value in (vars(law) | {"fitted_to": fitted_to or FittedRange(**limits)}).items():
         object.__setattr__(changed, name, value)
     return changed
+
+
+def laws_inside(tree: Any, prefix: str = "") -> list[tuple[str, AbstractDamper]]:
+    """All laws in a law, a vehicle or another module, each with the prefix of the paths of its parameters."""
+    if isinstance(tree, tuple | list):
+        return [found for i, item in enumerate(tree) for found in laws_inside(item, f"{prefix}{i}.")]
+    if not isinstance(tree, eqx.Module):
+        return []
+    own = [(prefix, tree)] if isinstance(tree, AbstractDamper) else []
+    inner = [laws_inside(getattr(tree, field.name), f"{prefix}{field.name}.") for field in dataclasses.fields(tree)]
+    return own + [found for part in inner for found in part]
 
 
 def refuse_states(argument: str, law: AbstractDamper, remedy: str) -> None:

@@ -1,7 +1,7 @@
 """The seven-parameter law of Besinger, Cebon and Cole, as paper 001 uses it for a heavy vehicle."""
 
 import warnings
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from jaxdamp._elementary import reciprocal_root
 from jaxdamp._limits import at_least, at_most
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import secant_rate
-from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.dampers.base import AbstractMemoryless, Condition, Reach
 from jaxdamp.parameters import parameter, positive
 
 
@@ -26,13 +26,29 @@ def transition_rate(
     return c1 * u * reciprocal_root(1.0 + u * u) + c2
 
 
+LEAST_COMPRESSION = 0.0067  # C_c/C_e below which the force falls with v in compression; exactly 0.00664
+_STEEPEST = 0.5 * (np.sqrt(17.0) - 3.0)  # u at which the slope of C(v) v is most unlike C(v)
+
+
+def least_rebound(limit_velocity: Any, transition_velocity: Any) -> Any:
+    """C_e/C_c below which the force falls with v between zero and v_lim; zero if α is too far above v_lim for that.
+
+    d(C v)/dv = c₂ + c₁ g(u), g = u/√(1+u²) + (1+u)/√(1+u²)³, which grows up to u = (√17 − 3)/2, where g = 1.525.
+    """
+    u = limit_velocity / transition_velocity - 1.0
+    u = 0.5 * (u + _STEEPEST - abs(u - _STEEPEST))  # the lesser of both
+    g = u * (1.0 + u * u) ** -0.5 + (1.0 + u) * (1.0 + u * u) ** -1.5
+    return 0.5 * (g - 1.0 + abs(g - 1.0)) / (g + 1.0)
+
+
 @final
 class Besinger(AbstractMemoryless):
     """Paper 001: F = C(v) v below the limit velocity, F = C_e v_open + C_b (v − v_open) above, when the valve is open.
 
     C(v) passes smoothly from C_c to C_e (`transition_rate`). The opening velocity is not a parameter of its own:
     continuity at v_lim gives v_open = v_lim (C(v_lim) − C_b)/(C_e − C_b). With v_open = v_lim, as the paper's text
-    suggests, the force jumps. The slope changes at v_lim. F grows with v everywhere if C_c > 0.0067 C_e and C_b > 0.
+    suggests, the force jumps. The slope changes at v_lim. F grows with v everywhere: sets for which it would not are
+    refused. C_c must be above 0.0067 C_e and, where v_lim is above α, C_e above up to 0.208 C_c (`least_rebound`).
     C_e must differ from C_b only for `opening_velocity` to exist, not for the force.
 
     Valid below 10 Hz and 1 m/s (paper 001); above 10 Hz put a `SeriesSpring` or a `Lag` around it. Needs data on both
@@ -54,6 +70,30 @@ class Besinger(AbstractMemoryless):
         closed = at_most(v, self.limit_velocity)
         rate = transition_rate(closed, self.compression_rate, self.rebound_rate, self.transition_velocity)
         return rate * closed + self.blow_off_rate * at_least(v - self.limit_velocity, 0.0)
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """The force grows with the velocity."""
+        falls = "Otherwise the force falls with growing velocity in {}."
+        share = least_rebound(self.limit_velocity, self.transition_velocity)
+        return (
+            Condition(
+                "compression_rate",
+                LEAST_COMPRESSION * self.rebound_rate,
+                f"{LEAST_COMPRESSION} rebound_rate",
+                falls.format("compression"),
+            ),
+            Condition(
+                "rebound_rate",
+                share * self.compression_rate,
+                "a share of compression_rate that limit_velocity / transition_velocity gives",
+                falls.format("rebound"),
+            ),
+        )
+
+    def other_starts(self, reach: Reach) -> list[dict[str, float]]:
+        """α far below, within and beyond the records; the valve opening early and late."""
+        shares = (("transition_velocity", (0.03, 0.3, 1.0, 4.0)), ("limit_velocity", (0.2, 0.6, 0.97)))
+        return [{name: share * reach.velocity} for name, parts in shares for share in parts]
 
     def opening_velocity(self) -> Scalar:
         """v_open [m/s], where the blow-off line meets the line C_e v."""

@@ -9,7 +9,7 @@ from jaxdamp.dampers._commands import command_paths
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.motion import Motion
 from jaxdamp.dampers.range_use import range_use, sentence, warn_outside
-from jaxdamp.parameters import as_float, check_parameters, get
+from jaxdamp.parameters import as_float, check_invariants, get
 
 
 def takes_command(law: AbstractDamper) -> bool:
@@ -39,9 +39,7 @@ def with_command(law: AbstractDamper, command: ScalarLike) -> AbstractDamper:
     value = as_float(command)
     changed = eqx.tree_at(lambda t: [get(t, path) for path in paths], law, [value] * len(paths))
     for path in paths:
-        owner = get(changed, path.rpartition(".")[0])
-        check_parameters(owner)
-        owner.__check_init__()
+        check_invariants(get(changed, path.rpartition(".")[0]))
     uses = [use for use in range_use(changed, Motion()) if use.quantity == "command"]
     warn_outside([sentence(type(law).__name__, uses)])
     return changed

@@ -16,7 +16,7 @@ from jaxdamp._types import Number
 from jaxdamp.dampers import AbstractDamper, FittedRange
 from jaxdamp.dampers.fitted_range import UNITS, has_fitted_range
 from jaxdamp.export._write import write_whole
-from jaxdamp.parameters import as_float
+from jaxdamp.parameters import as_float, check_invariants
 
 
 FORMAT = "jaxdamp law"
@@ -213,9 +213,7 @@ def _law(plain: Any, where: str) -> AbstractDamper:
             _checks.refuse(here, "be one number", value)
         object.__setattr__(law, field.name, value)
     object.__setattr__(law, FITTED_TO, covered)
-    for base in kind.__mro__:
-        if "__check_init__" in base.__dict__:
-            base.__dict__["__check_init__"](law)
+    check_invariants(law)
     return law
 
 

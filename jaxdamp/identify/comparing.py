@@ -69,6 +69,12 @@ class Comparison:
         """The law with the smallest error on the held-out records, or on the fitted ones if there are none."""
         return min(self.rungs, key=lambda rung: rung.error)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What all fits warn of, such as records that contradict each other: it concerns the records, not a law."""
+        first, *others = (rung.result.warnings for rung in self.rungs)
+        return tuple(warning for warning in first if all(warning in warnings for warnings in others))
+
     def __getitem__(self, name: str) -> FitResult:
         """The fit of the law of that name."""
         for rung in self.rungs:
@@ -88,7 +94,8 @@ class Comparison:
                 line += f"{r.held_out_fit_percent:>12.1f}{r.held_out_rmse:>9.1f}"
             lines.append(line)
         lines += [f"{failure.name:<24} failed: {failure.reason}" for failure in self.failed]
-        return "\n".join([*lines, f"best: {self.best.name}"])
+        about_records = [f"warning: {warning}" for warning in self.warnings if len(self.rungs) > 1]
+        return "\n".join([*lines, *about_records, f"best: {self.best.name}"])
 
 
 def compare(

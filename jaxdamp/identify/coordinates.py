@@ -7,14 +7,17 @@ vectors use the smooth map of their domain, and have no box.
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
+from jaxdamp.dampers.base import laws_inside
 from jaxdamp.parameters import FreeParameters, Parameter
 
 
 OPEN_EDGE = 1e-6  # how near a parameter comes to an edge that does not belong to its domain, in its unit
+AT_LIMIT = 1e-4  # distance from a limit that other parameters give, in units of the start, that counts as none
 TOUCHING = 1e-4  # gap between ordered numbers, relative to the largest, that counts as none
 
 
@@ -32,6 +35,11 @@ def _ordered(p: Parameter) -> bool:
 def _ranged(p: Parameter) -> bool:
     """Whether both ends of the range are finite."""
     return not _ordered(p) and bool(np.isfinite(p.domain.upper - p.domain.lower))
+
+
+def ordered(free: FreeParameters) -> Bool[np.ndarray, " free"]:
+    """Which numbers belong to ordered vectors."""
+    return np.array([_ordered(p) for p in free.chosen for _ in range(p.value.size)])
 
 
 def _pieces(free: FreeParameters, vector: Array) -> list[Array]:
@@ -87,10 +95,31 @@ def _met(p: Parameter, value: Float[np.ndarray, " _"]) -> Float[np.ndarray, " _"
 
 
 def edges(free: FreeParameters, values: Float[np.ndarray, " free"]) -> Float[np.ndarray, " free"]:
-    """−1 where a number lies on the lower edge of its range, 1 on the upper, else 0; neighbours are edges too."""
+    """−1 where a number lies on the lower edge of its range, 1 on the upper, else 0.
+
+    Neighbours of ordered numbers are edges too, and so are limits that depend on other parameters.
+    """
     pieces = _pieces(free, jnp.asarray(values))
     y = np.concatenate([np.ravel(value / unit) for value, unit in zip(pieces, _units(free), strict=True)])
     low, high = box(free)
     sides = np.where(y <= low + OPEN_EDGE, -1.0, np.where(y >= high - OPEN_EDGE, 1.0, 0.0))
     parts = zip(free.chosen, pieces, strict=True)
-    return sides + np.concatenate([_met(p, np.asarray(a)) if _ordered(p) else np.zeros(a.size) for p, a in parts])
+    sides += np.concatenate([_met(p, np.asarray(a)) if _ordered(p) else np.zeros(a.size) for p, a in parts])
+    limited = _limited(free, values)
+    return np.where(np.isin(free.names, list(limited)) & (sides == 0), -1.0, sides)
+
+
+def _limited(free: FreeParameters, values: Float[np.ndarray, " free"]) -> set[str]:
+    """Parameters that lie on a limit that other parameters give."""
+    scales = {p.path: float(np.max(np.asarray(scale))) for p, scale in zip(free.chosen, free.scales, strict=True)}
+    found = set()
+    for prefix, law in laws_inside(free.started_at(values).tree):
+        if not law.has_conditions():
+            continue
+        plain = jax.tree.map(np.asarray, law)
+        for condition in plain.conditions():
+            path = prefix + condition.parameter
+            margin = getattr(plain, condition.parameter) - condition.least
+            if path in scales and margin < AT_LIMIT * scales[path]:
+                found.add(path)
+    return found

@@ -10,21 +10,22 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.optimize
-from jaxtyping import Bool, Float
 
 from jaxdamp import _checks, dampers
-from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.bench import BenchRun, as_runs, contradictions, contradictions_in_words
 from jaxdamp.dampers import AbstractDamper, AbstractStateless, with_fitted_range, without_fitted_ranges
 from jaxdamp.dampers.base import parts
+from jaxdamp.dampers.command import takes_command
 from jaxdamp.dampers.coverage import coverage
 from jaxdamp.identify._tall import triangle
-from jaxdamp.identify.coordinates import box, edges, to_values
+from jaxdamp.identify.coordinates import box, to_values
 from jaxdamp.identify.covered import covered_range
-from jaxdamp.identify.judgement import judge, warn
+from jaxdamp.identify.judgement import judge, on_correlation
+from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.result import FitResult, score
-from jaxdamp.identify.search import Found, linearised, search
-from jaxdamp.identify.traces import Batch, Place, batches
-from jaxdamp.identify.uncertainty import uncertainty
+from jaxdamp.identify.search import Found, Problem, finite, linearised
+from jaxdamp.identify.several import Several, reach_of, search_from
+from jaxdamp.identify.traces import batches
 from jaxdamp.parameters import FreeParameters, free_parameters
 
 
@@ -43,6 +44,7 @@ def fit(
     weighting: str | Sequence[float] = "samples",
     force_noise: float | None = None,
     samples_per_cycle: int | None = 400,
+    starts: int | None = None,
     max_steps: int = 200,
 ) -> FitResult:
     """Fit a damper law to bench records by least squares on the force.
@@ -50,6 +52,12 @@ def fit(
     Minimises Σ ((F_law − F_measured)/σ)² over all samples of all records, with Levenberg-Marquardt inside the domains
     of the parameters, and Jacobians by forward-mode differentiation through the law and its states. Where the law is
     linear in everything free, the minimum is computed directly (bounded linear least squares).
+
+    A sum of squares may have several minima. The search goes from several starts, the best end is kept, and `minima`
+    tells of the others; nothing is random, the same records give the same result.
+
+    Standard errors count every other free number as unknown. Where the residual is correlated from sample to sample,
+    because the law misses something, they count as many samples as are independent (`inflation`).
 
     A law with states is led into every record by a copy of its first cycle, and the record's first half cycle is not
     compared; blocks of samples of slow records are averaged down to `samples_per_cycle`.
@@ -64,10 +72,12 @@ def fit(
         weighting: `"samples"`, every sample counts the same; `"runs"`, every record counts the same, relative to its
             RMS force; or one standard deviation [N] for each record, of which only the ratios matter. `inf` leaves a
             record out of the fit; it is scored all the same.
-        force_noise: standard deviation [N] of the measured force where it is known. Otherwise the residual gives it,
-            which makes the standard errors right only if the law can follow the data.
+        force_noise: standard deviation [N] of the measured force where it is known, as independent noise. Otherwise
+            the residual gives it, with its correlation.
         samples_per_cycle: see above; `None` uses every sample.
-        max_steps: of the search.
+        starts: search from at most so many starts: `law` first, then those that it and the laws inside it propose
+            (`other_starts`), all of them if left out. 1 searches from `law` alone.
+        max_steps: of each search.
 
     Returns:
         The law with the range of the fitted records (`law.fitted_to`), its parameters with standard errors, scores and
@@ -85,41 +95,66 @@ def fit(
     True
     """
     runs = as_runs(runs, call="fit(law, runs)")
-    _check(runs, force_noise, max_steps)
+    _check(runs, force_noise, max_steps, starts)
     sigma = weights(weighting, runs)
-    fitted_to = np.isfinite(sigma)
-    used_runs = [run for run, yes in zip(runs, fitted_to, strict=True) if yes]
-    begin = started(law, used_runs)
+    fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
+    begin = started(law, fitted_to)
     free = free_parameters(begin, freeze=freeze, bounds=bounds)
     _checks.finite("law", free.values)
     made, places = batches(begin, runs, sigma, samples_per_cycle)
     level = float(np.sqrt(sum(np.sum(np.square(batch.force * batch.weight)) for batch in made)))
-    found = _solve_linear(free, made) if is_linear(begin, free) else search(free, made, level, max_steps)
-    if not (np.all(np.isfinite(found.residual)) and np.all(np.isfinite(found.jacobian))):
+    problem = Problem(free, made, level)
+    reach, linear = reach_of(fitted_to), is_linear(begin, free)
+    several = _solve_linear(problem) if linear else search_from(problem, reach, starts=starts, max_steps=max_steps)
+    found = several.best
+    if not finite(found):
         must = "give finite forces and derivatives over the records"
         _checks.refuse("law", must, f"{begin}, which does not", coverage(begin) or "Start from another law.")
 
-    used = np.concatenate([np.ravel(batch.weight) for batch in made]) > 0
-    dof = max(int(np.count_nonzero(used)) - found.values.size, 1)
-    noise = _noise(found.residual, used, _owners(made, places), np.array(sigma), dof, weighting == "runs", force_noise)
-    sides = edges(free, found.values)
-    known = uncertainty(found.jacobian, found.residual, noise, sides != 0)
-    estimates = judge(free, found.values, known, sides, np.linalg.norm(found.jacobian, axis=0) / level, dof)
-    fitted = with_fitted_range(free.build(jnp.asarray(found.values)), covered_range(used_runs))
-    percent, rmse, scores = score(fitted, runs, fitted_to)
-    notes = warn(estimates, "" if found.converged else found.said, found.residual[used], force_noise is None)
+    noise, inflation = noise_of(problem, found, places, sigma, each=weighting == "runs", force_noise=force_noise)
+    judged = judge(problem, several, noise, reach, searched=not linear)
+    fitted = with_fitted_range(free.build(jnp.asarray(found.values)), covered_range(fitted_to))
+    percent, rmse, scores = score(fitted, runs, np.isfinite(sigma))
+    notes = [f"The search did not converge: {found.said} {_REMEDY}"] * (not found.converged)
+    notes += _contradicting(begin, fitted_to)
+    notes += [*judged.notes, *on_correlation(inflation)]
     return FitResult(
-        fitted, runs, estimates, known.covariance, percent, rmse, scores, tuple(notes), found.converged, found.steps
+        law=fitted,
+        runs=runs,
+        parameters=judged.estimates,
+        covariance=judged.covariance,
+        fit_percent=percent,
+        rmse=rmse,
+        scores=scores,
+        warnings=tuple(notes),
+        converged=found.converged,
+        steps=found.steps,
+        starts=several.starts,
+        minima=judged.minima,
+        inflation=inflation,
     )
 
 
-def _check(runs: Sequence[BenchRun], force_noise: float | None, max_steps: int) -> None:
+def _contradicting(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
+    """A sentence on records with the same motion, and the same command if the law follows it, but other forces."""
+    follows = takes_command(law) and all(run.command is not None for run in runs)
+    groups: dict[float | None, list[BenchRun]] = {}
+    for run in runs:
+        groups.setdefault(run.command if follows else None, []).append(run)
+    return contradictions_in_words([pair for group in groups.values() for pair in contradictions(group)])
+
+
+_REMEDY = "Try another start, bounds, or fewer free parameters."
+
+
+def _check(runs: Sequence[BenchRun], force_noise: float | None, max_steps: int, starts: int | None) -> None:
     if not runs:
         _checks.refuse("runs", "hold at least one record", "empty", "Read some with `bench.read`.")
     if force_noise is not None:
         _checks.positive("force_noise", force_noise)
-    if max_steps < 1:
-        _checks.refuse("max_steps", "be 1 or more", max_steps)
+    for name, count in (("max_steps", max_steps), ("starts", starts)):
+        if count is not None and count < 1:
+            _checks.refuse(name, "be 1 or more", count)
     if not any(np.ptp(run.force) > 0 for run in runs):
         _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
 
@@ -191,33 +226,6 @@ def weights(weighting: str | Sequence[float], runs: Sequence[BenchRun]) -> list[
     return sigma
 
 
-def _owners(made: Sequence[Batch], places: Sequence[Place]) -> np.ndarray:
-    """The number of the record that each weighted residual belongs to."""
-    numbers = [np.zeros(batch.weight.shape, dtype=int) for batch in made]
-    for i, place in enumerate(places):
-        numbers[place.batch][place.row, place.start : place.stop] = i
-    return np.concatenate([np.ravel(a) for a in numbers])
-
-
-def _noise(
-    residual: Float[np.ndarray, " samples"],
-    used: Bool[np.ndarray, " samples"],
-    owner: np.ndarray,
-    sigma: Float[np.ndarray, " runs"],
-    dof: int,
-    each: bool,
-    force_noise: float | None,
-) -> Float[np.ndarray, " samples"]:
-    """Standard deviation of each weighted residual: as known, or of all together, or (`each`) of its own record."""
-    if force_noise is not None:
-        return np.where(used, force_noise / sigma[owner], 1.0)
-    count = np.bincount(owner, used, minlength=sigma.size)
-    squares = np.bincount(owner, residual**2, minlength=sigma.size) * (count.sum() / dof)
-    if not each:
-        return np.full(residual.size, np.sqrt(squares.sum() / count.sum()))
-    return np.sqrt(squares / np.maximum(count, 1))[owner]
-
-
 def is_linear(law: AbstractDamper, free: FreeParameters) -> bool:
     """Whether the force is linear in all that is free, so that the least squares have a closed form."""
 
@@ -229,10 +237,11 @@ def is_linear(law: AbstractDamper, free: FreeParameters) -> bool:
     return keeps(law) and all(p.linear and p.domain.steps is None for p in free.chosen)
 
 
-def _solve_linear(free: FreeParameters, made: Sequence[Batch]) -> Found:
+def _solve_linear(problem: Problem) -> Several:
     """Minimum of a linear least-squares problem within the domains."""
+    free = problem.free
     begin = np.asarray(free.values)
-    residual, jacobian = (np.asarray(a) for a in linearised(free, free.values, made))
+    residual, jacobian = (np.asarray(a) for a in linearised(free, free.values, problem.made))
     norms = np.linalg.norm(jacobian, axis=0)
     scale = np.where(norms > 0, norms, 1.0)
     lower, upper = (np.asarray(to_values(free, jnp.asarray(y))) for y in box(free))
@@ -245,4 +254,5 @@ def _solve_linear(free: FreeParameters, made: Sequence[Batch]) -> Found:
         answer = scipy.optimize.lsq_linear(r, target, (lower * scale, upper * scale), method="bvls")
         values = np.clip(answer.x / scale, lower, upper)
         solved, said = bool(answer.success), str(answer.message)
-    return Found(values, residual + jacobian @ (values - begin), jacobian, solved, 0, said)
+    found = Found(values, residual + jacobian @ (values - begin), jacobian, solved, 0, said)
+    return Several(found, (found,), 1)

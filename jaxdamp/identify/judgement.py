@@ -1,79 +1,119 @@
 """What a user should know before trusting fitted numbers."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import scipy.stats
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from jaxdamp.identify.result import Estimate
-from jaxdamp.identify.uncertainty import Uncertainty
+from jaxdamp.dampers.base import Reach
+from jaxdamp.identify.coordinates import edges, ordered
+from jaxdamp.identify.profile import Profile, profile
+from jaxdamp.identify.result import Estimate, Minimum
+from jaxdamp.identify.search import Found, Problem, squares
+from jaxdamp.identify.several import Several, minima_of
+from jaxdamp.identify.uncertainty import uncertainty, weak_directions
 from jaxdamp.parameters import FreeParameters
 
 
 WEAK = 0.5  # standard error, relative to the value or to the force, above which a parameter is not identifiable
 PRESSING = 3.0  # standard errors beyond an edge from which the data truly press against it
-ALIKE = 0.5  # correlation of neighbouring residuals above which the law misses something
+NEARLY = 9.0  # chi-square above the best up to which another minimum is nearly as good: three standard errors
+APART = 3.0  # standard errors from which a parameter of another minimum is another value
+
+
+class Judged(NamedTuple):
+    """How far fitted numbers can be trusted."""
+
+    estimates: tuple[Estimate, ...]
+    covariance: Float[np.ndarray, "free free"]
+    minima: tuple[Minimum, ...]
+    notes: tuple[str, ...]
 
 
 def judge(
-    free: FreeParameters,
-    values: Float[np.ndarray, " free"],
-    known: Uncertainty,
-    sides: Float[np.ndarray, " free"],
-    effect: Float[np.ndarray, " free"],
-    dof: int,
-) -> tuple[Estimate, ...]:
-    """Values with standard errors, 95 % intervals by Student's t within the domain, and what is wrong with them.
+    problem: Problem, several: Several, noise: Float[np.ndarray, " samples"], reach: Reach, *, searched: bool
+) -> Judged:
+    """Standard errors, 95 % intervals by Student's t within the domain, and what is wrong with them.
 
     A parameter is "not identifiable" where no error is finite, or where its standard error is more than half of it. A
     number that may have either sign is measured by its force instead: its standard error must not change the force by
     more than half its RMS. One that ended at zero, where its domain ends, is "not identifiable" too if the data cannot
-    tell it from zero, and "at a bound" if they press beyond.
+    tell it from zero, and "at a bound" if they press beyond. Where one is not identifiable or
+    lies beyond the records, or another minimum is nearly as good, the others are moved away to see whether their errors
+    hold (`profile`).
 
     Arguments:
-        free: the free parameters.
-        values: their values.
-        known: their covariance.
-        sides: which lie on an edge, as `coordinates.edges` gives them.
-        effect: RMS force that one unit of each makes, relative to the RMS of the measured force.
-        dof: degrees of freedom of the residual.
+        problem: what was minimised.
+        several: where the searches ended.
+        noise: standard deviation of each weighted residual.
+        reach: how far the records go.
+        searched: whether the minimum was searched for, or has a closed form and no other beside it.
     """
+    free, found, used = problem.free, several.best, problem.used
+    known, variance = uncertainty(found.jacobian, found.residual, noise), float(np.mean(noise[used] ** 2))
+    yardstick = yardsticks(free, found.values, np.linalg.norm(found.jacobian, axis=0) / problem.level)
+    sides, minima = edges(free, found.values), minima_of(several, free.names, variance)
+    errors = np.sqrt(np.diag(known.covariance))
+    numbers = ~ordered(free)
+    firm = numbers & (errors <= WEAK * yardstick) & (sides == 0)
+    spans = _spans(free, reach)
+    doubt = np.any((np.abs(found.values) > spans) | (numbers & ~firm)) or any(m.chi_square < NEARLY for m in minima[1:])
+    far = WEAK * yardstick
+    moved = Profile(errors, np.zeros(errors.shape, bool))
+    if searched and doubt and found.converged and not problem.is_rounding(squares(found)):
+        moved = profile(problem, found, errors, far, firm, variance)
     lower, upper = free.limits()
-    reach = float(scipy.stats.t.ppf(0.975, dof))
+    at_zero = numbers & (sides < 0) & (lower == 0) & np.isinf(upper) & (np.abs(known.beyond) < PRESSING)
+    undetermined = ~(moved.errors <= far) | moved.open_ended
+    weak = np.where(sides != 0, at_zero | ~np.isfinite(errors), undetermined)
+    estimates = _estimates(free, found, moved.errors, weak, sides != 0, int(np.count_nonzero(used)))
+    notes = on_estimates(estimates, weak_directions(found.jacobian, float(np.sqrt(variance)), yardstick, WEAK))
+    notes += on_minima(minima, estimates) + on_reach(estimates, spans)
+    return Judged(estimates, known.covariance, minima, tuple(notes))
+
+
+def _estimates(
+    free: FreeParameters,
+    found: Found,
+    errors: Float[np.ndarray, " free"],
+    weak: Bool[np.ndarray, " free"],
+    bound: Bool[np.ndarray, " free"],
+    samples: int,
+) -> tuple[Estimate, ...]:
+    lower, upper = free.limits()
+    reach = float(scipy.stats.t.ppf(0.975, max(samples - found.values.size, 1)))
     owners = [p for p in free.chosen for _ in range(p.value.size)]
     rows = []
     for i, (name, p) in enumerate(zip(free.names, owners, strict=True)):
-        value, error = float(values[i]), float(np.sqrt(known.covariance[i, i]))
-        if sides[i]:
-            free_to_zero = p.domain.steps is None and sides[i] < 0 and lower[i] == 0 and np.isinf(upper[i])
-            unpressed = free_to_zero and abs(known.beyond[i]) < PRESSING
-            note = "not identifiable" if unpressed or not np.isfinite(error) else "at a bound"
-        else:
-            signed = lower[i] < 0 < upper[i]
-            share = (
-                error * effect[i] if signed and np.isfinite(error) else error / max(abs(value), np.finfo(float).tiny)
-            )
-            note = "" if share <= WEAK else "not identifiable"
+        value, error = float(found.values[i]), float(errors[i])
         interval = (max(value - reach * error, float(lower[i])), min(value + reach * error, float(upper[i])))
+        note = "not identifiable" if weak[i] else "at a bound" if bound[i] else ""
         rows.append(Estimate(name, value, p.unit, error, interval, p.meaning, note))
     return tuple(rows)
 
 
-def warn(
-    estimates: Sequence[Estimate], failure: str, residual: Float[np.ndarray, " samples"], noise_estimated: bool
-) -> list[str]:
-    """Sentences on a failed search, on parameters at bounds or not identifiable, and on residuals that are no noise.
+def yardsticks(
+    free: FreeParameters, values: Float[np.ndarray, " free"], effect: Float[np.ndarray, " free"]
+) -> Float[np.ndarray, " free"]:
+    """A large change of each parameter: its value; for one that may have either sign, what moves the force by its RMS.
 
     Arguments:
-        estimates: the parameters.
-        failure: why the search did not converge, empty if it did.
-        residual: the weighted residual, record by record.
-        noise_estimated: whether the standard errors were made from the residual.
+        free: the free parameters.
+        values: their values.
+        effect: RMS force that one unit of each makes, relative to the RMS of the measured force.
     """
+    lower, upper = free.limits()
+    tiny = np.finfo(float).tiny
+    signed = (lower < 0) & (upper > 0)
+    by_force = np.divide(1.0, effect, out=np.full(effect.shape, tiny), where=effect > 0)
+    return np.where(signed, by_force, np.maximum(np.abs(values), tiny))
+
+
+def on_estimates(estimates: Sequence[Estimate], directions: Sequence[np.ndarray]) -> list[str]:
+    """Sentences on parameters at bounds, on those that are not identifiable, and on groups that are so together."""
     notes = []
-    if failure:
-        notes.append(f"The search did not converge: {failure} Try another start, bounds, or fewer free parameters.")
     for e in estimates:
         unit = f" {e.unit}" if e.unit else ""
         if e.note == "at a bound":
@@ -83,12 +123,76 @@ def warn(
                 f"{e.name} is not identifiable from these records ({e.value:.3g} ± {e.standard_error:.2g}{unit}):"
                 " freeze it or add records that excite it."
             )
-    centred = residual - residual.mean()
-    memory = float(centred[1:] @ centred[:-1] / (centred @ centred)) if residual.size > 2 and centred.any() else 0.0
-    if memory > ALIKE and noise_estimated:
-        factor = np.sqrt((1 + memory) / (1 - memory)) if memory < 1 else np.inf
-        notes.append(
-            f"Neighbouring residuals are alike (correlation {memory:.2f}): the law misses something systematic, and"
-            f" standard errors, which assume independent noise, are too small by about {factor:.0f} times."
-        )
+    return notes + _together(estimates, directions)
+
+
+def _together(estimates: Sequence[Estimate], directions: Sequence[np.ndarray]) -> list[str]:
+    """Sentences on groups of parameters of which the records tell only some combination."""
+    weak = np.array([e.note == "not identifiable" for e in estimates])
+    groups: list[tuple[set[int], str]] = []
+    for direction in directions:
+        signs = np.sign(direction) * weak
+        members = set(map(int, np.flatnonzero(signs)))
+        if len(members) < 2:
+            continue
+        ways = (("raising", np.flatnonzero(signs > 0)), ("lowering", np.flatnonzero(signs < 0)))
+        how = " while ".join(f"{way} {_listed([estimates[int(i)].name for i in who])}" for way, who in ways if who.size)
+        joined = [group for group in groups if group[0] & members]
+        groups = [group for group in groups if not group[0] & members]
+        groups.append((members.union(*(group[0] for group in joined)), "" if joined else how))
+    return [
+        f"These records cannot tell {_listed([estimates[i].name for i in sorted(members)])} apart"
+        + f": {how} hardly changes the force" * bool(how)
+        + ". Freeze all but one of them, or add records."
+        for members, how in groups
+    ]
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+
+
+def _spans(free: FreeParameters, reach: Reach) -> Float[np.ndarray, " free"]:
+    """How far the records go in the unit of each number; infinite for units other than m/s and m."""
+    spans = {"m/s": reach.velocity, "m": 2.0 * reach.stroke}
+    return np.array([spans.get(p.unit, np.inf) for p in free.chosen for _ in range(p.value.size)])
+
+
+def on_reach(estimates: Sequence[Estimate], spans: Float[np.ndarray, " free"]) -> list[str]:
+    """Sentences on velocities and strokes in the law that the records do not reach."""
+    names = {"m/s": "velocity", "m": "range of the stroke"}
+    return [
+        f"{e.name} = {e.value:.4g} {e.unit} lies beyond the records, whose largest {names[e.unit]} is {span:.3g}"
+        f" {e.unit}: what the law does there was not measured. Add records that go beyond it, or freeze it."
+        for e, span in zip(estimates, spans, strict=True)
+        if abs(e.value) > span
+    ]
+
+
+def on_minima(minima: Sequence[Minimum], estimates: Sequence[Estimate]) -> list[str]:
+    """A sentence on each other minimum that is nearly as good and has other parameters."""
+    notes = []
+    for minimum in minima[1:]:
+        if minimum.chi_square >= NEARLY:
+            continue
+        other = [
+            f"{e.name} = {minimum.values[e.name]:.4g} instead of {e.value:.4g} {e.unit}".rstrip()
+            for e in estimates
+            if abs(minimum.values[e.name] - e.value) > APART * e.standard_error
+        ]
+        if other:
+            notes.append(
+                f"Another minimum is nearly as good (chi-square {minimum.chi_square:.2g} higher): {', '.join(other)}."
+                " The standard errors hold for the minimum given only; add records that tell them apart."
+            )
     return notes
+
+
+def on_correlation(inflation: float) -> list[str]:
+    """A sentence on a residual that is no independent noise."""
+    if inflation == 1.0:
+        return []
+    return [
+        "Neighbouring residuals are alike: the law misses something systematic. The standard errors count that as noise"
+        f" with the correlation of the residual, which makes them {inflation:.3g} times those of independent noise."
+    ]

@@ -22,8 +22,8 @@ PLACES = 3  # behind the point, of a value too large or too small to be written 
 class Estimate(NamedTuple):
     """One fitted number.
 
-    The standard error of a number at an edge of its range is what it would be without that edge; the errors of the
-    others count it as frozen there.
+    The standard error counts every other free number as unknown, also those that ended on an edge of their range, and
+    is what it would be without any edge.
     """
 
     name: str
@@ -51,6 +51,14 @@ def rounded(value: float, error: float) -> tuple[str, str]:
         return f"{value:.{PLACES}e}", f"{error:.1e}"
     texts = (f"{round(number, -at):.{max(-at, 0)}f}" for number, at in ((value, place_of_value), (error, place)))
     return next(texts), next(texts)
+
+
+class Minimum(NamedTuple):
+    """A set of parameters at which the sum of squares has a minimum."""
+
+    values: dict[str, float]  # of the free numbers, in their units
+    chi_square: float  # sum of squares over the variance of the noise, above that of the best minimum
+    starts: int  # so many of the starts ended here
 
 
 class Score(NamedTuple):
@@ -94,6 +102,15 @@ def score(
     return fit_percent(y, p), float(np.sqrt(np.mean(errors**2))), tuple(rows)
 
 
+def describe(minima: Sequence[Minimum], starts: int) -> str:
+    """Where several starts ended, in words."""
+    best, *others = minima
+    parts = [f"{best.starts} ended here"]
+    parts += [f"{m.starts} in another minimum, chi-square {m.chi_square:.3g} higher" for m in others]
+    left = starts - sum(m.starts for m in minima)
+    return f"{starts} starts: " + "; ".join([*parts, *[f"{left} given up as worse"] * bool(left)])
+
+
 @dataclasses.dataclass(frozen=True, repr=False)
 class FitResult:
     """A fitted law with its parameters, their uncertainty and its errors.
@@ -108,7 +125,11 @@ class FitResult:
         scores: the same for each record given.
         warnings: what a user should know before trusting the numbers, in words.
         converged: whether the search ended by its tolerance.
-        steps: steps of the search, 0 for a closed form.
+        steps: steps of the search that gave the law, 0 for a closed form.
+        starts: how many starts were tried, 1 for a closed form.
+        minima: where they ended, the best first, which is this result. Starts that were given up are in none.
+        inflation: the standard errors are so many times those for independent noise, because the residual is
+            correlated from sample to sample; 1 where it is not, or where the noise was stated.
     """
 
     law: AbstractDamper
@@ -121,6 +142,9 @@ class FitResult:
     warnings: tuple[str, ...]
     converged: bool
     steps: int
+    starts: int = 1
+    minima: tuple[Minimum, ...] = ()
+    inflation: float = 1.0
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name."""
@@ -152,4 +176,6 @@ class FitResult:
         for e, (value, error) in zip(self.parameters, texts, strict=True):
             note = f"  ({e.note})" if e.note else ""
             lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
+        if len(self.minima) > 1:
+            lines.append(f"  {describe(self.minima, self.starts)}")
         return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])

@@ -10,6 +10,7 @@ from jaxdamp.identify._tall import triangle
 
 BLIND = 1e-7  # singular value, relative to the largest, below which a direction leaves the force unchanged
 BLIND_SINGLE = 1e-4  # the same in single precision
+TAKES_PART = 0.1  # of the largest force in a direction, from which a parameter belongs to it
 
 
 class Uncertainty(NamedTuple):
@@ -33,41 +34,53 @@ def uncertainty(
     jacobian: Float[np.ndarray, "samples free"],
     residual: Float[np.ndarray, " samples"],
     noise: Float[np.ndarray, " samples"],
-    held: np.ndarray,
 ) -> Uncertainty:
-    """Covariance at a minimum, (JᵀJ)⁻¹ Jᵀ diag(σ²) J (JᵀJ)⁻¹.
+    """Covariance at a minimum, (JᵀJ)⁻¹ Jᵀ diag(σ²) J (JᵀJ)⁻¹, as if no parameter had an edge.
 
-    A direction with a singular value below `BLIND` of the largest leaves the force unchanged: its parameters get an
-    infinite variance instead of a number made of rounding.
+    So a parameter on an edge of its range counts as unknown in the errors of its partners: frozen there, it would lend
+    them a certainty that the records do not give. A direction with a singular value below `BLIND` of the largest leaves
+    the force unchanged: its parameters get an infinite variance instead of a number made of rounding.
 
     Arguments:
         jacobian: derivatives of the weighted residual by the parameters.
         residual: the weighted residual.
         noise: standard deviation σ of each weighted sample. Where the weights are one over the true standard deviation
             it is one, and the covariance (JᵀJ)⁻¹; elsewhere the covariance counts both.
-        held: which parameters lie on an edge of their range. The others are counted as if those were frozen; the
-            variance of those is what it would be without the edge.
     """
     norms = np.linalg.norm(jacobian, axis=0)
     scale = np.where(norms > 0, norms, 1.0)
     scaled = jacobian / scale
-    factor = triangle(scaled)
+    inverse, lost = _inverse(triangle(scaled))
     noisy = scaled * noise[:, None]
-    spread = noisy.T @ noisy
-
-    def covariance(some: np.ndarray) -> Float[np.ndarray, "some some"]:
-        inverse, lost = _inverse(factor[:, some])
-        found = inverse @ spread[np.ix_(some, some)] @ inverse
-        found[lost, :] = found[:, lost] = 0.0
-        found[lost, lost] = np.inf
-        return found
-
-    whole = covariance(np.ones_like(held))
+    whole = inverse @ (noisy.T @ noisy) @ inverse
+    whole[lost, :] = whole[:, lost] = 0.0
+    whole[lost, lost] = np.inf
     errors = np.sqrt(np.diag(whole))
-    step = -_inverse(factor)[0] @ (scaled.T @ residual)
-    if held.any():
-        whole = np.diag(np.diag(whole))
-        if not held.all():
-            whole[np.ix_(~held, ~held)] = covariance(~held)
+    step = -inverse @ (scaled.T @ residual)
     beyond = np.divide(step, errors, out=np.zeros_like(step), where=errors > 0)
     return Uncertainty(whole / np.outer(scale, scale), beyond)
+
+
+def weak_directions(
+    jacobian: Float[np.ndarray, "samples free"],
+    noise: float,
+    yardstick: Float[np.ndarray, " free"],
+    weak: float,
+) -> list[Float[np.ndarray, " free"]]:
+    """Directions in which parameters change the force, each by itself, but hardly together.
+
+    Arguments:
+        jacobian: derivatives of the weighted residual by the parameters.
+        noise: standard deviation of a weighted sample.
+        yardstick: a large change of each parameter.
+        weak: standard error along a direction, in yardsticks, above which it counts as undetermined.
+
+    Returns:
+        For each direction, changes in yardsticks; zero for parameters whose force has no part in it.
+    """
+    reduced = triangle(jacobian * yardstick)
+    _, singular, directions = np.linalg.svd(reduced)
+    singular = np.concatenate([singular, np.zeros(len(directions) - singular.size)])
+    found = directions[singular * weak < noise]
+    forces = np.abs(found) * np.linalg.norm(reduced, axis=0)
+    return [np.where(force > TAKES_PART * force.max(), row, 0.0) for row, force in zip(found, forces, strict=True)]

@@ -1,12 +1,14 @@
 """Paper 001: the numbers of its parameter set."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxdamp.dampers import Besinger, SeriesSpring
-from jaxdamp.dampers.besinger import transition_rate
+from jaxdamp.dampers.besinger import least_rebound, transition_rate
+from jaxdamp.dampers.conditions import margins
+from jaxdamp.export import from_json, to_json
+from jaxdamp.parameters import replace
 
 from .motions import force_at_zero_velocity, last_cycle, work
 
@@ -52,11 +54,51 @@ def test_the_printed_formula_with_the_right_opening_velocity_is_silent():
     np.testing.assert_allclose(law.force_velocity(0.3), 2457.3945, atol=5e-5)
 
 
-@pytest.mark.parametrize(("ratio", "increases"), [(0.0060, False), (0.0068, True)])
-def test_the_force_increases_if_compression_is_not_too_soft(ratio, increases):
-    v = jnp.linspace(-3.0, 0.1, 30001)
-    force = jax.vmap(Besinger(ratio * 15_600.0, *PUBLISHED[1:]).force_velocity)(v)
-    assert bool(np.all(np.diff(force) > 0)) is increases
+def increases(compression, rebound, limit, transition):
+    """Whether C(v) v grows up to v_lim."""
+    v = np.linspace(-5.0 * transition, limit, 30001)
+    rate = jax.vmap(lambda v: transition_rate(v, compression, rebound, transition))(v)
+    return bool(np.all(np.diff(v * np.asarray(rate)) > 0))
+
+
+def is_accepted(compression, rebound, limit, transition):
+    try:
+        Besinger(compression, rebound, 3_600.0, limit, transition)
+    except ValueError as error:
+        assert "Otherwise the force falls with growing velocity" in str(error)
+        return False
+    return True
+
+
+@pytest.mark.parametrize("ratio", [0.0060, 0.0066, 0.0068])
+def test_a_set_whose_force_falls_in_compression_is_refused(ratio):
+    numbers = (ratio * 15_600.0, 15_600.0, 0.125, 0.7)
+    assert is_accepted(*numbers) is increases(*numbers) is (ratio > 0.0067)
+
+
+@pytest.mark.parametrize("transition", [0.02, 0.07, 0.1, 0.119, 0.2])
+def test_a_set_whose_force_falls_in_rebound_is_refused(transition):
+    edge = 15_600.0 * float(least_rebound(0.125, transition))
+    assert (edge > 0) is (transition < 0.125)
+    for factor in (0.98, 1.02):
+        rebound = factor * edge if edge else 10.0
+        numbers = (15_600.0, rebound, 0.125, transition)
+        assert is_accepted(*numbers) is increases(*numbers) is (not edge or factor > 1)
+
+
+def test_a_replaced_value_and_a_file_are_refused_too():
+    law = SeriesSpring(Besinger(*PUBLISHED), 1.5e6)
+    with pytest.raises(ValueError, match=r"above 0.0067 rebound_rate, 104.52, but is 100.0"):
+        replace(law, {"law.compression_rate": 100.0})
+    text = to_json(law).replace("14400.0", "100.0")
+    with pytest.raises(ValueError, match=r"Besinger.compression_rate` must be above 0.0067 rebound_rate"):
+        from_json(text)
+
+
+def test_the_published_set_is_far_from_the_edge_and_traced_values_pass():
+    assert np.all(np.asarray(margins(Besinger(*PUBLISHED))) > 1e4)
+    made = jax.jit(lambda c: Besinger(c, *PUBLISHED[1:]).force_velocity(0.1))(1.0)
+    assert np.isfinite(made)
 
 
 # frequency, amplitude, then rigid and with the series spring: F+, F-, work, equivalent damping (None: not printed);

@@ -70,7 +70,7 @@ def test_equals_lstsq(sines, start, freeze, columns):
     expected, squares, *_ = np.linalg.lstsq(matrix, target, rcond=None)
     assert result.converged and result.steps == 0
     assert np.allclose([e.value for e in result.parameters], expected, rtol=1e-8)
-    covariance = squares[0] / (force.size - expected.size) * np.linalg.inv(matrix.T @ matrix)
+    covariance = squares[0] / (force.size - expected.size) * np.linalg.inv(matrix.T @ matrix) * result.inflation**2
     assert np.allclose(result.covariance, covariance, rtol=1e-6, atol=1e-9 * covariance.max())
     assert np.allclose([e.standard_error for e in result.parameters], np.sqrt(np.diag(covariance)), rtol=1e-6)
     assert result.rmse == pytest.approx(np.sqrt(squares[0] / force.size), rel=1e-9)
@@ -85,7 +85,8 @@ def test_explicit_standard_deviations(sines):
     matrix = sides(v) * weight[:, None]
     expected, squares, *_ = np.linalg.lstsq(matrix, force * weight, rcond=None)
     assert np.allclose([e.value for e in result.parameters], expected, rtol=1e-9)
-    assert np.allclose(result.covariance, squares[0] / (v.size - 2) * np.linalg.inv(matrix.T @ matrix), rtol=1e-7)
+    covariance = squares[0] / (v.size - 2) * np.linalg.inv(matrix.T @ matrix) * result.inflation**2
+    assert np.allclose(result.covariance, covariance, rtol=1e-7)
     known = fit(Bilinear, runs, weighting=sigma.tolist(), force_noise=20.0)
     inverse = np.linalg.inv(matrix.T @ matrix)
     noisy = matrix * (20.0 * weight)[:, None]
@@ -104,7 +105,7 @@ def test_weighting_by_runs_counts_every_record_relative_to_its_force(sines):
     left = (matrix @ expected - force * weight).reshape(3, 800)
     spread = np.repeat(np.sqrt(np.mean(left**2, axis=1) * v.size / (v.size - 2)), 800)
     inverse = np.linalg.inv(matrix.T @ matrix)
-    noisy = matrix * spread[:, None]
+    noisy = matrix * spread[:, None] * result.inflation
     assert np.allclose(result.covariance, inverse @ noisy.T @ noisy @ inverse, rtol=1e-7)
 
 
@@ -134,7 +135,7 @@ def test_frozen_parameters_stay(sines):
 
 def test_a_table_point_without_data_is_not_identifiable(sines):
     runs = sines(TRUTH, noise=20.0)
-    result = fit(Table([-0.7, 0.0, 0.7, 2.0, 3.0], np.zeros(5)), runs)
+    result = fit(Table([-0.7, 0.0, 0.7, 2.0, 3.0], np.zeros(5)), runs, force_noise=150.0)
     assert [e.note for e in result.parameters] == ["", "", "", "not identifiable", "not identifiable"]
     assert np.isinf(result.parameters[-1].standard_error)
     assert np.all(np.isfinite(result.covariance[:3, :3])) and result.parameters[0].standard_error < 10.0

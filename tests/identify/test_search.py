@@ -68,9 +68,13 @@ def test_an_optimum_at_zero_is_reached_and_said(sines):
         offset = result[name]
         assert 0.0 <= offset.value < 3.0 * offset.standard_error
         assert offset.note == "not identifiable" and offset.interval[0] == 0.0
-    if result["compression_offset"].value == 0.0 == result["rebound_offset"].value:
-        inner = fit(PowerLaw(1000.0, 1.0, 1000.0, 1.0), runs, freeze=["*offset"])
-        assert result["rebound_force"].standard_error == pytest.approx(inner["rebound_force"].standard_error, rel=1e-3)
+    # the offset counts as unknown in the error of the force: that of least squares over the columns of all parameters
+    free = free_parameters(result.law)
+    velocity = np.concatenate([run.velocity for run in runs])
+    columns = jax.jacfwd(lambda values: jax.vmap(free.build(values).force_velocity)(velocity))(free.values)
+    expected = result.rmse * np.sqrt(np.diag(np.linalg.inv(np.asarray(columns.T @ columns))))
+    assert np.allclose(np.sqrt(np.diag(result.covariance)), expected, rtol=5e-3)
+    assert np.all(np.array([e.standard_error for e in result.parameters]) >= 0.99 * expected)
 
 
 def test_data_that_press_beyond_zero_are_said_to(sines):
@@ -107,18 +111,23 @@ def test_bounds_hold_in_a_search(sines):
     [(0.010, 2.0, (0.07, 0.39, 4.82, 0.006, 5.82)), (0.020, 2.5, (0.013, 0.074, 0.005, 0.003, 1.41))],
 )
 def test_fisher_information_of_paper_001(amplitude, frequency, relative):
-    """20 N noise, 1000 samples of one cycle, the published set: C_b and α are not identifiable."""
+    """20 N noise, 1000 samples of one cycle, the published set: C_b and α are not identifiable.
+
+    Nor are C_c and C_e, which the Fisher information alone does not tell: with an α far away, half of either fits too.
+    """
     law = Besinger(14_400.0, 15_600.0, 3_600.0, limit_velocity=0.125, transition_velocity=0.7)
     angle = 2 * np.pi * np.arange(1000) / 1000
     velocity = 2 * np.pi * frequency * amplitude * np.cos(angle)
     force = np.asarray(jax.vmap(law.force_velocity)(velocity))
     run = BenchRun("cycle", angle / (2 * np.pi * frequency), amplitude * np.sin(angle), velocity, force)
     result = fit(law, run, force_noise=20.0)
-    errors = np.array([e.standard_error / e.value for e in result.parameters])
+    errors = np.sqrt(np.diag(result.covariance)) / free_parameters(law).values
     assert np.allclose(errors, relative, rtol=0.15)
     weak = {e.name for e in result.parameters if e.note == "not identifiable"}
-    assert weak == ({"blow_off_rate", "transition_velocity"} if amplitude == 0.010 else {"transition_velocity"})
+    assert weak >= {"compression_rate", "transition_velocity"}
+    assert ("blow_off_rate" in weak) == (amplitude == 0.010)
     assert sum("not identifiable" in w for w in result.warnings) == len(weak)
+    assert sum("lies beyond the records" in w for w in result.warnings) == 1
 
 
 def test_a_search_that_is_cut_short_says_so(sines):

@@ -1,0 +1,25 @@
+"""The conditions between parameters of all laws inside a tree, for searches that must keep them."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp.dampers.base import laws_inside
+
+
+def margins(tree: Any) -> Float[Array, " conditions"]:
+    """By how much each condition of each law in a law, a vehicle or another module is kept; negative where broken.
+
+    Every margin is in the unit of the parameter that the condition limits.
+    """
+    found = [getattr(law, c.parameter) - c.least for _, law in laws_inside(tree) for c in law.conditions()]
+    return jnp.stack(found) if found else jnp.zeros(0)
+
+
+def keeps_conditions(tree: Any) -> bool:
+    """Whether all laws in a law, a vehicle or another module keep their conditions; computed without compiling."""
+    plain = [jax.tree.map(np.asarray, law) for _, law in laws_inside(tree) if law.has_conditions()]
+    return all(np.all(getattr(law, c.parameter) > c.least) for law in plain for c in law.conditions())

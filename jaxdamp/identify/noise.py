@@ -1,0 +1,86 @@
+"""The noise of the measured force, as the residual of a fit shows it: its size, and how long it is alike."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jaxdamp.identify.search import Found, Problem, squares
+from jaxdamp.identify.traces import Batch, Place
+
+
+CORRELATED = 3.0  # samples that count as one, above which the residual is no independent noise
+
+
+def noise_of(
+    problem: Problem,
+    found: Found,
+    places: Sequence[Place],
+    sigma: Sequence[float],
+    *,
+    each: bool,
+    force_noise: float | None,
+) -> tuple[Float[np.ndarray, " samples"], float]:
+    """Standard deviation of each weighted residual, and how far correlation has inflated it.
+
+    Samples whose noise is alike tell less than as many independent ones. Where one in `CORRELATED` or fewer is
+    independent, the standard deviation is multiplied by the root of how many count as one, which is what that does to
+    the standard errors.
+
+    Arguments:
+        problem: the records as they were fitted.
+        found: the minimum.
+        places: where each record is.
+        sigma: standard deviation by which each record was weighted.
+        each: every record has its own noise; otherwise all have the same, in weighted residuals.
+        force_noise: of the measured force [N], if it is known; it counts as independent then.
+    """
+    owner, used = _owners(problem.made, places), problem.used
+    if force_noise is not None:
+        return np.where(used, force_noise / np.array(sigma)[owner], 1.0), 1.0
+    dof = max(int(np.count_nonzero(used)) - found.values.size, 1)
+    counted = correlation_time([found.residual[used & (owner == i)] for i in np.unique(owner[used])])
+    alike = counted > CORRELATED and not problem.is_rounding(squares(found))
+    inflation = float(np.sqrt(counted)) if alike else 1.0
+    return inflation * _from_residual(found.residual, used, owner, len(sigma), dof, each), inflation
+
+
+def _owners(made: Sequence[Batch], places: Sequence[Place]) -> np.ndarray:
+    """The number of the record that each weighted residual belongs to."""
+    numbers = [np.zeros(batch.weight.shape, dtype=int) for batch in made]
+    for i, place in enumerate(places):
+        numbers[place.batch][place.row, place.start : place.stop] = i
+    return np.concatenate([np.ravel(a) for a in numbers])
+
+
+def _from_residual(
+    residual: Float[np.ndarray, " samples"],
+    used: Bool[np.ndarray, " samples"],
+    owner: np.ndarray,
+    runs: int,
+    dof: int,
+    each: bool,
+) -> Float[np.ndarray, " samples"]:
+    """Standard deviation of each weighted residual, of all together, or (`each`) of its own record."""
+    count = np.bincount(owner, used, minlength=runs)
+    squares = np.bincount(owner, residual**2, minlength=runs) * (count.sum() / dof)
+    if not each:
+        return np.full(residual.size, np.sqrt(squares.sum() / count.sum()))
+    return np.sqrt(squares / np.maximum(count, 1))[owner]
+
+
+def correlation_time(residuals: list[Float[np.ndarray, " _"]]) -> float:
+    """Samples that count as one, because the residual is alike from one to the next: 1 + 2 Σ ρ(k), 1 for white noise.
+
+    ρ is the autocorrelation over all records together, summed up to where it first is zero or negative.
+    """
+    length = max(map(len, residuals))
+    total = np.zeros(length)
+    for residual in residuals:
+        spectrum = np.fft.rfft(residual, 2 * len(residual))
+        total[: len(residual)] += np.fft.irfft(np.abs(spectrum) ** 2, 2 * len(residual))[: len(residual)]
+    if not total[0] > 0:
+        return 1.0
+    alike = total / total[0]
+    ends = np.flatnonzero(alike <= 0)
+    return float(1.0 + 2.0 * np.sum(alike[1 : ends[0] if ends.size else None]))

@@ -1,0 +1,133 @@
+"""Several starts of a search: the best end is kept, the others say which other minima there are.
+
+Compiling a search takes some fifty times as long as running it, so all starts go one after another through the one
+program that is compiled for the first. A start other than the first is followed for a few steps; only the most
+promising are followed to their end.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers.base import Reach, laws_inside
+from jaxdamp.dampers.conditions import keeps_conditions
+from jaxdamp.identify.result import Minimum
+from jaxdamp.identify.search import Found, Problem, finite, search, squares
+from jaxdamp.parameters import FreeParameters
+
+
+FIRST_LOOK = 10  # steps after which a start is judged
+FOLLOWED = 2  # starts that are followed to their end, beside the first
+INSIDE = 0.02  # of a range, by which a start stays off its ends
+ROUNDS = 3  # of proposals, each from the best end of the round before
+SAME = 1.0  # chi-square by which two ends of one minimum differ at most
+BETTER = 1e-9  # relative decrease of the sum of squares that counts as one
+
+
+class Several(NamedTuple):
+    """The ends of searches from several starts."""
+
+    best: Found
+    ends: tuple[Found, ...]  # those that converged, the best among them, in the order of their starts
+    starts: int
+
+
+def reach_of(runs: Sequence[BenchRun]) -> Reach:
+    """How far records go."""
+    return Reach(0.5 * max(float(np.ptp(run.stroke)) for run in runs), max(run.peak_velocity for run in runs))
+
+
+def other_starts(free: FreeParameters, reach: Reach) -> list[Float[np.ndarray, " free"]]:
+    """Values of the free parameters to start from beside the law's own: what it and the laws inside it propose.
+
+    Proposals for frozen parameters are left out, those outside the limits are moved inside, and those that break a
+    condition between parameters are left out too.
+    """
+    own, (lower, upper) = np.asarray(free.values), free.limits()
+    width = np.where(np.isfinite(upper - lower), upper - lower, 0.0)
+    starts = []
+    for path, part in laws_inside(free.tree):
+        for proposal in part.other_starts(reach):
+            values = own.copy()
+            for i, name in enumerate(free.names):
+                field = name.removeprefix(path)
+                if name.startswith(path) and field in proposal:
+                    low, high = lower[i] + INSIDE * width[i], upper[i] - INSIDE * width[i]
+                    values[i] = np.clip(proposal[field], low, high)
+            known = any(np.array_equal(values, other) for other in (own, *starts))
+            if not known and keeps_conditions(free.started_at(values).tree):
+                starts.append(values)
+    return starts
+
+
+def search_from(problem: Problem, reach: Reach, *, starts: int | None, max_steps: int) -> Several:
+    """Search from the start of the problem, and from what its law and the laws inside propose beside it.
+
+    Where another start leads to a better end, the proposals are made anew from there, so that two parameters can be
+    wrong at the start.
+
+    Arguments:
+        problem: with the start.
+        reach: how far the records go.
+        starts: at most so many; all that are proposed if `None`.
+        max_steps: of each search.
+    """
+    best = search(problem, max_steps)
+    ends, tried = [best], [np.asarray(problem.free.values)]
+    for _ in range(ROUNDS):
+        if finite(best) and problem.is_rounding(squares(best)):
+            break
+        others = [v for v in other_starts(problem.free, reach) if not any(np.array_equal(v, known) for known in tried)]
+        others = others[: None if starts is None else starts - len(tried)]
+        tried, ends = [*tried, *others], [*ends, *_follow(problem, others, max_steps)]
+        better = min((end for end in ends if finite(end)), key=squares, default=best)
+        if finite(best) and squares(better) >= (1.0 - BETTER) * squares(best):
+            break
+        best, problem = better, problem.started_at(better.values)
+    return Several(best, tuple(end for end in ends if finite(end) and (end.converged or end is best)), len(tried))
+
+
+def _follow(problem: Problem, others: Sequence[np.ndarray], max_steps: int) -> list[Found]:
+    """The ends of a few steps from each of several starts, and of the whole search from the most promising."""
+    looks = [search(problem.started_at(values), min(FIRST_LOOK, max_steps)) for values in others]
+    promising = sorted((found for found in looks if not found.converged and finite(found)), key=squares)
+    ends = [found for found in looks if found.converged]
+    for found in promising[:FOLLOWED]:
+        left = max_steps - found.steps
+        on = search(problem.started_at(found.values), left) if left else found._replace(steps=0)
+        ends.append(on._replace(steps=found.steps + on.steps))
+    return ends
+
+
+def minima_of(several: Several, names: Sequence[str], variance: float) -> tuple[Minimum, ...]:
+    """The minima in which the searches ended, the best first.
+
+    Two ends are one minimum if their sums of squares differ by less than noise does and the best one's Jacobian says
+    that their parameters hardly differ in force.
+
+    Arguments:
+        several: the ends.
+        names: of the free numbers.
+        variance: of the noise of a weighted sample.
+    """
+    best = several.best
+    groups: list[tuple[Found, int]] = []
+    for end in sorted(several.ends, key=lambda end: (end is not best, squares(end))):
+        for i, (other, count) in enumerate(groups):
+            change = other.jacobian @ (end.values - other.values)
+            if max(squares(end) - squares(other), float(change @ change)) < SAME * variance:
+                groups[i] = (other, count + 1)
+                break
+        else:
+            groups.append((end, 1))
+    return tuple(
+        Minimum(
+            dict(zip(names, map(float, end.values), strict=True)),
+            max(squares(end) - squares(best), 0.0) / variance if variance > 0 else 0.0,
+            count,
+        )
+        for end, count in groups
+    )

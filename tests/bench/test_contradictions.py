@@ -1,0 +1,91 @@
+"""Records of the same motion with another force are named; repetitions and a little warmth are not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from jaxdamp.bench import RandomTest, SineTest, VirtualDyno, contradictions, contradictions_in_words, read
+from jaxdamp.dampers import Linear, Scheduled
+from jaxdamp.identify import compare, fit
+
+
+def record(name, rate=1500.0, *, amplitude=0.02, frequency=2.0, seed=0, noise=10.0, **more):
+    dyno = VirtualDyno(Linear(rate), sampling_rate=500.0, force_noise=noise, stroke_noise=1e-5, seed=seed, **more)
+    return dyno.run(SineTest(amplitude, frequency, name=name))[0]
+
+
+def test_another_setting_is_named_with_its_size():
+    soft, hard, other = record("soft"), record("hard", 2500.0, seed=1), record("slow", frequency=1.0)
+    (found,) = contradictions([soft, other, hard])
+    assert (found.first, found.second) == ("soft", "hard")
+    # 1000 N s/m times the RMS velocity, of forces of 1500 and 2500 N s/m
+    velocity = 2 * np.pi * 2.0 * 0.02 / np.sqrt(2)
+    assert found.difference == pytest.approx(1000.0 * velocity, rel=0.02)
+    assert found.share == pytest.approx(1000.0 / np.sqrt(0.5 * (1500.0**2 + 2500.0**2)), rel=0.02)
+    assert 0.0 < found.scatter < 10.0
+    (sentence,) = contradictions_in_words([found])
+    assert "soft and hard by 177 N (49 % of their RMS force" in sentence
+
+
+def test_a_gas_force_contradicts_too():
+    assert len(contradictions([record("a"), record("b", gas_force=-100.0)])) == 1
+
+
+@pytest.mark.parametrize(
+    "pair",
+    [
+        (record("a"), record("b", seed=1)),
+        (record("a"), record("warm", 1500.0 * 0.94, seed=1)),
+        (record("a"), record("larger", 2500.0, amplitude=0.024)),
+        (record("a"), record("faster", 2500.0, frequency=2.3)),
+        (record("a", 3.0, noise=60.0), record("b", 4.0, noise=60.0, seed=1)),
+    ],
+    ids=["repetition", "warmth", "another amplitude", "another frequency", "noise"],
+)
+def test_what_does_not_contradict(pair):
+    assert contradictions(pair) == [] == contradictions_in_words(contradictions(pair))
+
+
+def test_the_phase_at_which_a_record_begins_does_not_matter():
+    run = record("a")
+    later = replace(run.between(0.13, 1.5), name="later")
+    assert contradictions([run, later]) == []
+    turned = replace(later, force=1.3 * later.force)
+    assert len(contradictions([run, turned])) == 1
+
+
+def test_motions_that_do_not_repeat_are_not_compared():
+    test = RandomTest(duration=10.0)
+    runs = [VirtualDyno(Linear(c), sampling_rate=200.0).run(test)[0] for c in (1000.0, 3000.0)]
+    assert contradictions(runs) == []
+
+
+def test_a_fit_and_a_comparison_say_it():
+    runs = [record("soft"), record("hard", 2500.0, seed=1)]
+    words = "Records of the same motion differ in force"
+    assert any(words in w and "soft and hard" in w for w in fit(Linear, runs).warnings)
+    ladder = compare({"linear": Linear, "again": Linear(1.0)}, runs, progress=lambda _: None)
+    assert any(words in w for w in ladder.warnings) and words in repr(ladder)
+    # a record that is left out contradicts nothing
+    assert not any(words in w for w in fit(Linear, runs, weighting=[1.0, np.inf]).warnings)
+
+
+def test_a_law_that_follows_the_command_is_not_contradicted():
+    runs = [replace(record("soft"), command=0.0), replace(record("hard", 2500.0, seed=1), command=1.0)]
+    assert len(contradictions(runs)) == 1
+    follows = Scheduled((Linear(1000.0), Linear(1000.0)), levels=[0.0, 1.0], command=0.0)
+    result = fit(follows, runs)
+    assert not any("same motion" in w for w in result.warnings)
+    np.testing.assert_allclose([e.value for e in result.parameters], [1500.0, 2500.0], rtol=0.01)
+
+
+def test_measured_currents_contradict_each_other_and_not_themselves(data):
+    runs = list(read(sorted((data / "mr_damper").glob("*.csv")), sign="rebound-positive"))
+    named = {frozenset((pair.first, pair.second)) for pair in contradictions(runs)}
+    motions = ("25mm_0.25Hz", "25mm_0.5Hz", "2mm_5.0Hz", "5mm_3.0Hz")
+    assert {frozenset((f"{m}_0A", f"{m}_1.0A")) for m in motions} <= named
+    assert {frozenset((f"{m}_0A", f"{m}_0.5A")) for m in motions} <= named
+    assert all(len({name.split("Hz")[0] for name in pair}) == 1 for pair in named)
+    for current in ("0A", "0.5A", "1.0A"):
+        assert contradictions([run for run in runs if run.name.endswith(f"_{current}")]) == []

@@ -1,0 +1,77 @@
+"""Standard errors count partners as unknown and samples that are alike as few; groups are named."""
+
+import numpy as np
+import pytest
+
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import Besinger, Bilinear, Linear
+from jaxdamp.identify import fit
+from jaxdamp.identify.noise import correlation_time
+from jaxdamp.identify.uncertainty import uncertainty, weak_directions
+
+
+def coloured(rng, count, memory):
+    """Noise of standard deviation 1 whose neighbours have this correlation."""
+    noise = rng.standard_normal(count)
+    for i in range(1, count):
+        noise[i] = memory * noise[i - 1] + np.sqrt(1 - memory**2) * noise[i]
+    return noise
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.6, 0.9])
+def test_the_correlation_time_is_that_of_the_noise(rng, memory):
+    records = [coloured(rng, 6000, memory) for _ in range(4)]
+    assert correlation_time(records) == pytest.approx((1 + memory) / (1 - memory), rel=0.2)
+    assert correlation_time([np.zeros(50)]) == 1.0
+
+
+def test_a_constant_error_counts_as_one_sample_a_record():
+    assert correlation_time([np.full(400, 3.0)]) == pytest.approx(400.0, rel=0.01)
+
+
+def record(noise):
+    """A linear damper of 2000 N s/m at 3 Hz and slowly beside it, with this noise in its force."""
+    time = np.arange(len(noise)) / 400.0
+    velocity = 0.2 * np.cos(6 * np.pi * time) + 0.1 * np.cos(1.7 * time)
+    stroke = 0.2 / (6 * np.pi) * np.sin(6 * np.pi * time) + 0.1 / 1.7 * np.sin(1.7 * time)
+    return BenchRun("record", time, stroke, velocity, 2000.0 * velocity + noise)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.95])
+def test_errors_cover_the_scatter_whether_noise_is_alike_or_not(memory):
+    noises = [20.0 * coloured(np.random.default_rng(seed), 4000, memory) for seed in range(60)]
+    results = [fit(Linear, record(noise)) for noise in noises]
+    z = np.array([(r["rate"].value - 2000.0) / r["rate"].standard_error for r in results])
+    assert 0.6 < np.std(z) < 1.3
+    if memory:
+        assert np.std(z * [r.inflation for r in results]) > 2.0  # without the correction they do not cover
+        assert all("Neighbouring residuals are alike" in r.warnings[-1] for r in results)
+        assert all(f"{r.inflation:.3g} times" in r.warnings[-1] for r in results)
+    else:
+        assert all(r.inflation == 1.0 and r.warnings == () for r in results)
+
+
+def test_a_law_that_misses_something_has_errors_of_that_size(sines):
+    """Two halves of the records give two answers, which differ by about what the errors say."""
+    truth = Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05)
+    halves = ([(0.02, 2.0), (0.01, 3.0)], [(0.02, 5.0), (0.01, 10.0)])
+    one, other = (fit(Bilinear, sines(truth, noise=5.0, tests=tests)) for tests in halves)
+    apart = abs(one["compression_rate"].value - other["compression_rate"].value)
+    error = np.hypot(one["compression_rate"].standard_error, other["compression_rate"].standard_error)
+    assert apart < 4.0 * error
+    assert min(one.inflation, other.inflation) > 3.0
+
+
+def test_partners_count_as_unknown(rng):
+    jacobian = rng.standard_normal((500, 3))
+    jacobian[:, 2] = jacobian[:, 1] + 0.01 * jacobian[:, 2]
+    known = uncertainty(jacobian, np.zeros(500), np.ones(500))
+    np.testing.assert_allclose(known.covariance, np.linalg.inv(jacobian.T @ jacobian), rtol=1e-8)
+
+
+def test_a_weak_direction_names_those_who_take_part(rng):
+    jacobian = rng.standard_normal((500, 4)) * [1.0, 1e4, 1e-3, 1.0]
+    jacobian[:, 3] = 1e3 * jacobian[:, 2] + 1e-3 * rng.standard_normal(500)
+    (direction,) = weak_directions(jacobian, 1.0, np.array([1.0, 1e-4, 1e3, 1.0]), 0.5)
+    assert np.flatnonzero(direction).tolist() == [2, 3] and direction[2] * direction[3] < 0
+    assert weak_directions(jacobian[:, :3], 1.0, np.array([1.0, 1e-4, 1e3]), 0.5) == []
