@@ -29,7 +29,8 @@ for call in json.loads(sys.stdin.read()):
     try:
         answers[call] = "accepted: " + repr(eval(call))[:80]
     except Exception as error:
-        answers[call] = f"{type(error).__name__}: {error}"
+        kind = "ValueError" if isinstance(error, ValueError) else type(error).__name__
+        answers[call] = f"{kind}: {error}"
 print(json.dumps(answers))
 """
 

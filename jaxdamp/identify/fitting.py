@@ -14,6 +14,7 @@ import scipy.optimize
 from jaxdamp import _checks, dampers
 from jaxdamp.bench import BenchRun, as_runs, contradictions, contradictions_in_words
 from jaxdamp.dampers import AbstractDamper, AbstractStateless, with_fitted_range, without_fitted_ranges
+from jaxdamp.dampers._points import drives_motion
 from jaxdamp.dampers.base import parts
 from jaxdamp.dampers.command import takes_command
 from jaxdamp.dampers.coverage import coverage
@@ -25,7 +26,7 @@ from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.result import FitResult, score
 from jaxdamp.identify.search import Found, Problem, finite, linearised
 from jaxdamp.identify.several import Several, reach_of, search_from
-from jaxdamp.identify.traces import batches
+from jaxdamp.identify.traces import batches, is_memoryless, predict_runs
 from jaxdamp.parameters import FreeParameters, free_parameters
 
 
@@ -117,6 +118,7 @@ def fit(
     percent, rmse, scores = score(fitted, runs, np.isfinite(sigma))
     notes = [f"The search did not converge: {found.said} {_REMEDY}"] * (not found.converged)
     notes += _contradicting(begin, fitted_to)
+    notes += _driving(fitted, fitted_to)
     notes += [*judged.notes, *on_correlation(inflation)]
     return FitResult(
         law=fitted,
@@ -144,6 +146,22 @@ def _contradicting(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
     return contradictions_in_words([pair for group in groups.values() for pair in contradictions(group)])
 
 
+def _driving(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
+    """A sentence on a fitted curve that drives the motion at some of the velocities of the records."""
+    if not is_memoryless(law):
+        return []
+    velocity = np.concatenate([run.velocity for run in runs])
+    order = np.argsort(velocity, kind="stable")
+    velocity, force = velocity[order], np.concatenate(predict_runs(law, runs))[order]
+    at = velocity[drives_motion(velocity, force)]
+    if not at.size:
+        return []
+    return [
+        f"The fitted curve drives the motion instead of damping it at velocities from {at[0]:.3g} to {at[-1]:.3g} m/s. "
+        "Check the sign of the force, or take a law that cannot, such as `Bilinear` or `PiecewiseLinear`."
+    ]
+
+
 _REMEDY = "Try another start, bounds, or fewer free parameters."
 
 
@@ -164,7 +182,8 @@ def check_start(argument: str, law: Any) -> None:
     if isinstance(law, AbstractDamper) or (isinstance(law, type) and issubclass(law, AbstractDamper)):
         return
     if isinstance(law, str):
-        known = next((name for name in dampers.__all__ if name.lower() == law.lower().replace("_", "")), None)
+        laws = [name for name in dampers.__all__ if isinstance(getattr(dampers, name), type(AbstractDamper))]
+        known = next((name for name in laws if name.lower() == law.lower().replace("_", "")), None)
         remedy = f"Write `dampers.{known}`." if known else f"Write `default_ladder(runs, [{law!r}])[{law!r}]`."
     elif callable(law) and not isinstance(law, type | BenchRun | eqx.Module):
         return

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractMemoryless, Besinger, Bilinear, Lag, Linear, SeriesSpring
+from jaxdamp.dampers import AbstractMemoryless, Besinger, Bilinear, Lag, Linear, SeriesSpring, Table
 from jaxdamp.identify import LAWS, compare, default_ladder, fit, fit_percent
 from jaxdamp.parameters import get, parameter, positive
 
@@ -141,3 +141,14 @@ def test_refuses_unknown_rungs_and_no_laws(sines):
         default_ladder(sines(TRUTH), ["besinger_lagg"])
     with pytest.raises(ValueError, match="`laws` must hold at least one law"):
         compare({}, sines(TRUTH))
+
+
+def test_a_curve_that_drives_the_motion_is_named(rng):
+    time = np.arange(2000) / 1000
+    velocity = 0.25 * np.cos(12 * time)
+    force = np.where(velocity > 0, 900.0, 700.0) * velocity / 0.25  # compression counted as pushing
+    run = BenchRun.from_arrays("a", time, 0.25 / 12 * np.sin(12 * time), np.abs(force) + rng.normal(0.0, 1.0, 2000))
+    (warning,) = [text for text in fit(Table, [run]).warnings if "drives the motion" in text]
+    assert "at velocities from -0.2" in warning and "Check the sign of the force" in warning
+    honest = BenchRun.from_arrays("b", time, run.stroke, force + rng.normal(0.0, 1.0, 2000))
+    assert not any("drives the motion" in text for text in fit(Table, [honest]).warnings)
