@@ -231,12 +231,12 @@ def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled:
         (~finite, f"the law gives no finite force. {coverage(law)}".strip()),
         (finite & ~settled, f"the force still changes after {LONGEST_HOLD} s of constant velocity."),
     )
-    notes = [
-        f"No force at {np.count_nonzero(at)} of {at.size} velocities, from {velocity[at].min():.3g} to "
-        f"{velocity[at].max():.3g} m/s: {why}"
-        for at, why in reasons
-        if at.any()
-    ]
+    notes = []
+    for at, why in reasons:
+        if at.any():
+            lower, upper = (f"{end:.3g}" for end in (velocity[at].min(), velocity[at].max()))
+            where = f"at {lower}" if lower == upper else f"from {lower} to {upper}"
+            notes.append(f"No force at {np.count_nonzero(at)} of {at.size} velocities, {where} m/s: {why}")
     return " ".join(notes)
 
 

@@ -147,7 +147,7 @@ def test_everything_that_runs_it_refuses_in_words():
         respond(law, t, 0.06 * np.sin(9 * t), 0.54 * np.cos(9 * t))
     curve = quasi_static(law, np.array([0.0, 0.7]))
     assert curve.settled.tolist() == [True, False]
-    assert re.search("No force at 1 of 2 velocities, from 0.7 to 0.7 m/s: .* no finite force. " + COVERED, curve.note)
+    assert re.search("No force at 1 of 2 velocities, at 0.7 m/s: .* no finite force. " + COVERED, curve.note)
     with pytest.raises(ValueError, match="`vehicle` must have a finite response.*" + COVERED):
         simulate(quarter_car_000(0.1 * law + Linear(100.0)), cosine_bump(0.3, start=0.02, duration=0.1), duration=0.5)
     with pytest.raises(ValueError, match="`vehicle` must have an equilibrium.*" + COVERED):

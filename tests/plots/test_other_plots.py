@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 import jaxdamp
 from jaxdamp import metrics, plots, sweeps
 from jaxdamp.bench import BenchSet
-from jaxdamp.dampers import Bilinear, Lag, Linear
+from jaxdamp.dampers import Bilinear, Dahl, Lag, Linear
 from jaxdamp.identify import Comparison
 from jaxdamp.plots.curves import peak_points
 from jaxdamp.simulation import Response
@@ -75,6 +75,15 @@ def test_peak_points_are_the_force_at_the_largest_velocities(runs: BenchSet) -> 
     (v_compression, f_compression), (v_rebound, f_rebound) = peak_points(runs[0])  # 10 mm at 1 Hz, hardly any lag
     assert (v_compression, v_rebound) == pytest.approx((-0.0628, 0.0628), rel=0.02)
     assert (f_compression, f_rebound) == pytest.approx((-1200 * 0.0628, 2600 * 0.0628), rel=0.05)
+
+
+def test_a_gap_in_a_curve_and_a_remark_stand_under_the_picture() -> None:
+    law = Dahl(stiffness=2e5, friction_force=200.0)
+    figure = plots.force_velocity({"dry": law}, np.array([-0.1, -1e-6, 0.0, 1e-6, 0.1]), note="Drawn is one law.")
+    drawn = np.isfinite(_line(figure.axes[0], "dry (settled)")[:, 1])
+    assert drawn.tolist() == [True, False, True, False, True]
+    said = " ".join(figure.get_supxlabel().split())
+    assert said.startswith("Drawn is one law. dry: No force at 2 of 5 velocities, from -1e-06 to 1e-06 m/s")
 
 
 def test_no_law_is_refused() -> None:
