@@ -1,4 +1,4 @@
-"""Every law in a quarter car at coarse steps: right to 3 %, or warned of with the error, or refused."""
+"""Every law in a quarter car at coarse steps: right to 1.5 %, or warned of with the error, or refused."""
 
 import re
 import warnings
@@ -10,38 +10,33 @@ from jaxdamp import roads, simulate
 from jaxdamp.simulation import CoarseStepWarning
 from jaxdamp.vehicles.presets import quarter_car_000
 
-from .test_contract import LAWS
+from .test_contract import FURTHER, LAWS
 
 
 pytestmark = pytest.mark.slow
 
-BUMP = roads.cosine_bump(0.06, start=0.1, duration=0.25)
 ROUGH = roads.iso8608("C", 20.0, 2.0, seed=1)
 ALLOWED = 0.015  # RMS of the error over the RMS of the channel where nothing is said
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", [name for name in LAWS if name not in FURTHER])
 def test_right_or_warned_of_or_refused(name):
     car = quarter_car_000(LAWS[name]())
-    for road in (ROUGH, BUMP):
-        fine = simulate(car, road, duration=2.0, dt=1e-4)
-        exact = [np.asarray(fine[channel]) for channel in ("sprung_acceleration", "dynamic_tyre_load")]
-        for dt in (2e-3, 5e-3, 1e-2, 2e-2):
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always")
-                try:
-                    run = simulate(car, road, duration=2.0, dt=dt)
-                except ValueError as error:
-                    assert "estimated at" in str(error) and dt > 5e-3
-                    continue
-            found = [np.asarray(run[channel]) for channel in ("sprung_acceleration", "dynamic_tyre_load")]
-            every = round(dt / 1e-4)
-            errors = [
-                np.sqrt(np.mean((a - b[::every]) ** 2) / np.mean(b**2)) for a, b in zip(found, exact, strict=True)
-            ]
-            said = [str(w.message) for w in caught if issubclass(w.category, CoarseStepWarning)]
-            if not said:
-                assert max(errors) < ALLOWED, (road, dt)
+    fine = simulate(car, ROUGH, duration=2.0, dt=1e-4)
+    for dt in (5e-3, 1e-2, 2e-2):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                run = simulate(car, ROUGH, duration=2.0, dt=dt)
+            except ValueError as error:
+                assert "estimated at" in str(error) and dt > 5e-3
                 continue
-            match = re.search(r"estimated at (\S+) %", said[0])
-            assert match and 1 / 3 < 0.01 * float(match[1]) / max(errors) < 3, (road, dt)
+        every = round(dt / 1e-4)
+        pairs = [(run[name], fine[name][::every]) for name in ("sprung_acceleration", "dynamic_tyre_load")]
+        error = max(float(np.sqrt(np.mean((a - b) ** 2) / np.mean(b**2))) for a, b in pairs)
+        said = [str(w.message) for w in caught if issubclass(w.category, CoarseStepWarning)]
+        if not said:
+            assert error < ALLOWED, dt
+            continue
+        match = re.search(r"estimated at (\S+) %", said[0])
+        assert match and 1 / 3 < 0.01 * float(match[1]) / error < 3, dt
