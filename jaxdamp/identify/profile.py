@@ -14,7 +14,8 @@ from jaxdamp.dampers.conditions import keeps_conditions
 from jaxdamp.identify.search import Found, Problem, search, squares
 
 
-STEPS = 20  # of each search; one cut short makes an error smaller, never larger
+STEPS = 15  # of each search; one cut short makes an error smaller, never larger
+MOST_STEPS = 250  # of all searches together, after which the linear errors stand for the numbers left
 CHI_SQUARE = 9.0  # increase up to which a moved parameter still fits: three standard errors
 GROWTH = 4.0  # of the distance, from one step to the next
 
@@ -48,22 +49,23 @@ def profile(
         chosen: which numbers to move.
         variance: of the noise of a weighted sample.
     """
-    wide, open_ended = errors.copy(), np.zeros(errors.shape, bool)
-    for i in map(int, np.flatnonzero(chosen & (errors > 0))):
-        for side in (-1.0, 1.0):
-            distance, end = np.sqrt(CHI_SQUARE) * errors[i], found
-            most = max(far[i], distance)
-            while distance <= most:
-                moved = _moved(problem, end, i, found.values[i] + side * distance)
-                if moved is None:
-                    break
-                end = search(moved, STEPS, held=i)
-                rise = (squares(end) - squares(found)) / variance
-                if not rise < CHI_SQUARE:
-                    break
-                wide[i] = max(wide[i], distance / np.sqrt(max(rise, 1.0)))
-                open_ended[i] |= distance == far[i]
-                distance = min(GROWTH * distance, most) if distance < most else np.inf
+    wide, open_ended, left = errors.copy(), np.zeros(errors.shape, bool), MOST_STEPS
+    sides = [(int(i), side) for i in np.flatnonzero(chosen & (errors > 0)) for side in (-1.0, 1.0)]
+    for i, side in sides:
+        distance, end = np.sqrt(CHI_SQUARE) * errors[i], found
+        most = max(far[i], distance)
+        while distance <= most and left > 0:
+            moved = _moved(problem, end, i, found.values[i] + side * distance)
+            if moved is None:
+                break
+            end = search(moved, STEPS, held=i)
+            left -= end.steps
+            rise = (squares(end) - squares(found)) / variance
+            if not rise < CHI_SQUARE:
+                break
+            wide[i] = max(wide[i], distance / np.sqrt(max(rise, 1.0)))
+            open_ended[i] |= distance == far[i]
+            distance = min(GROWTH * distance, most) if distance < most else np.inf
     return Profile(wide, open_ended)
 
 

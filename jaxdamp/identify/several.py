@@ -21,9 +21,12 @@ from jaxdamp.parameters import FreeParameters
 
 FIRST_LOOK = 10  # steps after which a start is judged
 FOLLOWED = 2  # starts that are followed to their end, beside the first
+FOLLOWED_STEPS = 80  # of each of them at most
+PROMISING = 1.5  # sum of squares, relative to the best, up to which a start is followed
 INSIDE = 0.02  # of a range, by which a start stays off its ends
 ROUNDS = 3  # of proposals, each from the best end of the round before
 SAME = 1.0  # chi-square by which two ends of one minimum differ at most
+WORTH_A_ROUND = 1e-3  # relative decrease of the sum of squares after which there is another round
 BETTER = 1e-9  # relative decrease of the sum of squares that counts as one
 
 
@@ -82,21 +85,28 @@ def search_from(problem: Problem, reach: Reach, *, starts: int | None, max_steps
             break
         others = [v for v in other_starts(problem.free, reach) if not any(np.array_equal(v, known) for known in tried)]
         others = others[: None if starts is None else starts - len(tried)]
-        tried, ends = [*tried, *others], [*ends, *_follow(problem, others, max_steps)]
-        better = min((end for end in ends if finite(end)), key=squares, default=best)
-        if finite(best) and squares(better) >= (1.0 - BETTER) * squares(best):
+        tried, ends = [*tried, *others], [*ends, *_follow(problem, others, best, max_steps)]
+        before, known = squares(best), finite(best)
+        best = min(
+            (end for end in ends if finite(end)),
+            key=lambda end: (1.0 + BETTER * (end is not best)) * squares(end),
+            default=best,
+        )
+        if known and squares(best) >= (1.0 - WORTH_A_ROUND) * before:
             break
-        best, problem = better, problem.started_at(better.values)
+        problem = problem.started_at(best.values)
     return Several(best, tuple(end for end in ends if finite(end) and (end.converged or end is best)), len(tried))
 
 
-def _follow(problem: Problem, others: Sequence[np.ndarray], max_steps: int) -> list[Found]:
+def _follow(problem: Problem, others: Sequence[np.ndarray], best: Found, max_steps: int) -> list[Found]:
     """The ends of a few steps from each of several starts, and of the whole search from the most promising."""
     looks = [search(problem.started_at(values), min(FIRST_LOOK, max_steps)) for values in others]
-    promising = sorted((found for found in looks if not found.converged and finite(found)), key=squares)
+    most = PROMISING * min([squares(found) for found in (best, *looks) if finite(found)], default=np.inf)
+    open_ended = (found for found in looks if not found.converged and finite(found) and squares(found) < most)
+    promising = sorted(open_ended, key=squares)
     ends = [found for found in looks if found.converged]
     for found in promising[:FOLLOWED]:
-        left = max_steps - found.steps
+        left = min(max_steps - found.steps, FOLLOWED_STEPS)
         on = search(problem.started_at(found.values), left) if left else found._replace(steps=0)
         ends.append(on._replace(steps=found.steps + on.steps))
     return ends
