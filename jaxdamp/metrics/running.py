@@ -1,5 +1,7 @@
 """The running root mean square and its maximum."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Int
@@ -77,14 +79,16 @@ def _moving_sum(values: Signal, count: Int[Array, ""]) -> Signal:
     larger ones, as those of a cumulative sum are, which after a loud stretch leave nothing of a quiet one in single
     precision.
     """
-    total, taken, block = jnp.zeros_like(values), jnp.zeros_like(count), values
-    for digit in range(values.size.bit_length()):
-        length = 1 << digit
+
+    def double(_: Any, sums: tuple[Signal, Int[Array, ""], Signal, Int[Array, ""]]) -> tuple[Any, ...]:
+        total, taken, block, length = sums
         has = (count & length) != 0
         total = jnp.where(has, total + _delayed(block, taken), total)
-        taken = taken + jnp.where(has, length, 0)
-        block = block.at[length:].add(block[:-length])
-    return total
+        return total, taken + jnp.where(has, length, 0), block + _delayed(block, length), 2 * length
+
+    # a loop: written out, the compiler would compute every sum anew for each of its two uses, 2^digits times
+    start = jnp.zeros_like(values), jnp.zeros_like(count), values, jnp.ones_like(count)
+    return jax.lax.fori_loop(0, values.size.bit_length(), double, start)[0]
 
 
 def _delayed(values: Signal, count: Int[Array, ""]) -> Signal:
