@@ -222,8 +222,11 @@ def _places(paths: Iterable[str]) -> list[str]:
 
 
 def check_invariants(module: Any) -> None:
-    """Run the checks that a module's constructor runs, for one whose values were replaced."""
-    for kind in type(module).__mro__:
+    """Run the checks that a module's constructor runs, for one whose values were replaced.
+
+    Those of the base classes come first, so that a value outside its domain is named before what follows from it.
+    """
+    for kind in reversed(type(module).__mro__):
         if "__check_init__" in kind.__dict__:
             kind.__dict__["__check_init__"](module)
 

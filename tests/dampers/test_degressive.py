@@ -8,6 +8,7 @@ import pytest
 from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import Degressive
 from jaxdamp.identify import fit
+from jaxdamp.parameters import parameters
 
 from .cars import simulated_and_integrated
 
@@ -44,7 +45,7 @@ def test_guess_and_fit():
     v = np.concatenate([run.velocity for run in runs])
     start = Degressive.guess(v, np.concatenate([run.force for run in runs]))
     np.testing.assert_allclose(jax.tree.leaves(start), truth, rtol=0.2)
-    np.testing.assert_allclose(jax.tree.leaves(fit(Degressive, runs).law), truth, rtol=0.03)
+    np.testing.assert_allclose([p.value for p in parameters(fit(Degressive, runs).law)], truth, rtol=0.03)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
