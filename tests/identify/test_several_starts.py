@@ -90,7 +90,9 @@ def test_a_search_stays_inside_the_conditions_of_a_law():
     compression, rebound = result["compression_rate"], result["rebound_rate"]
     assert compression.value == pytest.approx(0.0067 * rebound.value, rel=1e-3)
     assert np.all(np.asarray(margins(result.law)) > 0)
-    assert from_json(to_json(result.law)).force_velocity(0.1) == result.law.force_velocity(0.1)
+    law = from_json(to_json(result.law))
+    assert isinstance(law, Besinger) and isinstance(result.law, Besinger)
+    assert law.force_velocity(0.1) == result.law.force_velocity(0.1)
     assert {compression.note, rebound.note, result["transition_velocity"].note} == {"not identifiable"}
     together = [w for w in result.warnings if w.startswith("These records cannot tell")]
     assert len(together) == 1 and "compression_rate" in together[0] and "rebound_rate" in together[0]
