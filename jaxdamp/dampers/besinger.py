@@ -143,11 +143,15 @@ class Besinger(AbstractMemoryless):
             if error < best[0]:
                 best = (error, float(slopes[0]), float(slopes[1]), float(knee))
         _, rebound, blow_off, knee = best
+        transition = 0.3 * knee
         rebound = max(rebound, 1.0)
+        compression = max(secant_rate(velocity, force, -1), 0.02 * rebound)
+        # records whose force falls in rebound, as with friction that lets go, still get a law whose force grows
+        rebound = max(rebound, 1.1 * float(least_rebound(knee, transition)) * compression)
         return cls(
-            compression_rate=max(secant_rate(velocity, force, -1), 0.02 * rebound),
+            compression_rate=compression,
             rebound_rate=rebound,
             blow_off_rate=float(np.clip(blow_off, 0.05 * rebound, None)),
             limit_velocity=knee,
-            transition_velocity=0.3 * knee,
+            transition_velocity=transition,
         )

@@ -1,6 +1,7 @@
 """Paper 001: the numbers of its parameter set."""
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -150,3 +151,10 @@ def test_guess_finds_the_knee_and_the_slopes():
     np.testing.assert_allclose(law.limit_velocity, 0.2, atol=0.02)
     np.testing.assert_allclose(law.rebound_rate, 3000.0, rtol=0.05)
     np.testing.assert_allclose(law.blow_off_rate, 700.0, rtol=0.05)
+
+
+def test_a_guess_keeps_the_conditions_where_the_force_falls_in_rebound():
+    velocity = np.linspace(-0.3, 0.3, 601)
+    law = Besinger.guess(velocity, np.where(velocity > 0, -200.0 * velocity, 3000.0 * velocity))
+    v = np.linspace(-1.0, 1.0, 2001)
+    assert np.all(np.diff(jax.vmap(law.force_velocity)(jnp.asarray(v))) > 0)
