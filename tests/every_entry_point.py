@@ -85,11 +85,11 @@ def numbers_of_vehicles():
     for name in ("quarter_car_000", "golden_car", "half_car_002", "full_car_jazar", "truck_001", "m113_003"):
         car = getattr(vehicles.presets, name)()
         if name != "m113_003":  # whose wheels without dampers never come to rest
-            rms = vehicles.stationary_rms(car, roads.white("C", 20.0).velocity_psd)
+            rms = vehicles.stationary_rms(car, roads.white("C", 20.0).velocity_psd, speed=20.0)
             found[f"{name}, stationary_rms"] = float(rms[car.ride_metrics[0].channel])
         found[f"{name}, modes"] = np.sort(np.asarray(vehicles.modes(car).frequency))
         found[f"{name}, static_wheel_loads"] = car.static_wheel_loads()
-        gain = vehicles.frequency_response(car, np.array([1.0, 5.0]))[car.ride_metrics[0].channel]
+        gain = vehicles.frequency_response(car, np.array([1.0, 5.0]), speed=20.0)[car.ride_metrics[0].channel]
         found[f"{name}, frequency_response"] = np.abs(np.asarray(gain))
     return found
 
