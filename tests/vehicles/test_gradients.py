@@ -27,7 +27,7 @@ def table(response):
 def assert_slopes(found, expected, level, message=""):
     """Relative slopes agree; powers relative to the largest, as what only stores dissipates next to nothing."""
     largest = max(float(v) for name, v in level.items() if name.endswith("_dissipated_power"))
-    sizes = {name: largest if name.endswith("_dissipated_power") else float(v) for name, v in level.items()}
+    sizes = {name: largest if name.endswith("_dissipated_power") else abs(float(v)) for name, v in level.items()}
     assert all(size > 0.0 for size in sizes.values())
     for name, size in sizes.items():
         error = f"{name} {message}"
