@@ -54,6 +54,7 @@ def fresh(script):
     return done.stdout.splitlines()
 
 
+@pytest.mark.slow
 def test_processes(tmp_path):
     scripts = [IMPORTING, CONFIGURING.replace("{folder}", str(tmp_path / "cache")), PLAIN]
     with ThreadPoolExecutor() as pool:

@@ -50,6 +50,7 @@ def test_odd_dampers_give_laws_tables_and_pictures(tmp_path: Path, name: str) ->
     assert not (out / "UNFINISHED.txt").exists()
 
 
+@pytest.mark.slow
 def test_a_best_law_that_does_not_settle_leaves_rows_out_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

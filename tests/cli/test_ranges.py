@@ -27,6 +27,7 @@ def test_a_fit_states_the_range_and_writes_it_into_the_law(records: Path, tmp_pa
     assert f"# fitted to: {law.fitted_to.words()}" in (out / "best_law_force_velocity.csv").read_text()
 
 
+@pytest.mark.slow
 def test_a_ride_beyond_the_range_is_said_in_table_report_and_words(tmp_path: Path) -> None:
     law, out = tmp_path / "law.json", tmp_path / "ride"
     to_json(with_fitted_range(Bilinear(2600.0, 1200.0), SLOW), law)

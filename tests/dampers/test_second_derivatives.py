@@ -78,6 +78,7 @@ def assert_agree(quantity, names, rng, *, with_differences=True):
         np.testing.assert_allclose(forward / size, differences(function, way) / size, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_powers_and_limits_on_the_bench(rng):
     assert_agree(bench, ["Bouc and Wen", "power 0.4, offsets", "bump stop"], rng)
 
@@ -94,6 +95,7 @@ def test_every_kind_of_law_in_a_ride(names, rng):
     assert_agree(ride, names, rng, with_differences=False)
 
 
+@pytest.mark.slow
 def test_a_hessian_of_a_ride_by_names():
     """As a user writes it: `jax.hessian` of a metric by paths of the vehicle, against differences of its gradient."""
     car = quarter_car_000(BoucWen(800.0, 2000.0, 300.0, 1e-3) + PowerLaw(900.0, 0.6, 700.0, 0.7))
@@ -124,6 +126,7 @@ def test_of_a_root_that_few_steps_find(rng):
     np.testing.assert_allclose(reverse, forward, rtol=0.0, atol=1e-11 * np.max(np.abs(forward)))
 
 
+@pytest.mark.slow
 def test_of_where_a_vehicle_comes_to_rest():
     """A gas spring's equilibrium k z = F(z): z″ by its pressure from differences of the first derivative."""
 

@@ -179,6 +179,7 @@ def test_a_single_sine_leaves_a_surface_open_and_the_fit_says_so(sines):
     assert np.max(np.abs([e.value for e in result.parameters])) < 10 * np.max(np.abs(runs[0].force))
 
 
+@pytest.mark.slow
 def test_a_law_with_states_that_are_frozen_needs_no_search(sines):
     truth = FrequencySelective(Linear(900.0), Linear(2000.0), 0.03, 0.002)
     runs = VirtualDyno(truth, force_noise=5.0).run([SineTest(0.02, f) for f in (0.5, 2.0, 6.0)])

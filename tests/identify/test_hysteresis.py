@@ -40,6 +40,7 @@ def test_thirty_records_give_the_car_damper_back(car, car_runs):
     assert np.all(np.ptp(values, axis=0) < 0.05 * errors)
 
 
+@pytest.mark.slow
 def test_the_discretisation_is_far_below_the_noise(car, car_runs):
     """The law's forces by the fit's steps, against the bench's own, which are 30 times finer."""
     error = np.concatenate([f - r.force for f, r in zip(predict_runs(car, car_runs), car_runs, strict=True)])
@@ -48,6 +49,7 @@ def test_the_discretisation_is_far_below_the_noise(car, car_runs):
     assert abs(np.mean(error)) < 0.25 and np.percentile(np.abs(smooth), 99) < 2.6 * 2.0
 
 
+@pytest.mark.slow
 def test_a_lag_is_found_without_noise(maxwell_runs):
     for start in (Lag(Linear(1000.0), 1e-3), Lag(Linear(5000.0), 2e-2)):
         result = fit(start, maxwell_runs)

@@ -36,6 +36,7 @@ def first_records():
     return records(0)
 
 
+@pytest.mark.slow
 def test_the_published_set_is_found_where_one_start_ends_elsewhere(first_records):
     alone = fit(Besinger, first_records, starts=1)
     assert alone.starts == 1 and len(alone.minima) == 1
@@ -74,6 +75,7 @@ def test_the_published_set_is_found_for_forty_seeds():
     assert 0.6 < np.std(z) < 1.2  # errors that hold far away are larger than those at the minimum
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_a_slope_beyond_what_a_record_shows_is_not_called_certain(seed):
     """10 mm at 2 Hz goes 0.7 mm/s beyond the knee: any blow-off rate fits, if only the knee moves."""

@@ -33,6 +33,7 @@ def half_car(law: AbstractDamper) -> tuple[AbstractVehicle, roads.AbstractRoad]:
     return car, roads.delayed(BUMP, positions=car.axle_positions, speed=15.0)
 
 
+@pytest.mark.slow
 def test_a_run_names_every_damper_with_its_own_numbers():
     car, road = half_car(with_fitted_range(LAW, SLOW))
     with pytest.warns(OutsideFittedRangeWarning) as caught:

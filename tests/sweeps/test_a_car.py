@@ -27,6 +27,7 @@ def test_a_simulated_quarter_car(tmp_path):
     np.testing.assert_allclose(slope, (near[1] - near[0]) / (2 * h), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_ride_is_swept_with_its_units():
     car, road = vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05)
     ride = jaxdamp.Ride(car, road, metrics=["rms_sprung_acceleration", "working_space_rms"], duration=0.2, dt=2e-3)

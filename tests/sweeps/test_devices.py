@@ -62,6 +62,7 @@ def compare(folder: Path, expected: xarray.Dataset, expected_failing: xarray.Dat
     assert "the axis 'a' has other values" in (folder / "refusal-0.txt").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_two_devices(tmp_path, expected, expected_failing):
     elsewhere(tmp_path, processes=1, devices=2)
     compare(tmp_path, expected, expected_failing, 1)

@@ -29,6 +29,7 @@ def test_on_a_white_road_velocities_reach_three_standard_deviations():
     assert f"warning: {result.warnings[0]}" in repr(result)
 
 
+@pytest.mark.slow
 def test_on_a_driven_road_the_run_itself_is_looked_at():
     car = vehicles.presets.quarter_car_000(LAW)
     road = roads.cosine_bump(0.05, start=0.2, duration=0.3)

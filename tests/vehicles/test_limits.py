@@ -56,6 +56,7 @@ def test_two_half_cars():
     np.testing.assert_allclose(response["roll"], 0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_two_roll_cars():
     """The same road under both axles, axles alike, with bars."""
     car = full(CORNER, CORNER, 9e3, 1500.0, 500.0)

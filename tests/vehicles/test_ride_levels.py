@@ -11,6 +11,7 @@ from jaxdamp.vehicles.presets import quarter_car_000
 from .test_quarter_car import closed_forms
 
 
+@pytest.mark.slow
 def test_simulated_stationary_and_closed_form_are_one():
     """Two laps of a road of 500 m at 20 m/s, the second one steady: its waves are all there a whole number of times."""
     car, speed, length, dt = quarter_car_000(), 20.0, 500.0, 2e-3
