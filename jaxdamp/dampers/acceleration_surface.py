@@ -1,6 +1,6 @@
 """The force as a smooth surface over velocity and acceleration, taken from data."""
 
-from typing import ClassVar, final
+from typing import final
 
 import equinox as eqx
 import jax
@@ -9,7 +9,6 @@ import numpy as np
 
 from jaxdamp._types import Matrix, Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers._first_order import follow
-from jaxdamp.dampers._hysteresis import own_states
 from jaxdamp.dampers._surface import (
     CONSENT,
     Axis,
@@ -18,7 +17,8 @@ from jaxdamp.dampers._surface import (
     surface_force,
     surface_least_squares,
 )
-from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import around_zero, nonnegative, parameter, positive, setting
 
 
@@ -77,7 +77,9 @@ class AccelerationSurface(AbstractDamper):
     washout_time: Number = setting("s", "τ, time constant of the washout", positive, default=WASHOUT_TIME)
     outside: str = eqx.field(static=True, default="nan")
 
-    preserves_linearity: ClassVar[bool] = True
+    def traits(self) -> Traits:
+        """Linear in the coefficients, as the state does not depend on them."""
+        return Traits(linear_in_parameters=True, stroke_dependent_at_rest=False)
 
     def __check_init__(self) -> None:
         check_surface(self.coefficients, self.outside)
@@ -108,7 +110,7 @@ class AccelerationSurface(AbstractDamper):
         (slow,) = own_states(self, state, 1)
         return jnp.stack([follow(slow, v0, v1, dt, self.washout_time)])
 
-    def covered(self) -> str:
+    def validity(self) -> str:
         """The ranges in words."""
         velocity, acceleration = self._axes(0.0, 0.0)
         return f"AccelerationSurface holds for {velocity.words()}, {acceleration.words()}. {CONSENT}"

@@ -5,13 +5,12 @@ from typing import Any
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp.dampers.base import AbstractDamper, parts
+from jaxdamp.dampers.base import AbstractDamper
 
 
 def coverage(law: AbstractDamper) -> str:
     """Where a law and the laws inside it hold, in words; empty if they hold everywhere."""
-    said = [law.covered()] if hasattr(law, "covered") else []  # type: ignore[attr-defined]
-    return " ".join([*said, *filter(None, map(coverage, parts(law)))])
+    return " ".join(filter(None, [law.validity(), *map(coverage, law.inner_laws())]))
 
 
 def refuse_gaps(law: AbstractDamper, force: Any, where: str) -> None:

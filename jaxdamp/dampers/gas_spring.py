@@ -7,6 +7,7 @@ import equinox as eqx
 from jaxdamp._limits import at_least
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractStateless
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import parameter, positive, setting
 
 
@@ -52,6 +53,10 @@ class GasSpring(AbstractStateless):
     exponent: Number = parameter("", "n, polytropic exponent", positive, default=1.3)
     atmospheric_pressure: Number = setting("Pa", "pressure outside", positive, default=101_325.0)
     relative: bool = eqx.field(static=True, default=False)
+
+    def traits(self) -> Traits:
+        """The velocity does not matter."""
+        return super().traits()._replace(has_feed_through=False)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m]; the velocity does not matter."""
