@@ -12,7 +12,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal, SignalLike
 from jaxdamp.dampers import AbstractDamper, Motion, range_use, without_fitted_ranges
-from jaxdamp.dampers.coverage import coverage, refuse_gaps
+from jaxdamp.dampers.coverage import coverage, require_finite_force
 from jaxdamp.dampers.fitted_range import has_fitted_range
 from jaxdamp.dampers.range_use import sentence, warn_outside
 from jaxdamp.parameters import as_float
@@ -99,7 +99,7 @@ def respond(
         force = march(law, dt, stroke, rate, substeps)
     else:
         force = _solve(law, time, stroke, rate, substeps, method, rtol, atol)
-    refuse_gaps(law, force, "over the whole motion")
+    require_finite_force(law, force, "over the whole motion")
     _warn_of_range(fitted, stroke, rate, force)
     return force
 

@@ -109,18 +109,19 @@ class AbstractSeries(AbstractWrapper):
         total = _total(deflections)
         v0, gained = jnp.asarray(v0, total.dtype), jnp.asarray(v1 - v0, total.dtype)
 
-        def stage(share: ScalarLike, now: _Now, duration: ScalarLike) -> _Rate:
-            free = _total(now.deflections) + duration * (v0 + share * gained)
-            return self._stage(law, free, now, duration, likely=3 if share < 1.0 else 2)
+        def stage(share: float, now: _Now) -> _Rate:
+            free = _total(now.deflections) + GAMMA * dt * (v0 + share * gained)
+            return self._stage(law, free, now, GAMMA * dt, likely=3 if share < 1.0 else 2)
 
-        def moved(rate: _Rate, now: _Now, duration: ScalarLike) -> _Now:
-            w, part = rate.velocity, duration / (GAMMA * dt)
-            after = tuple(old + part * change for old, change in zip(now.deflections, rate.change, strict=True))
+        def moved(rate: _Rate, now: _Now, part: float) -> _Now:
+            w, duration = rate.velocity, part * dt
+            pairs = zip(now.deflections, rate.change, strict=True)
             stroke = now.stroke + duration * w
             inner = law.advance(now.stroke, w, stroke, w, now.inner, duration)
+            after = tuple(old + (part / GAMMA) * change for old, change in pairs)
             return _Now(after, stroke, inner, w + (1.0 - GAMMA) * gained)
 
-        after = sdirk2(stage, moved, _Now(deflections, x0 - total, inner, v0), dt)
+        after = sdirk2(stage, moved, _Now(deflections, x0 - total, inner, v0))
         return jnp.concatenate([jnp.stack(after.deflections), after.inner])
 
     def _stage(self, law: AbstractDamper, free: Scalar, now: _Now, duration: ScalarLike, likely: int) -> _Rate:

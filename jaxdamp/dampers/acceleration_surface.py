@@ -45,7 +45,7 @@ class AccelerationSurface(AbstractDamper):
 
     The loops of shock absorbers open with frequency, because oil and hoses give way: at one velocity the force
     differs between speeding up and slowing down. So Duym and Schoukens (1996) lay the surface over velocity and
-    acceleration. A law is told the velocity only; a washout makes the acceleration from it, late by τ. One state, the
+    acceleration. A law receives the velocity only; a washout makes the acceleration from it, late by τ. One state, the
     washed-out velocity s [m/s]; its step is exact for a velocity linear over the step.
 
     A force that lags by τ_F has a slope ∂F/∂a ≈ −τ_F ∂F/∂v. Unless τ ≥ τ_F, such a surface drives the motion above

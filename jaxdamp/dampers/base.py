@@ -237,12 +237,12 @@ def own_states(law: AbstractDamper, state: State, count: int) -> list[Scalar]:
 def laws_inside(tree: Any, prefix: str = "") -> list[tuple[str, AbstractDamper]]:
     """All laws in a law, a vehicle or another module, each with the prefix of the paths of its parameters."""
     if isinstance(tree, tuple | list):
-        return [found for i, item in enumerate(tree) for found in laws_inside(item, f"{prefix}{i}.")]
+        return [entry for i, item in enumerate(tree) for entry in laws_inside(item, f"{prefix}{i}.")]
     if not isinstance(tree, eqx.Module):
         return []
     own = [(prefix, tree)] if isinstance(tree, AbstractDamper) else []
     inner = [laws_inside(getattr(tree, field.name), f"{prefix}{field.name}.") for field in dataclasses.fields(tree)]
-    return own + [found for part in inner for found in part]
+    return own + [entry for part in inner for entry in part]
 
 
 def refuse_states(argument: str, law: AbstractDamper, remedy: str) -> None:

@@ -1,4 +1,4 @@
-"""Laws made from data hold where the data are: what they say of that, and the refusal of forces beyond."""
+"""Laws made from data have a force where the data are: where that is, in words, and the refusal of other forces."""
 
 from typing import Any
 
@@ -13,9 +13,9 @@ def coverage(law: AbstractDamper) -> str:
     return " ".join(filter(None, [law.validity(), *map(coverage, law.inner_laws())]))
 
 
-def refuse_gaps(law: AbstractDamper, force: Any, where: str) -> None:
+def require_finite_force(law: AbstractDamper, force: Any, where: str) -> None:
     """Refuse forces [N] of a law that are not finite (traced ones cannot be checked)."""
-    found = _checks.concrete(force)
-    if found is not None and not np.all(np.isfinite(found)):
-        missing = f"{type(law).__name__} with none at {np.count_nonzero(~np.isfinite(found))} of {found.size} samples"
+    known = _checks.concrete(force)
+    if known is not None and not np.all(np.isfinite(known)):
+        missing = f"{type(law).__name__} with none at {np.count_nonzero(~np.isfinite(known))} of {known.size} samples"
         _checks.refuse("law", f"give a finite force {where}", missing, coverage(law))

@@ -15,9 +15,9 @@ from jaxdamp.parameters import parameter, positive
 
 def dahl_step(travel: ScalarLike, force: ScalarLike, stiffness: ScalarLike, friction: ScalarLike) -> Scalar:
     """F [N] after a travel [m] in one direction, exact: ±F_c is approached with exp(−σ₀ |travel|/F_c)."""
-    way = direction(travel)
-    settled = way * friction
-    return settled + (force - settled) * jnp.exp(-stiffness * way * travel / friction)
+    sign = direction(travel)
+    sliding = sign * friction
+    return sliding + (force - sliding) * jnp.exp(-stiffness * sign * travel / friction)
 
 
 @final

@@ -21,8 +21,8 @@ def gas_pressure(x: ScalarLike, pressure: ScalarLike, volume: ScalarLike, area: 
     instead of to the pole at V₀ + A x = 0: value and slope are finite and continuous at every stroke.
     """
     share = 1.0 + area * x / volume
-    kept = at_least(share, LEAST_SHARE)
-    return pressure * kept**-n * (1.0 - n * (share - kept) / kept)
+    limited = at_least(share, LEAST_SHARE)
+    return pressure * limited**-n * (1.0 - n * (share - limited) / limited)
 
 
 @final

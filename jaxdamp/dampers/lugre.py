@@ -75,14 +75,14 @@ class LuGre(AbstractDamper):
         zero = 0.0 * after
         turn = jnp.where(before != 0.0, zero, v0)
         for travel, start, end in ((before, v0, zero), (after, turn, v1)):
-            way = direction(travel)
+            sign = direction(travel)
             middle = self.sliding_force(0.5 * (start + end))
-            lengths = self.stiffness * way * travel / middle
+            lengths = self.stiffness * sign * travel / middle
             safe = jnp.where(lengths > 1e-6, lengths, 1.0)
-            kept = jnp.exp(-lengths)
+            decay = jnp.exp(-lengths)
             mean = jnp.where(lengths > 1e-6, -jnp.expm1(-safe) / safe, 1.0 - 0.5 * lengths)
-            settled = (mean - kept) * self.sliding_force(start) + (1.0 - mean) * self.sliding_force(end)
-            z = kept * z + way * settled / self.stiffness
+            sliding = (mean - decay) * self.sliding_force(start) + (1.0 - mean) * self.sliding_force(end)
+            z = decay * z + sign * sliding / self.stiffness
         return z[None]
 
     @classmethod

@@ -10,7 +10,7 @@ from jaxdamp._limits import at_least
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import sliding_fit
-from jaxdamp.dampers._sdirk2 import sdirk2
+from jaxdamp.dampers._sdirk2 import GAMMA, sdirk2
 from jaxdamp.dampers.base import AbstractDamper, own_states
 from jaxdamp.dampers.bouc_wen import hysteresis_rate, hysteresis_step
 from jaxdamp.parameters import interval, nonnegative, parameter, positive, real, setting
@@ -83,16 +83,15 @@ class ModifiedBoucWen(AbstractDamper):
         viscous, series, level = self.at_voltage()
 
         def surplus(w: Scalar) -> Scalar:
-            ahead, z_ahead = self._moved(w, (stroke, z), duration)
+            ahead, z_ahead = self._moved(w, stroke, z, duration)
             return viscous * w + self.stiffness * ahead + level * z_ahead - series * (v - w)
 
         held = self.stiffness * jnp.abs(stroke) + level * at_least(jnp.abs(z), 1.0)
         limit = (series * jnp.abs(v) + held) / (viscous + series)
         return increasing_root(surplus, jnp.zeros_like(limit), -limit, limit, steps=20)
 
-    def _moved(self, w: Scalar, states: tuple[Scalar, Scalar], duration: ScalarLike) -> tuple[Scalar, Scalar]:
+    def _moved(self, w: ScalarLike, stroke: Scalar, z: Scalar, duration: ScalarLike) -> tuple[Scalar, Scalar]:
         """Inner stroke [m] and z after moving at an inner velocity [m/s]."""
-        stroke, z = states
         travel = duration * w
         return stroke + travel, hysteresis_step(travel / self.yield_displacement, z, self.shape, self.exponent)
 
@@ -103,10 +102,13 @@ class ModifiedBoucWen(AbstractDamper):
         del x0, x1
         stroke, z = own_states(self, state, 2)
 
-        def stage(share: ScalarLike, states: tuple[Scalar, Scalar], duration: ScalarLike) -> Scalar:
-            return self._stage(v0 + share * (v1 - v0), *states, duration)
+        def stage(share: float, states: tuple[Scalar, Scalar]) -> Scalar:
+            return self._stage(v0 + share * (v1 - v0), *states, GAMMA * dt)
 
-        return jnp.stack(sdirk2(stage, self._moved, (stroke, z), dt))
+        def moved(w: Scalar, states: tuple[Scalar, Scalar], part: float) -> tuple[Scalar, Scalar]:
+            return self._moved(w, *states, part * dt)
+
+        return jnp.stack(sdirk2(stage, moved, (stroke, z)))
 
     @classmethod
     def prototype(cls, voltage: float = 0.0) -> "ModifiedBoucWen":

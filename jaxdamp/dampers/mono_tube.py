@@ -9,7 +9,7 @@ from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers._sdirk2 import sdirk2
+from jaxdamp.dampers._sdirk2 import GAMMA, sdirk2
 from jaxdamp.dampers.base import AbstractDamper, own_states
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
 from jaxdamp.dampers.gas_spring import LEAST_SHARE, GasSpring, gas_pressure
@@ -24,9 +24,9 @@ def oil_stiffness(x: ScalarLike, bulk_modulus: ScalarLike, area: ScalarLike, vol
 
 
 def stroke_within(
-    share: ScalarLike, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, dt: ScalarLike
+    share: float, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, dt: ScalarLike
 ) -> Scalar:
-    """Stroke [m] at a share of a step over which the velocity goes straight from v₀ to v₁; x₁ at its end."""
+    """Stroke [m] at a share of a step over which the velocity goes straight from v₀ to v₁."""
     return x0 + share * (x1 - x0) - 0.5 * share * dt * (1.0 - share) * (v1 - v0)
 
 
@@ -156,14 +156,15 @@ class MonoTube(AbstractDamper):
         """Two-stage SDIRK step; the velocity is taken as linear over the step."""
         (deflection,) = own_states(self, state, 1)
 
-        def stage(share: ScalarLike, deflection: Scalar, duration: ScalarLike) -> Scalar:
-            v = v0 + share * (v1 - v0)
-            return v - self._flow(stroke_within(share, x0, v0, x1, v1, dt), deflection + duration * v, duration)
+        def stage(share: float, deflection: Scalar) -> Scalar:
+            v, duration = v0 + share * (v1 - v0), GAMMA * dt
+            x = x1 if share == 1.0 else stroke_within(share, x0, v0, x1, v1, dt)
+            return v - self._flow(x, deflection + duration * v, duration)
 
-        def moved(rate: Scalar, deflection: Scalar, duration: ScalarLike) -> Scalar:
-            return deflection + duration * rate
+        def moved(rate: Scalar, deflection: Scalar, part: float) -> Scalar:
+            return deflection + part * dt * rate
 
-        return sdirk2(stage, moved, deflection, dt)[None]
+        return sdirk2(stage, moved, deflection)[None]
 
     def incompressible(self) -> AbstractDamper:
         """`piston + gas + friction`, the limit B → ∞ without cavities: no states, for sweeps and for slow motion."""

@@ -66,10 +66,10 @@ class NeuralHysteresis(AbstractDamper):
         shapes = {"stiffness": (n,), "hidden_weights": (width, n + 1), "hidden_biases": (width,)}
         shapes |= {"output_weights": (2 * n, width), "output_biases": (2 * n,)}
         for name, shape in shapes.items():
-            found = getattr(self, name).shape
-            if found != shape or 0 in shape:
+            actual = getattr(self, name).shape
+            if actual != shape or 0 in shape:
                 must = f"be of shape {shape} for {n} elements and {width} hidden units"
-                _checks.refuse(name, must, f"of shape {found}", "`NeuralHysteresis.random` makes a network that fits.")
+                _checks.refuse(name, must, f"of shape {actual}", "`NeuralHysteresis.random` makes a network that fits.")
 
     def traits(self) -> Traits:
         """The force is the sum of the states."""

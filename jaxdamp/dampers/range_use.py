@@ -15,7 +15,7 @@ from jaxdamp.dampers.fitted_range import OutsideFittedRangeWarning, has_fitted_r
 from jaxdamp.dampers.motion import Motion
 
 
-TOLERANCE = 0.05  # of the larger limit, by which a use may leave the range before it is said
+TOLERANCE = 0.05  # of the larger limit, by which a use may leave the range without a warning
 _ROUNDING = 1e-9  # of the larger limit
 
 

@@ -72,7 +72,8 @@ def rates(law: AbstractDamper, x: Array, v: Array, state: Array) -> Array:
 @eqx.filter_jit
 def predicted_and_advanced(law: AbstractDamper, ends: tuple[Array, ...], state: Array, dt: Array) -> tuple[Array, ...]:
     """`law.predict` and `law.advance`, compiled."""
-    return law.predict(*ends, state, dt), law.advance(*ends, state, dt)
+    x0, v0, x1, v1 = ends
+    return law.predict(x0, v0, x1, v1, state, dt), law.advance(x0, v0, x1, v1, state, dt)
 
 
 def points(free: FreeParameters, x, v) -> list[np.ndarray]:
