@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         roads,
         simulation,
         sweeps,
+        testing,
         tune,
         vehicles,
     )
@@ -53,6 +54,7 @@ __all__ = [
     "simulation",
     "sweep",
     "sweeps",
+    "testing",
     "tune",
     "vehicles",
 ]

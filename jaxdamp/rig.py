@@ -11,8 +11,8 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal, SignalLike
-from jaxdamp.dampers import AbstractDamper, Motion, Sum, range_use, without_fitted_ranges
-from jaxdamp.dampers.coverage import coverage, refuse_gaps
+from jaxdamp.dampers import AbstractDamper, Motion, range_use, without_fitted_ranges
+from jaxdamp.dampers.coverage import coverage, require_finite_force
 from jaxdamp.dampers.fitted_range import has_fitted_range
 from jaxdamp.dampers.range_use import sentence, warn_outside
 from jaxdamp.parameters import as_float
@@ -99,7 +99,7 @@ def respond(
         force = march(law, dt, stroke, rate, substeps)
     else:
         force = _solve(law, time, stroke, rate, substeps, method, rtol, atol)
-    refuse_gaps(law, force, "over the whole motion")
+    require_finite_force(law, force, "over the whole motion")
     _warn_of_range(fitted, stroke, rate, force)
     return force
 
@@ -115,15 +115,14 @@ def _warn_of_range(law: AbstractDamper, *channels: Signal) -> None:
 
 
 def _refuse_strokes(law: AbstractDamper, stroke: Signal) -> None:
-    """Refuse strokes outside the limits of a law, or of one in a sum (inside other laws the stroke is another)."""
+    """Refuse strokes outside the limits of a law."""
     found = _checks.concrete(stroke)
-    for part in law.terms if isinstance(law, Sum) else (law,):
-        limits = [_checks.concrete(limit) for limit in getattr(part, "stroke_limits", ())]
-        if found is None or not limits or any(limit is None for limit in limits):
+    for term in law.side_by_side():
+        low, high = (_checks.concrete(limit) for limit in term.stroke_limits)
+        if found is None or low is None or high is None:
             continue
-        low, high = (float(limit) for limit in limits if limit is not None)
         if found.min() < low or found.max() > high:
-            must = f"stay from {low:.4g} to {high:.4g} m for {type(part).__name__}"
+            must = f"stay from {low:.4g} to {high:.4g} m for {type(term).__name__}"
             value = f"from {found.min():.4g} to {found.max():.4g} m"
             _checks.refuse("stroke", must, value, "The law's volumes are those at stroke zero: shift the stroke.")
 

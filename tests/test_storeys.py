@@ -19,7 +19,7 @@ STOREYS = [
     {"simulation", "bench"},
     {"identify", "tune", "sweeps"},
     {"plots", "export"},
-    {"cli", "report", "__main__"},
+    {"cli", "report", "testing", "__main__"},
 ]
 TOP = len(STOREYS) - 1
 # A result draws itself: `.plot()` loads the plots when it is called.

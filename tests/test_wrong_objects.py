@@ -41,6 +41,7 @@ ANSWERS = {  # call: words that its refusal holds
     "Ride(road, car)": ("`vehicle` must be a vehicle", "`Ride(vehicle, road)`"),
     "respond(time, law, stroke)": ("`law` must be a damper law", "an array of shape (2000,)", "respond(law, time"),
     "respond(dampers.Linear, time, stroke)": ("`law` must be a damper law", "the class Linear", "`Linear(...)`"),
+    "jaxdamp.testing.check_law(dampers.Linear)": ("`law` must be a damper law", "the class Linear", "`Linear(...)`"),
     "vehicles.presets.quarter_car_000(1500.0)": ("`QuarterCar.damper` must be a damper law", "dampers.Linear(1500.0)"),
     "vehicles.presets.half_car_002(car)": ("`Corner.damper` must be a damper law", "is a QuarterCar"),
     "vehicles.presets.truck_001(damper=1000.0)": ("`Corner.damper` must be a damper law", "dampers.Linear(1000.0)"),

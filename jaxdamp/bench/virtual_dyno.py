@@ -19,7 +19,7 @@ from jaxdamp.bench.sampling import FEWEST
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.velocity import estimate_velocity
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.dampers.coverage import refuse_gaps
+from jaxdamp.dampers.coverage import require_finite_force
 from jaxdamp.rig import respond
 
 
@@ -199,5 +199,5 @@ def _exact_response(
         exact = jax.tree.map(lambda leaf: leaf.astype(np.float64) if eqx.is_inexact_array(leaf) else leaf, law)
         channels = (jax.numpy.asarray(channel) for channel in (time, stroke, velocity))
         forces = np.asarray(jax.vmap(lambda t, x, v: respond(exact, t, x, v))(*channels))
-    refuse_gaps(law, forces, "over the whole programme")
+    require_finite_force(law, forces, "over the whole programme")
     return forces

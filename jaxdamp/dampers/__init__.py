@@ -10,9 +10,7 @@ from jaxdamp.dampers.base import (
     AbstractMemoryless,
     AbstractStateful,
     AbstractStateless,
-    Scaled,
-    Sum,
-    with_fitted_range,
+    own_states,
 )
 from jaxdamp.dampers.besinger import Besinger
 from jaxdamp.dampers.bilinear import Bilinear
@@ -49,6 +47,7 @@ from jaxdamp.dampers.polynomial import Polynomial
 from jaxdamp.dampers.power_law import PowerLaw
 from jaxdamp.dampers.range_use import RangeUse, extrapolated, range_use
 from jaxdamp.dampers.saturating import Saturating
+from jaxdamp.dampers.scaled import Scaled
 from jaxdamp.dampers.scheduled import Scheduled
 from jaxdamp.dampers.segmented_polynomial import SegmentedPolynomial
 from jaxdamp.dampers.series_spring import SeriesSpring
@@ -56,8 +55,12 @@ from jaxdamp.dampers.spline_table import SplineTable
 from jaxdamp.dampers.spring import Spring
 from jaxdamp.dampers.stribeck_friction import StribeckFriction
 from jaxdamp.dampers.stroke_dependent import StrokeDependent
+from jaxdamp.dampers.sum import Sum
 from jaxdamp.dampers.table import Table
 from jaxdamp.dampers.temperature_scaled import TemperatureScaled
+from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.with_range import with_fitted_range
+from jaxdamp.dampers.wrapper import AbstractWrapper
 
 
 __all__ = [
@@ -65,6 +68,7 @@ __all__ = [
     "AbstractMemoryless",
     "AbstractStateful",
     "AbstractStateless",
+    "AbstractWrapper",
     "AccelerationSurface",
     "Besinger",
     "Bilinear",
@@ -108,7 +112,9 @@ __all__ = [
     "Sum",
     "Table",
     "TemperatureScaled",
+    "Traits",
     "extrapolated",
+    "own_states",
     "range_use",
     "takes_command",
     "with_command",

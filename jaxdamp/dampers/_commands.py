@@ -14,13 +14,13 @@ def command_paths(tree: Any, prefix: str = "") -> list[str]:
         return [path for i, item in enumerate(tree) for path in command_paths(item, f"{prefix}{i}.")]
     if not isinstance(tree, eqx.Module):
         return []
-    found = []
+    paths = []
     for field in dataclasses.fields(tree):
         if (field.metadata.get("setting") or {}).get("command"):
-            found.append(prefix + field.name)
+            paths.append(prefix + field.name)
         else:
-            found += command_paths(getattr(tree, field.name), f"{prefix}{field.name}.")
-    return found
+            paths += command_paths(getattr(tree, field.name), f"{prefix}{field.name}.")
+    return paths
 
 
 def commands_of(law: eqx.Module) -> list[float]:

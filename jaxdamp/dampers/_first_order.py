@@ -8,6 +8,6 @@ from jaxdamp._types import Scalar, ScalarLike
 def follow(now: ScalarLike, before: ScalarLike, after: ScalarLike, dt: ScalarLike, time: ScalarLike) -> Scalar:
     """State y of τ ẏ + y = u after a step over which u goes straight from `before` to `after`, exact for any τ > 0."""
     z = dt / time
-    kept = jnp.exp(-z)
+    decay = jnp.exp(-z)
     mean = -jnp.expm1(-z) / z
-    return kept * now + (mean - kept) * before + (1.0 - mean) * after
+    return decay * now + (mean - decay) * before + (1.0 - mean) * after

@@ -7,10 +7,10 @@ def binned_curve(velocity: np.ndarray, force: np.ndarray, edges: np.ndarray) -> 
     """Mean velocity and mean force in each bin that holds data; hysteresis averages out over whole cycles."""
     velocity, force = np.asarray(velocity), np.asarray(force)
     place = np.digitize(velocity, edges)
-    kept = [k for k in range(1, len(edges)) if np.any(place == k)]
+    filled = [k for k in range(1, len(edges)) if np.any(place == k)]
     return (
-        np.array([velocity[place == k].mean() for k in kept]),
-        np.array([force[place == k].mean() for k in kept]),
+        np.array([velocity[place == k].mean() for k in filled]),
+        np.array([force[place == k].mean() for k in filled]),
     )
 
 

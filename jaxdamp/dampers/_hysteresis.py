@@ -1,18 +1,8 @@
-"""What the laws with hysteresis share: the count of their states, travel with reversals."""
+"""What the laws with hysteresis share: travel with reversals, and its direction."""
 
 import jax.numpy as jnp
 
-from jaxdamp import _checks
-from jaxdamp._types import Scalar, ScalarLike, State
-from jaxdamp.dampers.base import AbstractDamper
-
-
-def own_states(law: AbstractDamper, state: State, count: int) -> list[Scalar]:
-    """The states as numbers; another count than that of the law is refused."""
-    if state.size != count:
-        must = f"hold {count} number{'s' * (count != 1)} for {type(law).__name__}"
-        _checks.refuse("state", must, f"of shape {state.shape}", "Start from `law.initial_state()`.")
-    return list(state)
+from jaxdamp._types import Scalar, ScalarLike
 
 
 def travels(v0: ScalarLike, v1: ScalarLike, dt: ScalarLike) -> tuple[Scalar, Scalar]:

@@ -1,122 +1,161 @@
 """A law in series with massless springs: all carry one force, the spring deflections are states."""
 
-import math
-from collections.abc import Callable
+from abc import abstractmethod
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import within
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Scalar, ScalarLike, State
-from jaxdamp.dampers.base import AbstractDamper, parts
+from jaxdamp.dampers._sdirk2 import GAMMA, sdirk2
+from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.wrapper import AbstractWrapper
 
 
-GAMMA = 1.0 - 1.0 / math.sqrt(2.0)  # of the two-stage, second-order, L-stable SDIRK method
+FASTEST = 1e3  # m/s, far above any damper
 
 Deflections = tuple[Scalar, ...]
 
 
-class Springs(NamedTuple):
-    """What stands in series with a law.
+class _Now(NamedTuple):
+    """Where the parts in series are within a step."""
 
-    Arguments:
-        force: carried at these deflections; it does not fall when the total grows.
-        shared: the deflections that make up a total at the end of an implicit stage of a duration that began at others.
-        reach: a total at which, at the end of any such stage, they carry at least this force.
+    deflections: Deflections  # of the springs [m]
+    stroke: ScalarLike  # of the law [m]
+    inner: State  # states of the law
+    guess: Scalar  # velocity of the law expected in the next stage [m/s]
+
+
+class _Rate(NamedTuple):
+    """What a stage finds."""
+
+    velocity: Scalar  # of the law [m/s]
+    change: Deflections  # of the springs over the stage [m]
+
+
+class AbstractSeries(AbstractWrapper):
+    """A law in series with springs, whose deflections are the own states; all carry the same force.
+
+    The step is the two-stage SDIRK method: each stage finds the law's velocity w with F_law(w) = F_springs(free −
+    duration w), where `free` is the springs' total deflection for a locked law.
     """
 
-    force: Callable[[Deflections], Scalar]
-    shared: Callable[[Scalar, Deflections, ScalarLike], Deflections]
-    reach: Callable[[Scalar, Deflections], Scalar]
+    @abstractmethod
+    def spring_force(self, deflections: Deflections) -> Scalar:
+        """Force [N] carried at these deflections [m]; it does not fall when their total grows."""
+
+    @abstractmethod
+    def largest_deflection(self, force: Scalar, begun: Deflections) -> Scalar:
+        """A total deflection [m] at which the springs carry at least this force [N] at the end of any stage."""
+
+    def shared(self, total: Scalar, begun: Deflections, duration: ScalarLike) -> Deflections:
+        """The deflections of a total [m] at the end of an implicit stage that began at others; one spring has it all.
+
+        Arguments:
+            total: sum of the deflections [m].
+            begun: deflections at the beginning of the stage [m].
+            duration: of the stage [s].
+        """
+        del begun, duration
+        return (total,)
+
+    def shared_rate(self, total_rate: Scalar, deflections: Deflections) -> Deflections:
+        """Rates of the deflections [m/s] that make up a total rate."""
+        del deflections
+        return (total_rate,)
+
+    def own_state_count(self) -> int:
+        """One deflection [m]."""
+        return 1
+
+    def traits(self) -> Traits:
+        """The force is that of the springs, which depends on states alone."""
+        return super().traits()._replace(has_feed_through=False, stroke_dependent_at_rest=False)
+
+    @property
+    def stroke_limits(self) -> tuple[ScalarLike, ScalarLike]:
+        """None: the springs take a part of the stroke."""
+        return -jnp.inf, jnp.inf
+
+    def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
+        """The same force; stroke and velocity of the whole, of which the springs take a part, so mostly a bound."""
+        return [(law, motion) for law in self.inner_laws()]
+
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Force [N] of the springs."""
+        del x, v
+        return self.spring_force(self.split(state)[0])
+
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """Rates of the deflections [m/s], v − v_d in total with F_law(v_d) = F, and of the law's states."""
+        law, (deflections, inner) = self.inner_law(), self.split(state)
+        force, stroke = self.spring_force(deflections), x - _total(deflections)
+        limit = jnp.asarray(FASTEST, dtype=inner.dtype)
+        guess = within(jnp.asarray(v, dtype=inner.dtype), -limit, limit)
+        velocity = increasing_root(lambda w: law.force(stroke, w, inner) - force, guess, -limit, limit, steps=60)
+        rates = self.shared_rate(v - velocity, deflections)
+        return jnp.concatenate([jnp.stack(rates), law.state_rate(stroke, velocity, inner)])
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """Two-stage SDIRK step; the velocity is taken as linear over the step."""
+        del x1
+        law, (deflections, inner) = self.inner_law(), self.split(state)
+        total = _total(deflections)
+        v0, gained = jnp.asarray(v0, total.dtype), jnp.asarray(v1 - v0, total.dtype)
+
+        def stage(share: float, now: _Now) -> _Rate:
+            free = _total(now.deflections) + GAMMA * dt * (v0 + share * gained)
+            return self._stage(law, free, now, GAMMA * dt, likely=3 if share < 1.0 else 2)
+
+        def moved(rate: _Rate, now: _Now, part: float) -> _Now:
+            w, duration = rate.velocity, part * dt
+            pairs = zip(now.deflections, rate.change, strict=True)
+            stroke = now.stroke + duration * w
+            inner = law.advance(now.stroke, w, stroke, w, now.inner, duration)
+            after = tuple(old + (part / GAMMA) * change for old, change in pairs)
+            return _Now(after, stroke, inner, w + (1.0 - GAMMA) * gained)
+
+        after = sdirk2(stage, moved, _Now(deflections, x0 - total, inner, v0))
+        return jnp.concatenate([jnp.stack(after.deflections), after.inner])
+
+    def _stage(self, law: AbstractDamper, free: Scalar, now: _Now, duration: ScalarLike, likely: int) -> _Rate:
+        """The velocity of the law that, held for the duration, ends where law and springs carry the same force."""
+
+        def law_force(w: Scalar) -> Scalar:
+            stroke = now.stroke + duration * w
+            return law.force(stroke, w, law.advance(now.stroke, w, stroke, w, now.inner, duration))
+
+        def deflections(w: Scalar) -> Deflections:
+            return self.shared(free - duration * w, now.deflections, duration)
+
+        at_rest = jnp.abs(law_force(jnp.zeros_like(free)))
+        reach = self.largest_deflection(at_rest, now.deflections)
+        limit = (jnp.abs(free) + reach) / duration + jnp.finfo(free.dtype).tiny
+        velocity = increasing_root(
+            lambda w: law_force(w) - self.spring_force(deflections(w)),
+            within(now.guess, -limit, limit),
+            -limit,
+            limit,
+            likely=likely,
+            close=1e-4,
+        )
+        pairs = zip(now.deflections, deflections(velocity), strict=True)
+        return _Rate(velocity, tuple(new - old for old, new in pairs))
 
 
-def one_spring(spring: Callable[[Scalar], Scalar], reach: Callable[[Scalar], Scalar]) -> Springs:
-    """A single spring, which bears the whole deflection."""
-    return Springs(lambda own: spring(own[0]), lambda total, _, __: (total,), lambda force, _: reach(force))
-
-
-def answers_at_once(law: AbstractDamper) -> bool:
-    """Whether the force depends on the velocity directly, not only through states."""
-    inside = parts(law)
-    return law.answers_at_once and (not inside or any(map(answers_at_once, inside)))
-
-
-def refuse_late(argument: str, law: AbstractDamper, name: str) -> None:
-    """Refuse a law that does not answer at once: no velocity of it would match the force of the springs."""
-    if not answers_at_once(law):
+def require_feed_through(argument: str, law: AbstractDamper, name: str) -> None:
+    """Refuse a law whose force does not answer the velocity at once: no velocity of it matches that of the springs."""
+    if not law.traits().has_feed_through:
         must = "be a law whose force answers the velocity at once"
         remedy = f"Put the lag outside, `Lag({name}(law))`, or combine two springs into one."
         _checks.refuse(argument, must, f"a {type(law).__name__}", remedy)
 
 
-def series_rate(
-    law: AbstractDamper, force: Scalar, x: ScalarLike, v: ScalarLike, inner: Float[Array, " inner"]
-) -> State:
-    """Rate of the springs' total deflection, v − v_d with F_law(v_d) = force, and of the states of the law at x."""
-    limit = jnp.asarray(1e3, dtype=inner.dtype)  # m/s, far above any damper
-
-    def surplus(w: Scalar) -> Scalar:
-        return law.force(x, w, inner) - force
-
-    guess = within(jnp.asarray(v, dtype=inner.dtype), -limit, limit)
-    velocity = increasing_root(surplus, guess, -limit, limit, steps=60)
-    return jnp.concatenate([(v - velocity)[None], law.state_rate(x, velocity, inner)])
-
-
-def series_step(
-    law: AbstractDamper,
-    springs: Springs,
-    x0: ScalarLike,
-    v0: ScalarLike,
-    v1: ScalarLike,
-    own: Deflections,
-    inner: Float[Array, " inner"],
-    dt: ScalarLike,
-) -> State:
-    """Deflections and states of the law after a step of the two-stage SDIRK method.
-
-    Each stage finds the law's velocity w with F_law(w) = F_springs(free − duration w), where `free` is the springs'
-    total deflection for a locked law.
-    """
-
-    def stage(
-        stroke: ScalarLike,
-        free: Scalar,
-        begun: Deflections,
-        inner_stroke: Scalar,
-        state: State,
-        guess: Scalar,
-        likely: int,
-    ) -> tuple[Scalar, Deflections, State]:
-        def law_states(w: Scalar) -> State:
-            return law.advance(inner_stroke, w, stroke - free + duration * w, w, state, duration)
-
-        def deflections(w: Scalar) -> Deflections:
-            return springs.shared(free - duration * w, begun, duration)
-
-        def surplus(w: Scalar) -> Scalar:
-            resisting = law.force(stroke - free + duration * w, w, law_states(w))
-            return resisting - springs.force(deflections(w))
-
-        at_rest = jnp.abs(law.force(stroke - free, jnp.zeros_like(free), law_states(jnp.zeros_like(free))))
-        limit = (jnp.abs(free) + springs.reach(at_rest, begun)) / duration + jnp.finfo(free.dtype).tiny
-        w = increasing_root(surplus, within(guess, -limit, limit), -limit, limit, likely=likely, close=1e-4)
-        return w, deflections(w), law_states(w)
-
-    duration = GAMMA * dt
-    total = sum(own[1:], own[0])
-    v0, gained = jnp.asarray(v0, total.dtype), jnp.asarray(v1 - v0, total.dtype)
-    moved_first = duration * (v0 + GAMMA * gained)
-    moved = dt * (v0 + 0.5 * gained)
-    stroke = x0 - total
-    w1, first, _ = stage(x0 + moved_first, total + moved_first, own, stroke, inner, v0, likely=3)
-    second = (1.0 - GAMMA) * dt  # taken at the rates of the first stage, the rest at those of the second
-    begun = tuple(old + (second / duration) * (new - old) for old, new in zip(own, first, strict=True))
-    stroke_second = stroke + second * w1
-    inner = law.advance(stroke, w1, stroke_second, w1, inner, second)
-    ahead = w1 + (1.0 - GAMMA) * gained
-    _, after, inner = stage(x0 + moved, total + moved - second * w1, begun, stroke_second, inner, ahead, likely=2)
-    return jnp.concatenate([jnp.stack(after), inner])
+def _total(deflections: Deflections) -> Scalar:
+    return sum(deflections[1:], deflections[0])

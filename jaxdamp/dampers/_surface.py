@@ -108,8 +108,8 @@ def surface_least_squares(
     if len(basis) < basis.shape[1]:
         _checks.refuse("force", f"have at least {basis.shape[1]} samples for these degrees", f"of {len(basis)}")
     left, sizes, right = np.linalg.svd(basis, full_matrices=False)
-    found = left.T @ force
-    missed_by_all = np.sum((force - left @ found) ** 2)
+    projected = left.T @ force
+    unexplained = np.sum((force - left @ projected) ** 2)
     shares = sizes / sizes[0]
     thin = int(np.count_nonzero(shares < THIN))
     if thin:
@@ -123,13 +123,13 @@ def surface_least_squares(
 
     rounding = len(basis) * np.finfo(float).eps
 
-    def kept(ridge: float | int) -> np.ndarray:
+    def retained(ridge: float | int) -> np.ndarray:
         return np.where(shares > rounding, shares**2 / (shares**2 + ridge), 0.0)
 
     def cross_validation(ridge: float | int) -> float:
-        missed = missed_by_all + np.sum(((1 - kept(ridge)) * found) ** 2)
-        return float(missed / (len(force) - np.sum(kept(ridge))) ** 2)
+        missed = unexplained + np.sum(((1 - retained(ridge)) * projected) ** 2)
+        return float(missed / (len(force) - np.sum(retained(ridge))) ** 2)
 
     if ridge is None:
         ridge = float(min(RIDGES, key=cross_validation))
-    return (right.T @ (kept(ridge) * found / sizes)).reshape(degrees[0] + 1, degrees[1] + 1)
+    return (right.T @ (retained(ridge) * projected / sizes)).reshape(degrees[0] + 1, degrees[1] + 1)

@@ -1,6 +1,6 @@
 """The force as a smooth surface over velocity and acceleration, taken from data."""
 
-from typing import ClassVar, final
+from typing import final
 
 import equinox as eqx
 import jax
@@ -9,7 +9,6 @@ import numpy as np
 
 from jaxdamp._types import Matrix, Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers._first_order import follow
-from jaxdamp.dampers._hysteresis import own_states
 from jaxdamp.dampers._surface import (
     CONSENT,
     Axis,
@@ -18,7 +17,8 @@ from jaxdamp.dampers._surface import (
     surface_force,
     surface_least_squares,
 )
-from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import around_zero, nonnegative, parameter, positive, setting
 
 
@@ -45,7 +45,7 @@ class AccelerationSurface(AbstractDamper):
 
     The loops of shock absorbers open with frequency, because oil and hoses give way: at one velocity the force
     differs between speeding up and slowing down. So Duym and Schoukens (1996) lay the surface over velocity and
-    acceleration. A law is told the velocity only; a washout makes the acceleration from it, late by τ. One state, the
+    acceleration. A law receives the velocity only; a washout makes the acceleration from it, late by τ. One state, the
     washed-out velocity s [m/s]; its step is exact for a velocity linear over the step.
 
     A force that lags by τ_F has a slope ∂F/∂a ≈ −τ_F ∂F/∂v. Unless τ ≥ τ_F, such a surface drives the motion above
@@ -77,7 +77,9 @@ class AccelerationSurface(AbstractDamper):
     washout_time: Number = setting("s", "τ, time constant of the washout", positive, default=WASHOUT_TIME)
     outside: str = eqx.field(static=True, default="nan")
 
-    preserves_linearity: ClassVar[bool] = True
+    def traits(self) -> Traits:
+        """Linear in the coefficients, as the state does not depend on them."""
+        return Traits(linear_in_parameters=True, stroke_dependent_at_rest=False)
 
     def __check_init__(self) -> None:
         check_surface(self.coefficients, self.outside)
@@ -108,7 +110,7 @@ class AccelerationSurface(AbstractDamper):
         (slow,) = own_states(self, state, 1)
         return jnp.stack([follow(slow, v0, v1, dt, self.washout_time)])
 
-    def covered(self) -> str:
+    def validity(self) -> str:
         """The ranges in words."""
         velocity, acceleration = self._axes(0.0, 0.0)
         return f"AccelerationSurface holds for {velocity.words()}, {acceleration.words()}. {CONSENT}"

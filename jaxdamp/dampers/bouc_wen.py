@@ -10,8 +10,8 @@ from jaxdamp._elementary import power, reciprocal_root
 from jaxdamp._limits import at_least, within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import sliding_fit
-from jaxdamp.dampers._hysteresis import direction, own_states
-from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers._hysteresis import direction
+from jaxdamp.dampers.base import AbstractDamper, own_states
 from jaxdamp.parameters import interval, nonnegative, parameter, positive, real
 
 
@@ -41,8 +41,8 @@ def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, expone
 
     Powers cost most: midway of what unloads altogether, |w|/2, needs none of its own, so that there are two in all.
     """
-    way = direction(travel)
-    u, w, curve = way * travel, way * z, 2.0 * shape - 1.0
+    sign = direction(travel)
+    u, w, curve = sign * travel, sign * z, 2.0 * shape - 1.0
     begin = power(jnp.abs(z), exponent)
     held, loaded = at_least(-w, 0.0), at_least(w, 0.0)
 
@@ -58,11 +58,14 @@ def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, expone
     steep = jnp.where(stays, 1.0 + curve * midway, steep)
     left = at_least(u - held / steep, 0.0)
     t = jnp.tanh(left * jnp.where(stays, 1.0, _rate_factor(loading, midway, exponent)))
-    return way * ((loaded + t) / (1.0 + loaded * t) - at_least(held - u * steep, 0.0))
+    return sign * ((loaded + t) / (1.0 + loaded * t) - at_least(held - u * steep, 0.0))
 
 
 def hysteresis_estimate(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, exponent: ScalarLike) -> Scalar:
-    """The state after a travel by Heun's step kept between −1 and 1, half as dear: what a predictor needs."""
+    """The state after a travel by Heun's step, held between −1 and 1, to predict the force: half the cost.
+
+    It is of second order, but of first order at kinks.
+    """
 
     def moved(z: ScalarLike) -> Scalar:
         to_the_n = power(jnp.abs(z), exponent)

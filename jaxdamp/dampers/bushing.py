@@ -1,20 +1,18 @@
 """A law in series with its oil column and with a rubber bushing that damps by itself."""
 
-from typing import ClassVar, final
+from typing import final
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
 
-from jaxdamp import _checks
-from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers._series import Deflections, Springs, refuse_late, series_rate, series_step
+from jaxdamp._types import Number, Scalar, ScalarLike
+from jaxdamp.dampers._series import AbstractSeries, Deflections, require_feed_through
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import parameter, positive
 
 
 @final
-class Bushing(AbstractDamper):
+class Bushing(AbstractSeries):
     """F = F_law(v_d) = k_o x_o = k_b x_b + c_b ẋ_b, x = x_d + x_o + x_b: oil column and bushing carry the law's force.
 
     Rubber loses energy when it is deflected; a spring in series (`SeriesSpring`) does not. A linear law of coefficient
@@ -46,53 +44,32 @@ class Bushing(AbstractDamper):
     stiffness: Number = parameter("N/m", "k_b, stiffness of the bushing", positive)
     damping: Number = parameter("N s/m", "c_b, damping of the bushing", positive)
 
-    answers_at_once: ClassVar[bool] = False
-
-    def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
-        """The same force; stroke and velocity of the whole, of which the rubber takes a part, so mostly a bound."""
-        return [(self.law, motion)]
-
     def __check_init__(self) -> None:
-        refuse_late("law", self.law, "Bushing")
+        require_feed_through("law", self.law, "Bushing")
 
-    def initial_state(self) -> State:
-        """Nothing deflected; then the states of the law."""
-        return jnp.concatenate([jnp.zeros(2), self.law.initial_state()])
+    def own_state_count(self) -> int:
+        """The deflections of oil column and bushing [m]."""
+        return 2
 
-    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
-        """Force [N]."""
-        del x, v
-        (oil, _), _ = self._split(state)
-        return self.oil_stiffness * oil
+    def traits(self) -> Traits:
+        """The rate of the bushing's deflection has a kink where the velocity has one."""
+        return super().traits()._replace(extrapolable_states=False)
 
-    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
-        """Rates of both deflections [m/s] and of the law's states."""
-        (oil, rubber), inner = self._split(state)
-        force = self.oil_stiffness * oil
-        rate = series_rate(self.law, force, x - oil - rubber, v, inner)
-        rubber_rate = (force - self.stiffness * rubber) / self.damping
-        return jnp.concatenate([jnp.stack([rate[0] - rubber_rate, rubber_rate]), rate[1:]])
+    def spring_force(self, deflections: Deflections) -> Scalar:
+        """Force [N] of the oil column, which the bushing carries too."""
+        return self.oil_stiffness * deflections[0]
 
-    def advance(
-        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
-    ) -> State:
-        """Two-stage SDIRK step; the velocity is taken as linear over the step."""
-        del x1
-        own, inner = self._split(state)
-        springs = Springs(lambda own: self.oil_stiffness * own[0], self._shared, self._reach)
-        return series_step(self.law, springs, x0, v0, v1, own, inner, dt)
+    def largest_deflection(self, force: Scalar, begun: Deflections) -> Scalar:
+        """That [m] of both springs, beside what the bushing has not yet given back."""
+        return jnp.abs(begun[1]) + force / self.oil_stiffness + force / self.stiffness
 
-    def _split(self, state: State) -> tuple[Deflections, Float[Array, " inner"]]:
-        if state.size < 2:
-            must = "hold the two deflections of Bushing first"
-            _checks.refuse("state", must, f"of shape {state.shape}", "Start from `law.initial_state()`.")
-        return (state[0], state[1]), state[2:]
-
-    def _shared(self, total: Scalar, begun: Deflections, duration: ScalarLike) -> Deflections:
-        # k_o x_o = k_b x_b + c_b (x_b − begun)/duration with x_o + x_b = total
+    def shared(self, total: Scalar, begun: Deflections, duration: ScalarLike) -> Deflections:
+        """k_o x_o = k_b x_b + c_b (x_b − begun)/duration with x_o + x_b = total."""
         carried = duration * self.stiffness * total + self.damping * (total - begun[1])
         oil = carried / (duration * (self.oil_stiffness + self.stiffness) + self.damping)
         return oil, total - oil
 
-    def _reach(self, force: Scalar, begun: Deflections) -> Scalar:
-        return jnp.abs(begun[1]) + force / self.oil_stiffness + force / self.stiffness
+    def shared_rate(self, total_rate: Scalar, deflections: Deflections) -> Deflections:
+        """Of the bushing ẋ_b = (F − k_b x_b)/c_b, and the rest of the oil column [m/s]."""
+        rubber = (self.spring_force(deflections) - self.stiffness * deflections[1]) / self.damping
+        return total_rate - rubber, rubber

@@ -15,8 +15,8 @@ def margins(tree: Any) -> Float[Array, " conditions"]:
 
     Every margin is in the unit of the parameter that the condition limits.
     """
-    found = [getattr(law, c.parameter) - c.least for _, law in laws_inside(tree) for c in law.conditions()]
-    return jnp.stack(found) if found else jnp.zeros(0)
+    each = [getattr(law, c.parameter) - c.least for _, law in laws_inside(tree) for c in law.conditions()]
+    return jnp.stack(each) if each else jnp.zeros(0)
 
 
 def keeps_conditions(tree: Any) -> bool:

@@ -1,22 +1,21 @@
-"""Laws made from data hold where the data are: what they say of that, and the refusal of forces beyond."""
+"""Laws made from data have a force where the data are: where that is, in words, and the refusal of other forces."""
 
 from typing import Any
 
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp.dampers.base import AbstractDamper, parts
+from jaxdamp.dampers.base import AbstractDamper
 
 
 def coverage(law: AbstractDamper) -> str:
     """Where a law and the laws inside it hold, in words; empty if they hold everywhere."""
-    said = [law.covered()] if hasattr(law, "covered") else []  # type: ignore[attr-defined]
-    return " ".join([*said, *filter(None, map(coverage, parts(law)))])
+    return " ".join(filter(None, [law.validity(), *map(coverage, law.inner_laws())]))
 
 
-def refuse_gaps(law: AbstractDamper, force: Any, where: str) -> None:
+def require_finite_force(law: AbstractDamper, force: Any, where: str) -> None:
     """Refuse forces [N] of a law that are not finite (traced ones cannot be checked)."""
-    found = _checks.concrete(force)
-    if found is not None and not np.all(np.isfinite(found)):
-        missing = f"{type(law).__name__} with none at {np.count_nonzero(~np.isfinite(found))} of {found.size} samples"
+    known = _checks.concrete(force)
+    if known is not None and not np.all(np.isfinite(known)):
+        missing = f"{type(law).__name__} with none at {np.count_nonzero(~np.isfinite(known))} of {known.size} samples"
         _checks.refuse("law", f"give a finite force {where}", missing, coverage(law))

@@ -1,22 +1,23 @@
 """Friction that begins as a spring: the law of Dahl."""
 
-from typing import ClassVar, final
+from typing import final
 
 import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import TYPICAL_GIVE, sliding_fit
-from jaxdamp.dampers._hysteresis import direction, own_states, travels
-from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers._hysteresis import direction, travels
+from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import parameter, positive
 
 
 def dahl_step(travel: ScalarLike, force: ScalarLike, stiffness: ScalarLike, friction: ScalarLike) -> Scalar:
     """F [N] after a travel [m] in one direction, exact: ±F_c is approached with exp(−σ₀ |travel|/F_c)."""
-    way = direction(travel)
-    settled = way * friction
-    return settled + (force - settled) * jnp.exp(-stiffness * way * travel / friction)
+    sign = direction(travel)
+    sliding = sign * friction
+    return sliding + (force - sliding) * jnp.exp(-stiffness * sign * travel / friction)
 
 
 @final
@@ -40,7 +41,9 @@ class Dahl(AbstractDamper):
     stiffness: Number = parameter("N/m", "σ₀, stiffness of the contact at rest", positive)
     friction_force: Number = parameter("N", "F_c, sliding friction", positive)
 
-    answers_at_once: ClassVar[bool] = False
+    def traits(self) -> Traits:
+        """The force is a state."""
+        return Traits(has_feed_through=False, stroke_dependent_at_rest=False)
 
     def initial_state(self) -> State:
         """No force."""

@@ -51,7 +51,7 @@ class FittedRange(eqx.Module):
     """
 
     # One array, with infinite limits for what is not known: laws that differ in their range alone have one structure,
-    # so that no compiled program is made twice. NumPy keeps double precision whatever JAX is told.
+    # so that no compiled program is made twice. NumPy keeps double precision whatever the precision of JAX.
     limits: Float[np.ndarray, "6 2"] | Float[Array, "6 2"]
 
     def __init__(

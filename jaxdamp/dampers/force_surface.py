@@ -62,7 +62,7 @@ class ForceSurface(AbstractStateless):
         stroke, velocity = self._axes(x, v)
         return surface_force(self.coefficients, stroke, velocity, self.outside) + self.outside_rate * velocity.beyond()
 
-    def covered(self) -> str:
+    def validity(self) -> str:
         """The ranges in words."""
         stroke, velocity = self._axes(0.0, 0.0)
         return f"ForceSurface holds for {stroke.words()}, {velocity.words()}. {CONSENT}"

@@ -1,14 +1,14 @@
 """A damper that is softer in fast oscillation than in slow motion."""
 
-from typing import ClassVar, final
+from typing import final
 
 import jax.numpy as jnp
 
 from jaxdamp._limits import at_least, within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._first_order import follow
-from jaxdamp.dampers._hysteresis import own_states
-from jaxdamp.dampers.base import AbstractDamper, refuse_states
+from jaxdamp.dampers.base import AbstractDamper, own_states, refuse_states
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import parameter, positive
 
 
@@ -49,8 +49,11 @@ class FrequencySelective(AbstractDamper):
     filter_time: Number = parameter("s", "τ_f, time constant of the velocity filter", positive)
     response_time: Number = parameter("s", "τ_r, time constant of the force", positive)
 
-    preserves_linearity: ClassVar[bool] = True
-    answers_at_once: ClassVar[bool] = False
+    def traits(self) -> Traits:
+        """The force is a state, linear in that of the laws inside."""
+        linear = self.high.traits().linear_in_parameters and self.low.traits().linear_in_parameters
+        inside = super().traits()
+        return inside._replace(has_feed_through=False, linear_in_parameters=linear, stroke_dependent_at_rest=False)
 
     def __check_init__(self) -> None:
         for name in ("high", "low"):

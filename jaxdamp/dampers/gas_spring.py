@@ -7,6 +7,7 @@ import equinox as eqx
 from jaxdamp._limits import at_least
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractStateless
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import parameter, positive, setting
 
 
@@ -20,8 +21,8 @@ def gas_pressure(x: ScalarLike, pressure: ScalarLike, volume: ScalarLike, area: 
     instead of to the pole at V₀ + A x = 0: value and slope are finite and continuous at every stroke.
     """
     share = 1.0 + area * x / volume
-    kept = at_least(share, LEAST_SHARE)
-    return pressure * kept**-n * (1.0 - n * (share - kept) / kept)
+    limited = at_least(share, LEAST_SHARE)
+    return pressure * limited**-n * (1.0 - n * (share - limited) / limited)
 
 
 @final
@@ -52,6 +53,10 @@ class GasSpring(AbstractStateless):
     exponent: Number = parameter("", "n, polytropic exponent", positive, default=1.3)
     atmospheric_pressure: Number = setting("Pa", "pressure outside", positive, default=101_325.0)
     relative: bool = eqx.field(static=True, default=False)
+
+    def traits(self) -> Traits:
+        """The velocity does not matter."""
+        return super().traits()._replace(has_feed_through=False)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m]; the velocity does not matter."""

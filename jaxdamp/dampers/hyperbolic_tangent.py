@@ -11,6 +11,16 @@ from jaxdamp.dampers.base import AbstractStateless
 from jaxdamp.parameters import nonnegative, parameter, positive, real, setting
 
 
+def two_branches(
+    x: ScalarLike, v: ScalarLike, steepness: ScalarLike, branch_offset: ScalarLike, stroke_width: ScalarLike
+) -> Scalar:
+    """tanh(β v + δ tanh(x/w)), from −1 to 1: a step over the velocity that each half of the stroke shifts its own way.
+
+    β [s/m], δ without unit, w [m].
+    """
+    return jnp.tanh(steepness * v + branch_offset * jnp.tanh(x / stroke_width))
+
+
 @final
 class HyperbolicTangent(AbstractStateless):
     """F = c v + k x + α tanh(β v + δ sgn x) + f₀ (Kwok et al. 2006; formula quoted from memory).
@@ -36,9 +46,8 @@ class HyperbolicTangent(AbstractStateless):
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m] and velocity v [m/s]."""
-        branch = self.branch_offset * jnp.tanh(x / self.stroke_width)
-        hysteresis = self.yield_force * jnp.tanh(self.steepness * v + branch)
-        return self.viscous_rate * v + self.stiffness * x + hysteresis + self.static_force
+        branches = two_branches(x, v, self.steepness, self.branch_offset, self.stroke_width)
+        return self.viscous_rate * v + self.stiffness * x + self.yield_force * branches + self.static_force
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "HyperbolicTangent":

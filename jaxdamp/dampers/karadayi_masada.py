@@ -1,18 +1,17 @@
 """Dashpot and dry friction behind a spring with clearance: the law of Karadayi and Masada."""
 
-from typing import ClassVar, final
+from typing import final
 
-import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._limits import within
-from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import TYPICAL_GIVE, sliding_fit
-from jaxdamp.dampers._hysteresis import own_states
-from jaxdamp.dampers._series import one_spring, series_rate, series_step
+from jaxdamp.dampers._series import AbstractSeries, Deflections
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.bilinear import Bilinear
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import nonnegative, parameter, positive
 
 
@@ -22,7 +21,7 @@ def dead_zone(deflection: ScalarLike, clearance: ScalarLike) -> Scalar:
 
 
 @final
-class KaradayiMasada(AbstractDamper):
+class KaradayiMasada(AbstractSeries):
     """F = k dz(x_k, δ) = c v_d + F_c tanh(v_d/v_f), x = x_d + x_k, c = c_r for v_d > 0 and c_c for v_d < 0.
 
     The elements of Karadayi and Masada (1989), for low frequencies: a bilinear dashpot and Coulomb friction, in series
@@ -33,6 +32,7 @@ class KaradayiMasada(AbstractDamper):
 
     State: the deflection x_k [m] of spring and clearance. The step is that of `SeriesSpring`, stable for any k.
 
+    >>> import jax.numpy as jnp
     >>> law = KaradayiMasada(2600.0, 1200.0, 40.0, 0.01, stiffness=1e6, clearance=2e-4)
     >>> [round(float(law.force(0.0, 0.0, jnp.array([deflection]))), 6) for deflection in (1.5e-4, 7e-4, -7e-4)]
     [0.0, 500.0, -500.0]
@@ -45,40 +45,23 @@ class KaradayiMasada(AbstractDamper):
     stiffness: Number = parameter("N/m", "k, series stiffness", positive)
     clearance: Number = parameter("m", "δ, half the free travel", nonnegative)
 
-    answers_at_once: ClassVar[bool] = False
-
-    def dashpot(self) -> AbstractDamper:
+    def inner_law(self) -> AbstractDamper:
         """Dashpot and friction, without spring and clearance."""
         friction = CoulombFriction(self.friction_force, self.friction_velocity)
         return Bilinear(self.rebound_rate, self.compression_rate) + friction
 
-    def spring(self, deflection: ScalarLike) -> Scalar:
-        """Force [N] of the spring behind its clearance at a deflection [m]."""
-        return self.stiffness * dead_zone(deflection, self.clearance)
+    def traits(self) -> Traits:
+        """The states have a kink where the clearance ends, and so the stroke since a reversal matters."""
+        return super().traits()._replace(extrapolable_states=False, stroke_dependent=True)
 
-    def initial_state(self) -> State:
-        """The middle of the clearance."""
-        return jnp.zeros(1)
+    def spring_force(self, deflections: Deflections) -> Scalar:
+        """Force [N] of the spring behind its clearance."""
+        return self.stiffness * dead_zone(deflections[0], self.clearance)
 
-    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
-        """Force [N]."""
-        del x, v
-        (deflection,) = own_states(self, state, 1)
-        return self.spring(deflection)
-
-    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
-        """ẋ_k = v − v_d [m/s]."""
-        (deflection,) = own_states(self, state, 1)
-        return series_rate(self.dashpot(), self.spring(deflection), x - deflection, v, jnp.zeros(0, state.dtype))
-
-    def advance(
-        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
-    ) -> State:
-        """Two-stage SDIRK step, as in `SeriesSpring`."""
-        del x1
-        (deflection,) = own_states(self, state, 1)
-        springs = one_spring(self.spring, lambda force: self.clearance + force / self.stiffness)
-        return series_step(self.dashpot(), springs, x0, v0, v1, (deflection,), jnp.zeros(0, state.dtype), dt)
+    def largest_deflection(self, force: Scalar, begun: Deflections) -> Scalar:
+        """Clearance and deflection [m] of the spring."""
+        del begun
+        return self.clearance + force / self.stiffness
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "KaradayiMasada":

@@ -1,17 +1,19 @@
 """A law whose force follows with a first-order lag."""
 
-from typing import ClassVar, final
+from typing import final
 
 import jax.numpy as jnp
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._first_order import follow
-from jaxdamp.dampers.base import AbstractDamper, own_and_inner
+from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import parameter, positive
 
 
 @final
-class Lag(AbstractDamper):
+class Lag(AbstractWrapper):
     """τ Ḟ + F = F_law: the force of any law behind a first-order lag. One state, the force.
 
     Oil and hose compressibility make the force trail the velocity. For a linear law the loop of a sine is that of a
@@ -26,22 +28,27 @@ class Lag(AbstractDamper):
     law: AbstractDamper
     lag_time: Number = parameter("s", "time constant of the lag", positive)
 
-    preserves_linearity: ClassVar[bool] = True
-    answers_at_once: ClassVar[bool] = False
-    smooth_state: ClassVar[bool] = True
+    def is_linear_in_law(self) -> bool:
+        """A lag is linear."""
+        return True
 
-    def initial_state(self) -> State:
-        """No force; then the states of the law."""
-        return jnp.concatenate([jnp.zeros(1), self.law.initial_state()])
+    def own_state_count(self) -> int:
+        """The force [N]."""
+        return 1
+
+    def traits(self) -> Traits:
+        """The force is a state, which follows a kink of the velocity smoothly."""
+        return super().traits()._replace(has_feed_through=False, stroke_dependent_at_rest=False)
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N]."""
         del x, v
-        return own_and_inner(self, state)[0]
+        (force,), _ = self.split(state)
+        return force
 
     def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
         """Rates of the force [N/s] and of the law's states."""
-        force, inner = own_and_inner(self, state)
+        (force,), inner = self.split(state)
         rate = (self.law.force(x, v, inner) - force) / self.lag_time
         return jnp.concatenate([rate[None], self.law.state_rate(x, v, inner)])
 
@@ -49,7 +56,7 @@ class Lag(AbstractDamper):
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
     ) -> State:
         """Exact for a law force linear over the step."""
-        force, inner = own_and_inner(self, state)
+        (force,), inner = self.split(state)
         before = self.law.force(x0, v0, inner)
         inner = self.law.advance(x0, v0, x1, v1, inner, dt)
         after = self.law.force(x1, v1, inner)

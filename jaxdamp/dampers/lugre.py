@@ -7,14 +7,11 @@ import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import TYPICAL_GIVE, sliding_fit
-from jaxdamp.dampers._hysteresis import direction, own_states, travels
-from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers._hysteresis import direction, travels
+from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.stribeck_friction import stribeck_force
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import nonnegative, parameter, positive
-
-
-def stribeck_force(v: ScalarLike, friction: ScalarLike, breakaway: ScalarLike, velocity: ScalarLike) -> Scalar:
-    """g(v) = F_c + (F_s − F_c) exp(−(v/v_s)²) [N], the friction of steady sliding."""
-    return friction + (breakaway - friction) * jnp.exp(-((v / velocity) ** 2))
 
 
 @final
@@ -42,6 +39,10 @@ class LuGre(AbstractDamper):
     friction_force: Number = parameter("N", "F_c, friction of fast sliding", positive)
     breakaway_force: Number = parameter("N", "F_s, friction of slow sliding", positive)
     stribeck_velocity: Number = parameter("m/s", "v_s, velocity over which F_s falls to F_c", positive)
+
+    def traits(self) -> Traits:
+        """No force at rest."""
+        return Traits(stroke_dependent_at_rest=False)
 
     def sliding_force(self, v: ScalarLike) -> Scalar:
         """g(v) [N], positive."""
@@ -74,14 +75,14 @@ class LuGre(AbstractDamper):
         zero = 0.0 * after
         turn = jnp.where(before != 0.0, zero, v0)
         for travel, start, end in ((before, v0, zero), (after, turn, v1)):
-            way = direction(travel)
+            sign = direction(travel)
             middle = self.sliding_force(0.5 * (start + end))
-            lengths = self.stiffness * way * travel / middle
+            lengths = self.stiffness * sign * travel / middle
             safe = jnp.where(lengths > 1e-6, lengths, 1.0)
-            kept = jnp.exp(-lengths)
+            decay = jnp.exp(-lengths)
             mean = jnp.where(lengths > 1e-6, -jnp.expm1(-safe) / safe, 1.0 - 0.5 * lengths)
-            settled = (mean - kept) * self.sliding_force(start) + (1.0 - mean) * self.sliding_force(end)
-            z = kept * z + way * settled / self.stiffness
+            sliding = (mean - decay) * self.sliding_force(start) + (1.0 - mean) * self.sliding_force(end)
+            z = decay * z + sign * sliding / self.stiffness
         return z[None]
 
     @classmethod

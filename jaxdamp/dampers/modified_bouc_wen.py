@@ -10,13 +10,10 @@ from jaxdamp._limits import at_least
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import sliding_fit
-from jaxdamp.dampers._hysteresis import own_states
-from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers._sdirk2 import GAMMA, sdirk2
+from jaxdamp.dampers.base import AbstractDamper, own_states
 from jaxdamp.dampers.bouc_wen import hysteresis_rate, hysteresis_step
 from jaxdamp.parameters import interval, nonnegative, parameter, positive, real, setting
-
-
-_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)  # of the two-stage, second-order, L-stable SDIRK method
 
 
 @final
@@ -81,22 +78,22 @@ class ModifiedBoucWen(AbstractDamper):
         w = self.inner_velocity(v, stroke, z)
         return jnp.stack([w, hysteresis_rate(w / self.yield_displacement, z, self.shape, self.exponent)])
 
-    def _after(self, w: ScalarLike, stroke: Scalar, z: Scalar, duration: ScalarLike) -> tuple[Scalar, Scalar]:
-        """Inner stroke and z after moving at w for a while."""
-        travel = duration * w
-        return stroke + travel, hysteresis_step(travel / self.yield_displacement, z, self.shape, self.exponent)
-
     def _stage(self, v: ScalarLike, stroke: Scalar, z: Scalar, duration: ScalarLike) -> Scalar:
-        """The inner velocity w that, kept for the duration, ends where the forces balance."""
+        """The inner velocity ṙ [m/s] that, held for the duration, ends where the forces balance."""
         viscous, series, level = self.at_voltage()
 
         def surplus(w: Scalar) -> Scalar:
-            ahead, z_ahead = self._after(w, stroke, z, duration)
+            ahead, z_ahead = self._moved(w, stroke, z, duration)
             return viscous * w + self.stiffness * ahead + level * z_ahead - series * (v - w)
 
         held = self.stiffness * jnp.abs(stroke) + level * at_least(jnp.abs(z), 1.0)
         limit = (series * jnp.abs(v) + held) / (viscous + series)
         return increasing_root(surplus, jnp.zeros_like(limit), -limit, limit, steps=20)
+
+    def _moved(self, w: ScalarLike, stroke: Scalar, z: Scalar, duration: ScalarLike) -> tuple[Scalar, Scalar]:
+        """Inner stroke [m] and z after moving at an inner velocity [m/s]."""
+        travel = duration * w
+        return stroke + travel, hysteresis_step(travel / self.yield_displacement, z, self.shape, self.exponent)
 
     def advance(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
@@ -104,10 +101,14 @@ class ModifiedBoucWen(AbstractDamper):
         """Two-stage SDIRK step; the velocity is taken as linear over the step."""
         del x0, x1
         stroke, z = own_states(self, state, 2)
-        first = _GAMMA * dt
-        w = self._stage(v0 + _GAMMA * (v1 - v0), stroke, z, first)
-        stroke, z = self._after(w, stroke, z, (1.0 - _GAMMA) * dt)
-        return jnp.stack(self._after(self._stage(v1, stroke, z, first), stroke, z, first))
+
+        def stage(share: float, states: tuple[Scalar, Scalar]) -> Scalar:
+            return self._stage(v0 + share * (v1 - v0), *states, GAMMA * dt)
+
+        def moved(w: Scalar, states: tuple[Scalar, Scalar], part: float) -> tuple[Scalar, Scalar]:
+            return self._moved(w, *states, part * dt)
+
+        return jnp.stack(sdirk2(stage, moved, (stroke, z)))
 
     @classmethod
     def prototype(cls, voltage: float = 0.0) -> "ModifiedBoucWen":

@@ -1,6 +1,6 @@
 """The mono-tube damper: oil on both sides of a piston, gas behind the oil."""
 
-from typing import ClassVar, final
+from typing import final
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,13 +9,25 @@ from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers._hysteresis import own_states
-from jaxdamp.dampers._series import GAMMA
-from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers._sdirk2 import GAMMA, sdirk2
+from jaxdamp.dampers.base import AbstractDamper, own_states
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
 from jaxdamp.dampers.gas_spring import LEAST_SHARE, GasSpring, gas_pressure
 from jaxdamp.dampers.piston_flow import PistonFlow
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import parameter, positive, setting
+
+
+def oil_stiffness(x: ScalarLike, bulk_modulus: ScalarLike, area: ScalarLike, volume: ScalarLike) -> Scalar:
+    """B A/(V_r − A x) [Pa/m], rise of the oil's pressure with its deflection; V_r − A x is 5 % of V_r or more."""
+    return bulk_modulus * area / at_least(volume - area * x, LEAST_SHARE * volume)
+
+
+def stroke_within(
+    share: float, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, dt: ScalarLike
+) -> Scalar:
+    """Stroke [m] at a share of a step over which the velocity goes straight from v₀ to v₁."""
+    return x0 + share * (x1 - x0) - 0.5 * share * dt * (1.0 - share) * (v1 - v0)
 
 
 @final
@@ -69,7 +81,9 @@ class MonoTube(AbstractDamper):
     bulk_modulus: Number = parameter("Pa", "B, of the oil and its chamber", positive)
     cavitation_pressure: Number = setting("Pa", "p_v, absolute pressure of a cavity", positive, default=1e5)
 
-    answers_at_once: ClassVar[bool] = False
+    def traits(self) -> Traits:
+        """The pressures are states; the seal's friction alone cannot match the force of a spring."""
+        return super().traits()._replace(has_feed_through=False)
 
     def __check_init__(self) -> None:
         charge, cavity = _checks.concrete(self.gas.pressure), _checks.concrete(self.cavitation_pressure)
@@ -86,14 +100,9 @@ class MonoTube(AbstractDamper):
     def pressures(self, x: ScalarLike, deflection: ScalarLike) -> tuple[Scalar, Scalar]:
         """p_r and p_c [Pa, absolute] at stroke x [m] and deflection e [m]."""
         gas = self.gas
-        above = at_least(gas.pressure + self._stiffness(x) * deflection, self.cavitation_pressure)
+        rise = oil_stiffness(x, self.bulk_modulus, self.piston.area, self.rebound_volume) * deflection
         below = gas_pressure(self._gas_stroke(x, deflection), gas.pressure, gas.volume, gas.rod_area, gas.exponent)
-        return above, below
-
-    def _stiffness(self, x: ScalarLike) -> Scalar:
-        """Rise of p_r with the deflection [Pa/m]."""
-        area, volume = self.piston.area, self.rebound_volume
-        return self.bulk_modulus * area / at_least(volume - area * x, LEAST_SHARE * volume)
+        return at_least(gas.pressure + rise, self.cavitation_pressure), below
 
     def _gas_stroke(self, x: ScalarLike, deflection: ScalarLike) -> Scalar:
         """Stroke [m] at which the rod alone would leave the gas the volume that it has."""
@@ -120,8 +129,14 @@ class MonoTube(AbstractDamper):
         drop = self._drop(x, deflection)
         return (v - self.piston.flow_velocity(self.piston.root(drop), self.piston.valve(drop >= 0)))[None]
 
-    def _stage(self, x: ScalarLike, free: Scalar, duration: ScalarLike) -> Scalar:
-        """Q/A [m/s] that, kept for the duration, ends where it is driven by the pressures; `free` is without flow."""
+    def _flow(self, x: ScalarLike, free: Scalar, duration: ScalarLike) -> Scalar:
+        """Q/A [m/s] that, held for the duration, ends where it is driven by the pressures.
+
+        Arguments:
+            x: stroke at the end [m].
+            free: deflection at the end if nothing flowed [m].
+            duration: [s].
+        """
         above, below = self.pressures(x, free)
         valve = self.piston.valve(above >= below)
 
@@ -140,12 +155,16 @@ class MonoTube(AbstractDamper):
     ) -> State:
         """Two-stage SDIRK step; the velocity is taken as linear over the step."""
         (deflection,) = own_states(self, state, 1)
-        first, second = GAMMA * dt, (1.0 - GAMMA) * dt
-        rise = v1 - v0
-        x_first = x0 + GAMMA * (x1 - x0) - 0.5 * first * (1.0 - GAMMA) * rise
-        flow = self._stage(x_first, deflection + first * (v0 + GAMMA * rise), first)
-        free = deflection + 0.5 * dt * (v0 + v1) - second * flow
-        return (free - first * self._stage(x1, free, first))[None]
+
+        def stage(share: float, deflection: Scalar) -> Scalar:
+            v, duration = v0 + share * (v1 - v0), GAMMA * dt
+            x = x1 if share == 1.0 else stroke_within(share, x0, v0, x1, v1, dt)
+            return v - self._flow(x, deflection + duration * v, duration)
+
+        def moved(rate: Scalar, deflection: Scalar, part: float) -> Scalar:
+            return deflection + part * dt * rate
+
+        return sdirk2(stage, moved, deflection)[None]
 
     def incompressible(self) -> AbstractDamper:
         """`piston + gas + friction`, the limit B → ∞ without cavities: no states, for sweeps and for slow motion."""

@@ -1,15 +1,16 @@
 """A damper that moves less, or more, than the point it is referred to."""
 
-from typing import ClassVar, final
+from typing import final
 
-from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import parameter, positive
 
 
 @final
-class MotionRatio(AbstractDamper):
+class MotionRatio(AbstractWrapper):
     """F_wheel = i F_law(i x, i v), with i = damper travel / wheel travel: force and motion both change.
 
     A linear damper c acts at the wheel as i² c.
@@ -23,34 +24,24 @@ class MotionRatio(AbstractDamper):
     law: AbstractDamper
     ratio: Number = parameter("", "damper travel divided by wheel travel", positive)
 
-    preserves_linearity: ClassVar[bool] = True
+    def is_linear_in_law(self) -> bool:
+        """A factor on the force is linear, whatever the motion."""
+        return True
+
+    @property
+    def stroke_limits(self) -> tuple[ScalarLike, ScalarLike]:
+        """Strokes [m] at the wheel within which the damper holds."""
+        low, high = self.law.stroke_limits
+        return low / self.ratio, high / self.ratio
 
     def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
         """The damper's own stroke and velocity, i times those at the wheel, and its own force."""
         return [(self.law, motion.moved(self.ratio).divided(self.ratio))]
 
-    def initial_state(self) -> State:
-        """The states of the law."""
-        return self.law.initial_state()
+    def inner_motion(self, x: ScalarLike, v: ScalarLike) -> tuple[ScalarLike, ScalarLike]:
+        """Stroke [m] and velocity [m/s] of the damper."""
+        return self.ratio * x, self.ratio * v
 
-    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+    def outer_force(self, force: Scalar) -> Scalar:
         """Force at the wheel [N]."""
-        return self.ratio * self.law.force(self.ratio * x, self.ratio * v, state)
-
-    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
-        """Rates of the law."""
-        return self.law.state_rate(self.ratio * x, self.ratio * v, state)
-
-    def advance(
-        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
-    ) -> State:
-        """The step of the law."""
-        i = self.ratio
-        return self.law.advance(i * x0, i * v0, i * x1, i * v1, state, dt)
-
-    def predict(
-        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
-    ) -> State:
-        """What the law predicts."""
-        i = self.ratio
-        return self.law.predict(i * x0, i * v0, i * x1, i * v1, state, dt)
+        return self.ratio * force

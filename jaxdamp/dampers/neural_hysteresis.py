@@ -10,12 +10,24 @@ from jaxdamp import _checks
 from jaxdamp._limits import at_least
 from jaxdamp._random import normal
 from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
-from jaxdamp.dampers._hysteresis import own_states
-from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import parameter, positive, setting, weight
 
 
 _ROUNDING = 0.01  # of the velocity scale, over which |v| is rounded at zero
+
+
+def relaxed_forces(forces: Vector, rates: Vector, stiffness: Vector, v: ScalarLike, dt: ScalarLike) -> Vector:
+    """Z [N] after a time dt [s] of ż = k v − ρ z at constant rates ρ [1/s] and velocity v [m/s], exactly."""
+    decay = rates * dt
+    tiny = jnp.finfo(decay.dtype).tiny
+    return jnp.exp(-decay) * forces + stiffness * v * dt * (-jnp.expm1(-decay) / at_least(decay, tiny))
+
+
+def rounded_speed(v: ScalarLike, width: ScalarLike) -> Scalar:
+    """√(v² + w²) − w [m/s]: |v|, rounded at zero over a width w [m/s]."""
+    return jnp.sqrt(v * v + width * width) - width
 
 
 @final
@@ -54,18 +66,21 @@ class NeuralHysteresis(AbstractDamper):
         shapes = {"stiffness": (n,), "hidden_weights": (width, n + 1), "hidden_biases": (width,)}
         shapes |= {"output_weights": (2 * n, width), "output_biases": (2 * n,)}
         for name, shape in shapes.items():
-            found = getattr(self, name).shape
-            if found != shape or 0 in shape:
+            actual = getattr(self, name).shape
+            if actual != shape or 0 in shape:
                 must = f"be of shape {shape} for {n} elements and {width} hidden units"
-                _checks.refuse(name, must, f"of shape {found}", "`NeuralHysteresis.random` makes a network that fits.")
+                _checks.refuse(name, must, f"of shape {actual}", "`NeuralHysteresis.random` makes a network that fits.")
+
+    def traits(self) -> Traits:
+        """The force is the sum of the states."""
+        return Traits(has_feed_through=False, stroke_dependent_at_rest=False)
 
     def relaxation(self, v: ScalarLike, forces: Vector) -> Vector:
         """ρᵢ [1/s], the rates at which the elements let go, never negative."""
         seen = jnp.concatenate([jnp.asarray(v / self.velocity_scale)[None], forces / self.force_scale])
         hidden = jnp.tanh(self.hidden_weights @ seen + self.hidden_biases)
         with_travel, with_time = jnp.split(jax.nn.softplus(self.output_weights @ hidden + self.output_biases), 2)
-        small = _ROUNDING * self.velocity_scale
-        speed = jnp.sqrt(v * v + small * small) - small
+        speed = rounded_speed(v, _ROUNDING * self.velocity_scale)
         return self.stiffness / self.force_scale * (with_travel * speed + with_time * self.velocity_scale)
 
     def initial_state(self) -> State:
@@ -89,15 +104,9 @@ class NeuralHysteresis(AbstractDamper):
         """Two exponential steps: to the middle with the rates of the start, then all the way with those found there."""
         del x0, x1
         forces = jnp.stack(own_states(self, state, self.stiffness.size))
-        middle = self._relaxed(forces, self.relaxation(v0, forces), 0.75 * v0 + 0.25 * v1, 0.5 * dt)
-        v = 0.5 * (v0 + v1)
-        return self._relaxed(forces, self.relaxation(v, middle), v, dt)
-
-    def _relaxed(self, forces: Vector, rates: Vector, v: ScalarLike, dt: ScalarLike) -> Vector:
-        """The forces after a time at constant rates and velocity, exactly."""
-        z = rates * dt
-        tiny = jnp.finfo(z.dtype).tiny
-        return jnp.exp(-z) * forces + self.stiffness * v * dt * (-jnp.expm1(-z) / at_least(z, tiny))
+        mean = 0.5 * (v0 + v1)
+        middle = relaxed_forces(forces, self.relaxation(v0, forces), self.stiffness, 0.75 * v0 + 0.25 * v1, 0.5 * dt)
+        return relaxed_forces(forces, self.relaxation(mean, middle), self.stiffness, mean, dt)
 
     @classmethod
     def random(

@@ -10,12 +10,12 @@ from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp.dampers._commands import commands_of
-from jaxdamp.dampers.base import AbstractDamper, AbstractMemoryless, parts
+from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.fitted_range import OutsideFittedRangeWarning, has_fitted_range, shown_unit, span
 from jaxdamp.dampers.motion import Motion
 
 
-TOLERANCE = 0.05  # of the larger limit, by which a use may leave the range before it is said
+TOLERANCE = 0.05  # of the larger limit, by which a use may leave the range without a warning
 _ROUNDING = 1e-9  # of the larger limit
 
 
@@ -92,7 +92,7 @@ def _uses(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
 def _own_uses(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
     assert law.fitted_to is not None
     uses = []
-    stroke = motion.stroke if depends_on_stroke(law) else None
+    stroke = motion.stroke if law.traits().stroke_dependent else None
     channels = {"velocity": motion.velocity, "stroke": stroke, "force": motion.force}
     channels |= {"temperature": _temperatures(law, motion), "command": np.array(commands_of(law))}
     for name, fitted, unit in law.fitted_to.known():
@@ -112,12 +112,6 @@ def _temperatures(law: AbstractDamper, motion: Motion) -> np.ndarray:
     deeper = [t for part, inner in law.motion_inside(motion) for t in _temperatures(part, inner)]
     known = {motion.temperature, *(inner.temperature for inner in inside), *deeper} - {None}
     return np.array(sorted(t for t in known if t is not None))
-
-
-def depends_on_stroke(law: AbstractDamper) -> bool:
-    """Whether the stroke matters to the kind of law; a law with memory feels its stroke since the last reversal."""
-    inside = parts(law)
-    return any(map(depends_on_stroke, inside)) if inside else not isinstance(law, AbstractMemoryless)
 
 
 def sentence(name: str, uses: Sequence[RangeUse]) -> str:

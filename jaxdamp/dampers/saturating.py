@@ -1,7 +1,7 @@
 """A steep slope that levels off: tanh, arctan or algebraic."""
 
 from collections.abc import Callable
-from typing import ClassVar, final
+from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -25,6 +25,16 @@ def _arctan(u: Numbers) -> Numbers:
 
 def _algebraic(u: Numbers) -> Numbers:
     return u * reciprocal_root(1.0 + u * u)
+
+
+SHAPES: dict[str, Callable[[Numbers], Numbers]] = {"tanh": jnp.tanh, "arctan": _arctan, "algebraic": _algebraic}
+
+
+def saturating_force(
+    v: ScalarLike, level: ScalarLike, rate: ScalarLike, high_rate: ScalarLike, shape: str = "tanh"
+) -> Scalar:
+    """F_s g(c₀ v/F_s) + c_∞ v [N] with the level F_s [N], the slopes c₀ and c_∞ [N s/m], and g by its name."""
+    return level * SHAPES[shape](rate * v / level) + high_rate * v
 
 
 @final
@@ -61,14 +71,8 @@ class Saturating(AbstractMemoryless):
     )
     shape: str = eqx.field(static=True, default="tanh")
 
-    shapes: ClassVar[dict[str, Callable[[Numbers], Numbers]]] = {
-        "tanh": jnp.tanh,
-        "arctan": _arctan,
-        "algebraic": _algebraic,
-    }
-
     def __check_init__(self) -> None:
-        _checks.one_of("shape", self.shape, self.shapes)
+        _checks.one_of("shape", self.shape, SHAPES)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
@@ -76,13 +80,13 @@ class Saturating(AbstractMemoryless):
         level = jnp.where(extends, self.rebound_force, self.compression_force)
         rate = jnp.where(extends, self.rebound_rate, self.compression_rate)
         high_rate = jnp.where(extends, self.rebound_high_rate, self.compression_high_rate)
-        return level * self.shapes[self.shape](rate * v / level) + high_rate * v
+        return saturating_force(v, level, rate, high_rate, self.shape)
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray, shape: str = "tanh") -> "Saturating":
         """Start values from measured data: F_s and c_∞ by least squares for several F_s/c₀, the best of them."""
-        _checks.one_of("shape", shape, cls.shapes)
-        curve = cls.shapes[shape]
+        _checks.one_of("shape", shape, SHAPES)
+        curve = SHAPES[shape]
         sides = []
         for side in (1, -1):
             knee, (level, high_rate) = knee_scan(

@@ -1,6 +1,6 @@
 """Any law whose parameters follow a command: coil current, valve current, clicks."""
 
-from typing import ClassVar, final
+from typing import final
 
 import jax
 import jax.numpy as jnp
@@ -9,14 +9,16 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types
 from jaxdamp._limits import within
-from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
+from jaxdamp._types import Number, Vector
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.fitted_range import without_fitted_ranges
+from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import increasing, setting
 
 
 @final
-class Scheduled(AbstractDamper):
+class Scheduled(AbstractWrapper):
     """One law between laws of one structure that hold at commands uₖ: all their numbers are interpolated at u.
 
     p(u) = pₖ + (pₖ₊₁ − pₖ)(u − uₖ)/(uₖ₊₁ − uₖ) for every number p of the laws, then the law with p(u). For a law that
@@ -44,8 +46,6 @@ class Scheduled(AbstractDamper):
     laws: tuple[AbstractDamper, ...]
     levels: Vector = setting("", "commands at which the laws hold", increasing)
     command: Number = setting("", "command, in the unit of the levels", command=True)
-
-    preserves_linearity: ClassVar[bool] = True
 
     def __check_init__(self) -> None:
         check_field_types(self)
@@ -75,30 +75,14 @@ class Scheduled(AbstractDamper):
         shares, laws = self.shares(), without_fitted_ranges(self.laws)
         return jax.tree.map(lambda *leaves: jnp.tensordot(shares, jnp.stack(leaves), 1), *laws)
 
-    def initial_state(self) -> State:
-        """The states of the law."""
-        return self.at_command().initial_state()
+    def inner_law(self) -> AbstractDamper:
+        """The law at the command."""
+        return self.at_command()
 
-    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
-        """Force [N]."""
-        return self.at_command().force(x, v, state)
+    def traits(self) -> Traits:
+        """Those of the laws, which are of one structure."""
+        return self.laws[0].traits()
 
-    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
-        """Rates of the law."""
-        return self.at_command().state_rate(x, v, state)
-
-    def advance(
-        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
-    ) -> State:
-        """The step of the law."""
-        return self.at_command().advance(x0, v0, x1, v1, state, dt)
-
-    def predict(
-        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
-    ) -> State:
-        """What the law predicts."""
-        return self.at_command().predict(x0, v0, x1, v1, state, dt)
-
-    def laws_with_states(self) -> list[AbstractDamper]:
-        """One of the laws: the states are those of the law at the command."""
-        return [self.laws[0]]
+    def side_by_side(self) -> tuple[AbstractDamper, ...]:
+        """The terms of the law at the command."""
+        return self.inner_law().side_by_side()

@@ -6,6 +6,7 @@ import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractStateless
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import nonnegative, parameter
 
 
@@ -23,6 +24,10 @@ class Spring(AbstractStateless):
 
     stiffness: Number = parameter("N/m", "k, stiffness beside the damper", nonnegative, linear=True)
     preload: Number = parameter("N", "f₀, force at rest at stroke zero", linear=True, default=0.0)
+
+    def traits(self) -> Traits:
+        """The velocity does not matter."""
+        return super().traits()._replace(has_feed_through=False)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m]."""

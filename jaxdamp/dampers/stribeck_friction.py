@@ -11,6 +11,12 @@ from jaxdamp.dampers.coulomb_friction import CoulombFriction
 from jaxdamp.parameters import parameter, positive
 
 
+def stribeck_force(v: ScalarLike, friction: ScalarLike, breakaway: ScalarLike, velocity: ScalarLike) -> Scalar:
+    """g(v) = F_c + (F_s − F_c) exp(−(v/v_s)²) [N], the friction of steady sliding."""
+    u = v / velocity
+    return friction + (breakaway - friction) * jnp.exp(-u * u)
+
+
 @final
 class StribeckFriction(AbstractMemoryless):
     """F = [F_c + (F_s − F_c) exp(−(v/v_s)²)] tanh(v/v_f): friction that falls from F_s to F_c as seals begin to float.
@@ -35,8 +41,7 @@ class StribeckFriction(AbstractMemoryless):
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
-        u = v / self.stribeck_velocity
-        level = self.friction_force + (self.breakaway_force - self.friction_force) * jnp.exp(-u * u)
+        level = stribeck_force(v, self.friction_force, self.breakaway_force, self.stribeck_velocity)
         return level * jnp.tanh(v / self.friction_velocity)
 
     @classmethod

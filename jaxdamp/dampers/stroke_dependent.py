@@ -1,7 +1,7 @@
 """A damper that changes along its stroke: hydraulic stops, grooves in the tube, tables over stroke and velocity."""
 
 from collections.abc import Sequence
-from typing import ClassVar, final
+from typing import final
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +15,7 @@ from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers.base import AbstractDamper, AbstractStateless, refuse_states
 from jaxdamp.dampers.fitted_range import without_fitted_ranges
 from jaxdamp.dampers.table import Table
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import as_float, increasing, setting
 
 
@@ -55,7 +56,10 @@ class StrokeDependent(AbstractStateless):
     laws: tuple[AbstractDamper, ...]
     stroke: Vector = setting("m", "strokes where the laws hold", increasing)
 
-    preserves_linearity: ClassVar[bool] = True
+    def traits(self) -> Traits:
+        """Linear where the laws are, and stroke-dependent though they may not be."""
+        linear = all(law.traits().linear_in_parameters for law in self.laws)
+        return super().traits()._replace(linear_in_parameters=linear)
 
     def __check_init__(self) -> None:
         check_field_types(self)

@@ -1,16 +1,17 @@
 """Any law at another oil temperature."""
 
-from typing import ClassVar, final
+from typing import final
 
 from jaxdamp import _checks
-from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp._types import Number, Scalar
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import parameter, positive, setting
 
 
 @final
-class TemperatureScaled(AbstractDamper):
+class TemperatureScaled(AbstractWrapper):
     """F(T) = F_law (1 − κ (T − T₀)): warm oil is thinner and lighter, the force falls in proportion.
 
     κ is 0.001 to 0.004 1/K: turbulent flow follows the density of the oil, laminar flow its viscosity, which falls
@@ -38,7 +39,9 @@ class TemperatureScaled(AbstractDamper):
     reference_temperature: Number = setting("K", "temperature of the law's own numbers", positive, default=293.15)
     sensitivity: Number = parameter("1/K", "κ, loss of force for each kelvin", default=0.002)
 
-    preserves_linearity: ClassVar[bool] = True
+    def is_linear_in_law(self) -> bool:
+        """A factor is linear."""
+        return True
 
     def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
         """The same motion at the oil temperature, at the force of the law's own temperature."""
@@ -54,26 +57,6 @@ class TemperatureScaled(AbstractDamper):
         """1 − κ (T − T₀)."""
         return 1.0 - self.sensitivity * (self.temperature - self.reference_temperature)
 
-    def initial_state(self) -> State:
-        """The states of the law."""
-        return self.law.initial_state()
-
-    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
-        """Force [N]."""
-        return self.factor() * self.law.force(x, v, state)
-
-    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
-        """Rates of the law."""
-        return self.law.state_rate(x, v, state)
-
-    def advance(
-        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
-    ) -> State:
-        """The step of the law."""
-        return self.law.advance(x0, v0, x1, v1, state, dt)
-
-    def predict(
-        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
-    ) -> State:
-        """What the law predicts."""
-        return self.law.predict(x0, v0, x1, v1, state, dt)
+    def outer_force(self, force: Scalar) -> Scalar:
+        """Force [N] at the oil temperature."""
+        return self.factor() * force

@@ -13,9 +13,8 @@ import scipy.optimize
 
 from jaxdamp import _checks, dampers
 from jaxdamp.bench import BenchRun, as_runs, contradictions, contradictions_in_words
-from jaxdamp.dampers import AbstractDamper, AbstractStateless, with_fitted_range, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper, with_fitted_range, without_fitted_ranges
 from jaxdamp.dampers._points import drives_motion
-from jaxdamp.dampers.base import parts
 from jaxdamp.dampers.command import takes_command
 from jaxdamp.dampers.coverage import coverage
 from jaxdamp.identify._tall import triangle
@@ -247,13 +246,7 @@ def weights(weighting: str | Sequence[float], runs: Sequence[BenchRun]) -> list[
 
 def is_linear(law: AbstractDamper, free: FreeParameters) -> bool:
     """Whether the force is linear in all that is free, so that the least squares have a closed form."""
-
-    def keeps(law: AbstractDamper) -> bool:
-        inner = parts(law)
-        kept = getattr(law, "preserves_linearity", isinstance(law, AbstractStateless) and not inner)
-        return kept and all(map(keeps, inner))
-
-    return keeps(law) and all(p.linear and p.domain.steps is None for p in free.chosen)
+    return law.traits().linear_in_parameters and all(p.linear and p.domain.steps is None for p in free.chosen)
 
 
 def _solve_linear(problem: Problem) -> Several:

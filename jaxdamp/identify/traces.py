@@ -13,7 +13,7 @@ from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 from jaxdamp.dampers.command import takes_command, with_command
-from jaxdamp.dampers.coverage import refuse_gaps
+from jaxdamp.dampers.coverage import require_finite_force
 from jaxdamp.rig import march
 
 
@@ -251,7 +251,7 @@ def predict_runs(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[np.ndarr
         for p, run in zip(places, runs, strict=True)
     ]
     for run, force in zip(runs, spread, strict=True):
-        refuse_gaps(law, force[used_samples(law, run)], f"over the record {run.name!r}")
+        require_finite_force(law, force[used_samples(law, run)], f"over the record {run.name!r}")
     return spread
 
 

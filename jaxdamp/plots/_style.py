@@ -121,6 +121,5 @@ def law_name(law: AbstractDamper) -> str:
     """The classes of a law in words: "SeriesSpring of Besinger", "Linear + CoulombFriction"."""
     if isinstance(law, Sum):
         return " + ".join(law_name(term) for term in law.terms)
-    inner = getattr(law, "law", None)
-    own = type(law).__name__
-    return f"{own} of {law_name(inner)}" if isinstance(inner, AbstractDamper) else own
+    own, inside = type(law).__name__, law.inner_laws()
+    return f"{own} of {law_name(inside[0])}" if len(inside) == 1 else own

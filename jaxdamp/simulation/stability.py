@@ -12,10 +12,8 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar
-from jaxdamp.dampers import AbstractDamper, AbstractStateful, Sum
-from jaxdamp.dampers.base import parts
+from jaxdamp.dampers import AbstractDamper
 from jaxdamp.vehicles import AbstractVehicle, PortForm
-from jaxdamp.vehicles.ports import is_smooth
 
 
 LARGEST = 0.5  # of the share below; the corrected step is stable up to 1
@@ -117,16 +115,15 @@ def rounded_down(value: float) -> float:
 
 
 def _steepest(law: AbstractDamper, dt: float) -> Slopes:
-    """Largest slopes of a law, or of the terms of a sum together; zero where they are not known."""
-    terms = law.terms if isinstance(law, Sum) else (law,)
-    return Slopes(*map(sum, zip(*(_of_term(term, dt) for term in terms), strict=True)))
+    """Largest slopes of all laws that act side by side in a law, together; zero where they are not known."""
+    return Slopes(*map(sum, zip(*(_of_term(term, dt) for term in law.side_by_side()), strict=True)))
 
 
 def _of_term(law: AbstractDamper, dt: float) -> Slopes:
     if any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(eqx.filter(law, eqx.is_array))):
         return Slopes()
     velocity, rate = jnp.asarray(_VELOCITIES), _state_rate(law)
-    if is_smooth(law):
+    if law.initial_state().size and law.traits().extrapolable_states:
         found = _checks.concrete(_slopes_over_step(law, velocity, jnp.asarray(dt, dtype=float)))
         return Slopes() if found is None else Slopes(2.0 * _largest(found), rate=rate)
     found = _slopes_at_instant(law, velocity, jnp.asarray(_STROKES))
@@ -174,14 +171,10 @@ def _slopes_at_instant(
 
 def _state_rate(law: AbstractDamper) -> float:
     """Fastest rate of the states of a law [1/s], if an explicit step carries some of them on."""
-    if not law.initial_state().size or not _has_explicit_step(law):
+    if not law.initial_state().size or not law.traits().has_explicit_step:
         return 0.0
     slopes = _checks.concrete(_slopes_of_rates(law, jnp.asarray(_VELOCITIES)))
     return 0.0 if slopes is None else float(np.max(np.abs(np.linalg.eigvals(np.nan_to_num(slopes)))))
-
-
-def _has_explicit_step(law: AbstractDamper) -> bool:
-    return isinstance(law, AbstractStateful) or any(map(_has_explicit_step, parts(law)))
 
 
 @eqx.filter_jit

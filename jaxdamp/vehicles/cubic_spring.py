@@ -3,7 +3,7 @@
 from typing import final
 
 from jaxdamp._types import Number, Scalar, ScalarLike
-from jaxdamp.dampers import AbstractStateless
+from jaxdamp.dampers import AbstractStateless, Traits
 from jaxdamp.parameters import nonnegative, parameter
 
 
@@ -20,6 +20,10 @@ class CubicSpring(AbstractStateless):
 
     quadratic_stiffness: Number = parameter("N/m²", "k₂, quadratic stiffness", default=0.0, linear=True)
     cubic_stiffness: Number = parameter("N/m³", "k₃, cubic stiffness", nonnegative, default=0.0, linear=True)
+
+    def traits(self) -> Traits:
+        """The velocity does not matter."""
+        return super().traits()._replace(has_feed_through=False)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m]; the velocity does not matter."""

@@ -14,7 +14,6 @@ from jaxdamp._field_types import check_module
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.dampers.coverage import coverage
 from jaxdamp.vehicles.base import AbstractVehicle
-from jaxdamp.vehicles.frame import holds_no_stroke
 from jaxdamp.vehicles.port_form import PortForm
 from jaxdamp.vehicles.ports import Ports
 
@@ -30,7 +29,7 @@ def rest_position(form: PortForm, laws: Sequence[AbstractDamper], road: Float[Ar
     shortened as far as helps. Derivatives are those of the implicit function theorem. NaN without an equilibrium.
     """
     ports = Ports(laws)
-    if all(map(holds_no_stroke, laws)):
+    if not any(law.traits().stroke_dependent_at_rest for law in laws):
         still = jnp.zeros(len(laws))
         forces = ports.force(still, still, ports.initial())
         return jnp.linalg.solve(form.stiffness, form.road_stiffness @ road - form.ports.T @ forces)

@@ -13,17 +13,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar
-from jaxdamp.dampers import (
-    AbstractDamper,
-    AbstractMemoryless,
-    Lag,
-    MotionRatio,
-    Scaled,
-    SeriesSpring,
-    Sum,
-    TemperatureScaled,
-)
-from jaxdamp.dampers.base import parts
+from jaxdamp.dampers import AbstractDamper, Sum
 from jaxdamp.vehicles.lift_off import LiftOff, LiftOffWithLaws
 from jaxdamp.vehicles.parts import SPRUNG, Body, Element, Link, Place, Wheel
 from jaxdamp.vehicles.points import Point
@@ -186,17 +176,11 @@ def lift_off(wheel: Wheel, static_load: Scalar) -> AbstractDamper:
     return LiftOffWithLaws(linear, Sum(laws)) if laws else linear
 
 
-def holds_no_stroke(law: AbstractDamper) -> bool:
-    """Whether the kind of the law alone says that its force at rest is the same at every stroke."""
-    around = (Sum, Scaled, MotionRatio, Lag, SeriesSpring, TemperatureScaled)
-    return isinstance(law, AbstractMemoryless) or (isinstance(law, around) and all(map(holds_no_stroke, parts(law))))
-
-
 def tangent_stiffness(
     form: PortForm, laws: Sequence[AbstractDamper], position: Float[Array, " q"]
 ) -> Float[Array, "q q"]:
     """K + Pᵀ (∂F/∂x) P: the stiffness [N/m] with that of the laws at rest at a position on level ground."""
-    if all(map(holds_no_stroke, laws)):
+    if not any(law.traits().stroke_dependent_at_rest for law in laws):
         return form.stiffness
     stiffness, _ = Ports(laws).stiffness_and_damping(form.ports @ position)
     return form.stiffness + (form.ports.T * stiffness[None, :]) @ form.ports

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from jaxdamp._smooth import ramp
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers import AbstractDamper, AbstractStateless
+from jaxdamp.dampers import AbstractDamper, AbstractStateless, AbstractWrapper, Traits
 from jaxdamp.parameters import nonnegative, positive, setting
 
 
@@ -49,7 +49,7 @@ class LiftOff(AbstractStateless):
 
 
 @final
-class LiftOffWithLaws(AbstractDamper):
+class LiftOffWithLaws(AbstractWrapper):
     """What a wheel with laws between it and the road has beside them and its spring: all together, they only push.
 
     As `LiftOff`, with the sum of the linear force and of the laws D in place of the linear force alone,
@@ -61,27 +61,21 @@ class LiftOffWithLaws(AbstractDamper):
 
     Arguments:
         linear: of the linear spring and dashpot.
-        laws: beside them.
+        law: beside them, the sum of all.
     """
 
     linear: LiftOff
-    laws: AbstractDamper
+    law: AbstractDamper
 
-    def initial_state(self) -> State:
-        """Those of the laws."""
-        return self.laws.initial_state()
+    def inner_law(self) -> AbstractDamper:
+        """The laws beside the tyre."""
+        return self.law
+
+    def traits(self) -> Traits:
+        """Those of the laws, and of the tyre, whose force on the road is not linear."""
+        return super().traits()._replace(has_feed_through=True, stroke_dependent=True, stroke_dependent_at_rest=True)
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N]."""
         spring = self.linear.tyre_stiffness * x + self.linear.tyre_damping * v
-        return self.linear.beside(spring + self.laws.force(x, v, state))
-
-    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
-        """Rates of the laws."""
-        return self.laws.state_rate(x, v, state)
-
-    def advance(
-        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
-    ) -> State:
-        """The step of the laws."""
-        return self.laws.advance(x0, v0, x1, v1, state, dt)
+        return self.linear.beside(spring + self.law.force(x, v, state))

@@ -50,7 +50,7 @@ class Ports(eqx.Module):
 
     laws: tuple[AbstractDamper, ...]  # one of each kind, its arrays stacked where there are several
     members: tuple[tuple[int, ...], ...]  # the ports of each kind
-    smooth: tuple[bool, ...] = eqx.field(static=True)  # of each kind, asked of one law: stacked ones cannot answer
+    smooth: tuple[bool, ...] = eqx.field(static=True)  # whether the states of each kind may be extrapolated
 
     def __init__(self, laws: Sequence[AbstractDamper], *, apart: bool = False) -> None:
         laws = [without_fitted_ranges(law) for law in laws]
@@ -62,7 +62,7 @@ class Ports(eqx.Module):
             else:
                 found.append(i)
         self.members = tuple(tuple(kind) for kind in kinds)
-        self.smooth = tuple(is_smooth(laws[kind[0]]) for kind in kinds)
+        self.smooth = tuple(laws[kind[0]].traits().extrapolable_states for kind in kinds)
         self.laws = tuple(
             laws[kind[0]] if len(kind) == 1 else jax.tree.map(_stacked, *[laws[i] for i in kind]) for kind in kinds
         )
@@ -145,13 +145,6 @@ class Ports(eqx.Module):
                 jax.vmap(lambda a, *more, rest=rest: call(eqx.combine(a, rest), *more))(arrays, *picked, *state)
             )
         return found
-
-
-def is_smooth(law: AbstractDamper) -> bool:
-    """Whether the law has states and all of them pass kinks of the velocity smoothly, so that they can be foreseen."""
-    inside = [part for part in law.laws_with_states() if part.initial_state().size]
-    size, of_parts = law.initial_state().size, sum(part.initial_state().size for part in inside)
-    return size > 0 and (size == of_parts or law.smooth_state) and all(map(is_smooth, inside))
 
 
 def _stacked(*leaves: Any) -> Any:

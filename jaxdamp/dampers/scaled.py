@@ -1,0 +1,46 @@
+"""A law times a factor."""
+
+from typing import final
+
+import equinox as eqx
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._types import Number, Scalar
+from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.wrapper import AbstractWrapper
+from jaxdamp.parameters import nonnegative, parameter, real
+
+
+@final
+class Scaled(AbstractWrapper):
+    """A law whose force is multiplied by a factor, F = factor · F_law; made by `2.0 * law`.
+
+    Arguments:
+        law: the law.
+        factor: not negative: it would turn a damper into a drive, F v ≤ 0.
+        allow_active: accept a negative factor, as in studies of stability: `Scaled(law, -2.0, allow_active=True)`.
+    """
+
+    law: AbstractDamper
+    factor: Number = parameter("", "factor on the force", lambda law: real if law.allow_active else nonnegative)
+    allow_active: bool = eqx.field(static=True, default=False)
+
+    def __check_init__(self) -> None:
+        factor = _checks.concrete(self.factor)
+        if factor is not None and np.any(factor < 0) and not self.allow_active:
+            remedy = "It makes the law drive the motion. If that is meant: `Scaled(law, factor, allow_active=True)`."
+            _checks.refuse("factor", "not be negative", factor, remedy)
+
+    def is_linear_in_law(self) -> bool:
+        """A factor is linear."""
+        return True
+
+    def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
+        """The same motion at a force that is smaller by the factor."""
+        return [(self.law, motion.divided(self.factor))]
+
+    def outer_force(self, force: Scalar) -> Scalar:
+        """Force [N]."""
+        return self.factor * force

@@ -1,0 +1,84 @@
+"""Laws side by side."""
+
+from typing import final
+
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar, ScalarLike, State
+from jaxdamp.dampers.base import START, AbstractDamper
+from jaxdamp.dampers.traits import Traits, combined_traits
+from jaxdamp.dampers.with_range import with_fitted_range
+
+
+@final
+class Sum(AbstractDamper):
+    """Laws side by side, F = Σ Fᵢ; made by `law + law`. States are concatenated in order."""
+
+    terms: tuple[AbstractDamper, ...]
+
+    def __check_init__(self) -> None:
+        if not self.terms:
+            _checks.refuse("terms", "hold at least one law", self.terms)
+
+    def traits(self) -> Traits:
+        """What all terms allow, and what any of them has."""
+        return combined_traits(term.traits() for term in self.terms)
+
+    def side_by_side(self) -> tuple[AbstractDamper, ...]:
+        """The terms, and the terms inside them."""
+        return tuple(law for term in self.terms for law in term.side_by_side())
+
+    @property
+    def stroke_limits(self) -> tuple[ScalarLike, ScalarLike]:
+        """Strokes [m] within which all terms hold."""
+        lows, highs = zip(*(term.stroke_limits for term in self.terms), strict=True)
+        return jnp.max(jnp.stack([*map(jnp.asarray, lows)])), jnp.min(jnp.stack([*map(jnp.asarray, highs)]))
+
+    def initial_state(self) -> State:
+        """The states of all terms."""
+        return jnp.concatenate([term.initial_state() for term in self.terms])
+
+    def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
+        """Sum of the forces [N]."""
+        pairs = zip(self.terms, self._split(state), strict=True)
+        return jnp.sum(jnp.stack([term.force(x, v, s) for term, s in pairs]), axis=0)
+
+    def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
+        """Rates of all terms."""
+        pairs = zip(self.terms, self._split(state), strict=True)
+        return jnp.concatenate([term.state_rate(x, v, s) for term, s in pairs])
+
+    def advance(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """Every term takes its own step."""
+        pairs = zip(self.terms, self._split(state), strict=True)
+        return jnp.concatenate([term.advance(x0, v0, x1, v1, s, dt) for term, s in pairs])
+
+    def predict(
+        self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
+    ) -> State:
+        """What every term predicts."""
+        pairs = zip(self.terms, self._split(state), strict=True)
+        return jnp.concatenate([term.predict(x0, v0, x1, v1, s, dt) for term, s in pairs])
+
+    def _split(self, state: State) -> list[Array]:
+        """The concatenated states cut into those of each term."""
+        sizes = [term.initial_state().size for term in self.terms]
+        ends = [sum(sizes[: i + 1]) for i in range(len(sizes))]
+        if state.size != ends[-1]:
+            must = f"hold {ends[-1]} numbers for the terms of the sum"
+            _checks.refuse("state", must, f"of shape {state.shape}", START)
+        return [state[end - size : end] for size, end in zip(sizes, ends, strict=True)]
+
+
+def terms_of(law: AbstractDamper) -> tuple[AbstractDamper, ...]:
+    """The terms of a sum, or the law itself. What a sum was fitted to holds for its terms, but for the force."""
+    if not isinstance(law, Sum):
+        return (law,)
+    if law.fitted_to is None:
+        return law.terms
+    covered = law.fitted_to.without("force")
+    return tuple(with_fitted_range(term, covered) if term.fitted_to is None else term for term in law.terms)

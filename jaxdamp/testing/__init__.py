@@ -1,0 +1,13 @@
+"""Checks that a damper law of your own works wherever the laws of the library do.
+
+    from jaxdamp.testing import check_law
+    check_law(MyLaw(1500.0))
+
+They need neither pytest nor a test runner: each check raises an `AssertionError` that says what is wrong.
+"""
+
+from jaxdamp.testing.law_checks import CHECKS, check_law
+from jaxdamp.testing.places import check_alike_ports, check_inside_wrappers
+
+
+__all__ = ["CHECKS", "check_alike_ports", "check_inside_wrappers", "check_law"]

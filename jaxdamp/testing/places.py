@@ -1,0 +1,131 @@
+"""Checks of laws where they are put: inside every wrapper, and twice in a half car."""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from jaxdamp import roads
+from jaxdamp.dampers import (
+    AbstractDamper,
+    Bushing,
+    FrequencySelective,
+    Lag,
+    Linear,
+    MotionRatio,
+    Scheduled,
+    SeriesSpring,
+    Spring,
+    StrokeDependent,
+    Sum,
+    TemperatureScaled,
+)
+from jaxdamp.parameters import free_parameters
+from jaxdamp.rig import march
+from jaxdamp.simulation import Ride
+from jaxdamp.testing._require import require
+from jaxdamp.vehicles import Corner, HalfCar
+
+
+Wrap = Callable[[AbstractDamper], AbstractDamper]
+Laws = dict[str, Any]  # by slot
+
+WRAPPERS: dict[str, Wrap] = {
+    "0.7 * law": lambda law: 0.7 * law,
+    "law + Spring(...) + law": lambda law: Sum((law, Spring(1e3), law)),
+    "MotionRatio(law, ...)": lambda law: MotionRatio(law, 0.8),
+    "TemperatureScaled(law, ...)": lambda law: TemperatureScaled(law, 313.15),
+    "Scheduled((law, law), ...)": lambda law: Scheduled((law, law), [0.0, 1.0], 0.4),
+    "Lag(law, ...)": lambda law: Lag(law, 0.004),
+}
+IN_SERIES: dict[str, Wrap] = {
+    "SeriesSpring(law, ...)": lambda law: SeriesSpring(law, 5e5),
+    "Bushing(law, ...)": lambda law: Bushing(law, 2e6, 6e5, 800.0),
+}
+WITHOUT_STATES: dict[str, Wrap] = {
+    "StrokeDependent((law, law), ...)": lambda law: StrokeDependent((law, law), [-0.01, 0.01]),
+    "FrequencySelective(law, ...)": lambda law: FrequencySelective(law, Linear(500.0), 0.03, 0.003),
+}
+SLOTS = ("damper", "extra_spring", "bump_stop", "friction")  # of a corner: so many laws share a car
+METRICS = ("rms_sprung_acceleration", "rms_front_dynamic_tyre_load", "rms_rear_dynamic_tyre_load")
+
+
+@eqx.filter_jit
+def _forces(laws: tuple[AbstractDamper, ...]) -> Array:
+    """The force [N] of each law in a short motion, shape (laws, time)."""
+    t = 1e-3 * jnp.arange(25.0)
+    x, v = 0.006 * jnp.sin(60.0 * t), 0.36 * jnp.cos(60.0 * t)
+    return jnp.stack([march(law, jnp.asarray(1e-3), x, v, 1) for law in laws])
+
+
+def _resists_more_the_faster(law: AbstractDamper) -> bool:
+    """Whether the force at rest grows with the velocity, as a law in series with a spring must."""
+    state, zero = law.initial_state(), jnp.zeros(())
+    force = [float(law.force(zero, jnp.asarray(v), state)) for v in (-2.0, -0.5, -0.1, 0.0, 0.1, 0.5, 2.0)]
+    return bool(np.all(np.diff(force) > 0.0))
+
+
+def check_inside_wrappers(law: AbstractDamper) -> None:
+    """Every wrapper takes the law, or refuses it as its traits say, and gives finite forces with it."""
+    stateless, feed_through = law.initial_state().size == 0, law.traits().has_feed_through
+    wrapped = {name: wrap(law) for name, wrap in WRAPPERS.items()}
+    for name, wrap in (IN_SERIES | WITHOUT_STATES).items():
+        fits, why = (feed_through, "feed-through") if name in IN_SERIES else (stateless, "states")
+        if fits and (name not in IN_SERIES or _resists_more_the_faster(law)):
+            wrapped[name] = wrap(law)
+        elif not fits:
+            try:
+                wrap(law)
+            except ValueError:
+                continue
+            raise AssertionError(f"`{name}` takes the law, which it must refuse for its {why}.")
+    forces = np.asarray(_forces(tuple(wrapped.values())))
+    for name, force in zip(wrapped, forces, strict=True):
+        require(np.all(np.isfinite(force)), f"`{name}` has forces that are not finite: {force}.")
+        require(np.ptp(force) > 0.0, f"`{name}` has the same force, {force[0]:g} N, throughout a motion.")
+
+
+def half_car(front: Laws, rear: Laws) -> HalfCar:
+    """A car that is symmetric but for its laws, given by the slot of a corner."""
+    ahead, behind = (Corner(40.0, 23.5e3, 190e3, **laws) for laws in (front, rear))
+    return HalfCar(580.0, 1100.0, 1.2, 1.2, ahead, behind)
+
+
+def two_bumps() -> tuple[np.ndarray, np.ndarray]:
+    """Time [s] and heights [m] of two short bumps, one under each axle, the rear one later."""
+    time = 1e-3 * np.arange(51)
+    share = np.clip((time[:, None] - np.array([0.002, 0.012])) / 0.03, 0.0, 1.0)
+    return time, 0.01 * (1.0 - np.cos(2 * np.pi * share))
+
+
+def _ride(front: Laws, rear: Laws, heights: np.ndarray) -> np.ndarray:
+    """The metrics of a ride, at a step that steep laws bear."""
+    road = roads.from_profile(two_bumps()[0], heights)
+    metrics = Ride(half_car(front, rear), road, metrics=list(METRICS), substeps=64)()
+    return np.array([float(metrics[name]) for name in METRICS])
+
+
+def check_alike_ports(*laws: AbstractDamper, rtol: float = 1e-9) -> None:
+    """Two of each law with different numbers at the ends of a half car, stacked and computed as one batch.
+
+    With both ends of the car and the road exchanged the ride must be the same but for the ends: no end has the numbers
+    of the other.
+
+    Arguments:
+        laws: up to four laws, which share the car.
+        rtol: relative difference of the two rides that is allowed.
+    """
+    _, heights = two_bumps()
+    one: Laws = dict(zip(SLOTS, laws, strict=False))
+    free = {slot: free_parameters(law) for slot, law in one.items()}
+    other: Laws = {slot: f.build(f.values * 1.02) for slot, f in free.items()}
+    there, back, same = _ride(one, other, heights), _ride(other, one, heights[:, ::-1]), _ride(one, one, heights)
+    require(np.all(np.isfinite(there)), f"In a half car {METRICS} are {there}.")
+    difference = np.abs(there / back[[0, 2, 1]] - 1.0)
+    message = f"{METRICS} change by {difference} of themselves when front and rear are exchanged."
+    require(np.all(difference <= rtol), f"Several laws of one kind must act as each alone, but {message}")
+    effect = abs(there[2] / same[2] - 1.0)
+    require(effect > 5 * rtol, f"Numbers 2 % larger at the rear change the rear tyre's load by {effect:.1g} only.")
