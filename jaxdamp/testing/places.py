@@ -26,7 +26,7 @@ from jaxdamp.dampers import (
 from jaxdamp.parameters import free_parameters
 from jaxdamp.rig import march
 from jaxdamp.simulation import Ride
-from jaxdamp.testing._require import require
+from jaxdamp.testing._require import require, require_equal
 from jaxdamp.vehicles import Corner, HalfCar
 
 
@@ -53,12 +53,22 @@ SLOTS = ("damper", "extra_spring", "bump_stop", "friction")  # of a corner: so m
 METRICS = ("rms_sprung_acceleration", "rms_front_dynamic_tyre_load", "rms_rear_dynamic_tyre_load")
 
 
+def expected_forces(force: np.ndarray, stroke: np.ndarray) -> dict[str, np.ndarray]:
+    """Forces [N] of the wrappers that follow at every instant from that of the law, in the same motion."""
+    return {
+        "0.7 * law": 0.7 * force,
+        "law + Spring(...) + law": 2.0 * force + 1e3 * stroke,
+        "TemperatureScaled(law, ...)": (1.0 - 0.002 * 20.0) * force,
+        "Scheduled((law, law), ...)": force,
+    }
+
+
 @eqx.filter_jit
-def _forces(laws: tuple[AbstractDamper, ...]) -> Array:
-    """The force [N] of each law in a short motion, shape (laws, time)."""
+def _forces(laws: tuple[AbstractDamper, ...]) -> tuple[Array, Array]:
+    """A short motion's strokes [m], and the force [N] of each law in it, shape (laws, time)."""
     t = 1e-3 * jnp.arange(25.0)
     x, v = 0.006 * jnp.sin(60.0 * t), 0.36 * jnp.cos(60.0 * t)
-    return jnp.stack([march(law, jnp.asarray(1e-3), x, v, 1) for law in laws])
+    return x, jnp.stack([march(law, jnp.asarray(1e-3), x, v, 1) for law in laws])
 
 
 def _resists_more_the_faster(law: AbstractDamper) -> bool:
@@ -82,10 +92,13 @@ def check_inside_wrappers(law: AbstractDamper) -> None:
             except ValueError:
                 continue
             raise AssertionError(f"`{name}` takes the law, which it must refuse for its {why}.")
-    forces = np.asarray(_forces(tuple(wrapped.values())))
-    for name, force in zip(wrapped, forces, strict=True):
+    stroke, forces = (np.asarray(a) for a in _forces((law, *wrapped.values())))
+    own, found = forces[0], dict(zip(wrapped, forces[1:], strict=True))
+    for name, force in found.items():
         require(np.all(np.isfinite(force)), f"`{name}` has forces that are not finite: {force}.")
-        require(np.ptp(force) > 0.0, f"`{name}` has the same force, {force[0]:g} N, throughout a motion.")
+    for name, expected in expected_forces(own, stroke).items():
+        atol = 1e-9 * float(np.max(np.abs(expected)))
+        require_equal(found[name], expected, f"`{name}` must follow from the law's own force.", atol=atol)
 
 
 def half_car(front: Laws, rear: Laws) -> HalfCar:

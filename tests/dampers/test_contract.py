@@ -214,6 +214,7 @@ LONG = {
 EXCEPTIONS = {
     "gas spring": {"rest": "its charge pushes the rod out at rest"},
     "mono-tube": {"rest": "its charge pushes the rod out at rest"},
+    "lag of a network": {"passive": "a lag behind a force that springs back gives energy out"},
 }
 
 
