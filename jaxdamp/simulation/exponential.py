@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
 from jaxdamp.simulation.stepper import Ground, Now, Stepper
-from jaxdamp.vehicles import AbstractVehicle, rest_position
+from jaxdamp.vehicles import System, rest_position
 
 
 class Saved(NamedTuple):
@@ -29,7 +29,7 @@ class Saved(NamedTuple):
 
 @eqx.filter_jit
 def exponential_steps(
-    vehicle: AbstractVehicle,
+    system: System,
     heights: Float[Array, "time wheels"],
     dt: Scalar,
     start: Float[Array, " n"] | None = None,
@@ -41,10 +41,9 @@ def exponential_steps(
     From `start`, or settled and at rest on the road's first height. Elements that stand on the road take its rate as
     the mean of the slopes before and after an instant.
     """
-    form = vehicle.port_form()
-    stepper = Stepper(vehicle, dt / substeps, apart=False)
+    form, stepper = system.form, Stepper(system, dt / substeps, apart=False)
     if start is None:
-        start = settled(vehicle, heights[0])
+        start = settled(system, heights[0])
     slopes = road_rate(heights, dt)
     ground = Ground(heights, None if form.port_road is None else slopes)
 
@@ -68,9 +67,9 @@ def exponential_steps(
     return Saved(motion, forces, heights, slopes, stepper.ports.by_port(last.states))
 
 
-def settled(vehicle: AbstractVehicle, road: Float[Array, " wheels"]) -> Float[Array, " n"]:
+def settled(system: System, road: Float[Array, " wheels"]) -> Float[Array, " n"]:
     """The motion of a vehicle at rest on these heights."""
-    position = rest_position(vehicle.port_form(), vehicle.elements(), road)
+    position = rest_position(system, road)
     return jnp.concatenate([position, jnp.zeros_like(position)])
 
 

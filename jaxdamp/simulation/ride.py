@@ -14,13 +14,13 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._many_points import outside_domains
 from jaxdamp._types import Scalar
+from jaxdamp._vectors import scalars
 from jaxdamp.configuration import fuses_loops
-from jaxdamp.dampers import RangeUse, without_fitted_ranges
+from jaxdamp.dampers import RangeUse
 from jaxdamp.dampers.fitted_range import has_fitted_range
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import match_paths, parameters, replace
 from jaxdamp.roads import AbstractRoad
-from jaxdamp.simulation._vectors import scalars
 from jaxdamp.simulation.exponential import exponential_steps, settled
 from jaxdamp.simulation.gauge import Gathered, Gauge
 from jaxdamp.simulation.range_notes import range_uses
@@ -92,7 +92,7 @@ class Ride(eqx.Module):
         _, self.heights = sampled(vehicle, road, duration, dt)
         self.road = road if delays_by_itself(vehicle, road) else None
         half = functools.partial(half_sampled, vehicle, road, self.heights.shape[0] - 1, dt)
-        self.substeps = checked_substeps(vehicle, self.heights, half, dt, substeps=substeps, grid=road.grid)
+        self.substeps = checked_substeps(vehicle.system(), self.heights, half, dt, substeps=substeps, grid=road.grid)
         self.metrics = tuple(chosen_metrics(vehicle, metrics, "metrics"))
 
     @property
@@ -130,8 +130,9 @@ class Ride(eqx.Module):
         if not has_fitted_range(vehicle):
             return {}
         heights, step = self.on_axles_of(vehicle).heights, jnp.asarray(self.dt, dtype=float)
-        saved = exponential_steps(without_fitted_ranges(vehicle), heights, step, None, self.substeps, 1)
-        return range_uses(vehicle, saved.motion, saved.road, saved.road_rate, saved.port_force)
+        system = vehicle.system()
+        saved = exponential_steps(system, heights, step, None, self.substeps, 1)
+        return range_uses(vehicle, system.form, saved.motion, saved.road, saved.road_rate, saved.port_force)
 
     def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
@@ -162,9 +163,10 @@ def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     if ride.road is not None and point and moves_axles(lambda point: replace(ride.vehicle, point), point):
         ride = ride.on_axles_of(vehicle)
     heights, dt = ride.heights, ride.dt
-    apart = ride.many or (fuses_loops() and 2 * len(vehicle.coordinates) <= FEW_STATES)
-    stepper = Stepper(vehicle, jnp.asarray(dt / ride.substeps, dtype=float), apart=apart, many=ride.many)
-    gauge = Gauge(vehicle, ride.metrics, dt, apart=apart)
+    system = vehicle.system()
+    apart = ride.many or (fuses_loops() and 2 * len(system.layout.coordinates) <= FEW_STATES)
+    stepper = Stepper(system, jnp.asarray(dt / ride.substeps, dtype=float), apart=apart, many=ride.many)
+    gauge = Gauge(system, ride.metrics, dt, apart=apart)
     half_rate = jnp.asarray(0.5 / dt, dtype=heights.dtype)
 
     def at(height: Array, rate: Array) -> Ground:
@@ -178,7 +180,7 @@ def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
         return (after, gauge.add(gathered, after, end), end, (coming, ahead)), None
 
     first = at(heights[0], 2.0 * half_rate * (heights[1] - heights[0]))
-    now = stepper.at_rest(settled(vehicle, heights[0]), first)
+    now = stepper.at_rest(settled(system, heights[0]), first)
     carry = now, gauge.begin(now, first), first, (heights[0], heights[1])
     road = jnp.concatenate([heights[2:], 2.0 * heights[-1:] - heights[-2:-1]])  # it ends as straight as it came
     lean = jax.checkpoint(step, policy=jax.checkpoint_policies.save_only_these_names(FOR_REVERSE), prevent_cse=False)

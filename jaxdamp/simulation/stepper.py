@@ -16,7 +16,7 @@ from jax.ad_checkpoint import checkpoint_name
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
-from jaxdamp.simulation._vectors import (
+from jaxdamp._vectors import (
     Matrix,
     Vector,
     between,
@@ -29,8 +29,7 @@ from jaxdamp.simulation._vectors import (
     times,
 )
 from jaxdamp.simulation.propagator import Propagator
-from jaxdamp.vehicles import AbstractVehicle, Ports
-from jaxdamp.vehicles.ports import Earlier, States
+from jaxdamp.vehicles import Earlier, Ports, States, System
 
 
 FOR_REVERSE = "needed by reverse derivatives"  # the rest of a step is cheap to repeat, or linear and not needed
@@ -58,7 +57,7 @@ class Stepper(eqx.Module):
     """What a step takes: the matrices of the linear part and the laws at the ports, in one of two layouts.
 
     Arguments:
-        vehicle: any vehicle.
+        system: the vehicle.
         dt: the step [s].
         apart: keep vectors as tuples of scalars.
         many: written for many cars side by side.
@@ -76,11 +75,11 @@ class Stepper(eqx.Module):
     deflection: Matrix  # of the ports, from the coordinates
     standing: Matrix | None  # from the heights of the road
 
-    def __init__(self, vehicle: AbstractVehicle, dt: Scalar, *, apart: bool, many: bool = False) -> None:
-        form = vehicle.port_form()
-        exact, kept = Propagator.over(form, dt), rows if apart else (lambda matrix: matrix)
+    def __init__(self, system: System, dt: Scalar, *, apart: bool, many: bool = False) -> None:
+        form = system.form
+        exact, kept = Propagator.over(system.motion, dt), rows if apart else (lambda matrix: matrix)
         self.unit = jnp.where(jnp.isnan(exact.phi[0, 0]), jnp.nan, 1.0) if many else None
-        self.ports, self.dt = Ports(vehicle.elements(), apart=apart), dt
+        self.ports, self.dt = Ports(system.laws, apart=apart), dt
         self.phi, self.earlier_input = kept(exact.phi), kept(-exact.force_ramp)
         self.force_input = kept(exact.force_held + exact.force_ramp)
         self.correction = kept(exact.force_ramp + exact.force_bend)
