@@ -14,6 +14,7 @@ from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 from jaxdamp.metrics import current_names
 from jaxdamp.parameters import check_parameters, readable
+from jaxdamp.vehicles.channels import channels_of
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
 from jaxdamp.vehicles.ride_metrics import RideMetric
@@ -44,7 +45,8 @@ class AbstractVehicle(eqx.Module):
     @functools.cached_property
     def layout(self) -> Layout:
         """Names of coordinates, ports, wheels, channels and metrics: what depends on no number."""
-        return layout_of(self.frame())
+        frame = self.frame()
+        return layout_of(frame, channels_of(frame))
 
     def port_form(self) -> PortForm:
         """The matrices, built from geometry."""

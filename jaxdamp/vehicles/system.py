@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.vehicles.channels import Channel, ChannelKind, channels_of, signals
+from jaxdamp.vehicles.channels import Channel, ChannelKind, Measured, channels_of, signals
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.points import matrix
 from jaxdamp.vehicles.port_form import LinearMap, PortForm
@@ -80,9 +80,9 @@ class Layout:
         return {channel.name: i for i, channel in enumerate(self.channels)}
 
 
-def layout_of(frame: Frame) -> Layout:
-    """The layout of a vehicle of these parts."""
-    channels = tuple(channel for channel, _ in channels_of(frame))
+def layout_of(frame: Frame, measured: Sequence[Measured]) -> Layout:
+    """The layout of a vehicle of these parts, with its channels."""
+    channels = tuple(channel for channel, _ in measured)
     return Layout(
         frame.coordinates,
         frame.element_names,
@@ -121,20 +121,21 @@ class System(eqx.Module):
 
 def assemble(frame: Frame) -> System:
     """The system of a vehicle of these parts."""
-    layout, form = layout_of(frame), frame.port_form()
-    loads = frame.static_wheel_loads(form)
-    motion = form.first_order()
-    return System(layout, form, frame.elements(loads), loads, motion, _outputs(frame, layout, motion, loads))
+    measured, form = channels_of(frame), frame.port_form()
+    layout, loads, motion = layout_of(frame, measured), frame.static_wheel_loads(form), form.first_order()
+    sums = matrix([point for _, point in measured], signals(frame))
+    return System(layout, form, frame.elements(loads), loads, motion, _outputs(layout, motion, sums, loads))
 
 
-def _outputs(frame: Frame, layout: Layout, motion: LinearMap, loads: Float[Array, " wheels"]) -> LinearMap:
+def _outputs(
+    layout: Layout, motion: LinearMap, sums: Float[Array, "channels signals"], loads: Float[Array, " wheels"]
+) -> LinearMap:
     """The channels, from their sums of signals and the accelerations of the coordinates."""
     n, ports, wheels = len(layout.coordinates), len(layout.ports), len(layout.wheels)
     relative = [c.kind is ChannelKind.RELATIVE_TYRE_LOAD for c in layout.channels]
     divisor = [1 + layout.wheels.index(c.place) if own else 0 for c, own in zip(layout.channels, relative, strict=True)]
     shares = jnp.concatenate([jnp.ones(1), 1.0 / loads])[np.array(divisor)]
-    sums = matrix([point for _, point in channels_of(frame)], signals(frame)) * shares[:, None]
     ends = np.cumsum([2 * n, n, ports, wheels])
-    of_motion, of_acceleration, *others = jnp.split(sums, ends, axis=1)
+    of_motion, of_acceleration, *others = jnp.split(sums * shares[:, None], ends, axis=1)
     accelerations = (part[n:] for part in (motion.motion, motion.force, motion.road, motion.road_rate))
     return LinearMap(*(own + of_acceleration @ by for own, by in zip((of_motion, *others), accelerations, strict=True)))
