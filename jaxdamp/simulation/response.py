@@ -1,7 +1,7 @@
 """What a vehicle did on a road: motion, forces, channels with units, energy, ride metrics."""
 
 import dataclasses
-import functools
+import weakref
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, final
 
@@ -37,6 +37,9 @@ class Comfort(NamedTuple):
 def _middle(values: Array) -> Array:
     """Mean over each step."""
     return 0.5 * (values[1:] + values[:-1])
+
+
+_COMPUTED: dict[int, dict[str, Signal]] = {}  # channels of living responses: a module has no place but its fields
 
 
 @jax.jit
@@ -113,20 +116,17 @@ class Response(eqx.Module):
         """All channels by name; each is computed once."""
         return {name: self[name] for name in self.system.layout.units}
 
-    @functools.cached_property
-    def _computed(self) -> dict[str, Signal]:
-        """The channels that were asked for, where their numbers are known: a traced one belongs to one program."""
-        return {}
-
     def __getitem__(self, channel: str) -> Signal:
-        numbers = self.system.layout.numbers
+        numbers, computed = self.system.layout.numbers, _COMPUTED.get(id(self), {})
         _checks.one_of("channel", channel, numbers)
-        if channel in self._computed:
-            return self._computed[channel]
+        if channel in computed:
+            return computed[channel]
         number = jnp.asarray(numbers[channel])
         values = _channel(self.system.outputs, number, self.motion, self.port_force, self.road, self.road_rate)
-        if _checks.concrete(values) is not None:
-            self._computed[channel] = values
+        if _checks.concrete(values) is not None:  # a traced one belongs to one program
+            if id(self) not in _COMPUTED:
+                weakref.finalize(self, _COMPUTED.pop, id(self))
+            _COMPUTED.setdefault(id(self), {})[channel] = values
         return values
 
     def metrics(self, names: Sequence[str] | None = None) -> dict[str, Scalar]:

@@ -1,11 +1,11 @@
 """What every vehicle offers, all from its frame of parts."""
 
-import functools
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import final
+from typing import Any, final
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -19,6 +19,9 @@ from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
 from jaxdamp.vehicles.ride_metrics import RideMetric
 from jaxdamp.vehicles.system import Layout, System, assemble, layout_of
+
+
+_LAYOUTS: dict[Any, Layout] = {}  # by all of a vehicle but the values of its arrays, which do not change its layout
 
 
 class AbstractVehicle(eqx.Module):
@@ -42,11 +45,15 @@ class AbstractVehicle(eqx.Module):
         """The vehicle assembled: matrices, laws, outputs. Compiled once for all vehicles of one layout."""
         return _assembled(without_fitted_ranges(self))  # vehicles with laws fitted to other records share one program
 
-    @functools.cached_property
+    @property
     def layout(self) -> Layout:
         """Names of coordinates, ports, wheels, channels and metrics: what depends on no number."""
-        frame = self.frame()
-        return layout_of(frame, channels_of(frame))
+        leaves, structure = jax.tree.flatten(without_fitted_ranges(self))
+        key = structure, tuple(leaf.shape if eqx.is_array(leaf) else leaf for leaf in leaves)
+        if key not in _LAYOUTS:
+            frame = self.frame()
+            _LAYOUTS[key] = layout_of(frame, channels_of(frame))
+        return _LAYOUTS[key]
 
     def port_form(self) -> PortForm:
         """The matrices, built from geometry."""

@@ -87,6 +87,16 @@ def test_a_channel_is_computed_alone_and_once(monkeypatch):
     np.testing.assert_array_equal(traced, 2.0 * other["stroke"])  # nothing traced was remembered
 
 
+def test_what_is_remembered_compiles_nothing_again():
+    """A module with anything beside its fields is another pytree, and a compiled function would compile again."""
+    car = QuarterCar(301.0, 40.0, 20e3, 180e3, dampers.Linear(1500.0))
+    run = simulate(car, tracks(bumps([0.02], 101)))
+    before = [jax.tree.structure(tree) for tree in (car, run, car.system())]
+    assert run.channels and car.layout.by_name and run.metrics()
+    assert [jax.tree.structure(tree) for tree in (car, run, car.system())] == before
+    assert car.layout is QuarterCar(302.0, 40.0, 20e3, 180e3, dampers.Linear(1.0)).layout
+
+
 def test_a_suspension_of_a_vehicle_of_ones_own():
     body, axle = Body("sprung", 600.0), Body("unsprung", 60.0)
     link = Suspension(45e3, dampers.Linear(3e3)).link("", body.at() - axle.at())
