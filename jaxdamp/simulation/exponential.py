@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
-from jaxdamp.simulation.stepper import Ground, Now, Stepper
+from jaxdamp.simulation.stepper import RoadInput, Stepper, StepState
 from jaxdamp.vehicles import System, rest_position
 
 
@@ -45,12 +45,12 @@ def exponential_steps(
     if start is None:
         start = settled(system, heights[0])
     slopes = road_rate(heights, dt)
-    ground = Ground(heights, None if form.port_road is None else slopes)
+    ground = RoadInput(heights, None if form.port_road is None else slopes)
 
-    def step(now: Now, ends: tuple[Ground, Ground]) -> tuple[Now, None]:
+    def step(now: StepState, ends: tuple[RoadInput, RoadInput]) -> tuple[StepState, None]:
         return stepper.over(now, *ends, substeps), None
 
-    def saving(now: Now, ends: tuple[Ground, Ground]) -> tuple:
+    def saving(now: StepState, ends: tuple[RoadInput, RoadInput]) -> tuple:
         after, _ = step(now, ends) if every == 1 else jax.lax.scan(step, now, ends)
         return after, (after.motion, after.states)
 

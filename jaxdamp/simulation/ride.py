@@ -22,16 +22,16 @@ from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import match_paths, parameters, replace
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.exponential import exponential_steps, settled
-from jaxdamp.simulation.gauge import Gathered, Gauge
+from jaxdamp.simulation.observer import Accumulators, MetricObserver
 from jaxdamp.simulation.range_notes import range_uses
 from jaxdamp.simulation.run import half_sampled, sampled
 from jaxdamp.simulation.step_size import checked_substeps
-from jaxdamp.simulation.stepper import FOR_REVERSE, Ground, Now, Stepper
+from jaxdamp.simulation.stepper import FOR_REVERSE, RoadInput, Stepper, StepState
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
 from jaxdamp.vehicles import AbstractVehicle, RideMetric, chosen_metrics
 
 
-Carry: TypeAlias = tuple[Now, Gathered, Ground, tuple[Array, Array]]
+Carry: TypeAlias = tuple[StepState, Accumulators, RoadInput, tuple[Array, Array]]
 FEW_STATES = 4  # up to which one car is best written number by number, if loops are fused
 BLOCK = 16_384  # instants, of which reverse derivatives keep what they need; longer runs are driven twice
 
@@ -166,22 +166,22 @@ def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     system = vehicle.system()
     apart = ride.many or (fuses_loops() and 2 * len(system.layout.coordinates) <= FEW_STATES)
     stepper = Stepper(system, jnp.asarray(dt / ride.substeps, dtype=float), apart=apart, many=ride.many)
-    gauge = Gauge(system, ride.metrics, dt, apart=apart)
+    observer = MetricObserver(system, ride.metrics, dt, apart=apart)
     half_rate = jnp.asarray(0.5 / dt, dtype=heights.dtype)
 
-    def at(height: Array, rate: Array) -> Ground:
-        return Ground(scalars(height), scalars(rate)) if apart else Ground(height, rate)
+    def at(height: Array, rate: Array) -> RoadInput:
+        return RoadInput(scalars(height), scalars(rate)) if apart else RoadInput(height, rate)
 
     def step(carry: Carry, ahead: Array) -> tuple[Carry, None]:
         """To the next instant, with the height of the one after it, from which the rate at its end follows."""
         now, gathered, begin, (height, coming) = carry
         end = at(coming, half_rate * (ahead - height))
         after = stepper.over(now, begin, end, ride.substeps)
-        return (after, gauge.add(gathered, after, end), end, (coming, ahead)), None
+        return (after, observer.add(gathered, after, end), end, (coming, ahead)), None
 
     first = at(heights[0], 2.0 * half_rate * (heights[1] - heights[0]))
     now = stepper.at_rest(settled(system, heights[0]), first)
-    carry = now, gauge.begin(now, first), first, (heights[0], heights[1])
+    carry = now, observer.begin(now, first), first, (heights[0], heights[1])
     road = jnp.concatenate([heights[2:], 2.0 * heights[-1:] - heights[-2:-1]])  # it ends as straight as it came
     lean = jax.checkpoint(step, policy=jax.checkpoint_policies.save_only_these_names(FOR_REVERSE), prevent_cse=False)
 
@@ -193,4 +193,4 @@ def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     if whole:
         carry, _ = jax.lax.scan(jax.checkpoint(drive), carry, road[:whole].reshape(-1, BLOCK, *road.shape[1:]))
     carry, _ = drive(carry, road[whole:])
-    return gauge.end(carry[1], count + 1)
+    return observer.end(carry[1], count + 1)

@@ -13,7 +13,7 @@ from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp._vectors import between
 from jaxdamp.simulation.exponential import road_rate, settled
-from jaxdamp.simulation.stepper import Ground, Now, Stepper
+from jaxdamp.simulation.stepper import RoadInput, Stepper, StepState
 from jaxdamp.vehicles import System
 
 
@@ -103,18 +103,18 @@ def _driven(
     outputs, stepper = system.channels(names), Stepper(system, dt / parts, apart=False)
     slopes = road_rate(heights, dt)
 
-    def ground(i: Array) -> Ground:
+    def ground(i: Array) -> RoadInput:
         whole = jnp.minimum(i // substeps, heights.shape[0] - 2)
         share = (i - whole * substeps).astype(dt.dtype) / parts
-        return Ground(*(between(a[whole], a[whole + 1], share) for a in (heights, slopes)))
+        return RoadInput(*(between(a[whole], a[whole + 1], share) for a in (heights, slopes)))
 
-    def step(i: Array, carry: tuple[Now, Array]) -> tuple[Now, Array]:
+    def step(i: Array, carry: tuple[StepState, Array]) -> tuple[StepState, Array]:
         now, found = carry
         now = stepper(now, ground(i), ground(i + 1))
         number = (i + substeps) // substeps  # the last of an interval is the instant's
         return now, found.at[number].set(values(now, ground(i + 1)))
 
-    def values(now: Now, at: Ground) -> Float[Array, " channels"]:
+    def values(now: StepState, at: RoadInput) -> Float[Array, " channels"]:
         return outputs(now.motion, now.force, at.height, at.rate)
 
     first = ground(jnp.zeros_like(count))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers
-from jaxdamp.vehicles import Cab, Corner, Ports, QuarterCar, Seat, SeatMass, Suspension, presets
+from jaxdamp.vehicles import Cab, Corner, Ports, QuarterCar, Seat, SeatMass, Suspension, WalkingBeam, presets
 
 
 ADDED = 7e3  # N/m
@@ -22,6 +22,7 @@ LAWS = {
 def truck(cab_laws, beam_laws, seat_laws, added=0.0):
     """A truck with a walking beam, a cab and a seat, with laws on them or stiffer linear springs."""
     own = presets.truck_001()
+    assert isinstance(own.tandem, WalkingBeam)
     mounts = {f"{end}_{name}": law for end in ("front", "rear") for name, law in cab_laws.items()}
     law = dampers.Linear(4e3)
     cab = Cab(900.0, 900.0, 2.6, 0.9, 0.7, 60e3 + added, 60e3 + added, law, law, **mounts)

@@ -1,4 +1,4 @@
-"""What a ride measures as it goes: channels as linear outputs, ISO weightings as extra states, statistics gathered."""
+"""The metrics of a run, observed step by step: channels, ISO weightings as extra states, accumulators of statistics."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from jaxdamp._vectors import Vector, scalars
 from jaxdamp.metrics import STATISTICS
 from jaxdamp.metrics.statistics import Kept
 from jaxdamp.metrics.weighting import discrete_weighting
-from jaxdamp.simulation.stepper import FOR_REVERSE, Ground, Now
+from jaxdamp.simulation.stepper import FOR_REVERSE, RoadInput, StepState
 from jaxdamp.vehicles import RideMetric, System
 
 
@@ -43,16 +43,16 @@ def _constant_dot(row: np.ndarray, vector: Vector, start: Scalar) -> Scalar:
     return start
 
 
-class Gathered(NamedTuple):
+class Accumulators(NamedTuple):
     """What the loop carries beside the vehicle: the last channels, the states of weightings, the statistics."""
 
     channels: tuple[Scalar, ...]
-    felt: tuple[tuple[Scalar, ...], ...]
-    kept: tuple[Kept, ...]
+    weighting_states: tuple[tuple[Scalar, ...], ...]
+    statistics: tuple[Kept, ...]
     rest: tuple[Scalar, ...]  # channels that count from the static equilibrium, as they are there
 
 
-class Gauge:
+class MetricObserver:
     """Which channels and weightings the metrics need, and how they are gathered."""
 
     def __init__(self, system: System, metrics: Sequence[RideMetric], dt: float, *, apart: bool) -> None:
@@ -64,29 +64,29 @@ class Gauge:
         felt = dict.fromkeys(m.channel for m in metrics if STATISTICS[m.statistic].weighted)
         self.weighted = {name: Filter(*discrete_weighting(system.layout.weighting(name), dt)) for name in felt}
 
-    def begin(self, now: Now, ground: Ground) -> Gathered:
+    def begin(self, now: StepState, ground: RoadInput) -> Accumulators:
         """At the first instant, the vehicle in its static equilibrium and weightings at rest."""
         values = self._values(now, ground)
         still = tuple((jnp.zeros_like(values[0]),) * f.output.size for f in self.weighted.values())
         rest = tuple(values[self.names.index(name)] for name in self.from_rest)
         records = self._records(values, still, rest)
-        return Gathered(values, still, tuple(STATISTICS[m.statistic].begin(y) for m, y in records), rest)
+        return Accumulators(values, still, tuple(STATISTICS[m.statistic].begin(y) for m, y in records), rest)
 
-    def add(self, old: Gathered, now: Now, ground: Ground) -> Gathered:
+    def add(self, old: Accumulators, now: StepState, ground: RoadInput) -> Accumulators:
         """One instant more."""
         values = self._values(now, ground)
         inputs = [(old.channels[i], values[i]) for i in map(self.names.index, self.weighted)]
-        felt = tuple(f(s, *u) for f, s, u in zip(self.weighted.values(), old.felt, inputs, strict=True))
-        pairs = zip(self._records(values, felt, old.rest), old.kept, strict=True)
+        felt = tuple(f(s, *u) for f, s, u in zip(self.weighted.values(), old.weighting_states, inputs, strict=True))
+        pairs = zip(self._records(values, felt, old.rest), old.statistics, strict=True)
         kept = tuple(STATISTICS[m.statistic].add(before, y) for (m, y), before in pairs)
-        return Gathered(values, felt, kept, old.rest)
+        return Accumulators(values, felt, kept, old.rest)
 
-    def end(self, gathered: Gathered, count: int) -> dict[str, Scalar]:
+    def end(self, gathered: Accumulators, count: int) -> dict[str, Scalar]:
         """The metrics of so many instants."""
-        pairs = zip(self.metrics, gathered.kept, strict=True)
+        pairs = zip(self.metrics, gathered.statistics, strict=True)
         return {m.name: STATISTICS[m.statistic].end(kept, count, self.dt) for m, kept in pairs}
 
-    def _values(self, now: Now, ground: Ground) -> tuple[Scalar, ...]:
+    def _values(self, now: StepState, ground: RoadInput) -> tuple[Scalar, ...]:
         """The channels."""
         values = self.outputs(now.motion, now.force, ground.height, ground.rate)
         return checkpoint_name(values if isinstance(values, tuple) else scalars(values), FOR_REVERSE)
