@@ -45,7 +45,7 @@ def main() -> None:
     def saved(every: int) -> Callable[[Array, Array], Array]:
         def run(heights: Array, rate: Array) -> Array:
             changed = replace(ride.vehicle, {path: rate})
-            return exponential_steps(changed, heights, jnp.asarray(DT), every=every).motion
+            return exponential_steps(changed.system(), heights, jnp.asarray(DT), every=every).motion
 
         return run
 

@@ -62,7 +62,9 @@ def main() -> None:
         heights = simulate(car, delayed, duration=10.0).road
         coarse = np.asarray(heights)
         first, warm = timed(on_road(car, coarse, DT))
-        _, saved = first_and_warm(lambda car=car, heights=heights: exponential_steps(car, heights, jnp.asarray(DT)))
+        _, saved = first_and_warm(
+            lambda car=car, heights=heights: exponential_steps(car.system(), heights, jnp.asarray(DT))
+        )
         exact = simulate(
             car,
             roads.from_profile(np.arange(10_000 * FINE + 1) * DT / FINE, problem.refined(coarse, FINE)),

@@ -141,4 +141,4 @@ def _matrices(case: str, dt: float) -> np.ndarray:
 
 @eqx.filter_jit
 def _propagator(car: AbstractVehicle, dt: Array) -> Propagator:
-    return Propagator.over(car.port_form(), dt)
+    return Propagator.over(car.system().motion, dt)

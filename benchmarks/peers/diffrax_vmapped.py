@@ -44,8 +44,8 @@ def _compiled(
 ) -> Callable[[Array, Array, Array], Array]:
     def one(row: Array, road: Array, dt: Array) -> Array:
         car = problem.vehicle(problem.law(case, row), case)
-        form, laws = car.port_form(), car.elements()
-        system, q = form.first_order(), form.mass.shape[0]
+        system = car.system()
+        form, laws, q = system.form, system.laws, system.form.mass.shape[0]
         steps = road.shape[0] - 1
         position = jnp.linalg.solve(form.stiffness, form.road_stiffness @ road[0])  # where no law carries a force
 
@@ -56,8 +56,7 @@ def _compiled(
             height = road[index] + (place - whole) * (road[index + 1] - road[index])
             stroke, velocity = form.ports @ x[:q], form.ports @ x[q:]
             forces = [law.force(*at) for law, *at in zip(laws, stroke, velocity, states, strict=True)]
-            change = system.state_matrix @ x + system.port_input @ jnp.stack(forces) + system.road_input @ height
-            return change, stroke, velocity
+            return system.motion(x, jnp.stack(forces), height, None), stroke, velocity
 
         def field(t: Any, y: tuple, args: None) -> tuple:
             del args

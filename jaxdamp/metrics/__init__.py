@@ -60,7 +60,7 @@ from jaxdamp.metrics.roughness_index import (
 )
 from jaxdamp.metrics.running import max_transient_value, running_rms
 from jaxdamp.metrics.spectrum import power_spectral_density
-from jaxdamp.metrics.statistics import STATISTICS, Statistic, weighting_of
+from jaxdamp.metrics.statistics import STATISTICS, Statistic
 from jaxdamp.metrics.transfer import coherence, transmissibility
 from jaxdamp.metrics.tyre_load import dynamic_load_coefficient, lift_off_fraction, road_stress_factor
 from jaxdamp.metrics.weighted import weighted_rms, weighted_signal
@@ -127,7 +127,6 @@ __all__ = [
     "weighted_rms",
     "weighted_signal",
     "weighting_factor",
-    "weighting_of",
     "weighting_response",
     "weighting_state_space",
     "working_space_exceedance",

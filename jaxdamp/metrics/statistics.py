@@ -159,8 +159,3 @@ STATISTICS: dict[str, Statistic] = {
         weighted=True,
     ),
 }
-
-
-def weighting_of(unit: str) -> str:
-    """The weighting of ISO 2631-1 for a vertical acceleration [m/s^2], Wk, or an angular one [rad/s^2], We."""
-    return "Wk" if unit == "m/s^2" else "We"

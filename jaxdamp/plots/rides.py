@@ -9,6 +9,7 @@ from jaxtyping import Float
 from jaxdamp import _checks, metrics
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.simulation import Response
+from jaxdamp.vehicles import ChannelKind
 
 
 if TYPE_CHECKING:
@@ -116,8 +117,10 @@ def _line_styles(names: Iterable[str], reference: str | None) -> dict[str, dict[
 
 def ride_channels(response: Response) -> tuple[str, ...]:
     """The channels that say most of a ride: body acceleration, first stroke, first dynamic tyre load."""
-    acceleration = next(m.channel for m in response.vehicle.ride_metrics if m.channel.endswith("acceleration"))
-    rest = [next((name for name in response.units if name.endswith(end)), None) for end in ("stroke", "tyre_load")]
+    layout = response.system.layout
+    acceleration = next(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting is not None)
+    kinds = ChannelKind.STROKE, ChannelKind.TYRE_LOAD
+    rest = [next((c.name for c in layout.channels if c.kind is kind), None) for kind in kinds]
     return (acceleration, *[name for name in rest if name is not None])
 
 

@@ -9,9 +9,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar, Signal
-from jaxdamp.simulation.exponential import Saved, road_rate
-from jaxdamp.vehicles import AbstractVehicle, Ports, rest_position
-from jaxdamp.vehicles.ports import States
+from jaxdamp.simulation.exponential import Saved, road_rate, settled
+from jaxdamp.vehicles import Ports, States, System
 
 
 STEPS_PER_INSTANT = 100  # on average: more are a law too fast for the solver, and would take for ever
@@ -19,7 +18,7 @@ STEPS_PER_INSTANT = 100  # on average: more are a law too fast for the solver, a
 
 @eqx.filter_jit
 def adaptive_steps(
-    vehicle: AbstractVehicle,
+    system: System,
     time: Signal,
     heights: Float[Array, "time wheels"],
     solver: diffrax.AbstractSolver,
@@ -32,14 +31,11 @@ def adaptive_steps(
 
     Steps end where the slope of the road changes.
     """
-    form, laws = vehicle.port_form(), vehicle.elements()
-    ports = Ports(laws)
+    form, ports = system.form, Ports(system.laws)
     q = form.mass.shape[0]
-    system = form.first_order()
     dt = (time[-1] - time[0]) / (time.size - 1)
     if start is None:
-        position = rest_position(form, laws, heights[0])
-        start = jnp.concatenate([position, jnp.zeros_like(position)])
+        start = settled(system, heights[0])
 
     def road(t: Scalar) -> tuple[Array, Array]:
         index = jnp.clip(jnp.floor((t - time[0]) / dt).astype(int), 0, time.size - 2)
@@ -54,9 +50,7 @@ def adaptive_steps(
         x, states = y
         height, slope = road(t)
         place = at_ports(x, height, slope)
-        driven = system.road_input @ height + system.road_rate_input @ slope
-        motion = system.state_matrix @ x + system.port_input @ ports.force(*place, states) + driven
-        return motion, ports.state_rate(*place, states)
+        return system.motion(x, ports.force(*place, states), height, slope), ports.state_rate(*place, states)
 
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(field),

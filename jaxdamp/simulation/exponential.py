@@ -13,8 +13,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
-from jaxdamp.simulation.stepper import Ground, Now, Stepper
-from jaxdamp.vehicles import AbstractVehicle, rest_position
+from jaxdamp.simulation.stepper import RoadInput, Stepper, StepState
+from jaxdamp.vehicles import System, rest_position
 
 
 class Saved(NamedTuple):
@@ -29,7 +29,7 @@ class Saved(NamedTuple):
 
 @eqx.filter_jit
 def exponential_steps(
-    vehicle: AbstractVehicle,
+    system: System,
     heights: Float[Array, "time wheels"],
     dt: Scalar,
     start: Float[Array, " n"] | None = None,
@@ -41,17 +41,16 @@ def exponential_steps(
     From `start`, or settled and at rest on the road's first height. Elements that stand on the road take its rate as
     the mean of the slopes before and after an instant.
     """
-    form = vehicle.port_form()
-    stepper = Stepper(vehicle, dt / substeps, apart=False)
+    form, stepper = system.form, Stepper(system, dt / substeps, apart=False)
     if start is None:
-        start = settled(vehicle, heights[0])
+        start = settled(system, heights[0])
     slopes = road_rate(heights, dt)
-    ground = Ground(heights, None if form.port_road is None else slopes)
+    ground = RoadInput(heights, None if form.port_road is None else slopes)
 
-    def step(now: Now, ends: tuple[Ground, Ground]) -> tuple[Now, None]:
+    def step(now: StepState, ends: tuple[RoadInput, RoadInput]) -> tuple[StepState, None]:
         return stepper.over(now, *ends, substeps), None
 
-    def saving(now: Now, ends: tuple[Ground, Ground]) -> tuple:
+    def saving(now: StepState, ends: tuple[RoadInput, RoadInput]) -> tuple:
         after, _ = step(now, ends) if every == 1 else jax.lax.scan(step, now, ends)
         return after, (after.motion, after.states)
 
@@ -68,9 +67,9 @@ def exponential_steps(
     return Saved(motion, forces, heights, slopes, stepper.ports.by_port(last.states))
 
 
-def settled(vehicle: AbstractVehicle, road: Float[Array, " wheels"]) -> Float[Array, " n"]:
+def settled(system: System, road: Float[Array, " wheels"]) -> Float[Array, " n"]:
     """The motion of a vehicle at rest on these heights."""
-    position = rest_position(vehicle.port_form(), vehicle.elements(), road)
+    position = rest_position(system, road)
     return jnp.concatenate([position, jnp.zeros_like(position)])
 
 

@@ -1,30 +1,30 @@
 """What a response says of itself in words: one function for each kind of note, a sentence for each thing to know."""
 
-from collections.abc import Mapping
+from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp._types import Signal
-from jaxdamp.vehicles import AbstractVehicle
-from jaxdamp.vehicles.parts import prefixed
+from jaxdamp.vehicles import ChannelKind, System
 
 
 LEAST = 1e-3  # of the static load, by which a load must be below zero
 
 
 def tyres_in_tension(
-    vehicle: AbstractVehicle, time: Float[np.ndarray, " time"], channels: Mapping[str, Signal]
+    system: System, time: Float[np.ndarray, " time"], channel: Callable[[str], Signal]
 ) -> tuple[str, ...]:
     """Linear tyres that pulled on the road: how far below zero their load went, when, and for how long."""
-    pulled = []
-    for wheel, static in zip(vehicle.frame().wheels, np.asarray(vehicle.static_wheel_loads()), strict=True):
-        load = static + np.asarray(channels[prefixed(wheel.name, "dynamic_tyre_load")])
+    layout, pulled = system.layout, []
+    loads = [c for c in layout.channels if c.kind is ChannelKind.TYRE_LOAD]  # in the order of the wheels
+    for beyond, static, lifts in zip(loads, np.asarray(system.static_loads), layout.lifts, strict=True):
+        load = static + np.asarray(channel(beyond.name))
         worst = int(np.argmin(load))
-        if static > 0.0 and not wheel.lifts and load[worst] < -LEAST * static:
+        if static > 0.0 and not lifts and load[worst] < -LEAST * static:
             share = 100.0 * float(np.mean(load < 0.0))
             pulled.append(
-                f"{wheel.name.replace('_', ' ') + ' ' if wheel.name else ''}{load[worst] / 1e3:.3g} kN at "
+                f"{beyond.place.replace('_', ' ') + ' ' if beyond.place else ''}{load[worst] / 1e3:.3g} kN at "
                 f"{time[worst]:.3f} s (static load {static / 1e3:.3g} kN, below zero in {share:.2g} % of the run)"
             )
     if not pulled:

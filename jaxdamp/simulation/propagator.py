@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
-from jaxdamp.vehicles import PortForm
+from jaxdamp.vehicles import LinearMap
 
 
 _HALVINGS = 20
@@ -31,18 +31,20 @@ class Propagator(eqx.Module):
     road_ramp: Float[Array, "n wheels"]
 
     @classmethod
-    def over(cls, form: PortForm, dt: Scalar) -> "Propagator":
-        """The matrices of a step of dt [s]: Φ = φ₀(A dt), H₀ = φ₁ B dt, H₁ = φ₂ B dt, H₂ = (φ₃ − φ₂/2) B dt."""
-        system = form.first_order()
-        phi, held, ramp, bend = phi_functions(system.state_matrix * dt)
-        forces, heights = system.port_input * dt, system.road_input * dt
+    def over(cls, rate: LinearMap, dt: Scalar) -> "Propagator":
+        """The matrices of a step of dt [s] of ẋ = A x + B f + R z + S ż.
+
+        Φ = φ₀(A dt), H₀ = φ₁ B dt, H₁ = φ₂ B dt, H₂ = (φ₃ − φ₂/2) B dt.
+        """
+        phi, held, ramp, bend = phi_functions(rate.motion * dt)
+        forces, heights = rate.force * dt, rate.road * dt
         return cls(
             phi,
             held @ forces,
             ramp @ forces,
             (bend - 0.5 * ramp) @ forces,
             held @ heights,
-            ramp @ heights + held @ system.road_rate_input,
+            ramp @ heights + held @ rate.road_rate,
         )
 
 

@@ -3,20 +3,21 @@
 from collections.abc import Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp.dampers import AbstractDamper, Motion, RangeUse, range_use, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper, Motion, RangeUse, range_use
 from jaxdamp.dampers.fitted_range import has_fitted_range
 from jaxdamp.dampers.range_use import sentence
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.vehicles import AbstractVehicle, PortForm
 
 
 def range_uses(
     vehicle: AbstractVehicle,
+    form: PortForm,
     motion: Float[Array, "time n"],
     road: Float[Array, "time wheels"],
     road_rate: Float[Array, "time wheels"],
@@ -26,6 +27,7 @@ def range_uses(
 
     Arguments:
         vehicle: with its laws.
+        form: its matrices.
         motion: coordinates and their rates [m, m/s] at each instant.
         road: heights [m].
         road_rate: their rates [m/s].
@@ -37,9 +39,8 @@ def range_uses(
     tree: Any = (vehicle, motion)
     if not has_fitted_range(vehicle) or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(tree)):
         return {}
-    strokes, velocities = (
-        np.asarray(a, dtype=float) for a in _at_ports(without_fitted_ranges(vehicle), motion, road, road_rate)
-    )
+    position, rate = jnp.split(motion, 2, axis=1)
+    strokes, velocities = (np.asarray(form.at_ports(*at), dtype=float) for at in ((position, road), (rate, road_rate)))
     forces = np.asarray(port_force, dtype=float)
     found = {}
     for i, (name, law) in enumerate(named_laws(vehicle).items()):
@@ -51,22 +52,10 @@ def range_uses(
 
 def named_laws(vehicle: AbstractVehicle) -> dict[str, AbstractDamper]:
     """The law at each port by the name of its element, such as "front_damper"."""
-    return dict(zip(vehicle.frame().element_names, vehicle.elements(), strict=True))
+    return dict(zip(vehicle.layout.ports, vehicle.elements(), strict=True))
 
 
 def range_sentences(uses: dict[str, Sequence[RangeUse]] | dict[str, list[RangeUse]]) -> tuple[str, ...]:
     """A sentence for each damper that leaves its range."""
     texts = (sentence(name.replace("_", " "), found) for name, found in uses.items())
     return tuple(text for text in texts if text)
-
-
-@eqx.filter_jit
-def _at_ports(
-    vehicle: AbstractVehicle,
-    motion: Float[Array, "time n"],
-    road: Float[Array, "time wheels"],
-    road_rate: Float[Array, "time wheels"],
-) -> tuple[Float[Array, "time ports"], Float[Array, "time ports"]]:
-    """Strokes [m] and velocities [m/s] at the ports."""
-    form, n = vehicle.port_form(), len(vehicle.coordinates)
-    return form.at_ports(motion[:, :n], road), form.at_ports(motion[:, n:], road_rate)

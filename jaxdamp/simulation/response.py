@@ -1,6 +1,7 @@
 """What a vehicle did on a road: motion, forces, channels with units, energy, ride metrics."""
 
 import dataclasses
+import weakref
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, final
 
@@ -14,10 +15,11 @@ from jaxdamp import _checks, metrics
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import MetricValues
+from jaxdamp.simulation.exponential import settled
 from jaxdamp.simulation.notes import tyres_in_tension
 from jaxdamp.simulation.range_notes import range_sentences, range_uses
 from jaxdamp.simulation.wheels import AxleTiming
-from jaxdamp.vehicles import AbstractVehicle, Instant, RideMetric, chosen_metrics, rest_position
+from jaxdamp.vehicles import AbstractVehicle, LinearMap, RideMetric, System, chosen_metrics
 
 
 if TYPE_CHECKING:
@@ -37,6 +39,23 @@ def _middle(values: Array) -> Array:
     return 0.5 * (values[1:] + values[:-1])
 
 
+_COMPUTED: dict[int, dict[str, Signal]] = {}  # channels of living responses: a module has no place but its fields
+
+
+@jax.jit
+def _channel(
+    outputs: LinearMap,
+    number: Array,
+    motion: Float[Array, "time n"],
+    port_force: Float[Array, "time ports"],
+    road: Float[Array, "time wheels"],
+    road_rate: Float[Array, "time wheels"],
+) -> Signal:
+    """One channel over time."""
+    row = jax.tree.map(lambda matrix: matrix[number][None], outputs)
+    return jax.vmap(row)(motion, port_force, road, road_rate)[:, 0]
+
+
 @final
 class Response(eqx.Module):
     """The response of a vehicle to a road, at uniformly spaced instants.
@@ -49,6 +68,7 @@ class Response(eqx.Module):
     """
 
     vehicle: AbstractVehicle
+    system: System
     time: Signal
     motion: Float[Array, "time n"]
     port_force: Float[Array, "time ports"]
@@ -78,7 +98,7 @@ class Response(eqx.Module):
         """
         if _checks.concrete(self.motion) is None:
             return ()
-        tyres = tyres_in_tension(self.vehicle, np.asarray(self.time), self.channels)
+        tyres = tyres_in_tension(self.system, np.asarray(self.time), self.__getitem__)
         return (*tyres, *range_sentences(self.range_use()))
 
     @property
@@ -89,26 +109,25 @@ class Response(eqx.Module):
     @property
     def units(self) -> dict[str, str]:
         """Unit of each channel."""
-        return self.vehicle.units
+        return dict(self.system.layout.units)
 
     @property
     def channels(self) -> dict[str, Signal]:
-        """All channels by name."""
-        if self.whole is None:
-            return self._channels()
-        return {name: self._of_this_part(values) for name, values in self.whole.channels.items()}
-
-    @eqx.filter_jit
-    def _channels(self) -> dict[str, Signal]:
-        system, n = self.vehicle.port_form().first_order(), len(self.vehicle.coordinates)
-        forces = self.port_force @ system.port_input.T + self.road @ system.road_input.T
-        change = self.motion @ system.state_matrix.T + forces + self.road_rate @ system.road_rate_input.T
-        parts = (self.motion[:, :n], self.motion[:, n:], change[:, n:], self.road, self.road_rate, self.port_force)
-        return jax.vmap(lambda *instant: self.vehicle.channels(Instant(*instant)))(*parts)
+        """All channels by name; each is computed once."""
+        return {name: self[name] for name in self.system.layout.units}
 
     def __getitem__(self, channel: str) -> Signal:
-        _checks.one_of("channel", channel, self.units)
-        return self.channels[channel]
+        numbers, computed = self.system.layout.numbers, _COMPUTED.get(id(self), {})
+        _checks.one_of("channel", channel, numbers)
+        if channel in computed:
+            return computed[channel]
+        number = jnp.asarray(numbers[channel])
+        values = _channel(self.system.outputs, number, self.motion, self.port_force, self.road, self.road_rate)
+        if _checks.concrete(values) is not None:  # a traced one belongs to one program
+            if id(self) not in _COMPUTED:
+                weakref.finalize(self, _COMPUTED.pop, id(self))
+            _COMPUTED.setdefault(id(self), {})[channel] = values
+        return values
 
     def metrics(self, names: Sequence[str] | None = None) -> dict[str, Scalar]:
         """The vehicle's ride metrics by name, or those of these names, over the run or the part of it that this is.
@@ -121,20 +140,20 @@ class Response(eqx.Module):
 
     @eqx.filter_jit
     def _metrics(self, chosen: Sequence[RideMetric], dt: ScalarLike) -> dict[str, Scalar]:
-        channels, found = self.channels, {}
+        found = {}
         weighted = {m.channel for m in chosen if metrics.STATISTICS[m.statistic].weighted}
-        felt = {name: self._felt(name, dt) for name in sorted(weighted)}
-        rest = self._at_rest() if any(m.from_rest for m in chosen) else {}
+        felt = {name: self._weighted(name, dt) for name in sorted(weighted)}
+        rest = self._at_rest() if any(m.from_rest for m in chosen) else jnp.zeros(0)
         for m in chosen:
             statistic = metrics.STATISTICS[m.statistic]
-            record = (felt if statistic.weighted else channels)[m.channel]
-            record = record - rest[m.channel] if m.from_rest else record
-            found[m.name] = statistic.of(record * channels[m.by] if m.by else record, dt)
+            record = (felt if statistic.weighted else self)[m.channel]
+            record = record - rest[self.system.layout.numbers[m.channel]] if m.from_rest else record
+            found[m.name] = statistic.of(record * self[m.by] if m.by else record, dt)
         return found
 
     def metric_units(self) -> dict[str, str]:
         """Unit of each ride metric."""
-        return {m.name: m.unit(self.units) for m in self.vehicle.ride_metrics}
+        return {m.name: m.unit(self.units) for m in self.system.layout.metrics}
 
     def _dt(self) -> ScalarLike:
         """Spacing of the instants, as a plain number where it is known: then filters are made by NumPy."""
@@ -142,24 +161,17 @@ class Response(eqx.Module):
         known = _checks.concrete(time)
         return time[1] - time[0] if known is None else float(known[1] - known[0])
 
-    def _felt(self, name: str, dt: ScalarLike) -> Signal:
+    def _weighted(self, name: str, dt: ScalarLike) -> Signal:
         """An acceleration weighted by ISO 2631-1 from the start of the run."""
         run = self if self.whole is None else self.whole
-        weighting = metrics.weighting_of(self.units[name])
-        felt = metrics.weighted_signal(run.channels[name], dt, weighting, method="step", remove_mean=False)
-        return self._of_this_part(felt)
+        weighting = self.system.layout.weighting(name)
+        felt = metrics.weighted_signal(run[name], dt, weighting, method="step", remove_mean=False)
+        return felt if self.whole is None else jax.lax.dynamic_slice_in_dim(felt, self.begin, self.time.size)
 
-    def _of_this_part(self, values: Float[Array, " whole"]) -> Signal:
-        """Values of the whole run, cut to the part of it that this is."""
-        return values if self.whole is None else jax.lax.dynamic_slice_in_dim(values, self.begin, self.time.size)
-
-    def _at_rest(self) -> dict[str, Scalar]:
+    def _at_rest(self) -> Float[Array, " channels"]:
         """The channels in the static equilibrium on the first heights of the run, forces left out."""
         road = (self if self.whole is None else self.whole).road[0]
-        form = self.vehicle.port_form()
-        position = rest_position(form, self.vehicle.elements(), road)
-        still, force = jnp.zeros_like(position), jnp.zeros(form.ports.shape[0])
-        return self.vehicle.channels(Instant(position, still, still, road, jnp.zeros_like(road), force))
+        return self.system.outputs(settled(self.system, road), jnp.zeros(len(self.system.laws)), road, None)
 
     def between(self, start: float, stop: float) -> "Response":
         """The part of the run from `start` to `stop` [s], both instants included, with the times of the run.
@@ -194,7 +206,7 @@ class Response(eqx.Module):
         return dataclasses.replace(self, **arrays, final_state=states, whole=whole, begin=begin)
 
     def comfort(self) -> dict[str, Comfort]:
-        """What of each acceleration of body, seats and places people feel, by ISO 2631-1, with the largest second.
+        """Weighted RMS, largest second (MTVV) and VDV of every body, seat and place acceleration, by ISO 2631-1.
 
         Weighted as in `metrics`. Differentiable but for the maximum.
         """
@@ -203,8 +215,9 @@ class Response(eqx.Module):
     @eqx.filter_jit
     def _comfort(self, dt: ScalarLike) -> dict[str, Comfort]:
         found = {}
-        for name in dict.fromkeys(m.channel for m in self.vehicle.ride_metrics if m.channel.endswith("_acceleration")):
-            felt = self._felt(name, dt)
+        layout = self.system.layout
+        for name in dict.fromkeys(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting):
+            felt = self._weighted(name, dt)
             transient = metrics.max_transient_value(felt, dt, None)
             dose = metrics.vibration_dose_value(felt, dt, None)
             found[name] = Comfort(metrics.rms(felt), transient, dose)
@@ -219,7 +232,7 @@ class Response(eqx.Module):
         ones, as in the tyre), up to `error`, which falls with the square of the step. All integrals by the trapezoid
         rule. Heights count from static equilibrium, so that weight and static loads do no work.
         """
-        form, n = self.vehicle.port_form(), len(self.vehicle.coordinates)
+        form, n = self.system.form, len(self.system.layout.coordinates)
         q, rate, dt = self.motion[:, :n], self.motion[:, n:], jnp.diff(self.time)
         slope = jnp.diff(self.road, axis=0) / dt[:, None]
 
@@ -247,18 +260,18 @@ class Response(eqx.Module):
 
         Where an element is several dampers that act together, it is that of all; force and power channels are of one.
         """
-        form, n = self.vehicle.port_form(), len(self.vehicle.coordinates)
+        form, n = self.system.form, len(self.system.layout.coordinates)
         dt = jnp.diff(self.time)
         moved = _middle(self.port_force * (self.motion[:, n:] @ form.ports.T))
         if form.port_road is not None:
             slope = jnp.diff(self.road, axis=0) / dt[:, None]
             moved = moved - _middle(self.port_force) * (slope @ form.port_road.T)
         taken = jnp.sum(moved * dt[:, None], axis=0)
-        return dict(zip(self.vehicle.frame().element_names, taken, strict=True))
+        return dict(zip(self.system.layout.ports, taken, strict=True))
 
     def range_use(self) -> dict[str, list[RangeUse]]:
         """What each damper did beside the range that its law was fitted to; only of laws that have one."""
-        return range_uses(self.vehicle, self.motion, self.road, self.road_rate, self.port_force)
+        return range_uses(self.vehicle, self.system.form, self.motion, self.road, self.road_rate, self.port_force)
 
     def to_xarray(self) -> "xarray.Dataset":
         """All channels as an `xarray.Dataset` over time, with units."""

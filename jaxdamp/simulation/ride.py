@@ -14,24 +14,24 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._many_points import outside_domains
 from jaxdamp._types import Scalar
+from jaxdamp._vectors import scalars
 from jaxdamp.configuration import fuses_loops
-from jaxdamp.dampers import RangeUse, without_fitted_ranges
+from jaxdamp.dampers import RangeUse
 from jaxdamp.dampers.fitted_range import has_fitted_range
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import match_paths, parameters, replace
 from jaxdamp.roads import AbstractRoad
-from jaxdamp.simulation._vectors import scalars
 from jaxdamp.simulation.exponential import exponential_steps, settled
-from jaxdamp.simulation.gauge import Gathered, Gauge
+from jaxdamp.simulation.observer import Accumulators, MetricObserver
 from jaxdamp.simulation.range_notes import range_uses
 from jaxdamp.simulation.run import half_sampled, sampled
 from jaxdamp.simulation.step_size import checked_substeps
-from jaxdamp.simulation.stepper import FOR_REVERSE, Ground, Now, Stepper
+from jaxdamp.simulation.stepper import FOR_REVERSE, RoadInput, Stepper, StepState
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
 from jaxdamp.vehicles import AbstractVehicle, RideMetric, chosen_metrics
 
 
-Carry: TypeAlias = tuple[Now, Gathered, Ground, tuple[Array, Array]]
+Carry: TypeAlias = tuple[StepState, Accumulators, RoadInput, tuple[Array, Array]]
 FEW_STATES = 4  # up to which one car is best written number by number, if loops are fused
 BLOCK = 16_384  # instants, of which reverse derivatives keep what they need; longer runs are driven twice
 
@@ -92,7 +92,7 @@ class Ride(eqx.Module):
         _, self.heights = sampled(vehicle, road, duration, dt)
         self.road = road if delays_by_itself(vehicle, road) else None
         half = functools.partial(half_sampled, vehicle, road, self.heights.shape[0] - 1, dt)
-        self.substeps = checked_substeps(vehicle, self.heights, half, dt, substeps=substeps, grid=road.grid)
+        self.substeps = checked_substeps(vehicle.system(), self.heights, half, dt, substeps=substeps, grid=road.grid)
         self.metrics = tuple(chosen_metrics(vehicle, metrics, "metrics"))
 
     @property
@@ -130,8 +130,9 @@ class Ride(eqx.Module):
         if not has_fitted_range(vehicle):
             return {}
         heights, step = self.on_axles_of(vehicle).heights, jnp.asarray(self.dt, dtype=float)
-        saved = exponential_steps(without_fitted_ranges(vehicle), heights, step, None, self.substeps, 1)
-        return range_uses(vehicle, saved.motion, saved.road, saved.road_rate, saved.port_force)
+        system = vehicle.system()
+        saved = exponential_steps(system, heights, step, None, self.substeps, 1)
+        return range_uses(vehicle, system.form, saved.motion, saved.road, saved.road_rate, saved.port_force)
 
     def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
@@ -162,24 +163,25 @@ def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     if ride.road is not None and point and moves_axles(lambda point: replace(ride.vehicle, point), point):
         ride = ride.on_axles_of(vehicle)
     heights, dt = ride.heights, ride.dt
-    apart = ride.many or (fuses_loops() and 2 * len(vehicle.coordinates) <= FEW_STATES)
-    stepper = Stepper(vehicle, jnp.asarray(dt / ride.substeps, dtype=float), apart=apart, many=ride.many)
-    gauge = Gauge(vehicle, ride.metrics, dt, apart=apart)
+    system = vehicle.system()
+    apart = ride.many or (fuses_loops() and 2 * len(system.layout.coordinates) <= FEW_STATES)
+    stepper = Stepper(system, jnp.asarray(dt / ride.substeps, dtype=float), apart=apart, many=ride.many)
+    observer = MetricObserver(system, ride.metrics, dt, apart=apart)
     half_rate = jnp.asarray(0.5 / dt, dtype=heights.dtype)
 
-    def at(height: Array, rate: Array) -> Ground:
-        return Ground(scalars(height), scalars(rate)) if apart else Ground(height, rate)
+    def at(height: Array, rate: Array) -> RoadInput:
+        return RoadInput(scalars(height), scalars(rate)) if apart else RoadInput(height, rate)
 
     def step(carry: Carry, ahead: Array) -> tuple[Carry, None]:
         """To the next instant, with the height of the one after it, from which the rate at its end follows."""
         now, gathered, begin, (height, coming) = carry
         end = at(coming, half_rate * (ahead - height))
         after = stepper.over(now, begin, end, ride.substeps)
-        return (after, gauge.add(gathered, after, end), end, (coming, ahead)), None
+        return (after, observer.add(gathered, after, end), end, (coming, ahead)), None
 
     first = at(heights[0], 2.0 * half_rate * (heights[1] - heights[0]))
-    now = stepper.at_rest(settled(vehicle, heights[0]), first)
-    carry = now, gauge.begin(now, first), first, (heights[0], heights[1])
+    now = stepper.at_rest(settled(system, heights[0]), first)
+    carry = now, observer.begin(now, first), first, (heights[0], heights[1])
     road = jnp.concatenate([heights[2:], 2.0 * heights[-1:] - heights[-2:-1]])  # it ends as straight as it came
     lean = jax.checkpoint(step, policy=jax.checkpoint_policies.save_only_these_names(FOR_REVERSE), prevent_cse=False)
 
@@ -191,4 +193,4 @@ def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     if whole:
         carry, _ = jax.lax.scan(jax.checkpoint(drive), carry, road[:whole].reshape(-1, BLOCK, *road.shape[1:]))
     carry, _ = drive(carry, road[whole:])
-    return gauge.end(carry[1], count + 1)
+    return observer.end(carry[1], count + 1)

@@ -11,7 +11,6 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal
-from jaxdamp.dampers import without_fitted_ranges
 from jaxdamp.dampers.coverage import coverage
 from jaxdamp.dampers.range_use import warn_outside
 from jaxdamp.roads import AbstractRoad
@@ -20,8 +19,7 @@ from jaxdamp.simulation.range_notes import range_sentences
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.step_size import checked_substeps
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
-from jaxdamp.vehicles import AbstractVehicle, static_equilibrium
-from jaxdamp.vehicles.equilibrium import refuse_restless
+from jaxdamp.vehicles import AbstractVehicle, refuse_restless, static_equilibrium
 
 
 if TYPE_CHECKING:
@@ -85,17 +83,17 @@ def simulate(
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "simulate(vehicle, road)")
     check_module("road", road, (AbstractRoad,), "simulate(vehicle, road)")
-    driven, vehicle = vehicle, without_fitted_ranges(vehicle)  # laws fitted to other records share one program
+    system = vehicle.system()
     time, heights = sampled(vehicle, road, duration, dt)
     _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)
     fixed = method == "exponential"
     half = functools.partial(half_sampled, vehicle, road, time.size - 1, dt)
     count = checked_substeps(
-        vehicle, heights, half, dt, substeps=substeps, start=begin, grid=road.grid, exponential=fixed
+        system, heights, half, dt, substeps=substeps, start=begin, grid=road.grid, exponential=fixed
     )
     if fixed:
-        saved = exponential_steps(vehicle, heights, jnp.asarray(dt, dtype=float), begin, count, every)
+        saved = exponential_steps(system, heights, jnp.asarray(dt, dtype=float), begin, count, every)
         remedy = f"Take a shorter step than {dt:g} s, or an implicit solver, `method=diffrax.Kvaerno5()`."
     else:
         import diffrax
@@ -105,15 +103,15 @@ def simulate(
         if isinstance(method, str):
             _checks.one_of("method", method, ["exponential", "diffrax"])
             method = diffrax.Tsit5()
-        saved, result = adaptive_steps(vehicle, time, heights, method, rtol, atol, begin, every)
+        saved, result = adaptive_steps(system, time, heights, method, rtol, atol, begin, every)
         remedy = f"The solver says: {diffrax.RESULTS[result] or 'finished'} Fast laws need `method=diffrax.Kvaerno5()`."
     last = _checks.concrete(saved.motion[-1])
     if last is not None and not np.all(np.isfinite(last)):
         if not np.all(np.isfinite(np.asarray(saved.motion[0]))):
             refuse_restless(vehicle)
-        remedy = " ".join([*filter(None, map(coverage, vehicle.elements())), remedy])
+        remedy = " ".join([*filter(None, map(coverage, system.laws)), remedy])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
-    response = Response(driven, time[::every], *saved, axle_timing(vehicle, road))
+    response = Response(vehicle, system, time[::every], *saved, axle_timing(vehicle, road))
     warn_outside(range_sentences(response.range_use()))
     return response
 

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.vehicles import AbstractVehicle, PortForm
+from jaxdamp.vehicles import AbstractVehicle, System
 
 
 LARGEST = 0.5  # of the share below; the corrected step is stable up to 1
@@ -54,17 +54,16 @@ class Slopes(NamedTuple):
 
 def substeps_needed(vehicle: AbstractVehicle, dt: float) -> int:
     """Steps of the exponential engine between instants dt [s] apart that keep every law stable: see `step_need`."""
-    return step_need(vehicle, vehicle.port_form(), law_slopes(vehicle, dt), dt).substeps
+    system = vehicle.system()
+    return step_need(system, law_slopes(system, dt), dt).substeps
 
 
-def law_slopes(vehicle: AbstractVehicle, dt: float) -> list[Slopes]:
+def law_slopes(system: System, dt: float) -> list[Slopes]:
     """The largest slopes of the law of each element, over a step of dt [s] where they depend on it."""
-    return [_steepest(law, dt) for law in vehicle.elements()]
+    return [_steepest(law, dt) for law in system.laws]
 
 
-def step_need(
-    vehicle: AbstractVehicle, form: PortForm, slopes: Sequence[Slopes], dt: float, *, most: int | float = MOST
-) -> Need:
+def step_need(system: System, slopes: Sequence[Slopes], dt: float, *, most: int | float = MOST) -> Need:
     """Steps of the exponential engine between instants dt [s] apart that keep every law stable.
 
     A force that grows by c [N s/m] with the velocity at the end of a step, and by k [N/m] with the travel within it,
@@ -78,7 +77,7 @@ def step_need(
     Raises:
         ValueError: more than `most` would be needed.
     """
-    mass, ports = _checks.concrete(form.mass), _checks.concrete(form.ports)
+    mass, ports = _checks.concrete(system.form.mass), _checks.concrete(system.form.ports)
     if mass is None or ports is None or not any(any(s) for s in slopes):
         return Need(1, 0.0)
     felt = np.diag(ports @ np.linalg.solve(mass, ports.T))
@@ -89,7 +88,7 @@ def step_need(
     counts = np.maximum(counts, dt * np.array([s.rate for s in slopes]) / HEUN)
     count, worst = max(1, math.ceil(min(float(counts.max()), 1e9))), int(counts.argmax())
     if count > most:
-        _refuse_law(vehicle.frame().element_names[worst], slopes[worst], dt, count)
+        _refuse_law(system.layout.ports[worst], slopes[worst], dt, count)
     return Need(count, float(by_travel.max()))
 
 

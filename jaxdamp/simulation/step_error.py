@@ -11,11 +11,10 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar
-from jaxdamp.simulation._vectors import between
+from jaxdamp._vectors import between
 from jaxdamp.simulation.exponential import road_rate, settled
-from jaxdamp.simulation.gauge import Outputs
-from jaxdamp.simulation.stepper import Ground, Now, Stepper
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.simulation.stepper import RoadInput, Stepper, StepState
+from jaxdamp.vehicles import System
 
 
 STRETCH = 2000  # steps that are driven twice, at most
@@ -32,7 +31,7 @@ class StepError(NamedTuple):
 
 
 def step_error(
-    vehicle: AbstractVehicle,
+    system: System,
     heights: Float[np.ndarray, "time wheels"],
     half: Callable[[], Float[Array, "fine wheels"]],
     dt: float,
@@ -46,7 +45,7 @@ def step_error(
     An error that falls with the square of the step is 4/3 of the difference.
 
     Arguments:
-        vehicle: any vehicle whose numbers are known.
+        system: a vehicle whose numbers are known.
         heights: under the wheels at the instants [m].
         half: gives the heights at twice as many instants [m].
         dt: spacing of the instants [s].
@@ -58,21 +57,19 @@ def step_error(
     first = 0 if start is not None else _roughest(heights, length)
     fine = half()[2 * first : 2 * (first + length) + 1]
     coarse = jnp.asarray(heights)[first : first + length + 1]
-    names = tuple(dict.fromkeys(m.channel for m in vehicle.ride_metrics if m.statistic == "rms"))
+    names = tuple(dict.fromkeys(m.channel for m in system.layout.metrics if m.statistic == "rms"))
     if start is None:
-        start = settled(vehicle, coarse[0])
+        start = settled(system, coarse[0])
         if not np.all(np.isfinite(np.asarray(start))):  # no equilibrium, which the run will say
             return StepError(names[0], 0.0)
     long, short = (
-        np.asarray(_driven(vehicle, _padded(z), start, jnp.asarray(step, float), jnp.asarray(substeps), names))[
-            : len(z)
-        ]
+        np.asarray(_driven(system, _padded(z), start, jnp.asarray(step, float), jnp.asarray(substeps), names))[: len(z)]
         for z, step in ((coarse, dt), (fine, 0.5 * dt))
     )
     size, difference = (np.sqrt(np.mean(y * y, axis=0)) for y in (short, long - short[::2]))
     if not np.all(np.isfinite(difference)):
         return StepError(names[int(np.argmin(np.isfinite(difference)))], np.inf)
-    units = [vehicle.units[name] for name in names]
+    units = [system.layout.units[name] for name in names]
     largest = {unit: max(s for s, u in zip(size, units, strict=True) if u == unit) for unit in units}
     floor = np.array([max(QUIET, SMALL * largest[unit]) for unit in units])
     errors = np.where(size > floor, difference / np.maximum(size, floor), 0.0) * 2**ORDER / (2**ORDER - 1)
@@ -94,7 +91,7 @@ def _padded(heights: Float[Array, "time wheels"]) -> tuple[Float[Array, "padded 
 
 @eqx.filter_jit
 def _driven(
-    vehicle: AbstractVehicle,
+    system: System,
     road: tuple[Float[Array, "time wheels"], Array],
     start: Float[Array, " n"],
     dt: Scalar,
@@ -103,26 +100,29 @@ def _driven(
 ) -> Float[Array, "time channels"]:
     """Channels at the instants of a run, zero after its last step."""
     (heights, count), parts = road, substeps.astype(dt.dtype)
-    outputs, stepper = Outputs.of(vehicle, names, apart=False), Stepper(vehicle, dt / parts, apart=False)
+    outputs, stepper = system.channels(names), Stepper(system, dt / parts, apart=False)
     slopes = road_rate(heights, dt)
 
-    def ground(i: Array) -> Ground:
+    def ground(i: Array) -> RoadInput:
         whole = jnp.minimum(i // substeps, heights.shape[0] - 2)
         share = (i - whole * substeps).astype(dt.dtype) / parts
-        return Ground(*(between(a[whole], a[whole + 1], share) for a in (heights, slopes)))
+        return RoadInput(*(between(a[whole], a[whole + 1], share) for a in (heights, slopes)))
 
-    def step(i: Array, carry: tuple[Now, Array]) -> tuple[Now, Array]:
+    def step(i: Array, carry: tuple[StepState, Array]) -> tuple[StepState, Array]:
         now, found = carry
         now = stepper(now, ground(i), ground(i + 1))
-        values = jnp.stack(outputs(now, ground(i + 1)))
-        return now, found.at[(i + substeps) // substeps].set(values)  # the last of an interval is the instant's
+        number = (i + substeps) // substeps  # the last of an interval is the instant's
+        return now, found.at[number].set(values(now, ground(i + 1)))
+
+    def values(now: StepState, at: RoadInput) -> Float[Array, " channels"]:
+        return outputs(now.motion, now.force, at.height, at.rate)
 
     first = ground(jnp.zeros_like(count))
     now = stepper.at_rest(start, first)
-    found = jnp.zeros((heights.shape[0], len(names)), heights.dtype).at[0].set(jnp.stack(outputs(now, first)))
+    found = jnp.zeros((heights.shape[0], len(names)), heights.dtype).at[0].set(values(now, first))
     return jax.lax.fori_loop(0, count * substeps, step, (now, found))[1]
 
 
-def known(vehicle: AbstractVehicle) -> bool:
+def known(system: System) -> bool:
     """Whether all numbers of a vehicle are known, not traced."""
-    return all(_checks.concrete(leaf) is not None for leaf in jax.tree.leaves(eqx.filter(vehicle, eqx.is_array)))
+    return all(_checks.concrete(leaf) is not None for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_array)))

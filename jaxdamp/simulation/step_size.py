@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp.simulation.stability import LARGEST, MOST, Need, law_slopes, rounded_down, step_need
 from jaxdamp.simulation.step_error import StepError, known, step_error
-from jaxdamp.vehicles import AbstractVehicle, PortForm
+from jaxdamp.vehicles import System
 
 
 LEAST_PER_PERIOD = 5.0  # instants a period of the fastest mode that follows the road; fewer are refused
@@ -37,7 +37,7 @@ class FastestMode(NamedTuple):
 
 
 def checked_substeps(
-    vehicle: AbstractVehicle,
+    system: System,
     heights: Float[Array, "time wheels"],
     half: Callable[[], Float[Array, "fine wheels"]],
     dt: float,
@@ -63,7 +63,7 @@ def checked_substeps(
     pass without a run. Where numbers are traced nothing is known of them, and what needs them is left out.
 
     Arguments:
-        vehicle: any vehicle.
+        system: the vehicle.
         heights: under its wheels at the instants [m].
         half: gives the heights at twice as many instants [m].
         dt: spacing of the instants [s].
@@ -75,26 +75,26 @@ def checked_substeps(
     Raises:
         ValueError: a step that the vehicle cannot bear, with the one to write.
     """
-    form, slopes = vehicle.port_form(), law_slopes(vehicle, dt)
-    mode = fastest_mode(vehicle, form, [s.at_rest for s in slopes])
+    slopes = law_slopes(system, dt)
+    mode = fastest_mode(system, [s.at_rest for s in slopes])
     per_period = np.inf if mode is None else 1.0 / (mode.frequency * dt)
     if mode is not None and per_period < LEAST_PER_PERIOD:
         _refuse_unresolved(mode, dt)
     if mode is not None and grid is not None and SAMPLES * grid < dt * heights.shape[0]:
         _warn_of_samples(mode, grid)
     if exponential:
-        need = step_need(vehicle, form, slopes, dt, most=MOST if substeps is None else np.inf)
+        need = step_need(system, slopes, dt, most=MOST if substeps is None else np.inf)
         count = need.substeps if substeps is None else _allowed(substeps, need, dt)
         doubtful = per_period < ENOUGH_PER_PERIOD or need.by_travel > STEEP or count < need.substeps
     else:
         try:
-            count = min(4 * step_need(vehicle, form, slopes, dt).substeps, MOST)  # so many that only the road differs
+            count = min(4 * step_need(system, slopes, dt).substeps, MOST)  # so many that only the road differs
         except ValueError:  # too steep for the engine that estimates the error
             return 1
         doubtful = per_period < ENOUGH_PER_PERIOD
     track, begin = _checks.concrete(heights), None if start is None else _checks.concrete(start)
-    if doubtful and track is not None and known(vehicle) and (start is None) == (begin is None):
-        _judge(step_error(vehicle, track, half, dt, count, start), dt)
+    if doubtful and track is not None and known(system) and (start is None) == (begin is None):
+        _judge(step_error(system, track, half, dt, count, start), dt)
     return count
 
 
@@ -164,13 +164,14 @@ def _warn_of_samples(mode: FastestMode, grid: float) -> None:
     )
 
 
-def fastest_mode(vehicle: AbstractVehicle, form: PortForm, stiffness: Sequence[float]) -> FastestMode | None:
+def fastest_mode(system: System, stiffness: Sequence[float]) -> FastestMode | None:
     """The fastest undamped mode that takes part in following the road; none where numbers are traced.
 
     Of masses, linear springs and the slopes of the elements' forces by their deflection. On a road that has come to
     rest at a height of one a mode moves the coordinates by φ (φᵀ K_r)/ω²; those that move all of them by less than a
     tenth, such as a light mass between stiff springs, are not shaken by the road.
     """
+    form = system.form
     parts = (form.mass, form.stiffness, form.road_stiffness, form.ports, form.port_road)
     numbers = [None if part is None else _checks.concrete(part) for part in parts]
     if any(number is None for number, part in zip(numbers, parts, strict=True) if part is not None):
@@ -192,5 +193,5 @@ def fastest_mode(vehicle: AbstractVehicle, form: PortForm, stiffness: Sequence[f
     fastest = int(np.flatnonzero(follows)[-1])
     return FastestMode(
         float(np.sqrt(squares[fastest]) / (2.0 * np.pi)),
-        vehicle.coordinates[int(np.argmax(np.abs(shapes[:, fastest])))],
+        system.layout.coordinates[int(np.argmax(np.abs(shapes[:, fastest])))],
     )

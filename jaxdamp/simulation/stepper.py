@@ -16,7 +16,7 @@ from jax.ad_checkpoint import checkpoint_name
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
-from jaxdamp.simulation._vectors import (
+from jaxdamp._vectors import (
     Matrix,
     Vector,
     between,
@@ -29,21 +29,20 @@ from jaxdamp.simulation._vectors import (
     times,
 )
 from jaxdamp.simulation.propagator import Propagator
-from jaxdamp.vehicles import AbstractVehicle, Ports
-from jaxdamp.vehicles.ports import Earlier, States
+from jaxdamp.vehicles import Earlier, Ports, States, System
 
 
 FOR_REVERSE = "needed by reverse derivatives"  # the rest of a step is cheap to repeat, or linear and not needed
 
 
-class Ground(NamedTuple):
+class RoadInput(NamedTuple):
     """The road under the wheels at an instant: heights [m] and, where elements stand on it, their rates [m/s]."""
 
     height: Vector
     rate: Vector | None
 
 
-class Now(NamedTuple):
+class StepState(NamedTuple):
     """A vehicle at an instant: motion (q, q̇), states and forces of its elements, and what they were a step before."""
 
     motion: Vector
@@ -58,7 +57,7 @@ class Stepper(eqx.Module):
     """What a step takes: the matrices of the linear part and the laws at the ports, in one of two layouts.
 
     Arguments:
-        vehicle: any vehicle.
+        system: the vehicle.
         dt: the step [s].
         apart: keep vectors as tuples of scalars.
         many: written for many cars side by side.
@@ -76,11 +75,11 @@ class Stepper(eqx.Module):
     deflection: Matrix  # of the ports, from the coordinates
     standing: Matrix | None  # from the heights of the road
 
-    def __init__(self, vehicle: AbstractVehicle, dt: Scalar, *, apart: bool, many: bool = False) -> None:
-        form = vehicle.port_form()
-        exact, kept = Propagator.over(form, dt), rows if apart else (lambda matrix: matrix)
+    def __init__(self, system: System, dt: Scalar, *, apart: bool, many: bool = False) -> None:
+        form = system.form
+        exact, kept = Propagator.over(system.motion, dt), rows if apart else (lambda matrix: matrix)
         self.unit = jnp.where(jnp.isnan(exact.phi[0, 0]), jnp.nan, 1.0) if many else None
-        self.ports, self.dt = Ports(vehicle.elements(), apart=apart), dt
+        self.ports, self.dt = Ports(system.laws, apart=apart), dt
         self.phi, self.earlier_input = kept(exact.phi), kept(-exact.force_ramp)
         self.force_input = kept(exact.force_held + exact.force_ramp)
         self.correction = kept(exact.force_ramp + exact.force_bend)
@@ -88,14 +87,14 @@ class Stepper(eqx.Module):
         self.deflection = kept(form.ports)
         self.standing = None if form.port_road is None else kept(form.port_road)
 
-    def at_rest(self, motion: Float[Array, " n"], ground: Ground) -> Now:
+    def at_rest(self, motion: Float[Array, " n"], ground: RoadInput) -> StepState:
         """The beginning, with elements at rest."""
         x = scalars(motion) if isinstance(self.phi, tuple) else motion
         states = self.ports.initial()
         force = self.ports.force(*self.at_ports(x, ground), states)
-        return Now(x, states, force, force, self.ports.first_earlier(states))
+        return StepState(x, states, force, force, self.ports.first_earlier(states))
 
-    def at_ports(self, x: Vector, ground: Ground) -> tuple[Vector, Vector]:
+    def at_ports(self, x: Vector, ground: RoadInput) -> tuple[Vector, Vector]:
         """Deflections of the elements [m] and their rates [m/s]."""
         n = len(x) // 2
         deflection, rate = times(self.deflection, x[:n]), times(self.deflection, x[n:])
@@ -104,7 +103,7 @@ class Stepper(eqx.Module):
             rate = minus(rate, times(self.standing, ground.rate))
         return checkpoint_name((deflection, rate), FOR_REVERSE)
 
-    def __call__(self, now: Now, begin: Ground, end: Ground) -> Now:
+    def __call__(self, now: StepState, begin: RoadInput, end: RoadInput) -> StepState:
         """A step later."""
         ports, rise = self.ports, minus(end.height, begin.height)
         driven = plus(times(self.road_held, begin.height), times(self.road_ramp, rise), times(self.phi, now.motion))
@@ -116,22 +115,24 @@ class Stepper(eqx.Module):
         motion = plus(ahead, times(self.correction, missed))
         new = self._reached(motion, end)
         states = ports.advance(*old, *new, now.states, self.dt)
-        return Now(motion, states, ports.force(*new, states), now.force, ports.next_earlier(now.states, now.earlier))
+        return StepState(
+            motion, states, ports.force(*new, states), now.force, ports.next_earlier(now.states, now.earlier)
+        )
 
-    def _reached(self, x: Vector, ground: Ground) -> tuple[Vector, Vector]:
+    def _reached(self, x: Vector, ground: RoadInput) -> tuple[Vector, Vector]:
         deflection, rate = self.at_ports(x, ground)
         return once_in_derivatives(deflection, self.unit), once_in_derivatives(rate, self.unit)
 
-    def over(self, now: Now, begin: Ground, end: Ground, substeps: int) -> Now:
+    def over(self, now: StepState, begin: RoadInput, end: RoadInput, substeps: int) -> StepState:
         """So many equal steps later, over which the road is straight."""
         if substeps == 1:
             return self(now, begin, end)
 
-        def at(share: Any) -> Ground:
+        def at(share: Any) -> RoadInput:
             rate = None if begin.rate is None or end.rate is None else between(begin.rate, end.rate, share)
-            return Ground(between(begin.height, end.height, share), rate)
+            return RoadInput(between(begin.height, end.height, share), rate)
 
-        def step(i: Any, now: Now) -> Now:
+        def step(i: Any, now: StepState) -> StepState:
             done = jnp.asarray(i, self.dt.dtype)
             return self(now, at(done / substeps), at((done + 1.0) / substeps))
 

@@ -58,9 +58,7 @@ def _listed(values: np.ndarray) -> str:
 
 def axle_timing(vehicle: AbstractVehicle, road: AbstractRoad) -> AxleTiming:
     """When each axle of the vehicle meets the road."""
-    wheels = vehicle.frame().wheels
-    first = [wheel.name for wheel in wheels if not wheel.beside]
-    names = tuple(name.removesuffix("left").strip("_") or f"number {i + 1}" for i, name in enumerate(first))
+    names = vehicle.layout.axle_names
     road = at_axles(vehicle, road)
     columns = road.columns
     if len(names) == 1:
@@ -72,7 +70,7 @@ def axle_timing(vehicle: AbstractVehicle, road: AbstractRoad) -> AxleTiming:
 
 def delays_by_itself(vehicle: AbstractVehicle, road: AbstractRoad) -> bool:
     """Whether the delay from axle to axle follows from the vehicle and the road's speed, without being asked for."""
-    return road.columns.kind == "road" and max(vehicle.frame().axles) > 0
+    return road.columns.kind == "road" and max(vehicle.layout.axles) > 0
 
 
 def at_axles(vehicle: AbstractVehicle, road: AbstractRoad) -> AbstractRoad:
@@ -85,7 +83,7 @@ def at_axles(vehicle: AbstractVehicle, road: AbstractRoad) -> AbstractRoad:
     if not delays_by_itself(vehicle, road):
         return road
     if road.speed is None:
-        must = f"have one speed under a vehicle of {max(vehicle.frame().axles) + 1} axles, which delays the rear ones"
+        must = f"have one speed under a vehicle of {max(vehicle.layout.axles) + 1} axles, which delays the rear ones"
         remedy = f"Write {WRITE} to drive over it, or `roads.in_phase(road)` to move all axles together."
         _checks.refuse("road", must, "given over time, or made for several speeds", remedy)
     return delayed(road, positions=vehicle.axle_positions)
@@ -97,7 +95,7 @@ def heights_under_wheels(vehicle: AbstractVehicle, road: AbstractRoad, time: Sig
     columns, heights = road.columns, road.height(time)
     if columns.kind == "by wheel":
         return heights
-    axles = np.array(vehicle.frame().axles)
+    axles = np.array(vehicle.layout.axles)
     side = np.array([np.sum(axles[:i] == axle) for i, axle in enumerate(axles)])
     first = axles * columns.tracks if columns.kind == "delayed" else np.zeros_like(axles)
     chosen = first + (side if columns.tracks > 1 else 0)
@@ -116,7 +114,7 @@ def moves_axles(build: Callable[[Any], AbstractVehicle], values: Any) -> bool:
 
 def _refuse_misfit(vehicle: AbstractVehicle, columns: Columns) -> None:
     """Refuse columns that are not one for each wheel, or one or each side for each axle, of the vehicle."""
-    names, axles = vehicle.wheel_names, vehicle.frame().axles
+    names, axles = vehicle.layout.wheels, vehicle.layout.axles
     called, count = f" ({', '.join(names)})" if any(names) else "", max(axles) + 1
     if columns.kind == "by wheel":
         if columns.tracks != len(names):

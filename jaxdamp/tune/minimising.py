@@ -144,8 +144,8 @@ def chosen_metrics(vehicle: AbstractVehicle, road: AbstractRoad | WhiteRoad, wan
 
     A white road gives what follows from an RMS, so no peaks. Means, which may be negative, only if they are wanted.
     """
-    white, kinds, units = isinstance(road, WhiteRoad), metrics.STATISTICS, vehicle.units
-    known = [m for m in vehicle.ride_metrics if not white or m.is_stationary(units)]
+    white, kinds = isinstance(road, WhiteRoad), metrics.STATISTICS
+    known = [m for m in vehicle.ride_metrics if not white or m.is_stationary(vehicle.layout.by_name)]
     for name in wanted:
         _checks.one_of("metric", name, [m.name for m in known])
     still = [m.name for m in known if not kinds[m.statistic].differentiable]
@@ -162,9 +162,9 @@ def stationary_ride(road: WhiteRoad, chosen: Sequence[RideMetric]) -> Measured:
     weighted = list(dict.fromkeys(m.channel for m in chosen if metrics.STATISTICS[m.statistic].weighted))
 
     def ride(vehicle: AbstractVehicle) -> dict[str, Scalar]:
-        linear, units = linearise(vehicle), vehicle.units
+        linear = linearise(vehicle)
         if weighted:
-            linear = with_weightings(linear, [(name, metrics.weighting_of(units[name])) for name in weighted])
+            linear = with_weightings(linear, [(name, vehicle.layout.weighting(name)) for name in weighted])
         rms, found = stationary_rms(linear, road.velocity_psd, speed=road.speed), {}
         for m in chosen:
             statistic = metrics.STATISTICS[m.statistic]

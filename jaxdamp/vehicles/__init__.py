@@ -13,10 +13,10 @@ from jaxdamp.vehicles import presets
 from jaxdamp.vehicles.axle import Axle
 from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle, chosen_metrics
 from jaxdamp.vehicles.cab import Cab
-from jaxdamp.vehicles.channels import Instant, RideMetric
+from jaxdamp.vehicles.channels import Channel, ChannelKind
 from jaxdamp.vehicles.corner import Corner
 from jaxdamp.vehicles.cubic_spring import CubicSpring
-from jaxdamp.vehicles.equilibrium import rest_position, static_equilibrium
+from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position, static_equilibrium
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
 from jaxdamp.vehicles.full_car import FullCar
@@ -26,12 +26,15 @@ from jaxdamp.vehicles.linear import LinearVehicle, linearise
 from jaxdamp.vehicles.modes import Modes, modes
 from jaxdamp.vehicles.parts import Body, Element, Link, Place, Wheel
 from jaxdamp.vehicles.points import Point
-from jaxdamp.vehicles.port_form import Connection, PortForm, assemble
-from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.port_form import LinearMap, PortForm
+from jaxdamp.vehicles.ports import Earlier, Ports, States
 from jaxdamp.vehicles.quarter_car import QuarterCar
+from jaxdamp.vehicles.ride_metrics import RideMetric
 from jaxdamp.vehicles.roll_car import RollCar
 from jaxdamp.vehicles.seat import Seat, SeatMass
 from jaxdamp.vehicles.stationary import lyapunov, stationary_rms
+from jaxdamp.vehicles.suspension import Suspension
+from jaxdamp.vehicles.system import Layout, System
 from jaxdamp.vehicles.tandem import IndependentTandem, WalkingBeam
 from jaxdamp.vehicles.tandem_truck import TandemTruck
 from jaxdamp.vehicles.tracked_hull import PitchDecay, TrackedHull
@@ -43,16 +46,19 @@ __all__ = [
     "Axle",
     "Body",
     "Cab",
-    "Connection",
+    "Channel",
+    "ChannelKind",
     "Corner",
     "CubicSpring",
+    "Earlier",
     "Element",
     "Frame",
     "FullCar",
     "HalfCar",
     "IndependentTandem",
-    "Instant",
+    "Layout",
     "LiftOff",
+    "LinearMap",
     "LinearVehicle",
     "Link",
     "LumpedVehicle",
@@ -67,17 +73,20 @@ __all__ = [
     "RollCar",
     "Seat",
     "SeatMass",
+    "States",
+    "Suspension",
+    "System",
     "TandemTruck",
     "TrackedHull",
     "WalkingBeam",
     "Wheel",
-    "assemble",
     "chosen_metrics",
     "frequency_response",
     "linearise",
     "lyapunov",
     "modes",
     "presets",
+    "refuse_restless",
     "rest_position",
     "spectral_rms",
     "static_equilibrium",

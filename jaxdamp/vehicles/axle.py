@@ -4,8 +4,8 @@ from typing import Any, final
 
 from jaxdamp._types import Number
 from jaxdamp.parameters import nonnegative, parameter, positive
-from jaxdamp.vehicles.corner import Corner, suspend
-from jaxdamp.vehicles.parts import AbstractPart, Body, Link, Wheel, prefixed
+from jaxdamp.vehicles.corner import Corner
+from jaxdamp.vehicles.parts import AbstractPart, Body, Link, Parts, prefixed
 
 
 @final
@@ -25,28 +25,20 @@ class Axle(AbstractPart):
     track_width: Number = parameter("m", "distance between the left and the right wheel", positive)
     anti_roll_rate: Number = parameter("N m/rad", "stiffness of the anti-roll bar", nonnegative, default=0.0)
 
+    def parts(self, name: str, body: Body, *, ahead: Any = None, behind: Any = 0.0) -> Parts:
+        """Left corner, right corner and anti-roll bar under a body that rolls.
 
-def carry(
-    axle: Axle, name: str, body: Body, *, ahead: Any = None, behind: Any = 0.0
-) -> tuple[tuple[Body, ...], tuple[Link, ...], tuple[Wheel, ...]]:
-    """The parts of an axle under a body that rolls: left corner, right corner, anti-roll bar.
-
-    Arguments:
-        axle: the axle.
-        name: of its parts, may be empty.
-        body: on it.
-        ahead: of the centre of gravity [m], on a body that pitches.
-        behind: distance behind the front axle [m].
-    """
-    half = 0.5 * axle.track_width
-    sides = [
-        suspend(
-            axle.corner, prefixed(name, side), body.at(ahead, left), behind=behind, left=left, beside=side == "right"
+        Arguments:
+            name: of the parts, may be empty.
+            body: on the axle.
+            ahead: of the centre of gravity [m], on a body that pitches.
+            behind: distance behind the front axle [m].
+        """
+        half = 0.5 * self.track_width
+        left, right = (
+            self.corner.parts(prefixed(name, side), body.at(ahead, y), behind=behind, left=y, beside=side == "right")
+            for side, y in (("left", half), ("right", -half))
         )
-        for side, left in (("left", half), ("right", -half))
-    ]
-    (left_wheel, _, _), (right_wheel, _, _) = sides
-    line = (left_wheel.at() - right_wheel.at()) * (1.0 / axle.track_width)
-    bar = Link(prefixed(name, "anti_roll_bar"), body.roll - line, axle.anti_roll_rate)
-    bodies, links, tyres = zip(*sides, strict=True)
-    return bodies, (*links, bar), tyres
+        line = (left[0].at() - right[0].at()) * (1.0 / self.track_width)
+        bar = Link(prefixed(name, "anti_roll_bar"), body.roll - line, self.anti_roll_rate)
+        return (left[0], right[0]), (left[1], right[1], bar), (left[2], right[2])

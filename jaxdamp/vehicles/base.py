@@ -2,28 +2,33 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import final
+from typing import Any, final
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 from jaxdamp.metrics import current_names
 from jaxdamp.parameters import check_parameters, readable
-from jaxdamp.vehicles.channels import Instant, RideMetric, channels_of, ride_metrics_of, units_of
-from jaxdamp.vehicles.descriptions import descriptions_of
+from jaxdamp.vehicles.channels import channels_of
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
+from jaxdamp.vehicles.ride_metrics import RideMetric
+from jaxdamp.vehicles.system import Layout, System, assemble, layout_of
+
+
+_LAYOUTS: dict[Any, Layout] = {}  # by all of a vehicle but the values of its arrays, which do not change its layout
 
 
 class AbstractVehicle(eqx.Module):
     """Masses and springs with damper laws at ports.
 
-    A vehicle names its parameters and has one method, `frame`, which says what it is made of; matrices, elements,
-    channels, units, metrics and static loads follow. `docs/vehicles.md` builds one.
+    A vehicle names its parameters and has one method, `frame`, which says what it is made of; the `layout` and the
+    assembled `system` follow from it. `docs/vehicles.md` builds one.
     """
 
     def __check_init__(self) -> None:
@@ -36,6 +41,20 @@ class AbstractVehicle(eqx.Module):
     def frame(self) -> Frame:
         """The parts, from the geometry."""
 
+    def system(self) -> System:
+        """The vehicle assembled: matrices, laws, outputs. Compiled once for all vehicles of one layout."""
+        return _assembled(without_fitted_ranges(self))  # vehicles with laws fitted to other records share one program
+
+    @property
+    def layout(self) -> Layout:
+        """Names of coordinates, ports, wheels, channels and metrics: what depends on no number."""
+        leaves, structure = jax.tree.flatten(without_fitted_ranges(self))
+        key = structure, tuple(leaf.shape if eqx.is_array(leaf) else leaf for leaf in leaves)
+        if key not in _LAYOUTS:
+            frame = self.frame()
+            _LAYOUTS[key] = layout_of(frame, channels_of(frame))
+        return _LAYOUTS[key]
+
     def port_form(self) -> PortForm:
         """The matrices, built from geometry."""
         return self.frame().port_form()
@@ -44,29 +63,25 @@ class AbstractVehicle(eqx.Module):
         """The law at each port."""
         return self.frame().elements()
 
-    def channels(self, instant: Instant) -> dict[str, Scalar]:
-        """What a test engineer would measure, by name, in the units of `units`; linear in the motion."""
-        return channels_of(self.frame(), instant)
-
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates, heights [m] and angles [rad]."""
-        return self.frame().coordinates
+        return self.layout.coordinates
 
     @property
     def units(self) -> dict[str, str]:
         """Unit of each channel."""
-        return units_of(self.frame())
+        return dict(self.layout.units)
 
     @property
     def descriptions(self) -> dict[str, str]:
         """What each channel is, its positive direction, and of how many dampers or wheels it is."""
-        return descriptions_of(self.frame())
+        return {channel.name: channel.description for channel in self.layout.channels}
 
     @property
     def ride_metrics(self) -> tuple[RideMetric, ...]:
         """The numbers that say how the vehicle rides."""
-        return ride_metrics_of(self.frame())
+        return self.layout.metrics
 
     def static_wheel_loads(self) -> Float[Array, " wheels"]:
         """Load of each wheel at rest on level ground [N] (see `Frame.static_wheel_loads`)."""
@@ -75,7 +90,7 @@ class AbstractVehicle(eqx.Module):
     @property
     def wheel_names(self) -> tuple[str, ...]:
         """Names of the wheels, in the order of the columns that motions given wheel by wheel must have."""
-        return tuple(wheel.name for wheel in self.frame().wheels)
+        return self.layout.wheels
 
     @property
     def axle_positions(self) -> Float[Array, " axles"]:
@@ -87,6 +102,11 @@ class AbstractVehicle(eqx.Module):
         """Largest distance between left and right wheels [m]; zero where a wheel stands for both sides."""
         offsets = jnp.stack([wheel.left for wheel in self.frame().wheels])
         return jnp.max(offsets) - jnp.min(offsets)
+
+
+@eqx.filter_jit
+def _assembled(vehicle: AbstractVehicle) -> System:
+    return assemble(vehicle.frame())
 
 
 def chosen_metrics(vehicle: AbstractVehicle, names: Sequence[str] | None, argument: str) -> list[RideMetric]:

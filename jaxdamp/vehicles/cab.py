@@ -5,7 +5,8 @@ from typing import final
 from jaxdamp._types import Number
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import parameter, positive
-from jaxdamp.vehicles.parts import AbstractPart, Body, Element, Link
+from jaxdamp.vehicles.parts import AbstractPart, Body, Link
+from jaxdamp.vehicles.suspension import Suspension
 
 
 @final
@@ -22,6 +23,12 @@ class Cab(AbstractPart):
         rear_rate: of the rear mount [N/m].
         front_damper: law at the front mount, both sides together.
         rear_damper: law at the rear mount, both sides together.
+        front_extra_spring: law beside the linear spring of the front mount, both sides together; the rest likewise.
+        rear_extra_spring: of the rear mount.
+        front_bump_stop: of the front mount.
+        rear_bump_stop: of the rear mount.
+        front_friction: of the front mount.
+        rear_friction: of the rear mount.
     """
 
     mass: Number = parameter("kg", "mass of the cab", positive)
@@ -33,16 +40,21 @@ class Cab(AbstractPart):
     rear_rate: Number = parameter("N/m", "spring rate of the rear mount", positive)
     front_damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
     rear_damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
+    front_extra_spring: AbstractDamper | None = None
+    rear_extra_spring: AbstractDamper | None = None
+    front_bump_stop: AbstractDamper | None = None
+    rear_bump_stop: AbstractDamper | None = None
+    front_friction: AbstractDamper | None = None
+    rear_friction: AbstractDamper | None = None
 
     def parts(self, body: Body) -> tuple[tuple[Body], tuple[Link, ...]]:
         """The cab and its mounts on a body."""
         cab = Body("cab", self.mass, pitch_inertia=self.pitch_inertia)
+        front = self.front_damper, self.front_extra_spring, self.front_bump_stop, self.front_friction
+        rear = self.rear_damper, self.rear_extra_spring, self.rear_bump_stop, self.rear_friction
         mounts = (
-            ("cab_front", self.front_distance, self.front_rate, self.front_damper),
-            ("cab_rear", -self.rear_distance, self.rear_rate, self.rear_damper),
+            ("cab_front", self.front_distance, Suspension(self.front_rate, *front)),
+            ("cab_rear", -self.rear_distance, Suspension(self.rear_rate, *rear)),
         )
-        links = tuple(
-            Link(name, cab.at(x) - body.at(self.ahead + x), rate, elements=(Element("damper", law),), sides=2)
-            for name, x, rate, law in mounts
-        )
+        links = tuple(mount.link(name, cab.at(x) - body.at(self.ahead + x), sides=2) for name, x, mount in mounts)
         return (cab,), links

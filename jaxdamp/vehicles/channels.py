@@ -1,169 +1,164 @@
-"""What a test engineer would measure on a vehicle, by name: channels, their units and the ride metrics made of them."""
+"""What a test engineer would measure on a vehicle: channels, each a sum of signals of the motion, forces and road."""
 
-from collections.abc import Mapping
-from typing import NamedTuple, final
+import enum
+from typing import NamedTuple
 
-import equinox as eqx
-from jaxtyping import Array, Float
-
-from jaxdamp._types import Scalar
-from jaxdamp.metrics import STATISTICS
 from jaxdamp.vehicles.frame import Frame
-from jaxdamp.vehicles.parts import Link, Wheel, prefixed
+from jaxdamp.vehicles.parts import Body, Element, Link, Wheel, prefixed
+from jaxdamp.vehicles.points import Point
 
 
-@final
-class Instant(eqx.Module):
-    """The motion of a vehicle at one instant, SI units."""
+class ChannelKind(enum.Enum):
+    """What a channel is of; its unit and its weighting by ISO 2631-1 follow.
 
-    position: Float[Array, " q"]
-    velocity: Float[Array, " q"]
-    acceleration: Float[Array, " q"]
-    road: Float[Array, " wheels"]
-    road_rate: Float[Array, " wheels"]
-    port_force: Float[Array, " ports"]
+    Attributes:
+        meaning: in words.
+        unit: SI.
+        weighting: of ISO 2631-1 for a person who feels it, where there is one.
+    """
+
+    HEIGHT = "height of a body or a place", "m"
+    ANGLE = "pitch or roll angle of a body", "rad"
+    ACCELERATION = "vertical acceleration of a body or a place", "m/s^2", "Wk"
+    ANGULAR_ACCELERATION = "pitch or roll acceleration of a body", "rad/s^2", "We"
+    STROKE = "deflection between two points, extension positive", "m"
+    DAMPER_VELOCITY = "rate of a deflection", "m/s"
+    FORCE = "force of one law", "N"
+    ROAD_HEIGHT = "height of the road under a wheel", "m"
+    TYRE_LOAD = "load of a wheel less the static load", "N"
+    RELATIVE_TYRE_LOAD = "load of a wheel less the static load, over the static load", ""
+
+    def __init__(self, meaning: str, unit: str, weighting: str | None = None) -> None:
+        self.meaning, self.unit, self.weighting = meaning, unit, weighting
 
 
-class RideMetric(NamedTuple):
-    """A number that says how a vehicle rides.
+class Channel(NamedTuple):
+    """A channel of a vehicle.
 
     Arguments:
-        name: what it is called.
-        channel: what it is made of.
-        statistic: how, one of `metrics.STATISTICS`.
-        by: a second channel, which the first is multiplied with.
-        from_rest: whether the channel is counted from its value in the static equilibrium on the road's first heights.
+        name: of the channel.
+        kind: what it is of.
+        place: name of the body, place, link, wheel or element that it is of.
+        description: what it is, its positive direction, and of how many dampers or wheels it is.
     """
 
     name: str
-    channel: str
-    statistic: str
-    by: str = ""
-    from_rest: bool = False
+    kind: ChannelKind
+    place: str
+    description: str
 
-    def unit(self, units: Mapping[str, str]) -> str:
-        """Its unit, from those of the channels."""
-        return STATISTICS[self.statistic].unit(units[self.channel])
-
-    def is_stationary(self, units: Mapping[str, str]) -> bool:
-        """Whether the RMS of its channel on a white road gives it; a height wanders with the road and has none."""
-        return STATISTICS[self.statistic].of_rms is not None and not (self.from_rest and units[self.channel] == "m")
+    @property
+    def unit(self) -> str:
+        """Its SI unit."""
+        return self.kind.unit
 
 
-def _acceleration(coordinate: str) -> str:
-    return f"{coordinate.removeprefix('z_')}_acceleration"
+Measured = tuple[Channel, Point]  # a channel, and what it is the sum of: see `signals`
+ANGULAR = (ChannelKind.ANGLE, ChannelKind.ANGULAR_ACCELERATION)
 
 
-def units_of(frame: Frame) -> dict[str, str]:
-    """Unit of each channel, by name."""
-    units: dict[str, str] = {}
-    for name in frame.coordinates:
-        unit = "m" if name.startswith("z_") else "rad"
-        units |= {name: unit, _acceleration(name): f"{unit}/s^2"}
-    for place in frame.places:
-        units |= {f"z_{place.name}": "m", f"{place.name}_acceleration": "m/s^2"}
-    parts: list[Link | Wheel] = [*frame.links, *frame.wheels]
-    for part in parts:
-        if part.elements:
-            units |= {prefixed(part.name, "stroke"): "m", prefixed(part.name, "damper_velocity"): "m/s"}
-            units |= {prefixed(part.name, f"{element.name}_force"): "N" for element in part.elements}
-    for wheel in frame.wheels:
-        units |= {f"z_{prefixed(wheel.name, 'road')}": "m", prefixed(wheel.name, "dynamic_tyre_load"): "N"}
-        units |= {prefixed(wheel.name, "relative_tyre_load"): ""}
-    return units
+def signals(frame: Frame) -> list[str]:
+    """Names of all that a channel can be a sum of.
 
-
-def channels_of(frame: Frame, instant: Instant) -> dict[str, Scalar]:
-    """Value of each channel at an instant; linear in the motion, the road and the forces of the elements.
-
-    Heights and angles, their accelerations, stroke, velocity and forces of the links with laws, road heights, tyre
-    loads beyond the static ones (positive: more load).
+    Positions, rates and accelerations of the coordinates, forces of the elements, heights and rates of the road.
     """
-    names = frame.coordinates
-    position, velocity, acceleration = (
-        dict(zip(names, values, strict=True)) for values in (instant.position, instant.velocity, instant.acceleration)
-    )
-    found: dict[str, Scalar] = {}
-    for name in names:
-        found |= {name: position[name], _acceleration(name): acceleration[name]}
+    motion = [f"{what}:{name}" for what in ("position", "rate", "acceleration") for name in frame.coordinates]
+    road = [f"{what}:{wheel.name}" for what in ("road", "road rate") for wheel in frame.wheels]
+    return [*motion, *[f"force:{name}" for name in frame.element_names], *road]
+
+
+def channels_of(frame: Frame) -> list[Measured]:
+    """All channels of a vehicle; the relative tyre load is still to be divided by the static load of its wheel."""
+    parts: list[Link | Wheel] = [*frame.links, *frame.wheels]
+    found = [channel for body in frame.bodies for channel in _of_body(body)]
     for place in frame.places:
-        point = frame.place(place)
-        found[f"z_{place.name}"] = point.of(position)
-        found[f"{place.name}_acceleration"] = point.of(acceleration)
-    forces = dict(zip(frame.element_names, instant.port_force, strict=True))
-    for link in frame.links:
-        if link.elements:
-            found[prefixed(link.name, "stroke")] = link.extension.of(position)
-            found[prefixed(link.name, "damper_velocity")] = link.extension.of(velocity)
-    loads = frame.static_wheel_loads()
-    for i, wheel in enumerate(frame.wheels):
-        stretch = wheel.point.of(position) - instant.road[i]
-        rate = wheel.point.of(velocity) - instant.road_rate[i]
-        own = [prefixed(wheel.name, element.name) for element in wheel.elements]
-        pull = wheel.stiffness * stretch + wheel.damping * rate
-        for name in own + [prefixed(wheel.name, "lift_off")] * wheel.lifts:
-            pull = pull + forces[name]
-        if wheel.elements:
-            found |= {prefixed(wheel.name, "stroke"): stretch, prefixed(wheel.name, "damper_velocity"): rate}
-        found[f"z_{prefixed(wheel.name, 'road')}"] = instant.road[i]
-        found[prefixed(wheel.name, "dynamic_tyre_load")] = -pull
-        found[prefixed(wheel.name, "relative_tyre_load")] = -pull / loads[i]
-    for part in [*frame.links, *frame.wheels]:
-        for element in part.elements:  # several that act together: the force of one
-            name = prefixed(part.name, element.name)
-            found[f"{name}_force"] = forces[name] if element.count == 1 else forces[name] / element.count
+        where, names = f"{place.name} on {place.body}, up", (f"z_{place.name}", place.name)
+        found += _of_point(place.name, frame.place(place), names, (f"height of {where}", f"acceleration of {where}"))
+    for part in parts:
+        found += _of_elements(part)
+    for wheel in frame.wheels:
+        found += _of_wheel(wheel)
     return found
 
 
-def ride_metrics_of(frame: Frame) -> tuple[RideMetric, ...]:
-    """What a ride is judged by, in groups: bodies and places, suspensions, tyres."""
-    return (*_of_bodies(frame), *_of_elements(frame), *_of_tyres(frame))
+def _signal(what: str, point: Point) -> Point:
+    """A point of the coordinates, of their positions, rates or accelerations."""
+    return Point({f"{what}:{name}": coefficient for name, coefficient in point.terms.items()})
 
 
-def _of_bodies(frame: Frame) -> list[RideMetric]:
-    """Accelerations of the bodies that are not wheels and of the places, as they are and as people feel them.
-
-    Displacements and angles of these bodies, from the static equilibrium.
-    """
-    on_wheels = {name for wheel in frame.wheels for name in wheel.point.terms}
-    riding = [b for b in frame.bodies if b.name == frame.main_body.name or on_wheels.isdisjoint(b.masses)]
-    coordinates = [name for body in riding for name in body.masses]
-    channels = [_acceleration(name) for name in coordinates] + [f"{place.name}_acceleration" for place in frame.places]
-    of_acceleration = ("rms", "peak", "weighted_rms", "vibration_dose_value")
-    metrics = [RideMetric(f"{statistic}_{c}", c, statistic) for c in channels for statistic in of_acceleration]
-    for name in coordinates:
-        word = f"{name[2:]}_displacement" if name.startswith("z_") else f"{name}_angle"
-        metrics += [RideMetric(f"{statistic}_{word}", name, statistic, from_rest=True) for statistic in ("rms", "peak")]
-    return metrics
+def _of_point(
+    place: str,
+    point: Point,
+    names: tuple[str, str],
+    words: tuple[str, str],
+    kinds: tuple[ChannelKind, ChannelKind] = (ChannelKind.HEIGHT, ChannelKind.ACCELERATION),
+) -> list[Measured]:
+    """A height or an angle, and its acceleration."""
+    return [
+        (Channel(names[0], kinds[0], place, words[0]), _signal("position", point)),
+        (Channel(f"{names[1]}_acceleration", kinds[1], place, words[1]), _signal("acceleration", point)),
+    ]
 
 
-def _of_elements(frame: Frame) -> list[RideMetric]:
-    """Working space and velocity of every link with laws, and the power that each law takes."""
-    metrics: list[RideMetric] = []
-    parts: list[Link | Wheel] = [*frame.links, *frame.wheels]
-    for part in parts:
-        stroke, velocity = prefixed(part.name, "stroke"), prefixed(part.name, "damper_velocity")
-        if part.elements:
-            space = prefixed(part.name, "working_space")
-            metrics += [
-                RideMetric(f"{space}_rms", stroke, "standard_deviation"),
-                RideMetric(f"{space}_mean", stroke, "mean", from_rest=True),
-                RideMetric(f"{space}_peak_to_peak", stroke, "peak_to_peak"),
-                RideMetric(f"peak_{velocity}", velocity, "peak"),
-            ]
-        for element in part.elements:
-            name = prefixed(part.name, element.name)
-            metrics.append(RideMetric(f"{name}_dissipated_power", f"{name}_force", "dissipated_power", velocity))
-    return metrics
+def _of_body(body: Body) -> list[Measured]:
+    height = f"height of {body.name}, up, from where the linear springs carry the weight on level ground"
+    words = height, f"acceleration of {body.name}, up"
+    found = _of_point(body.name, body.at(), (f"z_{body.name}", body.name), words)
+    for turn in body.turns:
+        angle, of = body.angle(turn.axis), f"of {body.name}, {turn.sense}"
+        words, kinds = (f"{turn.axis} angle {of}", f"{turn.axis} acceleration {of}"), ANGULAR
+        found += _of_point(body.name, Point({angle: 1.0}), (angle, angle), words, kinds)
+    return found
 
 
-def _of_tyres(frame: Frame) -> list[RideMetric]:
-    """Variation of the tyre loads, and how often a wheel lifts off."""
-    metrics: list[RideMetric] = []
-    for wheel in frame.wheels:
-        load, relative = prefixed(wheel.name, "dynamic_tyre_load"), prefixed(wheel.name, "relative_tyre_load")
-        coefficient = prefixed(wheel.name, "dynamic_load_coefficient")
-        metrics += [RideMetric(f"rms_{load}", load, "rms"), RideMetric(coefficient, relative, "standard_deviation")]
-        of_load = ("road_stress_factor", "lift_off_fraction")
-        metrics += [RideMetric(prefixed(wheel.name, statistic), relative, statistic) for statistic in of_load]
-    return metrics
+def _stretch(part: Link | Wheel, what: str) -> Point:
+    """The deflection of a link or a wheel, or its rate."""
+    if isinstance(part, Link):
+        return _signal(what, part.extension)
+    road = "road" if what == "position" else "road rate"
+    return _signal(what, part.point) - Point({f"{road}:{part.name}": 1.0})
+
+
+def _of_elements(part: Link | Wheel) -> list[Measured]:
+    """Deflection, its rate and the forces of a part with laws."""
+    if not part.elements:
+        return []
+    stroke, velocity = prefixed(part.name, "stroke"), prefixed(part.name, "damper_velocity")
+    what = f"deflection{f' of {part.name}' if part.name else ''}, extension positive"
+    found = [
+        (Channel(stroke, ChannelKind.STROKE, part.name, what), _stretch(part, "position")),
+        (Channel(velocity, ChannelKind.DAMPER_VELOCITY, part.name, f"rate of the {what}"), _stretch(part, "rate")),
+    ]
+    for element in part.elements:
+        name = prefixed(part.name, element.name)
+        words = f"force of {name}{_share(element, part)}, positive where it resists extension"
+        force = Point({f"force:{name}": 1.0 / element.count})  # several that act together: the force of one
+        found.append((Channel(f"{name}_force", ChannelKind.FORCE, name, words), force))
+    return found
+
+
+def _of_wheel(wheel: Wheel) -> list[Measured]:
+    """Height of the road under a wheel, and its load beyond the static one: positive with more load."""
+    where, of = (f" under {wheel.name}" if wheel.name else ""), _together(wheel)
+    pull = _stretch(wheel, "position") * wheel.stiffness + _stretch(wheel, "rate") * wheel.damping
+    for name in wheel.element_names:
+        pull = pull + Point({f"force:{name}": 1.0})
+    dynamic, relative = (prefixed(wheel.name, f"{word}_tyre_load") for word in ("dynamic", "relative"))
+    kinds, load = ChannelKind, f"load{where} less the static load"
+    height = Channel(
+        f"z_{prefixed(wheel.name, 'road')}", kinds.ROAD_HEIGHT, wheel.name, f"height of the road{where}, up"
+    )
+    return [
+        (height, Point({f"road:{wheel.name}": 1.0})),
+        (Channel(dynamic, kinds.TYRE_LOAD, wheel.name, f"{load}{of}, more load positive"), -pull),
+        (Channel(relative, kinds.RELATIVE_TYRE_LOAD, wheel.name, f"{load}, over the static load"), -pull),
+    ]
+
+
+def _share(element: Element, part: Link | Wheel) -> str:
+    """Of how many laws a force is."""
+    return f", one of {element.count} alike that act together" if element.count > 1 else _together(part)
+
+
+def _together(part: Link | Wheel) -> str:
+    return f", {'both' if part.sides == 2 else part.sides} sides together" if part.sides > 1 else ""

@@ -1,6 +1,5 @@
 """Where a vehicle comes to rest on the road, with every nonlinear spring."""
 
-from collections.abc import Sequence
 from typing import Any, NoReturn
 
 import equinox as eqx
@@ -11,26 +10,26 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp.dampers import AbstractDamper
 from jaxdamp.dampers.coverage import coverage
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.port_form import PortForm
 from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.system import System
 
 
 STEPS = 50
 SHARES = 0.5 ** np.arange(8.0)  # of a Newton step
 
 
-def rest_position(form: PortForm, laws: Sequence[AbstractDamper], road: Float[Array, " wheels"]) -> Float[Array, " q"]:
+def rest_position(system: System, road: Float[Array, " wheels"]) -> Float[Array, " q"]:
     """The coordinates at which springs and laws balance: K q + Pᵀ f(P q − S z_r, 0) = K_r z_r.
 
     The laws are in their initial states. One linear system where no law depends on its stroke; else Newton steps, each
     shortened as far as helps. Derivatives are those of the implicit function theorem. NaN without an equilibrium.
     """
-    ports = Ports(laws)
-    if not any(law.traits().stroke_dependent_at_rest for law in laws):
-        still = jnp.zeros(len(laws))
+    form, ports = system.form, Ports(system.laws)
+    if not any(law.traits().stroke_dependent_at_rest for law in system.laws):
+        still = jnp.zeros(len(system.laws))
         forces = ports.force(still, still, ports.initial())
         return jnp.linalg.solve(form.stiffness, form.road_stiffness @ road - form.ports.T @ forces)
     arrays, rest = eqx.partition((form, ports, road), eqx.is_array)
@@ -69,7 +68,7 @@ def _newton(form: PortForm, ports: Ports, road: Float[Array, " wheels"]) -> Floa
 
 @eqx.filter_jit
 def _rest(vehicle: AbstractVehicle, road: Float[Array, " wheels"]) -> Float[Array, " q"]:
-    return rest_position(vehicle.port_form(), vehicle.elements(), road)
+    return rest_position(vehicle.system(), road)
 
 
 def static_equilibrium(vehicle: AbstractVehicle, road: Any = None) -> dict[str, Array]:

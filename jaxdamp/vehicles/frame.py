@@ -15,9 +15,9 @@ from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper, Sum
 from jaxdamp.vehicles.lift_off import LiftOff, LiftOffWithLaws
-from jaxdamp.vehicles.parts import SPRUNG, Body, Element, Link, Place, Wheel
-from jaxdamp.vehicles.points import Point
-from jaxdamp.vehicles.port_form import Connection, PortForm, assemble
+from jaxdamp.vehicles.parts import SPRUNG, Body, Element, Link, Place, Wheel, prefixed
+from jaxdamp.vehicles.points import Point, matrix
+from jaxdamp.vehicles.port_form import PortForm, sum_springs
 from jaxdamp.vehicles.ports import Ports
 
 
@@ -54,11 +54,10 @@ class Frame(eqx.Module):
     def __check_init__(self) -> None:
         if not self.wheels or not self.bodies:
             _checks.refuse("wheels", "hold one or more, and `bodies` too", f"{len(self.wheels)} and {len(self.bodies)}")
-        moving: list[Link | Wheel] = [*self.links, *self.wheels]
         for kind, names in (
             ("bodies and places", [part.name for part in [*self.bodies, *self.places]]),
             ("wheels", [wheel.name for wheel in self.wheels]),
-            ("links and wheels with elements", [part.name for part in moving if part.elements]),
+            ("links and wheels with elements", [part.name for part in self._parts if part.elements]),
             ("elements", [name for name, _, _ in self._elements()]),
         ):
             if len(set(names)) < len(names):
@@ -81,23 +80,26 @@ class Frame(eqx.Module):
         """The point of a place of interest."""
         return self.body(place.body).at(place.ahead, place.left)
 
+    @property
+    def _parts(self) -> list[Link | Wheel]:
+        return [*self.links, *self.wheels]
+
     def _elements(self) -> list[tuple[str, Link | Wheel, Element]]:
-        parts: list[Link | Wheel] = [*self.links, *self.wheels]
-        return [(f"{part.name}_{e.name}" if part.name else e.name, part, e) for part in parts for e in part.elements]
+        return [(prefixed(part.name, e.name), part, e) for part in self._parts for e in part.elements]
 
     @property
     def element_names(self) -> tuple[str, ...]:
         """Name of the element at each port; those of tyres that can leave the road come last."""
-        lifting = [f"{wheel.name}_lift_off" if wheel.name else "lift_off" for wheel in self.wheels if wheel.lifts]
+        lifting = [wheel.element_names[-1] for wheel in self.wheels if wheel.lifts]
         return (*[name for name, _, _ in self._elements()], *lifting)
 
-    def elements(self) -> tuple[AbstractDamper, ...]:
-        """The law at each port."""
+    def elements(self, static_loads: Float[Array, " wheels"] | None = None) -> tuple[AbstractDamper, ...]:
+        """The law at each port, for static wheel loads [N] that are known already or found here."""
         own = tuple(element.together for _, _, element in self._elements())
         if not any(wheel.lifts for wheel in self.wheels):
             return own
-        pairs = zip(self.wheels, self.static_wheel_loads(), strict=True)
-        return (*own, *[lift_off(wheel, load) for wheel, load in pairs if wheel.lifts])
+        loads = self.static_wheel_loads() if static_loads is None else static_loads
+        return (*own, *[lift_off(wheel, load) for wheel, load in zip(self.wheels, loads, strict=True) if wheel.lifts])
 
     def element(self, name: str) -> Element:
         """The element of a name, with the law of one where several act together."""
@@ -114,49 +116,46 @@ class Frame(eqx.Module):
 
     def port_form(self) -> PortForm:
         """The matrices."""
-        return self._assembled([part for _, part, _ in self._elements()] + [w for w in self.wheels if w.lifts])
-
-    def _assembled(self, ports: Sequence[Link | Wheel]) -> PortForm:
-        count, names = len(self.wheels), self.coordinates
-        tracks = {id(wheel): jnp.eye(count)[i] for i, wheel in enumerate(self.wheels)}
-        nowhere = jnp.zeros(count)
-
-        def row(part: Link | Wheel) -> Float[Array, " q"]:
-            return (part.extension if isinstance(part, Link) else part.point).row(names)
-
-        connections = [
-            Connection(row(part), tracks.get(id(part), nowhere), part.stiffness, part.damping)
-            for part in [*self.links, *self.wheels]
-        ]
-        rows = jnp.stack([row(part) for part in ports]) if ports else jnp.zeros((0, len(names)))
-        road = None
-        if any(isinstance(part, Wheel) for part in ports):
-            road = jnp.stack([tracks.get(id(part), nowhere) for part in ports])
+        names, count = self.coordinates, len(self.links)
+        rows = matrix([part.extension if isinstance(part, Link) else part.point for part in self._parts], names)
+        on_road = np.eye(len(self._parts), len(self.wheels), -count)
+        ports = [i for i, part in enumerate(self._parts) for _ in part.elements]
+        ports += [count + i for i, wheel in enumerate(self.wheels) if wheel.lifts]
         masses: dict[str, Scalar] = reduce(or_, [body.masses for body in self.bodies])
-        return assemble(jnp.diag(jnp.stack([masses[name] for name in names])), connections, rows, road)
+        return sum_springs(
+            jnp.diag(jnp.stack([masses[name] for name in names])),
+            rows,
+            jnp.asarray(on_road, dtype=rows.dtype),
+            jnp.stack([part.stiffness for part in self._parts]),
+            jnp.stack([part.damping for part in self._parts]),
+            rows[np.array(ports, dtype=int)],
+            jnp.asarray(on_road[ports], dtype=rows.dtype) if any(port >= count for port in ports) else None,
+        )
 
-    def static_wheel_loads(self) -> Float[Array, " wheels"]:
+    def static_wheel_loads(self, form: PortForm | None = None) -> Float[Array, " wheels"]:
         """Load of each wheel at rest on level ground [N], in the order of the wheels.
 
         Where the weight can stand on the wheels in one way only, it does. Where there are more wheels than that, it is
         shared as if all springs were free of load on the same level ground before: K_t q = −weight, with the springs
         of the laws in the tangent stiffness K_t.
+
+        Arguments:
+            form: the matrices, if they are known already.
         """
+        form = self.port_form() if form is None else form
         own = [element.together for _, _, element in self._elements()]
-        form = self._assembled([part for _, part, _ in self._elements()])
-        weight = jnp.zeros(len(self.coordinates)).at[jnp.array(self._heights())].set(STANDARD_GRAVITY)
+        standing = None if form.port_road is None else form.port_road[: len(own)]
+        form = dataclasses.replace(form, ports=form.ports[: len(own)], port_road=standing)  # without lift-off
+        heights = np.array([name in {f"z_{body.name}" for body in self.bodies} for name in self.coordinates])
         stiffness = tangent_stiffness(form, own, jnp.zeros(len(self.coordinates)))
-        sunk = jnp.linalg.solve(stiffness, -jnp.diag(form.mass) * weight)
+        sunk = jnp.linalg.solve(stiffness, -jnp.diag(form.mass) * (STANDARD_GRAVITY * heights))
         tyres = jnp.stack([wheel.stiffness for wheel in self.wheels])
-        loads = -tyres * (jnp.stack([wheel.point.row(self.coordinates) for wheel in self.wheels]) @ sunk)
+        loads = -tyres * (matrix([wheel.point for wheel in self.wheels], self.coordinates) @ sunk)
         direct = [i for i, (_, part, _) in enumerate(self._elements()) if isinstance(part, Wheel)]
         if direct and form.port_road is not None:
             slopes, _ = Ports(own).stiffness_and_damping(jnp.zeros(len(own)))
-            loads = loads - form.port_road[jnp.array(direct)].T @ (slopes * (form.ports @ sunk))[jnp.array(direct)]
+            loads = loads - form.port_road[np.array(direct)].T @ (slopes * (form.ports @ sunk))[np.array(direct)]
         return loads
-
-    def _heights(self) -> list[int]:
-        return [i for i, name in enumerate(self.coordinates) if name in {f"z_{body.name}" for body in self.bodies}]
 
     @property
     def axles(self) -> tuple[int, ...]:

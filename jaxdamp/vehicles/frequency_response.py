@@ -54,7 +54,7 @@ def frequency_response(
     linear = as_linear(vehicle)
     gains = gains_by_wheel(linear, points)
     if not by_wheel:
-        gains = jnp.sum(gains * turning(points, linear.delays(speed, in_phase))[:, None], axis=2)
+        gains = jnp.sum(gains * phase_factors(points, linear.delays(speed, in_phase))[:, None], axis=2)
     return {name: gains[:, i] for i, name in enumerate(linear.channels)}
 
 
@@ -79,7 +79,7 @@ def gains_by_wheel(
     return c @ states + d + s * f
 
 
-def turning(
+def phase_factors(
     frequency: Float[Array, " frequencies"], delays: Float[Array, " wheels"]
 ) -> Complex[Array, "frequencies wheels"]:
     """exp(−2πi f τ)."""
@@ -137,7 +137,7 @@ def spectral_rms(
     if levels.shape != points.shape:
         _checks.refuse("density", f"have the shape {points.shape} of `frequency`", f"of shape {levels.shape}")
     linear = as_linear(vehicle)
-    gains, turned = gains_by_wheel(linear, points), turning(points, linear.delays(speed, in_phase))
+    gains, turned = gains_by_wheel(linear, points), phase_factors(points, linear.delays(speed, in_phase))
     shared = sides = None
     if coherence is not None:
         shared = jnp.asarray(coherence, dtype=float)

@@ -6,11 +6,11 @@ import equinox as eqx
 
 from jaxdamp._types import Number
 from jaxdamp.parameters import parameter, positive
-from jaxdamp.vehicles.axle import Axle, carry
+from jaxdamp.vehicles.axle import Axle
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Body, Place
-from jaxdamp.vehicles.seat import Seat, seated
+from jaxdamp.vehicles.seat import Seat, seat_parts
 
 
 @final
@@ -50,10 +50,10 @@ class FullCar(AbstractVehicle):
     def frame(self) -> Frame:
         """Coordinates z_sprung, pitch, roll, then wheels (front left, front right, rear left, rear right), seats."""
         body = Body("sprung", self.sprung_mass, pitch_inertia=self.pitch_inertia, roll_inertia=self.roll_inertia)
-        front = carry(self.front, "front", body, ahead=self.front_distance)
+        front = self.front.parts("front", body, ahead=self.front_distance)
         wheelbase = self.front_distance + self.rear_distance
-        rear = carry(self.rear, "rear", body, ahead=-self.rear_distance, behind=wheelbase)
-        bodies, links = seated(self.seats, body)
+        rear = self.rear.parts("rear", body, ahead=-self.rear_distance, behind=wheelbase)
+        bodies, links = seat_parts(self.seats, body)
         return Frame(
             (body, *front[0], *rear[0], *bodies), (*front[1], *rear[1], *links), front[2] + rear[2], self.places
         ).lifting(self.tyre_lifts)

@@ -7,10 +7,10 @@ import equinox as eqx
 from jaxdamp._types import Number
 from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles.base import AbstractVehicle
-from jaxdamp.vehicles.corner import Corner, suspend
+from jaxdamp.vehicles.corner import Corner
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Body, Place
-from jaxdamp.vehicles.seat import Seat, seated
+from jaxdamp.vehicles.seat import Seat, seat_parts
 
 
 @final
@@ -54,8 +54,8 @@ class HalfCar(AbstractVehicle):
         """Coordinates z_sprung, pitch, z_front_unsprung, z_rear_unsprung, then seats; wheels front, rear."""
         body = Body("sprung", self.sprung_mass, pitch_inertia=self.pitch_inertia)
         wheelbase = self.front_distance + self.rear_distance
-        front = suspend(self.front, "front", body.at(self.front_distance))
-        rear = suspend(self.rear, "rear", body.at(-self.rear_distance), behind=wheelbase)
-        bodies, links = seated(self.seats, body)
+        front = self.front.parts("front", body.at(self.front_distance))
+        rear = self.rear.parts("rear", body.at(-self.rear_distance), behind=wheelbase)
+        bodies, links = seat_parts(self.seats, body)
         suspensions, tyres = (front[1], rear[1], *links), (front[2], rear[2])
         return Frame((body, front[0], rear[0], *bodies), suspensions, tyres, self.places).lifting(self.tyre_lifts)

@@ -13,7 +13,6 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import ScalarLike
 from jaxdamp.vehicles.base import AbstractVehicle
-from jaxdamp.vehicles.channels import Instant
 from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position
 from jaxdamp.vehicles.equivalent import equivalent_slopes
 from jaxdamp.vehicles.ports import Ports
@@ -110,20 +109,19 @@ def linearise(vehicle: AbstractVehicle, *, amplitude: Any = None, frequency: Any
 
 @eqx.filter_jit
 def _linearise(vehicle: AbstractVehicle, amplitude: Array | None, frequency: Array | None) -> LinearVehicle:
-    form, laws = vehicle.port_form(), vehicle.elements()
-    ports = Ports(laws)
+    system, frame = vehicle.system(), vehicle.frame()
+    form, ports, layout = system.form, Ports(system.laws), system.layout
     n, wheels = form.road_stiffness.shape
     level = jnp.zeros(wheels)
-    rest = rest_position(form, laws, level)
+    rest = rest_position(system, level)
     start, unravel = jax.flatten_util.ravel_pytree(ports.initial())
     equivalent = None
     if amplitude is not None and frequency is not None:
         equivalent = equivalent_slopes(ports, form.at_ports(rest, level), amplitude, frequency)
         start = start[:0]
-    system = form.first_order()
 
     rest_state = jnp.concatenate([rest, jnp.zeros(n), start])
-    size, names = rest_state.size, tuple(vehicle.units)
+    size = rest_state.size
 
     def everything(inputs: Array) -> Array:
         """Rates of the state, then channels, from state, road heights and road rates."""
@@ -136,16 +134,13 @@ def _linearise(vehicle: AbstractVehicle, amplitude: Array | None, frequency: Arr
             states = unravel(x[2 * n :])
             forces = ports.force(deflection, rate, states)
             inner = ports.state_rate(deflection, rate, states)
-        driven = system.road_input @ road + system.road_rate_input @ road_rate
-        motion = system.state_matrix @ x[: 2 * n] + system.port_input @ forces + driven
-        channels = vehicle.channels(Instant(x[:n], x[n : 2 * n], motion[n:], road, road_rate, forces))
-        return jnp.concatenate([motion, *map(jnp.ravel, inner), jnp.stack([channels[name] for name in names])])
+        at = x[: 2 * n], forces, road, road_rate
+        return jnp.concatenate([system.motion(*at), *map(jnp.ravel, inner), system.outputs(*at)])
 
     slopes = jax.jacfwd(everything)(jnp.concatenate([rest_state, level, level]))
     (a, b, e), (c, d, f) = (jnp.split(part, [size, size + wheels], axis=1) for part in jnp.split(slopes, [size]))
-    frame = vehicle.frame()
     behind, left = (jnp.stack(values) for values in zip(*((w.behind, w.left) for w in frame.wheels), strict=True))
-    return LinearVehicle(a, b, e, c, d, f, behind, left, vehicle.coordinates, names, max(frame.axles) + 1)
+    return LinearVehicle(a, b, e, c, d, f, behind, left, layout.coordinates, tuple(layout.units), max(layout.axles) + 1)
 
 
 def as_linear(vehicle: AbstractVehicle | LinearVehicle) -> LinearVehicle:

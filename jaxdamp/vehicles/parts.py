@@ -1,6 +1,6 @@
 """What a vehicle is made of: rigid bodies, links between their points, wheels on the road."""
 
-from typing import Any, final
+from typing import Any, TypeAlias, final
 
 import equinox as eqx
 
@@ -12,6 +12,7 @@ from jaxdamp.vehicles.points import Point
 
 
 SPRUNG = "sprung"
+Parts: TypeAlias = "tuple[tuple[Body, ...], tuple[Link, ...], tuple[Wheel, ...]]"
 
 
 def prefixed(name: str, word: str) -> str:
@@ -39,6 +40,11 @@ class Inertia(AbstractPart):
 
     axis: str = eqx.field(static=True)
     moment: Number = parameter("kg m²", "moment of inertia about the centre of gravity", positive)
+
+    @property
+    def sense(self) -> str:
+        """Its positive direction."""
+        return {"pitch": "nose up", "roll": "left side up"}[self.axis]
 
 
 @final
@@ -184,6 +190,12 @@ class Wheel(AbstractPart):
     lifts: bool = eqx.field(static=True, default=False)
     beside: bool = eqx.field(static=True, default=False)
     sides: int = eqx.field(static=True, default=1)
+
+    @property
+    def element_names(self) -> tuple[str, ...]:
+        """Names of the elements between it and the road, with that of a tyre that can leave it."""
+        own = [element.name for element in self.elements] + ["lift_off"] * self.lifts
+        return tuple(prefixed(self.name, name) for name in own)
 
 
 @final

@@ -1,10 +1,11 @@
 """Points and angles of a vehicle as linear functions of its coordinates."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, final
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp._types import ScalarLike
@@ -45,11 +46,15 @@ class Point(eqx.Module):
     def __sub__(self, other: "Point") -> "Point":
         return self + -other
 
-    def of(self, values: Mapping[str, Any]) -> Any:
-        """Its value for values of the coordinates by name."""
-        shares = [values[name] if _is_one(c) else c * values[name] for name, c in self.terms.items()]
-        return sum(shares[1:], shares[0])
 
-    def row(self, coordinates: Sequence[str]) -> Float[Array, " q"]:
-        """The coefficients in the order of the coordinates; others are left out (`Frame` refuses them)."""
-        return jnp.stack([jnp.asarray(self.terms.get(name, 0.0), dtype=float) for name in coordinates])
+def matrix(points: Sequence[Point], coordinates: Sequence[str]) -> Float[Array, "points coordinates"]:
+    """The coefficients of points, a row each, in the order of the coordinates; others are left out."""
+    numbers: list[Any] = [0.0, 1.0]  # each entry is one of these: a gather compiles faster than a stack of rows
+    entries = np.zeros((len(points), len(coordinates)), dtype=int)
+    column = {name: j for j, name in enumerate(coordinates)}
+    for i, point in enumerate(points):
+        for name, coefficient in point.terms.items():
+            if name in column:
+                entries[i, column[name]] = 1 if _is_one(coefficient) else len(numbers)
+                numbers += [] if _is_one(coefficient) else [coefficient]
+    return jnp.stack([jnp.asarray(number, dtype=float) for number in numbers])[entries]

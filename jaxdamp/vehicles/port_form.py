@@ -11,22 +11,10 @@ from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
-from jaxdamp._types import Scalar
-
-
-@final
-class Connection(eqx.Module):
-    """A linear spring, with a linear dashpot beside it, between points of the vehicle or to the road.
-
-    Its extension is `row` · q − `road` · z_r [m].
-    """
-
-    row: Float[Array, " q"]
-    road: Float[Array, " wheels"]
-    stiffness: Scalar
-    damping: Scalar
+from jaxdamp._vectors import Matrix, Vector, plus, rows, times
 
 
 @final
@@ -46,15 +34,15 @@ class PortForm(eqx.Module):
     ports: Float[Array, "ports q"]
     port_road: Float[Array, "ports wheels"] | None = None  # S; None where no element stands on the road
 
-    def first_order(self) -> "FirstOrder":
-        """The matrices of ẋ = A x + B_f f + B_r z_r + B_d ż_r, x = (q, q̇), from one system with the mass matrix."""
+    def first_order(self) -> "LinearMap":
+        """ẋ = A x + B_f f + B_r z_r + B_d ż_r of the motion x = (q, q̇), by one solution with the mass matrix."""
         n, ports, wheels = self.mass.shape[0], self.ports.shape[0], self.road_stiffness.shape[1]
         forces = [-self.stiffness, -self.damping, -self.ports.T, self.road_stiffness, self.road_damping]
         rates = jnp.linalg.solve(self.mass, jnp.concatenate(forces, axis=1))
         eye = jnp.eye(n, 2 * n + ports + 2 * wheels, n, dtype=rates.dtype)  # the upper half: q̇ is q̇
         whole = jnp.concatenate([eye, rates])
         ends = [2 * n, 2 * n + ports, 2 * n + ports + wheels]
-        return FirstOrder(*jnp.split(whole, ends, axis=1))
+        return LinearMap(*jnp.split(whole, ends, axis=1))
 
     def at_ports(
         self, coordinates: Float[Array, "*time q"], road: Float[Array, "*time wheels"]
@@ -65,32 +53,57 @@ class PortForm(eqx.Module):
 
 
 @final
-class FirstOrder(eqx.Module):
-    """ẋ = A x + B_f f + B_r z_r + B_d ż_r of the motion x = (q, q̇)."""
+class LinearMap(eqx.Module):
+    """y = X x + F f + R z + S ż of the motion x = (q, q̇), the forces f and the heights z, matrices or scalars."""
 
-    state_matrix: Float[Array, "n n"]
-    port_input: Float[Array, "n ports"]
-    road_input: Float[Array, "n wheels"]
-    road_rate_input: Float[Array, "n wheels"]
+    motion: Matrix
+    force: Matrix
+    road: Matrix
+    road_rate: Matrix
+
+    def __call__(self, motion: Vector, force: Vector, road: Vector, road_rate: Vector | None) -> Vector:
+        """Its value; what the road gives is summed first, as it is the same for all cars. No rate is a rate of zero."""
+        given = times(self.road, road)
+        if road_rate is not None:
+            given = plus(given, times(self.road_rate, road_rate))
+        return plus(given, times(self.motion, motion), times(self.force, force))
+
+    def of(self, numbers: Sequence[int]) -> "LinearMap":
+        """Some of its rows."""
+        chosen = np.array(numbers, dtype=int)
+        return LinearMap(self.motion[chosen], self.force[chosen], self.road[chosen], self.road_rate[chosen])
+
+    def scalars(self) -> "LinearMap":
+        """The same, rows of scalars for matrices."""
+        return LinearMap(*map(rows, (self.motion, self.force, self.road, self.road_rate)))
 
 
-def assemble(
+def sum_springs(
     mass: Float[Array, "q q"],
-    connections: Sequence[Connection],
+    links: Float[Array, "links q"],
+    road: Float[Array, "links wheels"],
+    stiffness: Float[Array, " links"],
+    damping: Float[Array, " links"],
     ports: Float[Array, "ports q"],
     port_road: Float[Array, "ports wheels"] | None = None,
 ) -> PortForm:
-    """Sum the connections into matrices: K = Σ Rᵀ k R, K_r = Σ Rᵀ k S, K_g = Σ Sᵀ k S."""
-    rows = jnp.stack([c.row for c in connections])
-    road = jnp.stack([c.road for c in connections])
-    springs = rows.T * jnp.stack([c.stiffness for c in connections])[None, :]
-    dashpots = rows.T * jnp.stack([c.damping for c in connections])[None, :]
-    ground_springs = road.T * jnp.stack([c.stiffness for c in connections])[None, :]
-    ground_dashpots = road.T * jnp.stack([c.damping for c in connections])[None, :]
+    """The form of springs and dashpots whose extensions are R q − S z_r: K = Σ Rᵀ k R, K_r = Σ Rᵀ k S, K_g = Σ Sᵀ k S.
+
+    Arguments:
+        mass: M.
+        links: R, a row for each spring with the dashpot beside it.
+        road: S.
+        stiffness: k [N/m].
+        damping: c [N s/m].
+        ports: rows of the elements.
+        port_road: S of the elements; None where none stands on the road.
+    """
+    springs, dashpots = links.T * stiffness[None, :], links.T * damping[None, :]
+    ground_springs, ground_dashpots = road.T * stiffness[None, :], road.T * damping[None, :]
     return PortForm(
         mass,
-        springs @ rows,
-        dashpots @ rows,
+        springs @ links,
+        dashpots @ links,
         springs @ road,
         dashpots @ road,
         ground_springs @ road,

@@ -49,7 +49,7 @@ class Ports(eqx.Module):
     """
 
     laws: tuple[AbstractDamper, ...]  # one of each kind, its arrays stacked where there are several
-    members: tuple[tuple[int, ...], ...]  # the ports of each kind
+    members: tuple[tuple[int, ...], ...] = eqx.field(static=True)  # the ports of each kind
     smooth: tuple[bool, ...] = eqx.field(static=True)  # whether the states of each kind may be extrapolated
 
     def __init__(self, laws: Sequence[AbstractDamper], *, apart: bool = False) -> None:

@@ -5,17 +5,20 @@ from typing import final
 import equinox as eqx
 
 from jaxdamp._types import Number, Scalar
-from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import nonnegative, parameter, positive
+from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles.base import AbstractVehicle
-from jaxdamp.vehicles.corner import suspend
+from jaxdamp.vehicles.corner import AbstractCorner
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Body
-from jaxdamp.vehicles.seat import Seat, seated
+from jaxdamp.vehicles.seat import Seat, seat_parts
+
+
+class _SprungMass(AbstractVehicle):
+    sprung_mass: Number = parameter("kg", "mass of the body on this corner", positive)
 
 
 @final
-class QuarterCar(AbstractVehicle):
+class QuarterCar(AbstractCorner, _SprungMass):  # in this order, the sprung mass is the first argument
     """A quarter of a car: sprung mass, spring and damper, unsprung mass, tyre.
 
     m_s z̈_s = −k_s (z_s − z_u) − F,  m_u z̈_u = k_s (z_s − z_u) + F − F_t, F_t = k_t (z_u − z_r) + c_t (ż_u − ż_r), with
@@ -38,16 +41,6 @@ class QuarterCar(AbstractVehicle):
     12993.81
     """
 
-    sprung_mass: Number = parameter("kg", "mass of the body on this corner", positive)
-    unsprung_mass: Number = parameter("kg", "mass of wheel and hub", positive)
-    spring_rate: Number = parameter("N/m", "suspension spring rate at the wheel", positive)
-    tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness", positive)
-    damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
-    tyre_damping: Number = parameter("N s/m", "vertical tyre damping", nonnegative, default=0.0)
-    extra_spring: AbstractDamper | None = None
-    bump_stop: AbstractDamper | None = None
-    friction: AbstractDamper | None = None
-    tyre_lifts: bool = eqx.field(static=True, default=False)
     seats: tuple[Seat, ...] = ()
     damper_count: int = eqx.field(static=True, default=1)
 
@@ -58,6 +51,6 @@ class QuarterCar(AbstractVehicle):
     def frame(self) -> Frame:
         """Coordinates z_sprung, z_unsprung, then seats; one wheel."""
         body = Body("sprung", self.sprung_mass)
-        wheel, suspension, tyre = suspend(self, "", body.at())
-        bodies, links = seated(self.seats, body)
+        wheel, suspension, tyre = self.parts("", body.at())
+        bodies, links = seat_parts(self.seats, body)
         return Frame((body, wheel, *bodies), (suspension, *links), (tyre,))

@@ -6,11 +6,11 @@ import equinox as eqx
 
 from jaxdamp._types import Number
 from jaxdamp.parameters import parameter, positive
-from jaxdamp.vehicles.axle import Axle, carry
+from jaxdamp.vehicles.axle import Axle
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Body, Place
-from jaxdamp.vehicles.seat import Seat, seated
+from jaxdamp.vehicles.seat import Seat, seat_parts
 
 
 @final
@@ -45,7 +45,7 @@ class RollCar(AbstractVehicle):
     def frame(self) -> Frame:
         """Coordinates z_sprung, roll, z_left_unsprung, z_right_unsprung, then seats; wheels left, right."""
         body = Body("sprung", self.sprung_mass, roll_inertia=self.roll_inertia)
-        wheels, suspensions, tyres = carry(self.axle, "", body)
-        bodies, links = seated(self.seats, body)
+        wheels, suspensions, tyres = self.axle.parts("", body)
+        bodies, links = seat_parts(self.seats, body)
         frame = Frame((body, *wheels, *bodies), (*suspensions, *links), tyres, self.places)
         return frame.lifting(self.tyre_lifts)

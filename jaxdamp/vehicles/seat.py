@@ -9,17 +9,30 @@ from jaxdamp import _checks
 from jaxdamp._types import Number
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import as_float, parameter, positive
-from jaxdamp.vehicles.parts import AbstractPart, Body, Element, Link
+from jaxdamp.vehicles.parts import AbstractPart, Body, Link
 from jaxdamp.vehicles.points import Point
+from jaxdamp.vehicles.suspension import Suspension
 
 
 @final
 class SeatMass(AbstractPart):
-    """A mass on a spring and a damper, such as seat and driver on the seat's suspension."""
+    """A mass on a spring and a damper, such as seat and driver on the seat's suspension.
+
+    Arguments:
+        mass: on the spring [kg].
+        spring_rate: under the mass [N/m].
+        damper: law under the mass.
+        extra_spring: law beside the linear spring, such as `dampers.GasSpring`.
+        bump_stop: law such as `dampers.BumpStop`.
+        friction: law such as `dampers.CoulombFriction`.
+    """
 
     mass: Number = parameter("kg", "mass on the spring", positive)
     spring_rate: Number = parameter("N/m", "spring rate under the mass", positive)
     damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
+    extra_spring: AbstractDamper | None = None
+    bump_stop: AbstractDamper | None = None
+    friction: AbstractDamper | None = None
 
 
 @final
@@ -53,7 +66,7 @@ class Seat(eqx.Module):
             _checks.refuse("masses", "hold one or more", self.masses)
 
 
-def seated(seats: Sequence[Seat], body: Body) -> tuple[tuple[Body, ...], tuple[Link, ...]]:
+def seat_parts(seats: Sequence[Seat], body: Body) -> tuple[tuple[Body, ...], tuple[Link, ...]]:
     """The bodies and links of seats on a body."""
     bodies: list[Body] = []
     links: list[Link] = []
@@ -62,8 +75,8 @@ def seated(seats: Sequence[Seat], body: Body) -> tuple[tuple[Body, ...], tuple[L
         for number, stage in enumerate(seat.masses, 1):
             name = seat.name if number == 1 else f"{seat.name}_{number}"
             above = Body(name, stage.mass)
-            element = Element("damper", stage.damper)
-            links.append(Link(name, above.at() - below, stage.spring_rate, elements=(element,)))
+            laws = stage.damper, stage.extra_spring, stage.bump_stop, stage.friction
+            links.append(Suspension(stage.spring_rate, *laws).link(name, above.at() - below))
             bodies.append(above)
             below = above.at()
     return tuple(bodies), tuple(links)

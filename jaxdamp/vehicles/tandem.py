@@ -7,11 +7,9 @@ import equinox as eqx
 from jaxdamp._types import Number
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import nonnegative, parameter, positive
-from jaxdamp.vehicles.corner import Corner, suspend
-from jaxdamp.vehicles.parts import AbstractPart, Body, Element, Link, Wheel
-
-
-Parts = tuple[tuple[Body, ...], tuple[Link, ...], tuple[Wheel, ...]]
+from jaxdamp.vehicles.corner import Corner
+from jaxdamp.vehicles.parts import AbstractPart, Body, Parts, Wheel
+from jaxdamp.vehicles.suspension import Suspension
 
 
 @final
@@ -31,6 +29,9 @@ class WalkingBeam(AbstractPart):
         damper: law over the middle, both sides together.
         tyre_damping: of each axle [N s/m].
         tyre_lifts: whether the tyres can leave the road.
+        extra_spring: law beside the leaf spring, both sides together.
+        bump_stop: law over the middle, both sides together.
+        friction: law over the middle, such as that of the leaves, both sides together.
     """
 
     mass: Number = parameter("kg", "mass of beam, axles and wheels", positive)
@@ -41,12 +42,15 @@ class WalkingBeam(AbstractPart):
     damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
     tyre_damping: Number = parameter("N s/m", "vertical tyre damping of an axle", nonnegative, default=0.0)
     tyre_lifts: bool = eqx.field(static=True, default=False)
+    extra_spring: AbstractDamper | None = None
+    bump_stop: AbstractDamper | None = None
+    friction: AbstractDamper | None = None
 
     def parts(self, body: Body, ahead: Any, behind: Any) -> Parts:
         """The beam under a point `ahead` of the centre of gravity, its middle `behind` the front axle [m]."""
         beam, half = Body("beam", self.mass, pitch_inertia=self.pitch_inertia), 0.5 * self.spread
-        elements = (Element("damper", self.damper),)
-        leaf = Link("tandem", body.at(ahead) - beam.at(), self.spring_rate, elements=elements, sides=2)
+        laws = self.damper, self.extra_spring, self.bump_stop, self.friction
+        leaf = Suspension(self.spring_rate, *laws).link("tandem", body.at(ahead) - beam.at(), sides=2)
         tyres = tuple(
             Wheel(
                 f"tandem_{i}",
@@ -78,7 +82,7 @@ class IndependentTandem(AbstractPart):
         """The axles about a point `ahead` of the centre of gravity, `behind` the front axle [m]."""
         half = 0.5 * self.spread
         axles = [
-            suspend(self.axle, f"tandem_{i}", body.at(ahead + forward), behind=behind - forward, sides=2)
+            self.axle.parts(f"tandem_{i}", body.at(ahead + forward), behind=behind - forward, sides=2)
             for i, forward in ((1, half), (2, -half))
         ]
         bodies, links, tyres = zip(*axles, strict=True)

@@ -8,10 +8,10 @@ from jaxdamp._types import Number
 from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.cab import Cab
-from jaxdamp.vehicles.corner import Corner, suspend
+from jaxdamp.vehicles.corner import Corner
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Body, Place
-from jaxdamp.vehicles.seat import Seat, seated
+from jaxdamp.vehicles.seat import Seat, seat_parts
 from jaxdamp.vehicles.tandem import IndependentTandem, WalkingBeam
 
 
@@ -52,11 +52,11 @@ class TandemTruck(AbstractVehicle):
     def frame(self) -> Frame:
         """Coordinates z_sprung, pitch, then front axle, tandem, cab, seats; wheels front, tandem_1, tandem_2."""
         body = Body("sprung", self.sprung_mass, pitch_inertia=self.pitch_inertia)
-        front, suspension, tyre = suspend(self.front, "front", body.at(self.front_distance), sides=2)
+        front, suspension, tyre = self.front.parts("front", body.at(self.front_distance), sides=2)
         behind = self.front_distance + self.tandem_distance
         axles, leaves, tyres = self.tandem.parts(body, -self.tandem_distance, behind)
         cab, mounts = ((), ()) if self.cab is None else self.cab.parts(body)
-        bodies, links = seated(self.seats, body)
+        bodies, links = seat_parts(self.seats, body)
         return Frame(
             (body, front, *axles, *cab, *bodies),
             (suspension, *leaves, *mounts, *links),

@@ -13,7 +13,8 @@ from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Body, Element, Place, Wheel
-from jaxdamp.vehicles.seat import Seat, seated
+from jaxdamp.vehicles.seat import Seat, seat_parts
+from jaxdamp.vehicles.suspension import Suspension
 
 
 class PitchDecay(NamedTuple):
@@ -46,6 +47,9 @@ class TrackedHull(AbstractVehicle):
         seats: on the hull.
         tyre_lifts: whether the road wheels can leave the ground: spring and shock absorber of a wheel, which has no
             mass, then never pull together (`LiftOff`).
+        extra_spring: law of one road wheel beside its linear spring, on every wheel.
+        bump_stop: law of one road wheel, on every wheel.
+        friction: law of one road wheel, on every wheel.
 
     Raises:
         ValueError: positions that do not fall, a damped wheel that is not there.
@@ -65,6 +69,9 @@ class TrackedHull(AbstractVehicle):
     places: tuple[Place, ...] = ()
     seats: tuple[Seat, ...] = ()
     tyre_lifts: bool = eqx.field(static=True, default=False)
+    extra_spring: AbstractDamper | None = None
+    bump_stop: AbstractDamper | None = None
+    friction: AbstractDamper | None = None
 
     def __check_init__(self) -> None:
         positions = _checks.concrete(self.wheel_positions)
@@ -79,18 +86,23 @@ class TrackedHull(AbstractVehicle):
     def frame(self) -> Frame:
         """Coordinates z_sprung, pitch, then seats; wheels wheel_1, wheel_2 and so on."""
         body = Body("sprung", self.sprung_mass, pitch_inertia=self.pitch_inertia)
+        beside = self.extra_spring, self.bump_stop, self.friction
+        laws = [
+            Suspension(self.wheel_rate, self.damper if i + 1 in self.damped else None, *beside).elements
+            for i in range(self.wheel_positions.shape[0])
+        ]
         wheels = tuple(
             Wheel(
                 f"wheel_{i + 1}",
                 body.at(place),
                 2.0 * self.wheel_rate,
                 behind=self.wheel_positions[0] - place,
-                elements=(Element("damper", self.damper, count=2),) if i + 1 in self.damped else (),
+                elements=tuple(Element(element.name, element.law, count=2) for element in laws[i]),  # on both sides
                 sides=2,
             )
             for i, place in enumerate(self.wheel_positions)
         )
-        bodies, links = seated(self.seats, body)
+        bodies, links = seat_parts(self.seats, body)
         return Frame((body, *bodies), links, wheels, self.places).lifting(self.tyre_lifts)
 
     def _squares(self) -> tuple[Scalar, Scalar, Scalar]:

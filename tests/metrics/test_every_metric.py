@@ -84,7 +84,6 @@ OTHERS = {
     "current_names",
     "evaluation_method",
     "weighting_factor",
-    "weighting_of",
     "weighting_response",
     "weighting_state_space",
 }

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from jaxdamp import dampers
 from jaxdamp.parameters import replace
 from jaxdamp.simulation.propagator import Propagator, phi_functions
 from jaxdamp.vehicles import rest_position
@@ -39,8 +38,8 @@ def test_phi_functions_of_a_defective_matrix():
 @pytest.mark.parametrize("dt", [1e-4, 1e-3, 0.02])
 def test_step_is_exact_for_straight_roads_and_parabolic_forces(dt, rng):
     """Two half steps along the same inputs are the whole step, with tyre damping."""
-    form = replace(quarter_car_000(), {"tyre_damping": 300.0}).port_form()
-    whole, half = Propagator.over(form, jnp.asarray(dt)), Propagator.over(form, jnp.asarray(dt / 2))
+    rate = replace(quarter_car_000(), {"tyre_damping": 300.0}).system().motion
+    whole, half = Propagator.over(rate, jnp.asarray(dt)), Propagator.over(rate, jnp.asarray(dt / 2))
     x, parabola, line = rng.normal(size=4), 1e3 * rng.normal(size=3), 0.01 * rng.normal(size=2)
 
     def step(p, x, begin, length):
@@ -54,10 +53,10 @@ def test_step_is_exact_for_straight_roads_and_parabolic_forces(dt, rng):
 
 
 def test_a_vehicle_at_rest_stays():
-    form = quarter_car_000().port_form()
-    p = Propagator.over(form, jnp.asarray(1e-3))
+    system = quarter_car_000().system()
+    p = Propagator.over(system.motion, jnp.asarray(1e-3))
     road = jnp.array([0.3])
-    position = rest_position(form, [dampers.Linear(2500.0)], road)
+    position = rest_position(system, road)
     start = jnp.concatenate([position, jnp.zeros(2)])
     np.testing.assert_allclose(p.phi @ start + p.road_held @ jnp.array([0.3]), start, atol=1e-14)
 
@@ -67,7 +66,7 @@ def test_batches_and_derivatives_pass_through():
 
     @jax.jit
     def phi(rate):
-        return Propagator.over(replace(car, {"spring_rate": rate}).port_form(), jnp.asarray(1e-3)).phi[2, 0]
+        return Propagator.over(replace(car, {"spring_rate": rate}).system().motion, jnp.asarray(1e-3)).phi[2, 0]
 
     rates = jnp.array([1e3, 6e4, 5e6])
     np.testing.assert_allclose(jax.vmap(phi)(rates), [phi(r) for r in rates], rtol=1e-13)

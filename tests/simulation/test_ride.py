@@ -12,7 +12,7 @@ import scipy.linalg
 from jaxdamp import Ride, dampers, metrics, roads, simulate, vehicles
 from jaxdamp.metrics.weighting import discrete_weighting
 from jaxdamp.simulation import ride as riding
-from jaxdamp.simulation.gauge import Filter
+from jaxdamp.simulation.observer import Filter
 from jaxdamp.vehicles import Body, Frame, Link, LumpedVehicle, Wheel
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
 

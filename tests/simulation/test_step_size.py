@@ -83,8 +83,7 @@ def test_a_car_without_damping():
 
 def test_light_masses_between_stiff_springs_do_not_count():
     car = presets.quarter_car_000()
-    form = car.port_form()
-    found = fastest_mode(car, form, [0.0])
+    found = fastest_mode(car.system(), [0.0])
     assert found is not None and found.coordinate == "z_unsprung"
     assert found.frequency == pytest.approx(modes(car).undamped_frequency[-1], rel=0.02)
 

@@ -1,0 +1,50 @@
+"""What stands between two points of a vehicle: a spring, a damper and what may act beside them."""
+
+from typing import final
+
+import equinox as eqx
+
+from jaxdamp._types import Number
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import parameter, positive
+from jaxdamp.vehicles.parts import AbstractPart, Element, Link
+from jaxdamp.vehicles.points import Point
+
+
+@final
+class Suspension(AbstractPart):
+    """A spring, a damper, and what may act beside them, between a wheel and the body, under a cab or a seat.
+
+    Arguments:
+        spring_rate: of the linear spring [N/m].
+        damper: law; `dampers.MotionRatio(law, ratio)` for one that moves less or more.
+        extra_spring: law beside the linear spring, such as `CubicSpring` or `dampers.GasSpring`.
+        bump_stop: law such as `dampers.BumpStop`.
+        friction: law such as `dampers.CoulombFriction`.
+        damper_count: how many dampers like `damper` act together; the channel of the force and the power are of one.
+
+    >>> from jaxdamp.dampers import BumpStop, Linear
+    >>> from jaxdamp.vehicles import Body
+    >>> body, axle = Body("sprung", 600.0), Body("unsprung", 60.0)
+    >>> suspension = Suspension(45e3, Linear(3000.0), bump_stop=BumpStop(clearance=0.06, stiffness=5e4))
+    >>> [element.name for element in suspension.link("", body.at() - axle.at()).elements]
+    ['damper', 'bump_stop']
+    """
+
+    spring_rate: Number = parameter("N/m", "spring rate", positive)
+    damper: AbstractDamper | None = None
+    extra_spring: AbstractDamper | None = None
+    bump_stop: AbstractDamper | None = None
+    friction: AbstractDamper | None = None
+    damper_count: int = eqx.field(static=True, default=1)
+
+    @property
+    def elements(self) -> tuple[Element, ...]:
+        """Its laws."""
+        named = [("damper", self.damper, self.damper_count), ("extra_spring", self.extra_spring, 1)]
+        named += [("bump_stop", self.bump_stop, 1), ("friction", self.friction, 1)]
+        return tuple(Element(name, law, count) for name, law, count in named if law is not None)
+
+    def link(self, name: str, extension: Point, *, sides: int = 1) -> Link:
+        """It as a link: its extension is the upper point less the lower point, `sides` those that it stands for."""
+        return Link(name, extension, self.spring_rate, elements=self.elements, sides=sides)
