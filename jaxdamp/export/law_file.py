@@ -16,7 +16,7 @@ from jaxdamp._types import Number
 from jaxdamp.dampers import AbstractDamper, FittedRange
 from jaxdamp.dampers.fitted_range import UNITS, has_fitted_range
 from jaxdamp.export._write import write_whole
-from jaxdamp.parameters import as_float, check_invariants
+from jaxdamp.parameters import as_float, checked
 
 
 FORMAT = "jaxdamp law"
@@ -213,8 +213,7 @@ def _law(plain: Any, where: str) -> AbstractDamper:
             _checks.refuse(here, "be one number", value)
         object.__setattr__(law, field.name, value)
     object.__setattr__(law, FITTED_TO, covered)
-    check_invariants(law)
-    return law
+    return checked(law)
 
 
 def _fitted_to(plain: Any, owner: str) -> FittedRange | None:
