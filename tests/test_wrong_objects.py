@@ -89,7 +89,7 @@ ANSWERS = {  # call: words that its refusal holds
     "bench.VirtualDyno(1500.0)": ("`law` must be a damper law", "dampers.Linear(1500.0)"),
     "bench.VirtualDyno(law).run([1.0])": ("`tests[0]` must be a test", "bench.SineTest("),
     "bench.BenchSet([law])": ("`runs[0]` must be a record", "is a Linear"),
-    "export.to_json(1500.0)": ("`law` must be a damper law",),
+    "export.to_json(1500.0)": ("`module` must be a law, a vehicle",),
     "export.to_csv(1500.0, 'law.csv', [0.0, 1.0])": ("`law` must be a damper law", "to_csv(law, path, velocities)"),
     "plots.ride(car)": ("`responses` must be a response", "is a QuarterCar", "jaxdamp.simulate(vehicle, road)"),
     "plots.force_velocity({'a': 1500.0})": ("`laws['a']` must be a damper law", "the number 1500.0"),

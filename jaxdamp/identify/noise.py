@@ -24,7 +24,7 @@ def noise_of(
         found: the minimum.
         force_noise: of the measured force [N], if it is known; it counts as independent then.
     """
-    owner, used, sigma = _owners(problem), problem.used, problem.sigma
+    owner, used, sigma = problem.owner, problem.used, problem.sigma
     if force_noise is not None:
         return np.where(used, force_noise / np.array(sigma)[owner], 1.0), 1.0
     dof = max(int(np.count_nonzero(used)) - found.values.size, 1)
@@ -32,14 +32,6 @@ def noise_of(
     alike = counted > CORRELATED and not problem.is_rounding(found.squares)
     inflation = float(np.sqrt(counted)) if alike else 1.0
     return inflation * _from_residual(found.residual, used, owner, len(sigma), dof, problem.each), inflation
-
-
-def _owners(problem: Problem) -> np.ndarray:
-    """The number of the record that each weighted residual belongs to."""
-    numbers = [np.zeros(residuals.shape, dtype=int) for residuals in problem.residuals]
-    for i, place in enumerate(problem.ranges):
-        numbers[place.batch][place.row, place.start : place.stop] = i
-    return np.concatenate([np.ravel(a) for a in numbers])
 
 
 def _from_residual(

@@ -11,7 +11,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.dampers.base import Reach
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, started
-from jaxdamp.identify.traces import batches
+from jaxdamp.identify.traces import batches, owners
 from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
 
 
@@ -53,9 +53,10 @@ def prepare(
     free = free_parameters(_spread(begin, own, len(runs)), freeze=freeze, bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
     residuals, ranges = batches(begin, runs, sigma, samples_per_cycle, own)
+    owner = owners(residuals, ranges)
     level = float(np.sqrt(sum(np.sum(np.square(part.force * part.weight)) for part in residuals)))
     reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
-    return Problem(free, residuals, level, runs, tuple(sigma), tuple(ranges), reach, begin, own, weighting == "runs")
+    return Problem(free, residuals, level, runs, tuple(sigma), owner, reach, begin, own, weighting == "runs")
 
 
 def _per_record(law: AbstractDamper, names: Sequence[str], sigma: Sequence[float]) -> tuple[str, ...]:

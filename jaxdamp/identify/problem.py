@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper
@@ -30,15 +30,9 @@ class AbstractResiduals(eqx.Module):
     def used(self) -> Bool[np.ndarray, " samples"]:
         """Which samples count; the others are padding, or lie before the model has settled."""
 
-
-class SampleRange(NamedTuple):
-    """Where a record is: samples `start` to `stop` of a row of a batch, each the mean of `block` measured ones."""
-
-    batch: int
-    row: int
-    start: int
-    stop: int
-    block: int
+    @abstractmethod
+    def total_weight(self) -> Float[Array, ""]:
+        """Sum of the squared weights, the number of samples as measured where all weigh the same."""
 
 
 class Problem(NamedTuple):
@@ -50,7 +44,7 @@ class Problem(NamedTuple):
         level: size of the measured forces in the units of the residuals, root of the sum of squares.
         runs: the records given.
         sigma: standard deviation [N] by which the residuals of each record are divided, infinite for one left out.
-        ranges: where each record stands in the residuals.
+        owner: the number of the record that each sample of the residuals belongs to.
         reach: how far the fitted records go.
         law: the model to start from with one value for each parameter.
         per_record: paths of the parameters that have a value for each record.
@@ -62,7 +56,7 @@ class Problem(NamedTuple):
     level: float
     runs: tuple[BenchRun, ...]
     sigma: tuple[float, ...]
-    ranges: tuple[SampleRange, ...]
+    owner: Int[np.ndarray, " samples"]
     reach: Reach
     law: AbstractDamper
     per_record: tuple[str, ...]

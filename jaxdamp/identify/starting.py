@@ -27,7 +27,7 @@ def started(law: Start, runs: Sequence[BenchRun]) -> AbstractDamper:
     check_start("law", law)
     if isinstance(law, AbstractDamper):
         return without_fitted_ranges(law)
-    make = law
+    make: Any = law
     if isinstance(law, type):
         make = getattr(law, "from_runs", None) or getattr(law, "guess", None)
         if make is None:

@@ -15,7 +15,7 @@ from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 from jaxdamp.dampers._commands import command_paths
 from jaxdamp.dampers.command import takes_command, with_command
 from jaxdamp.dampers.coverage import require_finite_force
-from jaxdamp.identify.problem import AbstractResiduals, SampleRange
+from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.parameters import get, with_values
 from jaxdamp.rig import march
 
@@ -56,10 +56,19 @@ class Batch(AbstractResiduals):
         """Which samples count."""
         return np.ravel(self.weight) > 0
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Numbers of records and of samples of each."""
-        return self.weight.shape
+    def total_weight(self) -> Float[Array, ""]:
+        """Sum of the squared weights."""
+        return jnp.sum(jnp.square(self.weight))
+
+
+class SampleRange(NamedTuple):
+    """Where a record is: samples `start` to `stop` of a row of a batch, each the mean of `block` measured ones."""
+
+    batch: int
+    row: int
+    start: int
+    stop: int
+    block: int
 
 
 class _Row(NamedTuple):
@@ -234,6 +243,14 @@ def batches(
             ranges[i] = SampleRange(number, k, rows[i].warm_up, len(rows[i].weight), rows[i].block)
     made = tuple(_batch([rows[i] for i in group], fixed, per_record) for group in groups)
     return made, [ranges[i] for i in range(len(runs))]
+
+
+def owners(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> Int[np.ndarray, " samples"]:
+    """The number of the record that each sample of the residuals belongs to."""
+    numbers = [np.zeros(batch.weight.shape, dtype=int) for batch in made]
+    for i, at in enumerate(ranges):
+        numbers[at.batch][at.row, at.start : at.stop] = i
+    return np.concatenate([np.ravel(a) for a in numbers])
 
 
 @eqx.filter_jit

@@ -20,9 +20,10 @@ from jaxdamp.dampers import AbstractDamper, with_fitted_range
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.judging import notes_on
 from jaxdamp.identify.preparing import prepare
+from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.result import AbstractFitted, score
 from jaxdamp.identify.starting import Start
-from jaxdamp.identify.traces import Batch, batches
+from jaxdamp.identify.traces import batches
 from jaxdamp.parameters import Coordinates
 
 
@@ -200,15 +201,15 @@ def _law(coordinates: Coordinates, raw: Array) -> AbstractDamper:
     return coordinates.free.build(coordinates.to_physical(raw))
 
 
-def _mean_square(coordinates: Coordinates, raw: Array, made: Sequence[Batch]) -> Array:
+def _mean_square(coordinates: Coordinates, raw: Array, made: Sequence[AbstractResiduals]) -> Array:
     """Mean squared error [N²] of the law over the samples that count, each as often as it was measured."""
     law = _law(coordinates, raw)
-    squares = jnp.stack([jnp.sum(jnp.square(batch(law))) for batch in made])
-    return jnp.sum(squares) / jnp.sum(jnp.stack([jnp.sum(jnp.square(batch.weight)) for batch in made]))
+    squares = jnp.stack([jnp.sum(jnp.square(part(law))) for part in made])
+    return jnp.sum(squares) / jnp.sum(jnp.stack([part.total_weight() for part in made]))
 
 
 @eqx.filter_jit
-def _error(coordinates: Coordinates, raw: Array, made: Sequence[Batch]) -> Array:
+def _error(coordinates: Coordinates, raw: Array, made: Sequence[AbstractResiduals]) -> Array:
     return jnp.sqrt(_mean_square(coordinates, raw, made))
 
 
@@ -217,7 +218,7 @@ def _descend(
     coordinates: Coordinates,
     raw: Array,
     state: Any,
-    made: Sequence[Batch],
+    made: Sequence[AbstractResiduals],
     rule: optax.GradientTransformation,
     level: float,
     count: Array,

@@ -28,9 +28,9 @@ class Coordinates(eqx.Module):
     """Free parameters as a search sees them, and back.
 
     A coordinate is its parameter divided by a unit: the magnitude of its start, or for a fit the width of its range
-    where that is finite (a tuning has bounds of its own, near the start). So the force is linear in it where it is in the parameter, and a search can end on a bound.
-    Or it is the raw number of the domain's smooth map, which has no bounds, but crawls towards the edge of its domain.
-    Which of the two depends on what the search can handle:
+    where that is finite (a tuning has bounds of its own, near the start). So the force is linear in it where it is in
+    the parameter, and a search can end on a bound. Or it is the raw number of the domain's smooth map, which has no
+    bounds, but crawls towards the edge of its domain. Which of the two depends on what the search can handle:
 
     - `smooth="none"`: bounds and linear constraints (tuning). Ordered vectors are kept in order by `order`.
     - `smooth="ordered"`: bounds (fits). Ordered vectors have a smooth map.
