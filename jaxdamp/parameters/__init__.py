@@ -10,6 +10,7 @@ parameter inside a composition. Freezing, ties and extra bounds are arguments of
 from jaxdamp.parameters._checking import check_parameters, checked
 from jaxdamp.parameters._coordinates import Bounds, Coordinates
 from jaxdamp.parameters._declaration import (
+    Module,
     Parameter,
     as_float,
     modules_inside,
@@ -40,6 +41,7 @@ __all__ = [
     "Coordinates",
     "Domain",
     "FreeParameters",
+    "Module",
     "Parameter",
     "around_zero",
     "as_float",

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any, dataclass_transform
 
 import equinox as eqx
 import jax
@@ -63,6 +63,19 @@ def _number(kind: str, declared: dict[str, Any], options: dict[str, Any]) -> Any
 
     field = eqx.field(converter=convert, metadata={kind: declared}, **options)
     return field
+
+
+if TYPE_CHECKING:
+
+    @dataclass_transform(field_specifiers=(parameter, setting, eqx.field))
+    class _DeclaringMeta(type(eqx.Module)):
+        """What tells type checkers that `parameter` and `setting` declare fields."""
+
+    class Module(eqx.Module, metaclass=_DeclaringMeta):
+        """An equinox module whose fields may be parameters and settings."""
+
+else:
+    Module = eqx.Module
 
 
 class Parameter(eqx.Module):

@@ -12,14 +12,14 @@ from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import current_names
-from jaxdamp.parameters import check_parameters, readable
+from jaxdamp.parameters import Module, check_parameters, readable
 from jaxdamp.vehicles.channels import Instant, RideMetric, channels_of, ride_metrics_of, units_of
 from jaxdamp.vehicles.descriptions import descriptions_of
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
 
 
-class AbstractVehicle(eqx.Module):
+class AbstractVehicle(Module):
     """Masses and springs with damper laws at ports.
 
     A vehicle names its parameters and has one method, `frame`, which says what it is made of; matrices, elements,

@@ -34,7 +34,7 @@ class Corner(AbstractPart):
     unsprung_mass: Number = parameter("kg", "mass of wheel and hub", positive)
     spring_rate: Number = parameter("N/m", "suspension spring rate at the wheel", positive)
     tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness", positive)
-    damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
+    damper: AbstractDamper
     tyre_damping: Number = parameter("N s/m", "vertical tyre damping", nonnegative, default=0.0)
     extra_spring: AbstractDamper | None = None
     bump_stop: AbstractDamper | None = None

@@ -19,7 +19,7 @@ class SeatMass(AbstractPart):
 
     mass: Number = parameter("kg", "mass on the spring", positive)
     spring_rate: Number = parameter("N/m", "spring rate under the mass", positive)
-    damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
+    damper: AbstractDamper
 
 
 @final
