@@ -62,7 +62,8 @@ def estimate(problem: Problem, solution: Solution, noise: Float[np.ndarray, " sa
     if not solution.closed_form and doubt and found.converged and not problem.is_rounding(found.squares):
         moved = profile(problem, found, errors, far, firm, variance)
     lower, upper = free.limits()
-    at_zero = numbers & (sides < 0) & (lower == 0) & np.isinf(upper) & (np.abs(uncertain.beyond) < BOUND_Z_SCORE)
+    pressed = ~(np.abs(uncertain.unconstrained_step) < BOUND_Z_SCORE)
+    at_zero = numbers & (sides < 0) & (lower == 0) & np.isinf(upper) & ~pressed
     undetermined = ~(moved.errors <= far) | moved.open_ended
     weak = np.where(sides != 0, at_zero | ~np.isfinite(errors), undetermined)
     estimates = _estimates(problem, found, moved.errors, weak, sides != 0, int(np.count_nonzero(used)))
@@ -95,19 +96,19 @@ def _estimates(
 
 
 def yardsticks(
-    free: FreeParameters, values: Float[np.ndarray, " free"], effect: Float[np.ndarray, " free"]
+    free: FreeParameters, values: Float[np.ndarray, " free"], sensitivity: Float[np.ndarray, " free"]
 ) -> Float[np.ndarray, " free"]:
     """A large change of each parameter: its value; for one that may have either sign, what moves the force by its RMS.
 
     Arguments:
         free: the free parameters.
         values: their values.
-        effect: RMS force that one unit of each makes, relative to the RMS of the measured force.
+        sensitivity: RMS force that one unit of each makes, relative to the RMS of the measured force.
     """
     lower, upper = free.limits()
     tiny = np.finfo(float).tiny
     signed = (lower < 0) & (upper > 0)
-    by_force = np.divide(1.0, effect, out=np.full(effect.shape, tiny), where=effect > 0)
+    by_force = np.divide(1.0, sensitivity, out=np.full(sensitivity.shape, tiny), where=sensitivity > 0)
     return np.where(signed, by_force, np.maximum(np.abs(values), tiny))
 
 
