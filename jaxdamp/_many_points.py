@@ -9,8 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxdamp._domains import Domain
-from jaxdamp.parameters import get, match_paths, parameters
+from jaxdamp.parameters import Domain, get, match_paths, parameters
 
 
 Columns = Mapping[str, np.ndarray]

@@ -14,12 +14,28 @@ Signal = Float[Array, " time"]
 VectorLike = Float[Array, " _"] | Float[np.ndarray, " _"] | Sequence[float]
 SignalLike = Float[Array, " time"] | Float[np.ndarray, " time"]
 
-# Any number goes in as a scalar. Parameters of modules: the field's converter makes numbers and sequences arrays.
+# Any number goes in as a scalar. Fields of modules: the constructor takes numbers and sequences, the converter of the
+# field makes arrays of them, which is what type checkers read from the descriptors.
 if TYPE_CHECKING:
     ScalarLike: TypeAlias = Any
-    Number: TypeAlias = Any
-    Vector: TypeAlias = Any
-    Matrix: TypeAlias = Any
+
+    class Number:
+        """A field for one number."""
+
+        def __get__(self, instance: Any, owner: Any = None) -> Array: ...
+        def __set__(self, instance: Any, value: ArrayLike) -> None: ...
+
+    class Vector:
+        """A field for numbers in a row."""
+
+        def __get__(self, instance: Any, owner: Any = None) -> Array: ...
+        def __set__(self, instance: Any, value: ArrayLike | Sequence[float] | Sequence[Array]) -> None: ...
+
+    class Matrix:
+        """A field for rows of numbers."""
+
+        def __get__(self, instance: Any, owner: Any = None) -> Array: ...
+        def __set__(self, instance: Any, value: ArrayLike | Sequence[Sequence[float]]) -> None: ...
 else:
     ScalarLike = Float[ArrayLike, ""]
     Number = Scalar

@@ -9,9 +9,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from jaxdamp.dampers import Bilinear, CoulombFriction, Lag, Linear, PiecewiseLinear, PowerLaw, SegmentedPolynomial
+from jaxdamp.dampers import (
+    Besinger,
+    Bilinear,
+    CoulombFriction,
+    Lag,
+    Linear,
+    MonoTube,
+    PiecewiseLinear,
+    PowerLaw,
+    SegmentedPolynomial,
+    TemperatureScaled,
+)
 from jaxdamp.parameters import (
+    Coordinates,
     Domain,
+    checked,
     free_parameters,
     get,
     increasing,
@@ -25,7 +38,9 @@ from jaxdamp.parameters import (
     positive,
     real,
     replace,
+    with_values,
 )
+from jaxdamp.vehicles import presets
 
 
 # ---- transforms
@@ -206,6 +221,34 @@ def test_replace_inside_compiled_functions():
     np.testing.assert_array_equal(jax.vmap(force)(rates), 0.5 * rates)
 
 
+# ---- checking again
+
+
+def test_checked_finds_what_any_module_of_a_tree_refuses():
+    law = TemperatureScaled(Linear(1500.0), temperature=330.0)
+    car = presets.quarter_car_000(law)
+    assert checked(car) is car
+    too_hot = with_values(car, {"damper.sensitivity": jnp.asarray(0.1)})
+    with pytest.raises(ValueError, match="sensitivity"):
+        checked(too_hot)
+    with pytest.raises(ValueError, match=r"`QuarterCar\.spring_rate` must be positive"):
+        checked(with_values(car, {"spring_rate": jnp.asarray(-1.0)}))
+
+
+@pytest.mark.parametrize(
+    ("law", "values"),
+    [
+        (TemperatureScaled(Linear(1500.0), temperature=330.0), {"sensitivity": 0.1}),
+        (Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05), {"compression_rate": 1.0}),
+        (MonoTube.reference(), {"gas.pressure": 9e4}),
+    ],
+    ids=["on the law inside", "between parameters", "on a part"],
+)
+def test_replace_refuses_what_the_constructor_refuses(law, values):
+    with pytest.raises(ValueError, match="Argument"):
+        replace(Lag(law, 0.004), {f"law.{name}": value for name, value in values.items()})
+
+
 # ---- free parameters
 
 
@@ -220,7 +263,6 @@ def test_free_parameters_as_vectors():
         "lag_time",
     ]
     np.testing.assert_array_equal(free.values, [500.0, 2000.0, 800.0, 40.0, 0.01, 0.004])
-    np.testing.assert_allclose(free.physical(free.raw), free.values, rtol=1e-12)
     built = free.build(2.0 * free.values)
     assert get(built, "lag_time") == 0.008
     np.testing.assert_array_equal(get(built, "law.terms.0.slopes"), [1000.0, 4000.0, 1600.0])
@@ -237,47 +279,14 @@ def test_over_and_freeze():
 
 def test_limits_and_bounds():
     law = Bilinear(2600.0, 1200.0)
-    free = free_parameters(law, bounds={"rebound_rate": (1000.0, 3000.0)})
-    lower, upper = free.limits()
+    lower, upper = free_parameters(law, bounds={"rebound_rate": (1000.0, 3000.0)}).limits()
     np.testing.assert_array_equal(lower, [1000.0, 0.0])
     np.testing.assert_array_equal(upper, [3000.0, np.inf])
-    np.testing.assert_allclose(free.physical(free.raw), [2600.0, 1200.0], rtol=1e-9)
-    for raw in (-50.0, 50.0):
-        value = free.physical(jnp.full(2, raw))[0]
-        assert 1000.0 <= value <= 3000.0
 
 
 def test_bounds_meet_the_domain():
     free = free_parameters(Linear(100.0), bounds={"rate": (-500.0, 500.0)})
     assert free.limits()[0] == 0.0
-
-
-def test_bounds_keep_the_order_of_knots():
-    law = PiecewiseLinear([-0.1, 0.2, 0.25], [500.0, 2000.0, 800.0, 700.0])
-    free = free_parameters(law, over=["knots"], bounds={"knots": (-0.5, 0.5)})
-    np.testing.assert_allclose(free.physical(free.raw), [-0.1, 0.2, 0.25], rtol=1e-9)
-    for key in range(5):
-        knots = free.physical(3.0 * jax.random.normal(jax.random.key(key), (3,)))
-        assert np.all(np.diff(knots) > 0) and knots[0] > -0.5 and knots[-1] < 0.5
-
-
-def test_a_raw_step_of_one_is_of_the_size_of_the_parameter():
-    law = SegmentedPolynomial([-1.0, -0.01], 0.2, [1.0] * 4, [1.0] * 2, [1.0] * 4, [1.0] * 2, [1.0] * 4)
-    free = free_parameters(law, over=["compression_knots"])
-    slope = jax.jacfwd(free.physical)(free.raw)
-    np.testing.assert_allclose(np.abs(slope[1, 1]), 0.01, rtol=0.5)
-    np.testing.assert_allclose(np.abs(slope[0, 0]), 0.99, rtol=0.5)
-
-
-def test_a_zero_starts_inside_its_domain():
-    free = free_parameters(PowerLaw(1800.0, 0.5, 900.0, 0.5), over=["rebound_offset"])
-    assert free.values[0] == 0.0
-    np.testing.assert_allclose(free.physical(free.raw), [0.01], rtol=1e-6)
-
-
-def test_vectors_without_numbers():
-    free = free_parameters(PiecewiseLinear([], [1500.0]))
-    assert free.names == ["slopes[0]"] and free.values.shape == free.raw.shape == free.limits()[0].shape == (1,)
 
 
 def test_build_is_differentiable():
@@ -327,3 +336,144 @@ def test_bounds_of_what_is_not_free_are_refused():
     with pytest.raises(ValueError, match=r"`bounds\['rebound_rate'\]` must bound a parameter that is free"):
         free_parameters(law, freeze=["rebound_rate"], bounds={"rebound_rate": (1.0, 1e4)})
     assert free_parameters(law, freeze=["rebound_rate"], bounds={"*_rate": (1.0, 1e4)}).names == ["compression_rate"]
+
+
+# ---- coordinates
+
+
+SMOOTH = ("none", "ordered", "all")
+
+
+@pytest.mark.parametrize("smooth", SMOOTH)
+def test_coordinates_lead_to_the_values_and_back(smooth):
+    free = free_parameters(composed(), bounds={"lag_time": (0.001, 0.01)})
+    coordinates = Coordinates(free, smooth)
+    np.testing.assert_allclose(coordinates.to_physical(coordinates.start), free.values, rtol=1e-12)
+    other = free.values * 1.2
+    np.testing.assert_allclose(coordinates.to_physical(coordinates.from_physical(other)), other, rtol=1e-9)
+
+
+@pytest.mark.parametrize("smooth", SMOOTH)
+def test_coordinates_within_bounds_and_order_are_values_within_their_domains(smooth, rng):
+    law = PiecewiseLinear([-0.1, 0.2, 0.25], [500.0, 2000.0, 800.0, 700.0])
+    coordinates = Coordinates(free_parameters(law, bounds={"slopes": (100.0, 3000.0)}), smooth)
+    (lower, upper), (rows, gaps) = coordinates.bounds(), coordinates.order()
+    assert rows.shape == ((2, 7) if smooth == "none" else (0, 7))
+    inside = 0
+    for _ in range(20):
+        y = np.clip(np.asarray(coordinates.start) + 0.3 * rng.standard_normal(7), lower, upper)
+        if np.all(rows @ y >= gaps):
+            checked(coordinates.free.build(coordinates.to_physical(jnp.asarray(y))))
+            slopes = coordinates.to_physical(jnp.asarray(y))[3:]
+            assert np.all((slopes >= 100.0) & (slopes <= 3000.0))
+            inside += 1
+    assert inside > 5
+
+
+def test_rows_of_order_say_when_knots_meet():
+    coordinates = Coordinates(free_parameters(PiecewiseLinear([-0.1, 0.2], [5.0, 6.0, 7.0]), over=["knots"]), "none")
+    rows, gaps = coordinates.order()
+    y = coordinates.from_physical(jnp.array([0.1, 0.3]))
+    np.testing.assert_allclose(rows @ np.asarray(y), [0.2], rtol=1e-12)
+    assert 0.0 < gaps[0] < 1e-6
+
+
+def test_a_raw_step_of_one_is_of_the_size_of_the_parameter():
+    law = SegmentedPolynomial([-1.0, -0.01], 0.2, [1.0] * 4, [1.0] * 2, [1.0] * 4, [1.0] * 2, [1.0] * 4)
+    coordinates = Coordinates(free_parameters(law, over=["compression_knots"]), "ordered")
+    slope = jax.jacfwd(coordinates.to_physical)(coordinates.start)
+    np.testing.assert_allclose(np.abs(slope[1, 1]), 0.01, rtol=0.5)
+    np.testing.assert_allclose(np.abs(slope[0, 0]), 0.99, rtol=0.5)
+
+
+def test_a_zero_starts_inside_its_domain_where_the_map_is_smooth():
+    coordinates = Coordinates(free_parameters(PowerLaw(1800.0, 0.5, 900.0, 0.5), over=["rebound_offset"]), "all")
+    np.testing.assert_allclose(coordinates.to_physical(coordinates.start), [0.01], rtol=1e-6)
+
+
+def test_vectors_without_numbers():
+    free = free_parameters(PiecewiseLinear([], [1500.0]))
+    assert free.names == ["slopes[0]"] and free.values.shape == free.limits()[0].shape == (1,)
+    for smooth in SMOOTH:
+        assert Coordinates(free, smooth).start.shape == (1,)
+
+
+def test_ends_of_ranges_and_neighbours():
+    law = PiecewiseLinear([-0.1, 0.2], [500.0, 2000.0, 800.0])
+    coordinates = Coordinates(free_parameters(law, bounds={"slopes": (100.0, 3000.0)}), "ordered")
+    ends = coordinates.at_ends(np.array([0.2 - 1e-7, 0.2, 100.0, 3000.0, 800.0]))
+    np.testing.assert_array_equal(ends, [1.0, -1.0, -1.0, 1.0, 0.0])
+
+
+# ---- ties
+
+
+def half_car():
+    return presets.half_car_002(Bilinear(2600.0, 1200.0))
+
+
+FRONT = {"front.damper.*": "rear.damper.*"}
+
+
+def test_a_group_of_tied_parameters_is_one_free_value():
+    free = free_parameters(half_car(), over=["damper*"], tie=FRONT)
+    assert free.names == ["rear.damper.rebound_rate", "rear.damper.compression_rate"]
+    assert free.followers == [("front.damper.rebound_rate",), ("front.damper.compression_rate",)]
+    for tree in (free.build(jnp.array([3000.0, 1000.0])), free.started_at(np.array([3000.0, 1000.0])).tree):
+        assert get(tree, "front.damper.rebound_rate") == get(tree, "rear.damper.rebound_rate") == 3000.0
+        assert get(tree, "front.damper.compression_rate") == 1000.0
+
+
+def test_the_derivative_of_a_group_is_the_sum():
+    def loads(car):
+        return 2.0 * get(car, "front.damper.rebound_rate") + 3.0 * get(car, "rear.damper.rebound_rate")
+
+    free = free_parameters(half_car(), over=["rebound_rate"], tie=FRONT)
+    assert jax.grad(lambda values: loads(free.build(values)))(free.values) == 5.0
+
+
+def test_over_freeze_and_bounds_of_one_hold_for_its_group():
+    car = half_car()
+    assert free_parameters(car, over=["front.damper.*"], tie=FRONT).names[0] == "rear.damper.rebound_rate"
+    frozen = free_parameters(car, over=["damper*"], freeze=["front.damper.rebound_rate"], tie=FRONT)
+    assert frozen.names == ["rear.damper.compression_rate"] and len(frozen.ties) == 1
+    bounded = free_parameters(car, over=["rebound_rate"], tie=FRONT, bounds={"front.*.rebound_rate": (1e3, 9e3)})
+    assert bounded.limits() == (1e3, 9e3)
+
+
+def test_one_parameter_may_lead_many_and_chains_have_one_end():
+    law = Linear(10.0) + Linear(10.0) + Linear(10.0)
+    assert free_parameters(law, tie={"rate": "terms.1.rate"}).names == ["terms.1.rate"]
+    chain = free_parameters(law, tie={"terms.0.rate": "terms.1.rate", "terms.1.rate": "terms.2.rate"})
+    assert chain.names == ["terms.2.rate"] and len(chain.followers[0]) == 2
+
+
+def test_a_group_is_linear_only_if_all_of_it_is():
+    law = replace(Linear(2.0) + 2.0 * Linear(10.0), {"terms.0.rate": 2.0})
+    assert [p.linear for p in free_parameters(law, over=["rate"]).chosen] == [True, True]
+
+
+@pytest.mark.parametrize(
+    ("tie", "message"),
+    [
+        ({"front.dmper.*": "rear.damper.*"}, "No parameter is named 'front.dmper.*'"),
+        ({"front.damper.*": "rear.dmper.*"}, "No parameter is named 'rear.dmper.*'"),
+        (
+            {"front.damper.*": "rear.*.rebound_rate"},
+            "name one parameter that front.damper.rebound_rate takes its value",
+        ),
+        ({"front.damper.rebound_rate": "*_rate"}, "name one parameter that"),
+        ({"front.damper.rebound_rate": "rear.unsprung_mass"}, "must tie parameters of one kind"),
+        (
+            {"front.damper.rebound_rate": "rear.damper.compression_rate"},
+            "must tie parameters that start from one value",
+        ),
+        (
+            {"front.*.rebound_rate": "rear.*.rebound_rate", "rear.*.rebound_rate": "front.*.rebound_rate"},
+            "lead back to",
+        ),
+    ],
+)
+def test_ties_that_make_no_sense_are_refused(tie, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        free_parameters(half_car(), tie=tie)

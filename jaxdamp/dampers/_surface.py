@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import within
-from jaxdamp._types import Matrix, Scalar, ScalarLike, Vector
+from jaxdamp._types import Scalar, ScalarLike, Vector
 
 
 CONSENT = 'Fit it to records that reach farther, or accept the values of the nearest edge beyond, `outside="hold"`.'
@@ -52,7 +52,7 @@ class Axis(NamedTuple):
         return f"{self.name} from {float(self.reach[0]):.4g} to {float(self.reach[1]):.4g} {self.unit}"
 
 
-def surface_force(coefficients: Matrix, first: Axis, second: Axis, outside: str) -> Scalar:
+def surface_force(coefficients: Float[Array, "_ _"], first: Axis, second: Axis, outside: str) -> Scalar:
     """Σ Cᵢⱼ Tᵢ Tⱼ; outside the ranges NaN, or an error where the values are known, unless `outside` is "hold"."""
     rows, columns = coefficients.shape
     weights = first.polynomials(rows)[:, None] * second.polynomials(columns)[None, :]

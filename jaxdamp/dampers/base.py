@@ -18,13 +18,13 @@ from jaxdamp.dampers._starts import Reach, starts_of_bends
 from jaxdamp.dampers.fitted_range import FittedRange
 from jaxdamp.dampers.motion import Motion
 from jaxdamp.dampers.traits import Traits, combined_traits
-from jaxdamp.parameters import check_parameters, readable
+from jaxdamp.parameters import Module, check_parameters, readable
 
 
 START = "Start from `law.initial_state()`."
 
 
-class AbstractDamper(eqx.Module):
+class AbstractDamper(Module):
     """A force law between two points, with a flat array of states (empty for memoryless laws).
 
     A law whose states are fast compared with a step of about a millisecond derives from this class and brings its own

@@ -1,7 +1,5 @@
 """Laws that take a command: a voltage, a coil current, the click of an adjuster."""
 
-import equinox as eqx
-
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import ScalarLike
@@ -9,7 +7,7 @@ from jaxdamp.dampers._commands import command_paths
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.motion import Motion
 from jaxdamp.dampers.range_use import range_use, sentence, warn_outside
-from jaxdamp.parameters import as_float, check_invariants, get
+from jaxdamp.parameters import as_float, checked, with_values
 
 
 def takes_command(law: AbstractDamper) -> bool:
@@ -37,9 +35,7 @@ def with_command(law: AbstractDamper, command: ScalarLike) -> AbstractDamper:
         remedy = "`ModifiedBoucWen` takes a voltage; `Scheduled` makes any law depend on a command."
         _checks.refuse("law", "take a command", f"{law}, which takes none", remedy)
     value = as_float(command)
-    changed = eqx.tree_at(lambda t: [get(t, path) for path in paths], law, [value] * len(paths))
-    for path in paths:
-        check_invariants(get(changed, path.rpartition(".")[0]))
+    changed = checked(with_values(law, dict.fromkeys(paths, value)))
     uses = [use for use in range_use(changed, Motion()) if use.quantity == "command"]
     warn_outside([sentence(type(law).__name__, uses)])
     return changed

@@ -16,7 +16,7 @@ def margins(tree: Any) -> Float[Array, " conditions"]:
     Every margin is in the unit of the parameter that the condition limits.
     """
     each = [getattr(law, c.parameter) - c.least for _, law in laws_inside(tree) for c in law.conditions()]
-    return jnp.stack(each) if each else jnp.zeros(0)
+    return jnp.concatenate([jnp.ravel(margin) for margin in each]) if each else jnp.zeros(0)
 
 
 def keeps_conditions(tree: Any) -> bool:

@@ -18,7 +18,7 @@ from jaxdamp.parameters import parameter, positive, setting, weight
 _ROUNDING = 0.01  # of the velocity scale, over which |v| is rounded at zero
 
 
-def relaxed_forces(forces: Vector, rates: Vector, stiffness: Vector, v: ScalarLike, dt: ScalarLike) -> Vector:
+def relaxed_forces(forces: State, rates: State, stiffness: State, v: ScalarLike, dt: ScalarLike) -> State:
     """Z [N] after a time dt [s] of ż = k v − ρ z at constant rates ρ [1/s] and velocity v [m/s], exactly."""
     decay = rates * dt
     tiny = jnp.finfo(decay.dtype).tiny
@@ -75,7 +75,7 @@ class NeuralHysteresis(AbstractDamper):
         """The force is the sum of the states."""
         return Traits(has_feed_through=False, stroke_dependent_at_rest=False)
 
-    def relaxation(self, v: ScalarLike, forces: Vector) -> Vector:
+    def relaxation(self, v: ScalarLike, forces: State) -> State:
         """ρᵢ [1/s], the rates at which the elements let go, never negative."""
         seen = jnp.concatenate([jnp.asarray(v / self.velocity_scale)[None], forces / self.force_scale])
         hidden = jnp.tanh(self.hidden_weights @ seen + self.hidden_biases)

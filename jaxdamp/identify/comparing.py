@@ -6,8 +6,9 @@ from typing import Any, NamedTuple
 
 from jaxdamp._progress import Progress
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.identify.fitting import NUMERICAL, Start, check_starts, fit
+from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.result import FitResult
+from jaxdamp.identify.starting import Start, check_starts
 
 
 class Rung(NamedTuple):

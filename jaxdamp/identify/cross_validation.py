@@ -9,9 +9,9 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.identify.fitting import Start, check_starts, fit
-from jaxdamp.identify.result import FitResult, score
-from jaxdamp.identify.training import Training
+from jaxdamp.identify.fitting import fit
+from jaxdamp.identify.result import AbstractFitted, score
+from jaxdamp.identify.starting import Start, check_starts
 
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def cross_validate(
     runs: Iterable[BenchRun],
     *,
     by: Callable[[BenchRun], Hashable] | None = None,
-    method: Callable[..., FitResult | Training] = fit,
+    method: Callable[..., AbstractFitted] = fit,
     **options: Any,
 ) -> CrossValidation:
     """Hold out each record in turn, fit every law to the others, and score it on the record held out.

@@ -25,7 +25,8 @@ from jaxdamp.dampers import (
     Spring,
     Table,
 )
-from jaxdamp.identify.fitting import NUMERICAL, Start
+from jaxdamp.identify.fitting import NUMERICAL
+from jaxdamp.identify.starting import Start, started
 
 
 def lag_time(runs: Sequence[BenchRun]) -> float:
@@ -66,6 +67,23 @@ _MEMORYLESS = {
 LAWS = (*_MEMORYLESS, "besinger_lag", "besinger_series_spring", "linear_friction_lag", "bouc_wen", "lugre_spring")
 
 
+def ladder_starts(names: Sequence[str] = LAWS) -> dict[str, Start]:
+    """Laws of the ladder as functions of the records: each fit starts them anew from its own records.
+
+    For `cross_validate`, where nothing of the record held out may leak into a start.
+
+    Raises:
+        ValueError: an unknown name.
+
+    >>> list(ladder_starts(["linear", "besinger_lag"]))
+    ['linear', 'besinger_lag']
+    """
+    names = [names] if isinstance(names, str) else names
+    for name in names:
+        _checks.one_of("law", name, LAWS)
+    return {name: functools.partial(_start, name) for name in names}
+
+
 def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dict[str, Start]:
     """Laws from plain to rich by name, each started from the records, ready for `compare` or `fit`.
 
@@ -81,21 +99,18 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dic
         ValueError: an unknown name.
     """
     runs = as_runs(runs, call="default_ladder(runs, names)")
-    names = [names] if isinstance(names, str) else names
-    for name in names:
-        _checks.one_of("law", name, LAWS)
     ladder: dict[str, Start] = {}
-    for name in names:
+    for name, start in ladder_starts(names).items():
         try:
-            ladder[name] = _start(name, runs)
+            ladder[name] = started(start, runs)
         except NUMERICAL as error:
             ladder[name] = functools.partial(_no_start, error)
     return ladder
 
 
-def _no_start(error: Exception, velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
+def _no_start(error: Exception, runs: Sequence[BenchRun]) -> AbstractDamper:
     """The place of a start that could not be made."""
-    del velocity, force
+    del runs
     raise ValueError(f"No start can be made from these records: {error}") from error
 
 

@@ -1,25 +1,17 @@
 """The noise of the measured force, as the residual of a fit shows it: its size, and how long it is alike."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jaxdamp.identify.search import Found, Problem, squares
-from jaxdamp.identify.traces import Batch, Place
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.search import SearchEnd
 
 
 CORRELATED = 3.0  # samples that count as one, above which the residual is no independent noise
 
 
 def noise_of(
-    problem: Problem,
-    found: Found,
-    places: Sequence[Place],
-    sigma: Sequence[float],
-    *,
-    each: bool,
-    force_noise: float | None,
+    problem: Problem, found: SearchEnd, force_noise: float | None
 ) -> tuple[Float[np.ndarray, " samples"], float]:
     """Standard deviation of each weighted residual, and how far correlation has inflated it.
 
@@ -28,29 +20,18 @@ def noise_of(
     the standard errors.
 
     Arguments:
-        problem: the records as they were fitted.
+        problem: what was minimised.
         found: the minimum.
-        places: where each record is.
-        sigma: standard deviation by which each record was weighted.
-        each: every record has its own noise; otherwise all have the same, in weighted residuals.
         force_noise: of the measured force [N], if it is known; it counts as independent then.
     """
-    owner, used = _owners(problem.made, places), problem.used
+    owner, used, sigma = problem.owner, problem.used, problem.sigma
     if force_noise is not None:
         return np.where(used, force_noise / np.array(sigma)[owner], 1.0), 1.0
     dof = max(int(np.count_nonzero(used)) - found.values.size, 1)
     counted = correlation_time([found.residual[used & (owner == i)] for i in np.unique(owner[used])])
-    alike = counted > CORRELATED and not problem.is_rounding(squares(found))
+    alike = counted > CORRELATED and not problem.is_rounding(found.squares)
     inflation = float(np.sqrt(counted)) if alike else 1.0
-    return inflation * _from_residual(found.residual, used, owner, len(sigma), dof, each), inflation
-
-
-def _owners(made: Sequence[Batch], places: Sequence[Place]) -> np.ndarray:
-    """The number of the record that each weighted residual belongs to."""
-    numbers = [np.zeros(batch.weight.shape, dtype=int) for batch in made]
-    for i, place in enumerate(places):
-        numbers[place.batch][place.row, place.start : place.stop] = i
-    return np.concatenate([np.ravel(a) for a in numbers])
+    return inflation * _from_residual(found.residual, used, owner, len(sigma), dof, problem.each), inflation
 
 
 def _from_residual(

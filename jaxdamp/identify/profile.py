@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp.dampers.conditions import keeps_conditions
-from jaxdamp.identify.search import Found, Problem, search, squares
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.search import SearchEnd, search
 
 
 STEPS = 15  # of each search; one cut short makes an error smaller, never larger
@@ -29,7 +30,7 @@ class Profile(NamedTuple):
 
 def profile(
     problem: Problem,
-    found: Found,
+    found: SearchEnd,
     errors: Float[np.ndarray, " free"],
     far: Float[np.ndarray, " free"],
     chosen: Bool[np.ndarray, " free"],
@@ -60,7 +61,7 @@ def profile(
                 break
             end = search(moved, STEPS, held=i)
             left -= end.steps
-            rise = (squares(end) - squares(found)) / variance
+            rise = (end.squares - found.squares) / variance
             if not rise < CHI_SQUARE:
                 break
             wide[i] = max(wide[i], distance / np.sqrt(max(rise, 1.0)))
@@ -69,7 +70,7 @@ def profile(
     return Profile(wide, open_ended)
 
 
-def _moved(problem: Problem, end: Found, index: int, value: float) -> Problem | None:
+def _moved(problem: Problem, end: SearchEnd, index: int, value: float) -> Problem | None:
     """The problem started where another search ended, with one value changed; `None` if the law forbids that."""
     lower, upper = problem.free.limits()
     values = end.values.copy()

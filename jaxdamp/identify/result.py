@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp._status import Status
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify.traces import is_memoryless, predict_runs, used_samples
+from jaxdamp.identify.traces import predict_runs, used_samples
 
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ class Estimate(NamedTuple):
     interval: tuple[float, float]  # 95 %, cut at the edges of the range
     meaning: str
     note: str  # "", "not identifiable" or "at a bound"
+    tied: tuple[str, ...] = ()  # the numbers that have the same value
 
 
 def rounded(value: float, error: float) -> tuple[str, str]:
@@ -83,11 +85,16 @@ def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray])
 
 
 def score(
-    law: AbstractDamper, runs: Sequence[BenchRun], counted: Sequence[bool] | np.ndarray | None = None
+    law: AbstractDamper | Sequence[AbstractDamper],
+    runs: Sequence[BenchRun],
+    counted: Sequence[bool] | np.ndarray | None = None,
 ) -> tuple[float, float, tuple[Score, ...]]:
-    """Fit percent and RMSE [N] of a law over the records that count together, and for each record."""
-    forces = predict_runs(law, runs)
-    kept = [slice(None)] * len(runs) if is_memoryless(law) else [used_samples(law, run) for run in runs]
+    """Fit percent and RMSE [N] of a law, or of one for each record, over the records that count, and for each."""
+    if isinstance(law, AbstractDamper):
+        forces, laws = predict_runs(law, runs), [law] * len(runs)
+    else:
+        forces, laws = [predict_runs(own, [run])[0] for own, run in zip(law, runs, strict=True)], law
+    kept = [used_samples(own, run) for own, run in zip(laws, runs, strict=True)]
     measured = [run.force[k] for run, k in zip(runs, kept, strict=True)]
     predicted = [force[k] for force, k in zip(forces, kept, strict=True)]
     rows = []
@@ -112,46 +119,31 @@ def describe(minima: Sequence[Minimum], starts: int) -> str:
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class FitResult:
-    """A fitted law with its parameters, their uncertainty and its errors.
+class AbstractFitted:
+    """A law fitted to records or trained on them, and how good it is.
 
     Attributes:
         law: the fitted law.
         runs: the records given; those with an infinite weighting were not fitted.
-        parameters: an estimate for each free number, with unit, standard error and 95 % interval.
-        covariance: of the free numbers, in their units, in the order of `parameters`.
         fit_percent: 100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all records fitted.
         rmse: root of the mean squared error over all records fitted [N].
         scores: the same for each record given.
         warnings: what a user should know before trusting the numbers, in words.
-        converged: whether the search ended by its tolerance.
-        steps: steps of the search that gave the law, 0 for a closed form.
-        starts: how many starts were tried, 1 for a closed form.
-        minima: where they ended, the best first, which is this result. Starts that were given up are in none.
-        inflation: the standard errors are so many times those for independent noise, because the residual is
-            correlated from sample to sample; 1 where it is not, or where the noise was stated.
+        status: how the search ended.
     """
 
     law: AbstractDamper
     runs: tuple[BenchRun, ...]
-    parameters: tuple[Estimate, ...]
-    covariance: Float[np.ndarray, "free free"]
     fit_percent: float
     rmse: float
     scores: tuple[Score, ...]
     warnings: tuple[str, ...]
-    converged: bool
-    steps: int
-    starts: int = 1
-    minima: tuple[Minimum, ...] = ()
-    inflation: float = 1.0
+    status: Status
 
-    def __getitem__(self, name: str) -> Estimate:
-        """The estimate of that name."""
-        for estimate in self.parameters:
-            if estimate.name == name:
-                return estimate
-        raise KeyError(f"No parameter is named {name!r}; there are {', '.join(e.name for e in self.parameters)}.")
+    @property
+    def converged(self) -> bool:
+        """Whether the search ended by its tolerance."""
+        return self.status is Status.CONVERGED
 
     def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
         """Force [N] of the fitted law at every sample of records, old or new."""
@@ -160,6 +152,37 @@ class FitResult:
     def score(self, runs: Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
         """Fit percent, RMSE [N] and the scores by record, on other records."""
         return score(self.law, as_runs(runs))
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class FitResult(AbstractFitted):
+    """A fitted law with its parameters, their uncertainty and its errors.
+
+    Attributes:
+        parameters: an estimate for each free number, with unit, standard error and 95 % interval.
+        covariance: of the free numbers, in their units, in the order of `parameters`.
+        steps: steps of the search that gave the law, 0 for a closed form.
+        starts: how many starts were tried, 1 for a closed form.
+        minima: where they ended, the best first, which is this result. Starts that were given up are in none.
+        inflation: the standard errors are so many times those for independent noise, because the residual is
+            correlated from sample to sample; 1 where it is not, or where the noise was stated.
+        record_laws: the law of each record, where parameters have a value for each; then `law` has their means.
+    """
+
+    parameters: tuple[Estimate, ...]
+    covariance: Float[np.ndarray, "free free"]
+    steps: int
+    starts: int = 1
+    minima: tuple[Minimum, ...] = ()
+    inflation: float = 1.0
+    record_laws: tuple[AbstractDamper, ...] = ()
+
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of that name."""
+        for estimate in self.parameters:
+            if estimate.name == name:
+                return estimate
+        raise KeyError(f"No parameter is named {name!r}; there are {', '.join(e.name for e in self.parameters)}.")
 
     def plot(self, runs: Iterable[BenchRun] | None = None, **options: Any) -> "Figure":
         """Loops of force over velocity and over stroke, measured and fitted, with residuals."""
@@ -174,7 +197,7 @@ class FitResult:
             f"{type(self.law).__name__} on {len(self.runs)} records: {self.fit_percent:.1f} %, RMSE {self.rmse:.4g} N"
         ]
         for e, (value, error) in zip(self.parameters, texts, strict=True):
-            note = f"  ({e.note})" if e.note else ""
+            note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
             lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
         if len(self.minima) > 1:
             lines.append(f"  {describe(self.minima, self.starts)}")

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp.bench import BenchRun
 from jaxdamp.dampers.base import Reach, laws_inside
 from jaxdamp.dampers.conditions import keeps_conditions
+from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.result import Minimum
-from jaxdamp.identify.search import Found, Problem, finite, search, squares
+from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.parameters import FreeParameters
 
 
@@ -30,17 +30,13 @@ WORTH_A_ROUND = 1e-3  # relative decrease of the sum of squares after which ther
 BETTER = 1e-9  # relative decrease of the sum of squares that counts as one
 
 
-class Several(NamedTuple):
+class Solution(NamedTuple):
     """The ends of searches from several starts."""
 
-    best: Found
-    ends: tuple[Found, ...]  # those that converged, the best among them, in the order of their starts
+    best: SearchEnd
+    ends: tuple[SearchEnd, ...]  # those that converged, the best among them, in the order of their starts
     starts: int
-
-
-def reach_of(runs: Sequence[BenchRun]) -> Reach:
-    """How far records go."""
-    return Reach(0.5 * max(float(np.ptp(run.stroke)) for run in runs), max(run.peak_velocity for run in runs))
+    closed_form: bool = False  # there is one minimum, which was computed
 
 
 def other_starts(free: FreeParameters, reach: Reach) -> list[Float[np.ndarray, " free"]]:
@@ -66,7 +62,7 @@ def other_starts(free: FreeParameters, reach: Reach) -> list[Float[np.ndarray, "
     return starts
 
 
-def search_from(problem: Problem, reach: Reach, *, starts: int | None, max_steps: int) -> Several:
+def search_from(problem: Problem, *, starts: int | None, max_steps: int) -> Solution:
     """Search from the start of the problem, and from what its law and the laws inside propose beside it.
 
     Where another start leads to a better end, the proposals are made anew from there, so that two parameters can be
@@ -74,36 +70,37 @@ def search_from(problem: Problem, reach: Reach, *, starts: int | None, max_steps
 
     Arguments:
         problem: with the start.
-        reach: how far the records go.
         starts: at most so many; all that are proposed if `None`.
         max_steps: of each search.
     """
     best = search(problem, max_steps)
     ends, tried = [best], [np.asarray(problem.free.values)]
     for _ in range(ROUNDS):
-        if finite(best) and problem.is_rounding(squares(best)):
+        if best.finite and problem.is_rounding(best.squares):
             break
-        others = [v for v in other_starts(problem.free, reach) if not any(np.array_equal(v, known) for known in tried)]
+        others = [
+            v for v in other_starts(problem.free, problem.reach) if not any(np.array_equal(v, known) for known in tried)
+        ]
         others = others[: None if starts is None else starts - len(tried)]
         tried, ends = [*tried, *others], [*ends, *_follow(problem, others, best, max_steps)]
-        before, known = squares(best), finite(best)
+        before, known = best.squares, best.finite
         best = min(
-            (end for end in ends if finite(end)),
-            key=lambda end: (1.0 + BETTER * (end is not best)) * squares(end),
+            (end for end in ends if end.finite),
+            key=lambda end: (1.0 + BETTER * (end is not best)) * end.squares,
             default=best,
         )
-        if known and squares(best) >= (1.0 - WORTH_A_ROUND) * before:
+        if known and best.squares >= (1.0 - WORTH_A_ROUND) * before:
             break
         problem = problem.started_at(best.values)
-    return Several(best, tuple(end for end in ends if finite(end) and (end.converged or end is best)), len(tried))
+    return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(tried))
 
 
-def _follow(problem: Problem, others: Sequence[np.ndarray], best: Found, max_steps: int) -> list[Found]:
+def _follow(problem: Problem, others: Sequence[np.ndarray], best: SearchEnd, max_steps: int) -> list[SearchEnd]:
     """The ends of a few steps from each of several starts, and of the whole search from the most promising."""
     looks = [search(problem.started_at(values), min(FIRST_LOOK, max_steps)) for values in others]
-    most = PROMISING * min([squares(found) for found in (best, *looks) if finite(found)], default=np.inf)
-    open_ended = (found for found in looks if not found.converged and finite(found) and squares(found) < most)
-    promising = sorted(open_ended, key=squares)
+    most = PROMISING * min([found.squares for found in (best, *looks) if found.finite], default=np.inf)
+    open_ended = (found for found in looks if not found.converged and found.finite and found.squares < most)
+    promising = sorted(open_ended, key=lambda end: end.squares)
     ends = [found for found in looks if found.converged]
     for found in promising[:FOLLOWED]:
         left = min(max_steps - found.steps, FOLLOWED_STEPS)
@@ -112,23 +109,23 @@ def _follow(problem: Problem, others: Sequence[np.ndarray], best: Found, max_ste
     return ends
 
 
-def minima_of(several: Several, names: Sequence[str], variance: float) -> tuple[Minimum, ...]:
+def minima_of(solution: Solution, names: Sequence[str], variance: float) -> tuple[Minimum, ...]:
     """The minima in which the searches ended, the best first.
 
     Two ends are one minimum if their sums of squares differ by less than noise does and the best one's Jacobian says
     that their parameters hardly differ in force.
 
     Arguments:
-        several: the ends.
+        solution: the ends.
         names: of the free numbers.
         variance: of the noise of a weighted sample.
     """
-    best = several.best
-    groups: list[tuple[Found, int]] = []
-    for end in sorted(several.ends, key=lambda end: (end is not best, squares(end))):
+    best = solution.best
+    groups: list[tuple[SearchEnd, int]] = []
+    for end in sorted(solution.ends, key=lambda end: (end is not best, end.squares)):
         for i, (other, count) in enumerate(groups):
             change = other.jacobian @ (end.values - other.values)
-            if max(squares(end) - squares(other), float(change @ change)) < SAME * variance:
+            if max(end.squares - other.squares, float(change @ change)) < SAME * variance:
                 groups[i] = (other, count + 1)
                 break
         else:
@@ -136,7 +133,7 @@ def minima_of(several: Several, names: Sequence[str], variance: float) -> tuple[
     return tuple(
         Minimum(
             dict(zip(names, map(float, end.values), strict=True)),
-            max(squares(end) - squares(best), 0.0) / variance if variance > 0 else 0.0,
+            max(end.squares - best.squares, 0.0) / variance if variance > 0 else 0.0,
             count,
         )
         for end, count in groups

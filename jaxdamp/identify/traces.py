@@ -1,19 +1,22 @@
 """Bench records as batches of equal length, ready for one compiled call."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, final
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
+from jaxdamp.dampers._commands import command_paths
 from jaxdamp.dampers.command import takes_command, with_command
 from jaxdamp.dampers.coverage import require_finite_force
+from jaxdamp.identify.problem import AbstractResiduals
+from jaxdamp.parameters import get, with_values
 from jaxdamp.rig import march
 
 
@@ -23,7 +26,7 @@ PREDICTED_PER_CYCLE = 1000  # samples at which a law with states is evaluated; s
 
 
 @final
-class Batch(eqx.Module):
+class Batch(AbstractResiduals):
     """Records side by side, padded to one length; padded and unused samples have weight zero."""
 
     dt: Float[Array, " runs"]
@@ -31,23 +34,34 @@ class Batch(eqx.Module):
     velocity: Float[Array, "runs time"]
     force: Float[Array, "runs time"]
     weight: Float[Array, "runs time"]
-    command: Float[Array, " runs"] | None  # for laws that take one
+    number: Int[Array, " runs"]  # of each record among those given
+    fixed: dict[str, Float[Array, " runs"]]  # values of the law that each record states, by path, such as its command
+    per_record: tuple[str, ...] = eqx.field(static=True)  # paths where the law has a value for each record
     substeps: int = eqx.field(static=True)
 
     def predict(self, law: AbstractDamper) -> Float[Array, "runs time"]:
         """Force of the law under these strokes [N]."""
 
-        def one(dt: Array, x: Array, v: Array, command: Array | None) -> Array:
-            return march(law if command is None else with_command(law, command), dt, x, v, self.substeps)
+        def one(dt: Array, x: Array, v: Array, values: dict[str, Array]) -> Array:
+            return march(with_values(law, values), dt, x, v, self.substeps)
 
-        return jax.vmap(one)(self.dt, self.stroke, self.velocity, self.command)
+        own = {path: get(law, path)[self.number] for path in self.per_record}
+        return jax.vmap(one)(self.dt, self.stroke, self.velocity, self.fixed | own)
 
-    def residual(self, law: AbstractDamper) -> Float[Array, "runs time"]:
+    def __call__(self, model: AbstractDamper) -> Float[Array, " samples"]:
         """Weighted difference of the law's force from the measured one; zero where the weight is, even beside NaN."""
-        return jnp.where(self.weight > 0, (self.predict(law) - self.force) * self.weight, 0.0)
+        return jnp.ravel(jnp.where(self.weight > 0, (self.predict(model) - self.force) * self.weight, 0.0))
+
+    def used(self) -> Bool[np.ndarray, " samples"]:
+        """Which samples count."""
+        return np.ravel(self.weight) > 0
+
+    def total_weight(self) -> Float[Array, ""]:
+        """Sum of the squared weights."""
+        return jnp.sum(jnp.square(self.weight))
 
 
-class Place(NamedTuple):
+class SampleRange(NamedTuple):
     """Where a record is: samples `start` to `stop` of a row of a batch, each the mean of `block` measured ones."""
 
     batch: int
@@ -63,8 +77,8 @@ class _Row(NamedTuple):
     dt: float
     signals: tuple[np.ndarray, np.ndarray, np.ndarray]  # stroke, velocity, force
     weight: np.ndarray
-    command: float | None
-    lead: int
+    number: int
+    warm_up: int
     block: int
     substeps: int
 
@@ -90,45 +104,45 @@ def _averaged(values: np.ndarray, block: int) -> np.ndarray:
     return values[:kept].reshape(-1, block).mean(axis=1)
 
 
-def pace(run: BenchRun) -> float:
+def dominant_rate(run: BenchRun) -> float:
     """How fast a record moves [rad/s]: RMS velocity over RMS stroke, or its frequency if that is higher."""
     moved = float(np.std(run.stroke))
     return max(2 * np.pi * run.frequency, float(np.std(run.velocity)) / moved)
 
 
-def settling(run: BenchRun) -> float:
+def settling_time(run: BenchRun) -> float:
     """Time [s] at the start of a record, half a cycle, in which a law with states forgets how it was started."""
-    return min(np.pi / pace(run), 0.25 * run.duration)
+    return min(np.pi / dominant_rate(run), 0.25 * run.duration)
 
 
-def _with_lead(run: BenchRun, lead: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _with_warm_up(run: BenchRun, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stroke, velocity and force, preceded by a copy of the record's own first cycle, its stroke shifted to join."""
-    period = min(2 * np.pi / pace(run), run.duration)
+    period = min(2 * np.pi / dominant_rate(run), run.duration)
     since = run.time - run.time[0]
-    instants = period + np.arange(-lead, 0) / run.sampling_rate
+    instants = period + np.arange(-count, 0) / run.sampling_rate
     stroke, velocity = (np.interp(instants, since, values) for values in (run.stroke, run.velocity))
     stroke = stroke + run.stroke[0] - np.interp(period, since, run.stroke)
-    before = (stroke, velocity, np.zeros(lead))
+    before = (stroke, velocity, np.zeros(count))
     after = (run.stroke, run.velocity, run.force)
     return tuple(np.concatenate(pair) for pair in zip(before, after, strict=True))  # type: ignore[return-value]
 
 
 def _block(run: BenchRun, samples_per_cycle: int | None) -> int:
     """How many samples of a record are averaged."""
-    cycle = 2 * np.pi * run.sampling_rate / pace(run)
+    cycle = 2 * np.pi * run.sampling_rate / dominant_rate(run)
     return 1 if samples_per_cycle is None else max(int(cycle / samples_per_cycle), 1)
 
 
-def _row(run: BenchRun, sigma: float, samples_per_cycle: int | None, led: bool, command: float | None) -> _Row:
-    dt, omega = 1.0 / run.sampling_rate, pace(run)
+def _row(run: BenchRun, sigma: float, samples_per_cycle: int | None, warms_up: bool, number: int) -> _Row:
+    dt, omega = 1.0 / run.sampling_rate, dominant_rate(run)
     block = _block(run, samples_per_cycle)
     substeps = int(np.clip(np.ceil(omega * dt * block / STEP_ANGLE), 1, 8))
-    lead = int(min(2 * np.pi / omega, run.duration) / (dt * block)) if led else 0
-    stroke, velocity, force = (_averaged(values, block) for values in _with_lead(run, lead * block))
+    warm_up = int(min(2 * np.pi / omega, run.duration) / (dt * block)) if warms_up else 0
+    stroke, velocity, force = (_averaged(values, block) for values in _with_warm_up(run, warm_up * block))
     weight = np.full(len(force), np.sqrt(block) / sigma)
-    if led:
-        weight[: lead + int(np.ceil(settling(run) / (dt * block)))] = 0.0
-    return _Row(dt * block, (stroke, velocity, force), weight, command, lead, block, substeps)
+    if warms_up:
+        weight[: warm_up + int(np.ceil(settling_time(run) / (dt * block)))] = 0.0
+    return _Row(dt * block, (stroke, velocity, force), weight, number, warm_up, block, substeps)
 
 
 def _grouped(rows: Sequence[_Row]) -> list[list[int]]:
@@ -152,19 +166,19 @@ def _grouped(rows: Sequence[_Row]) -> list[list[int]]:
     return groups
 
 
-def _batch(rows: Sequence[_Row]) -> Batch:
+def _batch(rows: Sequence[_Row], fixed: Mapping[str, Sequence[float]], per_record: tuple[str, ...]) -> Batch:
     length = _round_up(max(len(row.weight) for row in rows))
     columns = [np.stack([_pad(row.signals[k], length) for row in rows]) for k in range(3)]
     weight = np.stack([_pad(row.weight, length, "constant") for row in rows])
-    commands = [row.command for row in rows if row.command is not None]
-    arrays = (np.array([row.dt for row in rows]), *columns, weight)
-    substeps = max(row.substeps for row in rows)
-    return Batch(*map(jnp.asarray, arrays), command=jnp.asarray(commands) if commands else None, substeps=substeps)
+    number = np.array([row.number for row in rows])
+    arrays = map(jnp.asarray, (np.array([row.dt for row in rows]), *columns, weight, number))
+    own = {path: jnp.asarray(np.array(values)[number], float) for path, values in fixed.items()}
+    return Batch(*arrays, fixed=own, per_record=per_record, substeps=max(row.substeps for row in rows))
 
 
 def _memoryless_batch(
     runs: Sequence[BenchRun], sigma: Sequence[float], samples_per_cycle: int | None
-) -> tuple[list[Batch], list[Place]]:
+) -> tuple[tuple[Batch, ...], list[SampleRange]]:
     blocks = [_block(run, samples_per_cycle) for run in runs]
     counts = [len(run) // block for run, block in zip(runs, blocks, strict=True)]
     ends = np.cumsum(counts)
@@ -174,23 +188,23 @@ def _memoryless_batch(
         for name in ("stroke", "velocity", "force")
     )
     weight = np.repeat(np.sqrt(blocks) / np.asarray(sigma), counts)
-    arrays = (np.ones(1), stroke, velocity, force, _pad(weight, length, "constant")[None])
-    places = [Place(0, 0, int(end) - n, int(end), b) for end, n, b in zip(ends, counts, blocks, strict=True)]
-    return [Batch(*map(jnp.asarray, arrays), command=None, substeps=1)], places
+    arrays = (np.ones(1), stroke, velocity, force, _pad(weight, length, "constant")[None], np.zeros(1, int))
+    ranges = [SampleRange(0, 0, int(end) - n, int(end), b) for end, n, b in zip(ends, counts, blocks, strict=True)]
+    return (Batch(*map(jnp.asarray, arrays), fixed={}, per_record=(), substeps=1),), ranges
 
 
-def _commands(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[float | None]:
-    """The command of each record, if the law takes one and the records state it; otherwise the law keeps its own."""
-    commands = [run.command for run in runs]
-    if not takes_command(law) or all(command is None for command in commands):
-        return [None] * len(runs)
+def _stated(law: AbstractDamper, runs: Sequence[BenchRun]) -> dict[str, list[float]]:
+    """Values of the law that the records state, by path: the command, if the law takes one."""
+    commands = [run.command for run in runs if run.command is not None]
+    if not takes_command(law) or not commands:
+        return {}
     lacking = [run.name for run in runs if run.command is None]
     if lacking:
         must, remedy = "all state their command", 'Pass it when reading, `bench.read(..., command={"*_0.5A": 0.5})`.'
         _checks.refuse("runs", must, f"without one: {', '.join(lacking)}", remedy)
     for command in set(commands):
         with_command(law, command)  # refuses what is out of range
-    return commands
+    return dict.fromkeys(command_paths(law), commands)
 
 
 def batches(
@@ -198,7 +212,8 @@ def batches(
     runs: Sequence[BenchRun],
     sigma: Sequence[float],
     samples_per_cycle: int | None,
-) -> tuple[list[Batch], list[Place]]:
+    per_record: tuple[str, ...] = (),
+) -> tuple[tuple[Batch, ...], list[SampleRange]]:
     """Prepare records for a law.
 
     Where a record has more than `samples_per_cycle`, blocks of samples are averaged, whose weight grows with the root
@@ -211,20 +226,31 @@ def batches(
         runs: the records.
         sigma: standard deviation [N] of the force for each record.
         samples_per_cycle: see above; `None` takes every sample.
+        per_record: paths where the law that the batches are given has a value for each record.
 
     Returns:
         The batches, and for each record where it is.
     """
-    commands, led = _commands(law, runs), not is_memoryless(law)
-    if not led and set(commands) == {None}:
+    fixed, warms_up = _stated(law, runs), not is_memoryless(law)
+    if not (warms_up or fixed or per_record):
         return _memoryless_batch(runs, sigma, samples_per_cycle)
-    rows = [_row(run, s, samples_per_cycle, led, c) for run, s, c in zip(runs, sigma, commands, strict=True)]
+    pairs = zip(runs, sigma, strict=True)
+    rows = [_row(run, s, samples_per_cycle, warms_up, number) for number, (run, s) in enumerate(pairs)]
     groups = _grouped(rows)
-    places: dict[int, Place] = {}
+    ranges: dict[int, SampleRange] = {}
     for number, group in enumerate(groups):
         for k, i in enumerate(group):
-            places[i] = Place(number, k, rows[i].lead, len(rows[i].weight), rows[i].block)
-    return [_batch([rows[i] for i in group]) for group in groups], [places[i] for i in range(len(runs))]
+            ranges[i] = SampleRange(number, k, rows[i].warm_up, len(rows[i].weight), rows[i].block)
+    made = tuple(_batch([rows[i] for i in group], fixed, per_record) for group in groups)
+    return made, [ranges[i] for i in range(len(runs))]
+
+
+def owners(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> Int[np.ndarray, " samples"]:
+    """The number of the record that each sample of the residuals belongs to."""
+    numbers = [np.zeros(batch.weight.shape, dtype=int) for batch in made]
+    for i, at in enumerate(ranges):
+        numbers[at.batch][at.row, at.start : at.stop] = i
+    return np.concatenate([np.ravel(a) for a in numbers])
 
 
 @eqx.filter_jit
@@ -244,11 +270,11 @@ def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
 def predict_runs(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[np.ndarray]:
     """Force [N] of the law at every sample of every record."""
     law = without_fitted_ranges(law)
-    made, places = batches(law, runs, [1.0] * len(runs), None if is_memoryless(law) else PREDICTED_PER_CYCLE)
+    made, ranges = batches(law, runs, [1.0] * len(runs), None if is_memoryless(law) else PREDICTED_PER_CYCLE)
     forces = [np.asarray(_predict(batch, law)) for batch in made]
     spread = [
         _spread(forces[p.batch][p.row, p.start : p.stop], p.block, len(run))
-        for p, run in zip(places, runs, strict=True)
+        for p, run in zip(ranges, runs, strict=True)
     ]
     for run, force in zip(runs, spread, strict=True):
         require_finite_force(law, force[used_samples(law, run)], f"over the record {run.name!r}")
@@ -257,4 +283,4 @@ def predict_runs(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[np.ndarr
 
 def used_samples(law: AbstractDamper, run: BenchRun) -> slice:
     """The samples of a record that a fit of this law looks at: all, or those after settling."""
-    return slice(0 if is_memoryless(law) else int(np.ceil(settling(run) * run.sampling_rate)), None)
+    return slice(0 if is_memoryless(law) else int(np.ceil(settling_time(run) * run.sampling_rate)), None)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
@@ -14,13 +14,17 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._status import Status
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, with_fitted_range
 from jaxdamp.identify.covered import covered_range
-from jaxdamp.identify.fitting import Start, started, weights
-from jaxdamp.identify.result import Score, score
-from jaxdamp.identify.traces import Batch, batches
-from jaxdamp.parameters import FreeParameters, free_parameters
+from jaxdamp.identify.judging import notes_on
+from jaxdamp.identify.preparing import prepare
+from jaxdamp.identify.problem import AbstractResiduals
+from jaxdamp.identify.result import AbstractFitted, score
+from jaxdamp.identify.starting import Start
+from jaxdamp.identify.traces import batches
+from jaxdamp.parameters import Coordinates
 
 
 if TYPE_CHECKING:
@@ -31,18 +35,13 @@ CHUNK = 25  # steps in one compiled call, after each of which the records left o
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class Training:
-    """A trained law and how it came about.
+class Training(AbstractFitted):
+    """A law trained by gradient descent, from the step where its error on the held-out records was smallest.
 
     Attributes:
-        law: the law where the error on the held-out records was smallest.
-        runs: the records it was trained on.
         held_out: the records that decided when to stop.
-        fit_percent: over the training records together.
-        rmse: over the training records together [N].
         held_out_fit_percent: over the held-out records together.
         held_out_rmse: over the held-out records together [N].
-        scores: of every record, `runs` first.
         steps: after how many steps each entry of the histories was taken.
         history: RMSE [N] over the training records as trained on (averaged samples), for each entry.
         held_out_history: the same over the held-out records.
@@ -50,14 +49,9 @@ class Training:
         stopped: why the training ended, in words.
     """
 
-    law: AbstractDamper
-    runs: tuple[BenchRun, ...]
     held_out: tuple[BenchRun, ...]
-    fit_percent: float
-    rmse: float
     held_out_fit_percent: float
     held_out_rmse: float
-    scores: tuple[Score, ...]
     steps: Float[np.ndarray, " entries"]
     history: Float[np.ndarray, " entries"]
     held_out_history: Float[np.ndarray, " entries"]
@@ -83,8 +77,9 @@ def train(
     runs: BenchRun | Iterable[BenchRun],
     *,
     held_out: BenchRun | Iterable[BenchRun],
-    weighting: Sequence[float] | None = None,
+    weighting: str | Sequence[float] = "samples",
     freeze: Sequence[str] = (),
+    tie: Mapping[str, str] | None = None,
     steps: int = 2000,
     patience: int = 400,
     learning_rate: float = 0.02,
@@ -105,9 +100,9 @@ def train(
         runs: records to train on. A few steady cycles of each are enough: `run.last_cycles(3)`.
         held_out: records that decide when to stop; they are not trained on. Judge the law on records that are in
             neither of the two.
-        weighting: one standard deviation [N] for each of `runs`, of which only the ratios matter; `inf` leaves one
-            out. All count the same if it is left out.
+        weighting: of `runs`, as in `fit`.
         freeze: parameters to leave alone, by path, last part of a path, or pattern.
+        tie: parameters that take the values of others, as in `fit`.
         steps: at most so many.
         patience: stop when the held-out error has not fallen for so many steps.
         learning_rate: of Adam, at the start; it falls to a hundredth along a cosine over `steps`.
@@ -129,29 +124,26 @@ def train(
     runs, held_out = as_runs(runs, call="train(law, runs, held_out=...)"), as_runs(held_out, "held_out")
     _check(runs, held_out, steps, patience)
     _checks.positive("learning_rate", learning_rate)
-    sigma = weights([1.0] * len(runs) if weighting is None else weighting, runs)
-    trained_on = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
-    law = started(law, trained_on)
-    free = free_parameters(law, freeze=freeze)
-    used = batches(law, runs, sigma, samples_per_cycle)[0]
+    problem = prepare(law, runs, freeze=freeze, tie=tie, weighting=weighting, samples_per_cycle=samples_per_cycle)
+    coordinates, used, law = Coordinates(problem.free, smooth="all"), problem.residuals, problem.law
     checked = batches(law, held_out, [1.0] * len(held_out), samples_per_cycle)[0]
-    level = float(np.sqrt(np.mean(np.concatenate([run.force for run in trained_on]) ** 2)))
+    level = float(np.sqrt(np.mean(np.concatenate([run.force for run in problem.fitted_to]) ** 2)))
     rule = _adam(learning_rate, steps) if optimiser is None else optimiser
 
-    raw = free.raw
+    raw = coordinates.start
     state = rule.init(raw)
-    best, best_step, reached = raw, 0, float(_error(free, raw, checked))
+    best, best_step, reached = raw, 0, float(_error(coordinates, raw, checked))
     if not np.isfinite(reached):
         _checks.refuse("law", "give finite forces over the records", f"{law}, which does not", "Start from another.")
-    taken, history, tested = [0], [float(_error(free, raw, used))], [reached]
+    taken, history, tested = [0], [float(_error(coordinates, raw, used))], [reached]
     stopped = f"after all {steps} steps"
     with Progress("Training") as shown:
         for done in range(CHUNK, steps + CHUNK, CHUNK):
             done = min(done, steps)
-            raw, state = _descend(free, raw, state, used, rule, level, jnp.asarray(done - taken[-1]))
+            raw, state = _descend(coordinates, raw, state, used, rule, level, jnp.asarray(done - taken[-1]))
             taken.append(done)
-            history.append(float(_error(free, raw, used)))
-            tested.append(float(_error(free, raw, checked)))
+            history.append(float(_error(coordinates, raw, used)))
+            tested.append(float(_error(coordinates, raw, checked)))
             shown(f"step {done} of {steps}, RMSE {history[-1]:.4g} N, held out {tested[-1]:.4g} N")
             if tested[-1] < reached:
                 best, best_step, reached = raw, done, tested[-1]
@@ -162,8 +154,8 @@ def train(
                 stopped = f"stopped at step {done}, {patience} steps after the held-out error last fell"
                 break
 
-    trained = with_fitted_range(free.build(free.physical(best)), covered_range(trained_on))
-    percent, rmse, scores = score(trained, runs, np.isfinite(sigma))
+    trained = with_fitted_range(_law(coordinates, best), covered_range(problem.fitted_to))
+    percent, rmse, scores = score(trained, runs, np.isfinite(problem.sigma))
     held_percent, held_rmse, held_scores = score(trained, held_out)
     return Training(
         law=trained,
@@ -174,6 +166,8 @@ def train(
         held_out_fit_percent=held_percent,
         held_out_rmse=held_rmse,
         scores=scores + held_scores,
+        warnings=tuple(notes_on(trained, problem.fitted_to)),
+        status=Status.STOPPED_EARLY if taken[-1] < steps else Status.ALL_STEPS,
         steps=np.array(taken, dtype=float),
         history=np.array(history),
         held_out_history=np.array(tested),
@@ -202,24 +196,29 @@ def _adam(learning_rate: float, steps: int) -> optax.GradientTransformation:
     return optax.chain(optax.clip_by_global_norm(1.0), optax.adam(schedule))
 
 
-def _mean_square(free: FreeParameters, raw: Array, made: Sequence[Batch]) -> Array:
+def _law(coordinates: Coordinates, raw: Array) -> AbstractDamper:
+    """The law at these coordinates."""
+    return coordinates.free.build(coordinates.to_physical(raw))
+
+
+def _mean_square(coordinates: Coordinates, raw: Array, made: Sequence[AbstractResiduals]) -> Array:
     """Mean squared error [N²] of the law over the samples that count, each as often as it was measured."""
-    law = free.build(free.physical(raw))
-    squares = jnp.stack([jnp.sum(jnp.square(batch.residual(law))) for batch in made])
-    return jnp.sum(squares) / jnp.sum(jnp.stack([jnp.sum(jnp.square(batch.weight)) for batch in made]))
+    law = _law(coordinates, raw)
+    squares = jnp.stack([jnp.sum(jnp.square(part(law))) for part in made])
+    return jnp.sum(squares) / jnp.sum(jnp.stack([part.total_weight() for part in made]))
 
 
 @eqx.filter_jit
-def _error(free: FreeParameters, raw: Array, made: Sequence[Batch]) -> Array:
-    return jnp.sqrt(_mean_square(free, raw, made))
+def _error(coordinates: Coordinates, raw: Array, made: Sequence[AbstractResiduals]) -> Array:
+    return jnp.sqrt(_mean_square(coordinates, raw, made))
 
 
 @eqx.filter_jit
 def _descend(
-    free: FreeParameters,
+    coordinates: Coordinates,
     raw: Array,
     state: Any,
-    made: Sequence[Batch],
+    made: Sequence[AbstractResiduals],
     rule: optax.GradientTransformation,
     level: float,
     count: Array,
@@ -228,7 +227,7 @@ def _descend(
 
     def step(_: Any, now: tuple[Array, Any]) -> tuple[Array, Any]:
         raw, state = now
-        slope = jax.grad(lambda raw: _mean_square(free, raw, made) / level**2)(raw)
+        slope = jax.grad(lambda raw: _mean_square(coordinates, raw, made) / level**2)(raw)
         with jax.numpy_dtype_promotion("standard"):  # optax mixes its integer count with floats
             change, state = rule.update(slope, state, raw)
         return optax.apply_updates(raw, change), state  # type: ignore[return-value]

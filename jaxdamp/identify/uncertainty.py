@@ -8,8 +8,8 @@ from jaxtyping import Float
 from jaxdamp.identify._tall import triangle
 
 
-BLIND = 1e-7  # singular value, relative to the largest, below which a direction leaves the force unchanged
-BLIND_SINGLE = 1e-4  # the same in single precision
+RANK_TOLERANCE = 1e-7  # singular value, relative to the largest, below which a direction leaves the force unchanged
+RANK_TOLERANCE_SINGLE = 1e-4  # the same in single precision
 TAKES_PART = 0.1  # of the largest force in a direction, from which a parameter belongs to it
 
 
@@ -17,13 +17,13 @@ class Uncertainty(NamedTuple):
     """What noise does to the parameters."""
 
     covariance: Float[np.ndarray, "free free"]
-    beyond: Float[np.ndarray, " free"]  # step to the minimum without any bounds, in standard errors
+    unconstrained_step: Float[np.ndarray, " free"]  # step to the minimum without any bounds, in standard errors
 
 
 def _inverse(factor: Float[np.ndarray, "rows free"]) -> tuple[np.ndarray, np.ndarray]:
     """(RᵀR)⁻¹ for a matrix R with columns of length one or zero, and which parameters blind directions touch."""
     _, singular, directions = np.linalg.svd(factor)
-    blind = BLIND if factor.dtype == np.float64 else BLIND_SINGLE
+    blind = RANK_TOLERANCE if factor.dtype == np.float64 else RANK_TOLERANCE_SINGLE
     directions = directions[: singular.size]
     seen = singular > blind * singular[0]
     inverse = (directions[seen].T / singular[seen] ** 2) @ directions[seen]
@@ -38,8 +38,8 @@ def uncertainty(
     """Covariance at a minimum, (JᵀJ)⁻¹ Jᵀ diag(σ²) J (JᵀJ)⁻¹, as if no parameter had an edge.
 
     So a parameter on an edge of its range counts as unknown in the errors of its partners: frozen there, it would lend
-    them a certainty that the records do not give. A direction with a singular value below `BLIND` of the largest leaves
-    the force unchanged: its parameters get an infinite variance instead of a number made of rounding.
+    them a certainty that the records do not give. A direction with a singular value below `RANK_TOLERANCE` of the
+    largest leaves the force unchanged: its parameters get an infinite variance instead of a number made of rounding.
 
     Arguments:
         jacobian: derivatives of the weighted residual by the parameters.
@@ -57,8 +57,8 @@ def uncertainty(
     whole[lost, lost] = np.inf
     errors = np.sqrt(np.diag(whole))
     step = -inverse @ (scaled.T @ residual)
-    beyond = np.divide(step, errors, out=np.zeros_like(step), where=errors > 0)
-    return Uncertainty(whole / np.outer(scale, scale), beyond)
+    steps = np.divide(step, errors, out=np.zeros_like(step), where=errors > 0)
+    return Uncertainty(whole / np.outer(scale, scale), steps)
 
 
 def weak_directions(

@@ -1,8 +1,9 @@
 """From a ride metric to a better damper: `minimise`; and whether it is better on other roads: `rescore`."""
 
+from jaxdamp._status import Status
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.rescoring import Rescore, rescore
 from jaxdamp.tune.result import Change, TuneResult
 
 
-__all__ = ["Change", "Rescore", "TuneResult", "minimise", "rescore"]
+__all__ = ["Change", "Rescore", "Status", "TuneResult", "minimise", "rescore"]

@@ -10,6 +10,7 @@ import numpy as np
 from jaxdamp import _checks, metrics
 from jaxdamp._field_types import check_module
 from jaxdamp._progress import Progress
+from jaxdamp._status import Status
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -31,6 +32,7 @@ def minimise(
     over: Sequence[str] | Mapping[str, Any] = ("damper*",),
     freeze: Sequence[str] = (),
     bounds: Mapping[str, Any] | None = None,
+    tie: Mapping[str, str] | None = None,
     limits: Mapping[str, float] | None = None,
     duration: float | None = None,
     dt: float = 1e-3,
@@ -64,6 +66,8 @@ def minimise(
         bounds: bounds `{parameter: (lower, upper)}` in its unit, in place of those above; the start must lie between
             them. None in place of a side or of both frees it: `bounds={"*": None}` leaves the domains only. Of two
             names for one parameter the later counts.
+        tie: parameters that take the values of others, such as `{"front.damper.*": "rear.damper.*"}`: one free value
+            for each group (see `jaxdamp.parameters.free_parameters`).
         limits: hard limits `{metric: largest value}` in the metric's unit, such as
             `{"working_space_peak_to_peak": 0.1}`.
         duration: length of the run [s], as in `simulate`.
@@ -99,7 +103,7 @@ def minimise(
         _checks.refuse("max_steps", "be 1 or more", max_steps)
     chosen = chosen_metrics(vehicle, road, (metric, *limits))
     white = isinstance(road, WhiteRoad)
-    space = search_range(vehicle, over, freeze, bounds)
+    space = search_range(vehicle, over, freeze, bounds, tie)
     ride = stationary_ride(road, chosen) if white else driven_ride(vehicle, road, chosen, duration, dt, space.free)
     evaluator = Evaluator(ride, space.free, [m.name for m in chosen])
     before, _ = evaluator.at(space.start)
@@ -113,10 +117,15 @@ def minimise(
     reached = active(limits, after, evaluator.tolerance)
     missed = [name for name in reached if after[name] > limits[name] * (1 + evaluator.tolerance.limit)]
     changes = changes_of(space, ended.values)
-    converged = ended.slope_left < evaluator.tolerance.slope and not missed
+    if missed:
+        status = Status.LIMIT_NOT_MET
+    elif ended.slope_left < evaluator.tolerance.slope:
+        status = Status.CONVERGED
+    else:
+        status = Status.STEP_LIMIT if ended.out_of_steps else Status.NO_BETTER_STEP
     notes = [f"The limit {n} <= {limits[n]:.4g} is not met: {after[n]:.4g}. Loosen it, or free more." for n in missed]
     notes += bound_notes(space, changes)
-    if not converged and not missed:
+    if status in (Status.STEP_LIMIT, Status.NO_BETTER_STEP):
         notes.append(early_end(ended, max_steps))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
     coarse = [] if white else step_notes(vehicle, tuned, road, [m.name for m in chosen], duration, dt)
@@ -134,7 +143,7 @@ def minimise(
         limits=limits,
         active_limits=reached,
         warnings=tuple(notes),
-        converged=converged,
+        status=status,
         history=ended.history,
     )
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.parameters import (
+    Coordinates,
     FreeParameters,
     Parameter,
     free_parameters,
@@ -21,7 +22,7 @@ from jaxdamp.parameters import (
 
 Pair = tuple[float, float]
 FACTOR = 3.0  # by which a number may fall or rise if nobody gives bounds
-INSIDE = 1e-6  # share of its start by which a number stays off the open ends of its domain
+INSIDE = 1e-6  # share of its unit by which a number stays off the open ends of its domain
 NO_BOUND = (-math.inf, math.inf)
 
 
@@ -31,24 +32,29 @@ class SearchRange:
     """Free numbers with the closed range of each, in physical units and double precision.
 
     Attributes:
-        free: the free parameters of the vehicle.
+        coordinates: those of the search, whose free parameters are the vehicle's.
         start: the value of each number to start from.
-        scale: the magnitude of each start, one where it is zero.
+        unit: the value of each number where its coordinate is one.
         lower: the smallest allowed value of each number.
         upper: the largest allowed value of each number.
         origin: where the two bounds of each number come from: `"default"`, `"given"` or `"domain"`.
     """
 
-    free: FreeParameters
+    coordinates: Coordinates
     start: np.ndarray
-    scale: np.ndarray
+    unit: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
     origin: tuple[tuple[str, str], ...]
 
+    @property
+    def free(self) -> FreeParameters:
+        """The free parameters of the vehicle."""
+        return self.coordinates.free
+
     def side(self, values: np.ndarray) -> list[str]:
         """The bound that each value lies on: `"lower"`, `"upper"`, or nothing."""
-        slack = 2 * INSIDE * self.scale
+        slack = 2 * INSIDE * self.unit
         low, high = values <= self.lower + slack, values >= self.upper - slack
         return ["lower" if at_low else "upper" if at_high else "" for at_low, at_high in zip(low, high, strict=True)]
 
@@ -58,6 +64,7 @@ def search_range(
     over: Sequence[str] | Mapping[str, Any],
     freeze: Sequence[str],
     bounds: Mapping[str, Any] | None,
+    tie: Mapping[str, str] | None = None,
 ) -> SearchRange:
     """The free parameters and their ranges.
 
@@ -66,37 +73,31 @@ def search_range(
             start between them.
     """
     in_over, names = (over, list(over)) if isinstance(over, Mapping) else ({}, over)
-    free = free_parameters(vehicle, over=name_patterns("over", names), freeze=freeze)
-    paths = [p.path for p in free.chosen]
-    given = _given("over", in_over, vehicle, paths)
-    more = _given("bounds", bounds or {}, vehicle, paths)
-    twice = [path for path in more if given.get(path) is not None]
+    free = free_parameters(vehicle, over=name_patterns("over", names), freeze=freeze, tie=tie)
+    given, more = _given("over", in_over, free), _given("bounds", bounds or {}, free)
+    twice = [path for path in more if path in given]
     if twice:
         remedy = "Give the bounds in one place."
         _checks.refuse("bounds", "leave out what `over` gives bounds for", ", ".join(twice), remedy)
-    given = {path: given.get(path) or more.get(path) for path in paths}
-    start = np.concatenate([np.ravel(np.asarray(p.value, np.float64)) for p in free.chosen])
-    scale = np.where(start == 0.0, 1.0, np.abs(start))
-    lower, upper, origin = [], [], []
-    position = 0
-    for p in free.chosen:
-        for index in range(p.value.size):
-            low, high, where = _one_range(p, index, scale[position], given[p.path])
-            lower.append(low)
-            upper.append(high)
-            origin.append(where)
-            position += 1
-    return SearchRange(free, start, scale, np.array(lower), np.array(upper), tuple(origin))
+    given |= more
+    coordinates = Coordinates(free, smooth="none")
+    start = np.asarray(free.values, np.float64)
+    unit = np.concatenate([np.ravel(np.asarray(unit, np.float64)) for unit in coordinates.units])
+    numbers = zip(free.names, free.owners, start, unit, strict=True)
+    rows = [_one_range(name, p, float(value), size, given.get(p.path)) for name, p, value, size in numbers]
+    lower, upper, origin = zip(*rows, strict=True)
+    return SearchRange(coordinates, start, unit, np.array(lower), np.array(upper), origin)
 
 
-def _given(argument: str, bounds: Mapping[str, Any], vehicle: Any, free: Sequence[str]) -> dict[str, Pair | None]:
+def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> dict[str, Pair]:
     """Bounds by path, an open side infinite. Of two names for one parameter the later counts."""
-    known, found = [p.path for p in parameters(vehicle)], {}
+    known, leaders, found = [p.path for p in parameters(free.tree)], dict(free.ties), {}
+    paths = [p.path for p in free.chosen]
     for name, bound in bounds.items():
-        named = match_paths(known, [name])
-        chosen = [path for path in named if path in free]
+        named = [leaders.get(path, path) for path in match_paths(known, [name])]
+        chosen = [path for path in named if path in paths]
         if not chosen:
-            remedy = f"The free parameters are {', '.join(free)}: add it to `over`, or leave its bounds out."
+            remedy = f"The free parameters are {', '.join(paths)}: add it to `over`, or leave its bounds out."
             _checks.refuse(f"{argument}[{name!r}]", "bound a parameter that is free", "one that is not", remedy)
         found |= dict.fromkeys(chosen, _pair(argument, name, bound))
     return found
@@ -120,16 +121,16 @@ def _pair(argument: str, name: str, bound: Any) -> Pair:
     return pair
 
 
-def _one_range(p: Parameter, index: int, scale: float, given: Pair | None) -> tuple[float, float, tuple[str, str]]:
+def _one_range(
+    name: str, p: Parameter, value: float, unit: float, given: Pair | None
+) -> tuple[float, float, tuple[str, str]]:
     """The range of one number of a parameter: what its domain and its bounds have in common."""
-    value = float(np.ravel(np.asarray(p.value, np.float64))[index])
     if given is not None and not given[0] <= value <= given[1]:
         remedy = "Start inside the bounds or widen them."
-        name = p.path if p.value.ndim == 0 else f"{p.path}[{index}]"
         _checks.refuse(name, f"start between {given[0]:g} and {given[1]:g} [{p.unit or '-'}]", value, remedy)
     low, high = _default(p, value) if given is None else given
     source = "default" if given is None else "given"
-    edges = p.domain.lower + INSIDE * scale, p.domain.upper - INSIDE * scale
+    edges = p.domain.lower + INSIDE * unit, p.domain.upper - INSIDE * unit
     where = source if low > edges[0] else "domain", source if high < edges[1] else "domain"
     return min(max(low, edges[0]), value), max(min(high, edges[1]), value), where
 
@@ -143,7 +144,7 @@ def _default(p: Parameter, value: float) -> Pair:
     """
     if value == 0.0 or p.domain == weight:
         return NO_BOUND
-    keeps_sign = p.domain.lower >= 0.0 or p.domain.upper <= 0.0 or p.domain.steps is not None
+    keeps_sign = p.domain.lower >= 0.0 or p.domain.upper <= 0.0 or p.domain.ordered
     far = FACTOR * value
     low, high = (value / FACTOR, far) if keeps_sign else (2.0 * value - far, far)
     return min(low, high), max(low, high)

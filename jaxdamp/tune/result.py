@@ -3,6 +3,7 @@
 import dataclasses
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
+from jaxdamp._status import Status
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -23,6 +24,7 @@ class Change(NamedTuple):
     note: str  # "", "at its lower bound" or "at its upper bound"
     lower: float
     upper: float
+    tied: tuple[str, ...] = ()  # the numbers that have the same value
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -40,7 +42,7 @@ class TuneResult(Generic[V]):
         limits: largest allowed value of metrics, as asked for.
         active_limits: the metrics among these that are at their limit, or beyond.
         warnings: what a user should know, in words.
-        converged: whether the search ended at a point where the gradient says optimum.
+        status: how the search ended; `CONVERGED` only at a point where the gradient says optimum.
         history: the metric after each step of the search.
     """
 
@@ -54,8 +56,13 @@ class TuneResult(Generic[V]):
     limits: dict[str, float]
     active_limits: tuple[str, ...]
     warnings: tuple[str, ...]
-    converged: bool
+    status: Status
     history: tuple[float, ...]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the search ended at a point where the gradient says optimum."""
+        return self.status is Status.CONVERGED
 
     def plot(self, **options: Any) -> "Figure":
         """The laws and the metrics before and after."""
@@ -87,7 +94,8 @@ class TuneResult(Generic[V]):
             lines.append(f"{metrics[name]:<{width}}{_before_after(before, after)}{mark}")
         for p in self.parameters:
             bounds = f"  ({p.lower:.5g} to {p.upper:.5g}{', ' * bool(p.note)}{p.note})"
-            lines.append(f"{numbers[p.name]:<{width}}{_before_after(p.before, p.after)}{bounds}")
+            tied = f"  = {', '.join(p.tied)}" * bool(p.tied)
+            lines.append(f"{numbers[p.name]:<{width}}{_before_after(p.before, p.after)}{bounds}{tied}")
         return "\n".join(lines + [f"warning: {warning}" for warning in self.warnings])
 
 

@@ -80,40 +80,40 @@ def search(
     max_steps: int,
     progress: Callable[[int, float], None],
 ) -> Ended:
-    """SLSQP in values divided by their start, objective divided by its start.
+    """SLSQP in coordinates, the objective divided by its start.
 
     If it ends on a slope, its estimate of the curvature is out of date or a kink has stopped it: it begins again there.
     """
     import scipy.optimize
 
-    scale = space.scale
+    unit = space.unit
     level = abs(evaluator.at(space.start)[0][metric]) or 1.0
     history: list[float] = []
 
     def note(u: np.ndarray) -> None:
-        history.append(evaluator.at(u * scale)[0][metric])
+        history.append(evaluator.at(u * unit)[0][metric])
         progress(len(history), history[-1])
 
     def attempt(begin: np.ndarray) -> Ended:
         solved = scipy.optimize.minimize(
-            lambda u: evaluator.at(u * scale)[0][metric] / level,
+            lambda u: evaluator.at(u * unit)[0][metric] / level,
             begin,
-            jac=lambda u: evaluator.at(u * scale)[1][metric] * scale / level,
+            jac=lambda u: evaluator.at(u * unit)[1][metric] * unit / level,
             method="SLSQP",
-            bounds=scipy.optimize.Bounds(space.lower / scale, space.upper / scale, keep_feasible=True),  # type: ignore[arg-type]
+            bounds=scipy.optimize.Bounds(space.lower / unit, space.upper / unit, keep_feasible=True),  # type: ignore[arg-type]
             constraints=_constraints(evaluator, space, limits),
             callback=note,
             options={"ftol": 1e-15, "maxiter": max_steps - len(history)},
         )
-        values = np.clip(np.asarray(solved.x, np.float64) * scale, space.lower, space.upper)
+        values = np.clip(np.asarray(solved.x, np.float64) * unit, space.lower, space.upper)
         left = _slope_left(evaluator, space, values, metric, limits)
         return Ended(values, tuple(history), solved.status == OUT_OF_STEPS, left)
 
-    ended = attempt(space.start / scale)
+    ended = attempt(space.start / unit)
     for _ in range(RESTARTS):
         if ended.slope_left < evaluator.tolerance.slope or len(history) >= max_steps:
             break
-        ended = attempt(ended.values / scale)
+        ended = attempt(ended.values / unit)
     return ended
 
 
@@ -124,31 +124,17 @@ def active(limits: Mapping[str, float], values: Mapping[str, float], tolerance: 
 
 def _constraints(evaluator: Evaluator, space: SearchRange, limits: Mapping[str, float]) -> list[dict]:
     """Metrics below their limits, and vectors that must increase in order."""
-    scale = space.scale
+    unit = space.unit
     below = [
         {
             "type": "ineq",
-            "fun": lambda u, n=name, top=top: 1.0 - evaluator.at(u * scale)[0][n] / top,
-            "jac": lambda u, n=name, top=top: -evaluator.at(u * scale)[1][n] * scale / top,
+            "fun": lambda u, n=name, top=top: 1.0 - evaluator.at(u * unit)[0][n] / top,
+            "jac": lambda u, n=name, top=top: -evaluator.at(u * unit)[1][n] * unit / top,
         }
         for name, top in limits.items()
     ]
-    return below + _orders(space.free, scale)
-
-
-def _orders(free: FreeParameters, scale: np.ndarray) -> list[dict]:
-    """Vectors that must increase stay in order."""
-    orders, start = [], 0
-    for p in free.chosen:
-        size = p.value.size
-        if p.domain.steps is not None:
-            rows = np.zeros((size - 1, len(scale)))
-            for i in range(size - 1):
-                rows[i, start + i], rows[i, start + i + 1] = -scale[start + i], scale[start + i + 1]
-            gap = 1e-6 * scale[start : start + size].max()
-            orders.append({"type": "ineq", "fun": lambda u, r=rows, g=gap: r @ u - g, "jac": lambda u, r=rows: r})
-        start += size
-    return orders
+    rows, gaps = space.coordinates.order()
+    return below + [{"type": "ineq", "fun": lambda u: rows @ u - gaps, "jac": lambda u: rows}] * bool(gaps.size)
 
 
 def _slope_left(
@@ -157,9 +143,9 @@ def _slope_left(
     """Length of the scaled gradient that neither a bound nor an active limit holds back, relative to the metric."""
     found, slopes = evaluator.at(values)
     unbound = np.array([not side for side in space.side(values)])
-    gradient = (slopes[metric] * space.scale)[unbound]
+    gradient = (slopes[metric] * space.unit)[unbound]
     tight = active(limits, found, evaluator.tolerance)
     if tight and gradient.size:
-        walls = np.stack([(slopes[name] * space.scale)[unbound] for name in tight], axis=1)
+        walls = np.stack([(slopes[name] * space.unit)[unbound] for name in tight], axis=1)
         gradient = gradient - walls @ np.linalg.lstsq(walls, gradient, rcond=None)[0]
     return float(np.linalg.norm(gradient)) / max(abs(found[metric]), 1e-300)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from jaxdamp._status import Status
 from jaxdamp.tune.ranges import FACTOR, SearchRange
 from jaxdamp.tune.result import Change
 from jaxdamp.tune.searching import Ended
@@ -9,12 +10,12 @@ from jaxdamp.tune.searching import Ended
 
 def changes_of(space: SearchRange, values: np.ndarray) -> tuple[Change, ...]:
     """Every free number before and after, with its bounds."""
-    units = [p.unit for p in space.free.chosen for _ in range(p.value.size)]
+    free = space.free
     notes = [f"at its {side} bound" if side else "" for side in space.side(values)]
-    columns = (space.free.names, space.start, values, units, notes, space.lower, space.upper)
+    columns = (free.names, space.start, values, free.owners, notes, space.lower, space.upper, free.followers)
     return tuple(
-        Change(name, float(before), float(after), unit, note, float(lower), float(upper))
-        for name, before, after, unit, note, lower, upper in zip(*columns, strict=True)
+        Change(name, float(before), float(after), p.unit, note, float(lower), float(upper), followers)
+        for name, before, after, p, note, lower, upper, followers in zip(*columns, strict=True)
     )
 
 
@@ -43,6 +44,6 @@ def early_end(ended: Ended, max_steps: int) -> str:
     if ended.out_of_steps:
         return f"The search stopped after {max_steps} steps, before an optimum: {slope}. Allow more with `max_steps`."
     return (
-        f"The search found no better step from where it ended, but that is not a smooth optimum: {slope}. A peak has a "
-        "kink where another instant becomes the largest. Compare with a tuning from another start."
+        f"{Status.NO_BETTER_STEP.sentence.rstrip('.')}: {slope}. A peak has a kink where another instant becomes the "
+        "largest. Compare with a tuning from another start."
     )

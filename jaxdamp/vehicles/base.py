@@ -13,7 +13,7 @@ from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 from jaxdamp.metrics import current_names
-from jaxdamp.parameters import check_parameters, readable
+from jaxdamp.parameters import Module, check_parameters, readable
 from jaxdamp.vehicles.channels import channels_of
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
@@ -24,7 +24,7 @@ from jaxdamp.vehicles.system import Layout, System, assemble, layout_of
 _LAYOUTS: dict[Any, Layout] = {}  # by all of a vehicle but the values of its arrays, which do not change its layout
 
 
-class AbstractVehicle(eqx.Module):
+class AbstractVehicle(Module):
     """Masses and springs with damper laws at ports.
 
     A vehicle names its parameters and has one method, `frame`, which says what it is made of; the `layout` and the

@@ -38,8 +38,8 @@ class Cab(AbstractPart):
     rear_distance: Number = parameter("m", "rear mount behind the cab's centre of gravity", positive)
     front_rate: Number = parameter("N/m", "spring rate of the front mount", positive)
     rear_rate: Number = parameter("N/m", "spring rate of the rear mount", positive)
-    front_damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
-    rear_damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
+    front_damper: AbstractDamper
+    rear_damper: AbstractDamper
     front_extra_spring: AbstractDamper | None = None
     rear_extra_spring: AbstractDamper | None = None
     front_bump_stop: AbstractDamper | None = None

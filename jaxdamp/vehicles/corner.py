@@ -6,25 +6,25 @@ import equinox as eqx
 
 from jaxdamp._types import Number
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import nonnegative, parameter, positive
+from jaxdamp.parameters import Module, nonnegative, parameter, positive
 from jaxdamp.vehicles.parts import AbstractPart, Body, Link, Wheel, prefixed
 from jaxdamp.vehicles.points import Point
 from jaxdamp.vehicles.suspension import Suspension
 
 
-class AbstractCorner(eqx.Module):
+class AbstractCorner(Module):
     """The fields of a wheel with its suspension, which a `Corner` and a `QuarterCar` have in common."""
 
     unsprung_mass: Number = parameter("kg", "mass of wheel and hub", positive)
     spring_rate: Number = parameter("N/m", "suspension spring rate at the wheel", positive)
     tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness", positive)
-    damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
+    damper: AbstractDamper
     tyre_damping: Number = parameter("N s/m", "vertical tyre damping", nonnegative, default=0.0)
     extra_spring: AbstractDamper | None = None
     bump_stop: AbstractDamper | None = None
     friction: AbstractDamper | None = None
     tyre_lifts: bool = eqx.field(static=True, default=False)
-    damper_count: eqx.AbstractVar[int]  # pyright: ignore[reportGeneralTypeIssues]
+    damper_count: eqx.AbstractVar[int]
 
     def parts(
         self,

@@ -41,8 +41,8 @@ class FullCar(AbstractVehicle):
     roll_inertia: Number = parameter("kg m²", "moment of inertia of the body in roll", positive)
     front_distance: Number = parameter("m", "front axle ahead of the centre of gravity", positive)
     rear_distance: Number = parameter("m", "rear axle behind the centre of gravity", positive)
-    front: Axle  # pyright: ignore[reportGeneralTypeIssues]
-    rear: Axle  # pyright: ignore[reportGeneralTypeIssues]
+    front: Axle
+    rear: Axle
     places: tuple[Place, ...] = ()
     seats: tuple[Seat, ...] = ()
     tyre_lifts: bool = eqx.field(static=True, default=False)

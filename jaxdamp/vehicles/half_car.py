@@ -44,8 +44,8 @@ class HalfCar(AbstractVehicle):
     pitch_inertia: Number = parameter("kg m²", "moment of inertia of the body in pitch", positive)
     front_distance: Number = parameter("m", "front axle ahead of the centre of gravity", positive)
     rear_distance: Number = parameter("m", "rear axle behind the centre of gravity", positive)
-    front: Corner  # pyright: ignore[reportGeneralTypeIssues]
-    rear: Corner  # pyright: ignore[reportGeneralTypeIssues]
+    front: Corner
+    rear: Corner
     places: tuple[Place, ...] = ()
     seats: tuple[Seat, ...] = ()
     tyre_lifts: bool = eqx.field(static=True, default=False)

@@ -7,7 +7,7 @@ import equinox as eqx
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import as_float, check_parameters, nonnegative, parameter, positive, readable
+from jaxdamp.parameters import Module, as_float, check_parameters, nonnegative, parameter, positive, readable
 from jaxdamp.vehicles.points import Point
 
 
@@ -24,7 +24,7 @@ def _maybe(value: Any) -> Any:
     return None if value is None else as_float(value)
 
 
-class AbstractPart(eqx.Module):
+class AbstractPart(Module):
     """Anything a vehicle is made of that has parameters of its own."""
 
     def __check_init__(self) -> None:
@@ -67,7 +67,7 @@ class Body(AbstractPart):
 
     name: str = eqx.field(static=True)
     mass: Number = parameter("kg", "mass of the body", positive)
-    turns: tuple[Inertia, ...]  # pyright: ignore[reportGeneralTypeIssues]
+    turns: tuple[Inertia, ...]
 
     def __init__(self, name: str, mass: Any, *, pitch_inertia: Any = None, roll_inertia: Any = None) -> None:
         self.name, self.mass = name, mass

@@ -37,7 +37,7 @@ class RollCar(AbstractVehicle):
 
     sprung_mass: Number = parameter("kg", "mass of the body on this axle", positive)
     roll_inertia: Number = parameter("kg m²", "moment of inertia of the body in roll", positive)
-    axle: Axle  # pyright: ignore[reportGeneralTypeIssues]
+    axle: Axle
     places: tuple[Place, ...] = ()
     seats: tuple[Seat, ...] = ()
     tyre_lifts: bool = eqx.field(static=True, default=False)

@@ -8,7 +8,7 @@ import equinox as eqx
 from jaxdamp import _checks
 from jaxdamp._types import Number
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import as_float, parameter, positive
+from jaxdamp.parameters import Module, as_float, parameter, positive
 from jaxdamp.vehicles.parts import AbstractPart, Body, Link
 from jaxdamp.vehicles.points import Point
 from jaxdamp.vehicles.suspension import Suspension
@@ -29,14 +29,14 @@ class SeatMass(AbstractPart):
 
     mass: Number = parameter("kg", "mass on the spring", positive)
     spring_rate: Number = parameter("N/m", "spring rate under the mass", positive)
-    damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
+    damper: AbstractDamper
     extra_spring: AbstractDamper | None = None
     bump_stop: AbstractDamper | None = None
     friction: AbstractDamper | None = None
 
 
 @final
-class Seat(eqx.Module):
+class Seat(Module):
     """A seat at a point of the body: one mass, or two over one another (seat frame, driver on the cushion), or more.
 
     Channels: `z_seat`, `seat_acceleration`, `seat_stroke`, `seat_damper_force` and so on for the first mass; the next

@@ -39,7 +39,7 @@ class WalkingBeam(AbstractPart):
     spread: Number = parameter("m", "distance between the two axles", positive)
     spring_rate: Number = parameter("N/m", "rate of the leaf spring", positive)
     tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness of an axle", positive)
-    damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
+    damper: AbstractDamper
     tyre_damping: Number = parameter("N s/m", "vertical tyre damping of an axle", nonnegative, default=0.0)
     tyre_lifts: bool = eqx.field(static=True, default=False)
     extra_spring: AbstractDamper | None = None

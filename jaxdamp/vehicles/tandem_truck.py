@@ -42,8 +42,8 @@ class TandemTruck(AbstractVehicle):
     pitch_inertia: Number = parameter("kg m²", "moment of inertia of the sprung mass in pitch", positive)
     front_distance: Number = parameter("m", "front axle ahead of the centre of gravity", positive)
     tandem_distance: Number = parameter("m", "middle of the tandem behind the centre of gravity", positive)
-    front: Corner  # pyright: ignore[reportGeneralTypeIssues]
-    tandem: WalkingBeam | IndependentTandem  # pyright: ignore[reportGeneralTypeIssues]
+    front: Corner
+    tandem: WalkingBeam | IndependentTandem
     cab: Cab | None = None
     places: tuple[Place, ...] = ()
     seats: tuple[Seat, ...] = ()

@@ -64,8 +64,8 @@ class TrackedHull(AbstractVehicle):
     pitch_inertia: Number = parameter("kg m²", "moment of inertia of the hull in pitch", positive)
     wheel_positions: Vector = parameter("m", "road wheels ahead of the centre of gravity, first to last")
     wheel_rate: Number = parameter("N/m", "spring rate of one road wheel", positive)
-    damper: AbstractDamper  # pyright: ignore[reportGeneralTypeIssues]
-    damped: tuple[int, ...] = eqx.field(static=True)  # pyright: ignore[reportGeneralTypeIssues]
+    damper: AbstractDamper
+    damped: tuple[int, ...] = eqx.field(static=True)
     places: tuple[Place, ...] = ()
     seats: tuple[Seat, ...] = ()
     tyre_lifts: bool = eqx.field(static=True, default=False)

@@ -1,5 +1,7 @@
 """What the linearised vehicle says: modes, frequency response, stationary response, equivalent elements."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -55,7 +57,7 @@ def test_undamped_modes_solve_the_eigenproblem_and_overdamped_ones_do_not_oscill
 
 def test_walking_beam_pitches_on_its_tyres_alone():
     truck = replace(truck_001(), {"tandem.tyre_damping": 0.0})
-    beam = truck.tandem
+    beam: Any = truck.tandem
     expected = np.sqrt(float(beam.tyre_stiffness * beam.spread**2 / (2 * beam.pitch_inertia))) / (2 * np.pi)
     found = modes(truck)
     lone = np.flatnonzero(np.abs(found.damping_ratio) < 1e-9)

@@ -8,22 +8,23 @@ import scipy.stats
 from jaxtyping import Bool, Float
 
 from jaxdamp.dampers.base import Reach
-from jaxdamp.identify.coordinates import edges, ordered
+from jaxdamp.identify.ends import at_ends
+from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.profile import Profile, profile
 from jaxdamp.identify.result import Estimate, Minimum
-from jaxdamp.identify.search import Found, Problem, squares
-from jaxdamp.identify.several import Several, minima_of
+from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.several import Solution, minima_of
 from jaxdamp.identify.uncertainty import uncertainty, weak_directions
 from jaxdamp.parameters import FreeParameters
 
 
 WEAK = 0.5  # standard error, relative to the value or to the force, above which a parameter is not identifiable
-PRESSING = 3.0  # standard errors beyond an edge from which the data truly press against it
+BOUND_Z_SCORE = 3.0  # standard errors beyond an edge from which the data truly press against it
 NEARLY = 9.0  # chi-square above the best up to which another minimum is nearly as good: three standard errors
 APART = 3.0  # standard errors from which a parameter of another minimum is another value
 
 
-class Judged(NamedTuple):
+class Estimates(NamedTuple):
     """How far fitted numbers can be trusted."""
 
     estimates: tuple[Estimate, ...]
@@ -32,9 +33,7 @@ class Judged(NamedTuple):
     notes: tuple[str, ...]
 
 
-def judge(
-    problem: Problem, several: Several, noise: Float[np.ndarray, " samples"], reach: Reach, *, searched: bool
-) -> Judged:
+def estimate(problem: Problem, solution: Solution, noise: Float[np.ndarray, " samples"]) -> Estimates:
     """Standard errors, 95 % intervals by Student's t within the domain, and what is wrong with them.
 
     A parameter is "not identifiable" where no error is finite, or where its standard error is more than half of it. A
@@ -46,68 +45,70 @@ def judge(
 
     Arguments:
         problem: what was minimised.
-        several: where the searches ended.
+        solution: where the searches ended.
         noise: standard deviation of each weighted residual.
-        reach: how far the records go.
-        searched: whether the minimum was searched for, or has a closed form and no other beside it.
     """
-    free, found, used = problem.free, several.best, problem.used
-    known, variance = uncertainty(found.jacobian, found.residual, noise), float(np.mean(noise[used] ** 2))
+    free, found, used = problem.free, solution.best, problem.used
+    uncertain, variance = uncertainty(found.jacobian, found.residual, noise), float(np.mean(noise[used] ** 2))
     yardstick = yardsticks(free, found.values, np.linalg.norm(found.jacobian, axis=0) / problem.level)
-    sides, minima = edges(free, found.values), minima_of(several, free.names, variance)
-    errors = np.sqrt(np.diag(known.covariance))
-    numbers = ~ordered(free)
+    sides, minima = at_ends(problem.coordinates, found.values), minima_of(solution, free.names, variance)
+    errors = np.sqrt(np.diag(uncertain.covariance))
+    numbers = ~problem.coordinates.ordered
     firm = numbers & (errors <= WEAK * yardstick) & (sides == 0)
-    spans = _spans(free, reach)
+    spans = _spans(free, problem.reach)
     doubt = np.any((np.abs(found.values) > spans) | (numbers & ~firm)) or any(m.chi_square < NEARLY for m in minima[1:])
     far = WEAK * yardstick
     moved = Profile(errors, np.zeros(errors.shape, bool))
-    if searched and doubt and found.converged and not problem.is_rounding(squares(found)):
+    if not solution.closed_form and doubt and found.converged and not problem.is_rounding(found.squares):
         moved = profile(problem, found, errors, far, firm, variance)
     lower, upper = free.limits()
-    at_zero = numbers & (sides < 0) & (lower == 0) & np.isinf(upper) & (np.abs(known.beyond) < PRESSING)
+    pressed = ~(np.abs(uncertain.unconstrained_step) < BOUND_Z_SCORE)
+    at_zero = numbers & (sides < 0) & (lower == 0) & np.isinf(upper) & ~pressed
     undetermined = ~(moved.errors <= far) | moved.open_ended
     weak = np.where(sides != 0, at_zero | ~np.isfinite(errors), undetermined)
-    estimates = _estimates(free, found, moved.errors, weak, sides != 0, int(np.count_nonzero(used)))
+    estimates = _estimates(problem, found, moved.errors, weak, sides != 0, int(np.count_nonzero(used)))
     notes = on_estimates(estimates, weak_directions(found.jacobian, float(np.sqrt(variance)), yardstick, WEAK))
     notes += on_minima(minima, estimates) + on_reach(estimates, spans)
-    return Judged(estimates, known.covariance, minima, tuple(notes))
+    return Estimates(estimates, uncertain.covariance, minima, tuple(notes))
 
 
 def _estimates(
-    free: FreeParameters,
-    found: Found,
+    problem: Problem,
+    found: SearchEnd,
     errors: Float[np.ndarray, " free"],
     weak: Bool[np.ndarray, " free"],
     bound: Bool[np.ndarray, " free"],
     samples: int,
 ) -> tuple[Estimate, ...]:
+    free = problem.free
     lower, upper = free.limits()
     reach = float(scipy.stats.t.ppf(0.975, max(samples - found.values.size, 1)))
-    owners = [p for p in free.chosen for _ in range(p.value.size)]
     rows = []
-    for i, (name, p) in enumerate(zip(free.names, owners, strict=True)):
+    for i, (name, p, tied) in enumerate(zip(free.names, free.owners, free.followers, strict=True)):
         value, error = float(found.values[i]), float(errors[i])
         interval = (max(value - reach * error, float(lower[i])), min(value + reach * error, float(upper[i])))
         note = "not identifiable" if weak[i] else "at a bound" if bound[i] else ""
-        rows.append(Estimate(name, value, p.unit, error, interval, p.meaning, note))
+        meaning = p.meaning
+        if p.path in problem.per_record:
+            meaning += f" in record {problem.runs[int(name.rpartition('[')[2][:-1])].name!r}"
+        rows.append(Estimate(name, value, p.unit, error, interval, meaning, note, tied))
     return tuple(rows)
 
 
 def yardsticks(
-    free: FreeParameters, values: Float[np.ndarray, " free"], effect: Float[np.ndarray, " free"]
+    free: FreeParameters, values: Float[np.ndarray, " free"], sensitivity: Float[np.ndarray, " free"]
 ) -> Float[np.ndarray, " free"]:
     """A large change of each parameter: its value; for one that may have either sign, what moves the force by its RMS.
 
     Arguments:
         free: the free parameters.
         values: their values.
-        effect: RMS force that one unit of each makes, relative to the RMS of the measured force.
+        sensitivity: RMS force that one unit of each makes, relative to the RMS of the measured force.
     """
     lower, upper = free.limits()
     tiny = np.finfo(float).tiny
     signed = (lower < 0) & (upper > 0)
-    by_force = np.divide(1.0, effect, out=np.full(effect.shape, tiny), where=effect > 0)
+    by_force = np.divide(1.0, sensitivity, out=np.full(sensitivity.shape, tiny), where=sensitivity > 0)
     return np.where(signed, by_force, np.maximum(np.abs(values), tiny))
 
 
@@ -155,7 +156,7 @@ def _listed(names: Sequence[str]) -> str:
 def _spans(free: FreeParameters, reach: Reach) -> Float[np.ndarray, " free"]:
     """How far the records go in the unit of each number; infinite for units other than m/s and m."""
     spans = {"m/s": reach.velocity, "m": 2.0 * reach.stroke}
-    return np.array([spans.get(p.unit, np.inf) for p in free.chosen for _ in range(p.value.size)])
+    return np.array([spans.get(p.unit, np.inf) for p in free.owners])
 
 
 def on_reach(estimates: Sequence[Estimate], spans: Float[np.ndarray, " free"]) -> list[str]:

@@ -27,6 +27,11 @@ class Domain:
     upper: float = np.inf
     steps: Callable[[Array], Array] | None = None
 
+    @property
+    def ordered(self) -> bool:
+        """Whether it is of vectors whose numbers must increase."""
+        return self.steps is not None
+
 
 def _inverse_softplus(y: Array) -> Array:
     return jnp.where(y > 30.0, y, jnp.log(jnp.expm1(jnp.minimum(y, 30.0))))

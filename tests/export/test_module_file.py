@@ -2,14 +2,14 @@ import inspect
 import json
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-import jaxdamp.dampers
+from jaxdamp import dampers, roads, vehicles
 from jaxdamp.dampers import (
-    AbstractDamper,
     AbstractMemoryless,
     CoulombFriction,
     FittedRange,
@@ -19,10 +19,14 @@ from jaxdamp.dampers import (
     PiecewiseLinear,
     SeriesSpring,
     Table,
+    TemperatureScaled,
     with_fitted_range,
 )
 from jaxdamp.export import from_json, to_json
-from jaxdamp.parameters import get, parameter, positive, setting
+from jaxdamp.export._plain import known_classes
+from jaxdamp.parameters import get, parameter, positive, replace, setting
+from jaxdamp.tune import minimise
+from jaxdamp.vehicles import Body, Element, Frame, Link, LumpedVehicle, Seat, SeatMass, Wheel, presets
 
 
 def law():
@@ -99,8 +103,8 @@ def test_single_precision_keeps_its_value():
 # ---- what cannot be written
 
 
-def test_not_a_law():
-    with pytest.raises((ValueError, TypeError), match="law"):
+def test_not_a_module():
+    with pytest.raises((ValueError, TypeError), match="module"):
         to_json(3.0)  # type: ignore[arg-type]
 
 
@@ -141,9 +145,9 @@ def test_no_folder(tmp_path):
 
 
 def test_no_file(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"There is no law file .*front\.json"):
+    with pytest.raises(FileNotFoundError, match=r"There is no file .*front\.json"):
         from_json(tmp_path / "front.json")
-    with pytest.raises(FileNotFoundError, match="There is no law file"):
+    with pytest.raises(FileNotFoundError, match="There is no file"):
         from_json("front.json")
 
 
@@ -154,15 +158,21 @@ def changed(change):
 
 
 READ_ERRORS = {
-    "not JSON": ("{oops", "A law must be written in JSON, but the text is not: Expecting property name"),
+    "not JSON": ("{oops", "It must be written in JSON, but the text is not: Expecting property name"),
     "another file": ('{"format": "PDF"}', '`path_or_text` must begin with "format": "jaxdamp law"'),
     "version": (changed(lambda d: d.update(version=3)), "`version` must be 1 or 2, but is 3"),
-    "no law": (changed(lambda d: d.pop("law")), "`the law file` must hold format, version, law, but is lacks law"),
+    "no law": (
+        changed(lambda d: d.pop("law")),
+        "must hold format, version, law, but is of format, version",
+    ),
     "unknown law": (
         changed(lambda d: d["law"]["law"].update({"class": "Linaer"})),
-        "must be a law that is known, but is 'Linaer'. Did you mean 'Linear'. Import the module of your own laws first",
+        "of a class that is known, but is 'Linaer'. Did you mean 'Linear'. Import the module of your own classes first",
     ),
-    "abstract law": (changed(lambda d: d["law"].update({"class": "AbstractDamper"})), "must be a law that is known"),
+    "abstract law": (
+        changed(lambda d: d["law"].update({"class": "AbstractDamper"})),
+        "must be of a class that is known",
+    ),
     "missing": (
         changed(lambda d: d["law"].pop("lag_time")),
         "`Lag` must hold class, law, lag_time, but is lacks lag_time",
@@ -204,13 +214,67 @@ def test_a_file_of_several_faults_is_named(tmp_path):
         from_json(path)
 
 
-def test_every_law_of_the_package_is_found_by_its_name():
-    from jaxdamp.export.law_file import _classes
+def test_every_class_of_the_package_is_found_by_its_name():
+    kinds = [getattr(door, name) for door in (dampers, roads, vehicles) for name in door.__all__]
+    kinds = [kind for kind in kinds if isinstance(kind, type) and issubclass(kind, eqx.Module)]
+    kinds = [kind for kind in kinds if not inspect.isabstract(kind) and not kind.__name__.startswith("Abstract")]
+    assert len(kinds) > 60 and all(known_classes()[kind.__name__] is kind for kind in kinds)
 
-    public = {name: getattr(jaxdamp.dampers, name) for name in jaxdamp.dampers.__all__}
-    laws = {name: kind for name, kind in public.items() if isinstance(kind, type) and issubclass(kind, AbstractDamper)}
-    laws = {name: kind for name, kind in laws.items() if not inspect.isabstract(kind)}
-    assert len(laws) > 30 and all(_classes()[name] is kind for name, kind in laws.items())
+
+# ---- vehicles, roads, other modules
+
+
+PRESETS = [
+    name for name, make in inspect.getmembers(presets, inspect.isfunction) if make.__module__ == presets.__name__
+]
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_published_vehicle_comes_back_bit_for_bit(name, tmp_path):
+    car = getattr(presets, name)()
+    to_json(car, tmp_path / "car.json")
+    assert json.loads((tmp_path / "car.json").read_text(encoding="utf-8"))["format"] == "jaxdamp vehicle"
+    assert same(from_json(tmp_path / "car.json"), car)
+
+
+def test_a_vehicle_of_parts_and_one_with_everything_come_back():
+    body, wheel = Body("sprung", 300.0), Body("unsprung", 40.0)
+    suspension = Link("", body.at() - wheel.at(), stiffness=20e3, elements=(Element("damper", law()),))
+    parts = LumpedVehicle(Frame((body, wheel), (suspension,), (Wheel("", wheel.at(), 180e3),)))
+    fitted = with_fitted_range(Linear(1500.0), velocity=(-0.5, 0.5))
+    seat = Seat((SeatMass(80.0, 12e3, Linear(600.0)),))
+    full = replace(presets.quarter_car_000(fitted, tyre_lifts=True), {"tyre_damping": 10.0 / 3.0})
+    full = eqx.tree_at(lambda car: car.seats, full, (seat,), is_leaf=lambda x: isinstance(x, tuple))
+    for car in (parts, full):
+        again = from_json(to_json(car))
+        assert same(again, car) and again.static_wheel_loads() == car.static_wheel_loads()
+    assert json.loads(to_json(full))["version"] == 2
+
+
+def test_a_tuned_vehicle_is_saved():
+    road = roads.white("C", 20.0)
+    tuned = minimise("rms_sprung_acceleration", presets.quarter_car_000(), road, max_steps=2).vehicle
+    assert same(from_json(to_json(tuned)), tuned)
+
+
+def test_a_file_may_lack_fields_that_a_class_was_given_later():
+    document = json.loads(to_json(presets.quarter_car_000()))
+    for name in ("friction", "seats", "damper_count"):
+        del document["vehicle"][name]
+    assert same(from_json(json.dumps(document)), presets.quarter_car_000())
+
+
+def test_a_vehicle_is_checked_as_its_constructor_checks_it():
+    document = json.loads(to_json(presets.quarter_car_000(TemperatureScaled(Linear(1.0), temperature=330.0))))
+    document["vehicle"]["damper"]["sensitivity"]["value"] = 0.1
+    with pytest.raises(ValueError, match="sensitivity"):
+        from_json(json.dumps(document))
+    document = json.loads(to_json(presets.quarter_car_000()))
+    document["vehicle"]["damper"] = json.loads(to_json(roads.sine(0.01, frequency=1.0)))["road"]
+    with pytest.raises(ValueError, match=r"`QuarterCar\.damper` must be a damper law"):
+        from_json(json.dumps(document))
+    with pytest.raises(ValueError, match="`law` must be a law"):
+        from_json(json.dumps({"format": "jaxdamp law", "version": 1, "law": document["vehicle"]["damper"]}))
 
 
 # ---- the range of the fitted records

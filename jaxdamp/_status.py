@@ -1,0 +1,20 @@
+"""How searches end."""
+
+import enum
+
+
+class Status(enum.Enum):
+    """How a fit, a training or a tuning ended: compare with `is` in code, read `sentence` as a person."""
+
+    CONVERGED = "The search converged."
+    STEP_LIMIT = "The search stopped after as many steps as `max_steps` allows."
+    NO_STEP = "A step of the search could not be computed."
+    NO_BETTER_STEP = "The search found no better step from where it ended, but that is not a smooth optimum."
+    LIMIT_NOT_MET = "A limit is not met."
+    STOPPED_EARLY = "The error on the held-out records fell no more."
+    ALL_STEPS = "All steps were taken."
+
+    @property
+    def sentence(self) -> str:
+        """What it means, in a sentence."""
+        return self.value

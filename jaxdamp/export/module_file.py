@@ -1,0 +1,132 @@
+"""A law, a vehicle, a road as a text that people read, diff and keep: JSON with class names, numbers and units."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any, NoReturn
+
+import equinox as eqx
+
+from jaxdamp import _checks
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers.fitted_range import has_fitted_range
+from jaxdamp.export._plain import FITTED_TO, plain_module
+from jaxdamp.export._rebuild import rebuilt
+from jaxdamp.export._write import write_whole
+from jaxdamp.parameters import checked
+from jaxdamp.roads import AbstractRoad, WhiteRoad
+from jaxdamp.vehicles import AbstractVehicle
+
+
+KINDS: dict[str, Any] = {  # what a file holds, the most particular first
+    "law": AbstractDamper,
+    "vehicle": AbstractVehicle,
+    "road": (AbstractRoad, WhiteRoad),
+    "module": eqx.Module,
+}
+FORMATS = {f"jaxdamp {kind}": kind for kind in KINDS}
+PLAIN, WITH_RANGES = 1, 2  # versions: a file of the second may say what its laws were fitted to
+
+
+def to_json(module: eqx.Module, path: str | os.PathLike[str] | None = None) -> str:
+    """Write a law, a vehicle, a road or any other module of this package or of your own as JSON.
+
+    Every number stands with its unit, all digits are kept: `from_json` gives the same module, bit for bit. Classes that
+    you defined yourself are written by their name. The range that a law was fitted to stands with it, under
+    "fitted_to".
+
+    Arguments:
+        module: any composition.
+        path: a file to write it to; an existing one is replaced, and never left half-written.
+
+    Returns:
+        The text.
+
+    Raises:
+        ValueError: something else, values that are not finite or only known inside `jax.jit`, fields other than
+            modules, numbers, words, arrays and tuples of these.
+
+    >>> from jaxdamp.dampers import Linear
+    >>> print(to_json(Linear(1500.0)))
+    {
+      "format": "jaxdamp law",
+      "version": 1,
+      "law": {
+        "class": "Linear",
+        "rate": {"value": 1500.0, "unit": "N s/m"}
+      }
+    }
+    """
+    must = "be a law, a vehicle, a road or another module"
+    _checks.instance("module", module, eqx.Module, must, "Write for example `to_json(result.law, 'law.json')`.")
+    kind = next(kind for kind, classes in KINDS.items() if isinstance(module, classes))
+    version = WITH_RANGES if has_fitted_range(module) else PLAIN
+    text = _layout({"format": f"jaxdamp {kind}", "version": version, kind: plain_module(module)}) + "\n"
+    if path is not None:
+        write_whole(path, text)
+    return text.rstrip("\n")
+
+
+def from_json(path_or_text: str | os.PathLike[str]) -> Any:
+    """Read what `to_json` wrote.
+
+    A class of your own is found by its name if the module that defines it has been imported before. Values are checked
+    as constructors check them.
+
+    Arguments:
+        path_or_text: a file, or the text itself (anything that begins with `{`).
+
+    Returns:
+        The law, vehicle, road or other module.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: not JSON, another format or version, an unknown class, a parameter missing or too many, a value
+            that is not finite or outside its domain, another unit.
+
+    >>> from jaxdamp.dampers import Lag, Linear
+    >>> from_json(to_json(Lag(Linear(1500.0), lag_time=0.004)))
+    Lag(law=Linear(rate=1500.0), lag_time=0.004)
+    """
+    if isinstance(path_or_text, str) and path_or_text.lstrip().startswith("{"):
+        source, text = "the text", path_or_text
+    else:
+        file = Path(path_or_text).expanduser()
+        if not file.is_file():
+            raise FileNotFoundError(f"There is no file {str(file)!r} (text would have to begin with '{{').")
+        source, text = str(file), file.read_text(encoding="utf-8")
+    try:
+        document = json.loads(text, parse_constant=_no_constant)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"It must be written in JSON, but {source} is not: {error}.") from error
+    kind = FORMATS.get(str(document.get("format"))) if isinstance(document, dict) else None
+    if kind is None:
+        formats = " or ".join(f'"{name}"' for name in FORMATS)
+        _checks.refuse("path_or_text", f'begin with "format": {formats}', source, "Was it written by `to_json`?")
+    version = document.get("version")
+    if version not in (PLAIN, WITH_RANGES):
+        remedy = "Another version of jaxdamp wrote it; read it with that one."
+        _checks.refuse("version", f"be {PLAIN} or {WITH_RANGES}", repr(version), remedy)
+    if sorted(document) != sorted(["format", "version", kind]):
+        _checks.refuse(f"the {kind} file", f"hold format, version, {kind}", f"of {', '.join(document)}")
+    module = checked(rebuilt(document[kind], kind))
+    _checks.instance(kind, module, KINDS[kind], f"be a {kind}", "The format of the file says so.")
+    if version == PLAIN and has_fitted_range(module):
+        remedy = f'Files that say what laws were fitted to are of "version": {WITH_RANGES}.'
+        _checks.refuse(f"the {kind} file", f"have no {FITTED_TO!r} in version {PLAIN}", "one that has", remedy)
+    return module
+
+
+def _layout(value: Any, indent: str = "") -> str:
+    """JSON with one field a line; a quantity and a list of numbers stay on one line."""
+    deeper = indent + "  "
+    if isinstance(value, dict) and value and "value" not in value:
+        lines = [f"{deeper}{json.dumps(key)}: {_layout(item, deeper)}" for key, item in value.items()]
+        return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+    if isinstance(value, list) and any(isinstance(item, dict) for item in value):
+        return "[\n" + ",\n".join(deeper + _layout(item, deeper) for item in value) + f"\n{indent}]"
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
+def _no_constant(name: str) -> NoReturn:
+    raise ValueError(f"A file must hold finite numbers only, but the text has {name}.")

@@ -1,0 +1,109 @@
+"""`judge`: from the minimum of a problem to a result with errors, scores and warnings."""
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
+from jaxdamp.dampers import AbstractDamper, with_fitted_range
+from jaxdamp.dampers._points import drives_motion
+from jaxdamp.dampers.command import takes_command
+from jaxdamp.dampers.coverage import coverage
+from jaxdamp.identify.covered import covered_range
+from jaxdamp.identify.estimating import estimate, on_correlation
+from jaxdamp.identify.noise import noise_of
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.result import FitResult, score
+from jaxdamp.identify.several import Solution
+from jaxdamp.identify.traces import is_memoryless, predict_runs
+from jaxdamp.parameters import get, with_values
+
+
+_REMEDY = "Try another start, bounds, or fewer free parameters."
+
+
+def judge(problem: Problem, solution: Solution, *, force_noise: float | None = None) -> FitResult:
+    """The third step of `fit`: what the minimum says, and how far it can be trusted.
+
+    Arguments:
+        problem: of `prepare`.
+        solution: of `solve`.
+        force_noise: standard deviation [N] of the measured force where it is known, as in `fit`.
+
+    Raises:
+        ValueError: forces or derivatives that are not finite at the minimum.
+    """
+    best = solution.best
+    if not best.finite:
+        must = "give finite forces and derivatives over the records"
+        _checks.refuse(
+            "law", must, f"{problem.law}, which does not", coverage(problem.law) or "Start from another law."
+        )
+    noise, inflation = noise_of(problem, best, force_noise)
+    estimates = estimate(problem, solution, noise)
+    laws, law = _fitted(problem, best.values)
+    percent, rmse, scores = score(laws, problem.runs, np.isfinite(problem.sigma))
+    notes = [f"The search did not converge: {best.status.sentence} {_REMEDY}"] * (not best.converged)
+    notes += [*notes_on(law, problem.fitted_to), *estimates.notes, *on_correlation(inflation)]
+    return FitResult(
+        law=law,
+        runs=problem.runs,
+        parameters=estimates.estimates,
+        covariance=estimates.covariance,
+        fit_percent=percent,
+        rmse=rmse,
+        scores=scores,
+        warnings=tuple(notes),
+        status=best.status,
+        steps=best.steps,
+        starts=solution.starts,
+        minima=estimates.minima,
+        inflation=inflation,
+        record_laws=tuple(laws) if isinstance(laws, list) else (),
+    )
+
+
+def _fitted(problem: Problem, values: np.ndarray) -> tuple[AbstractDamper | list[AbstractDamper], AbstractDamper]:
+    """The fitted law, of each record where they differ, and the one with the mean of what differs."""
+    covered, built = covered_range(problem.fitted_to), problem.free.build(jnp.asarray(values))
+    if not problem.per_record:
+        law = with_fitted_range(built, covered)
+        return law, law
+    own = {path: get(built, path) for path in problem.per_record}
+    laws = [
+        with_fitted_range(with_values(built, {path: v[i] for path, v in own.items()}), covered)
+        for i in range(len(problem.runs))
+    ]
+    return laws, with_fitted_range(with_values(built, {path: jnp.mean(v) for path, v in own.items()}), covered)
+
+
+def notes_on(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
+    """Sentences on records that contradict each other and on a fitted curve that drives the motion."""
+    return _contradicting(law, runs) + _driving(law, runs)
+
+
+def _contradicting(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
+    """A sentence on records with the same motion, and the same command if the law follows it, but other forces."""
+    follows = takes_command(law) and all(run.command is not None for run in runs)
+    groups: dict[float | None, list[BenchRun]] = {}
+    for run in runs:
+        groups.setdefault(run.command if follows else None, []).append(run)
+    return contradictions_in_words([pair for group in groups.values() for pair in contradictions(group)])
+
+
+def _driving(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
+    """A sentence on a fitted curve that drives the motion at some of the velocities of the records."""
+    if not is_memoryless(law):
+        return []
+    velocity = np.concatenate([run.velocity for run in runs])
+    order = np.argsort(velocity, kind="stable")
+    velocity, force = velocity[order], np.concatenate(predict_runs(law, runs))[order]
+    at = velocity[drives_motion(velocity, force)]
+    if not at.size:
+        return []
+    return [
+        f"The fitted curve drives the motion instead of damping it at velocities from {at[0]:.3g} to {at[-1]:.3g} m/s. "
+        "Check the sign of the force, or take a law that cannot, such as `Bilinear` or `PiecewiseLinear`."
+    ]

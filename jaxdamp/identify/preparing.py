@@ -1,0 +1,98 @@
+"""`prepare`: a law and bench records as a least-squares problem."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers.base import Reach
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.starting import Start, started
+from jaxdamp.identify.traces import batches, owners
+from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
+
+
+def prepare(
+    law: Start,
+    runs: BenchRun | Iterable[BenchRun],
+    *,
+    freeze: Sequence[str] = (),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    tie: Mapping[str, str] | None = None,
+    per_record: Sequence[str] = (),
+    weighting: str | Sequence[float] = "samples",
+    samples_per_cycle: int | None = 400,
+) -> Problem:
+    """The first of the three steps of `fit`, whose arguments these are: `prepare`, `solve`, `judge`.
+
+    Returns:
+        The residuals of the records, and the free parameters with their start.
+
+    Raises:
+        ValueError: no records; names that fit no parameter; a start outside its bounds; a force that never varies.
+
+    >>> from jaxdamp import bench, dampers
+    >>> from jaxdamp.identify import judge, solve
+    >>> runs = bench.VirtualDyno(dampers.Linear(1500.0)).run([bench.SineTest(amplitude=0.02, frequency=2.0)])
+    >>> problem = prepare(dampers.Linear(1000.0), runs)
+    >>> round(float(judge(problem, solve(problem)).law.rate), 3)
+    1500.0
+    """
+    runs = as_runs(runs, call="fit(law, runs)")
+    if not runs:
+        _checks.refuse("runs", "hold at least one record", "empty", "Read some with `bench.read`.")
+    if not any(np.ptp(run.force) > 0 for run in runs):
+        _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
+    sigma = weights(weighting, runs)
+    fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
+    begin = started(law, fitted_to)
+    own = _per_record(begin, per_record, sigma)
+    free = free_parameters(_spread(begin, own, len(runs)), freeze=freeze, bounds=bounds, tie=tie)
+    _checks.finite("law", free.values)
+    residuals, ranges = batches(begin, runs, sigma, samples_per_cycle, own)
+    owner = owners(residuals, ranges)
+    level = float(np.sqrt(sum(np.sum(np.square(part.force * part.weight)) for part in residuals)))
+    reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
+    return Problem(free, residuals, level, runs, tuple(sigma), owner, reach, begin, own, weighting == "runs")
+
+
+def _per_record(law: AbstractDamper, names: Sequence[str], sigma: Sequence[float]) -> tuple[str, ...]:
+    """Paths of the parameters that have a value for each record."""
+    by_path = {p.path: p for p in parameters(law)}
+    paths = match_paths(list(by_path), name_patterns("per_record", names))
+    for path in paths:
+        if by_path[path].value.ndim:
+            remedy = "Only single numbers can differ from record to record."
+            _checks.refuse("per_record", "name parameters that are one number", f"{path}, a vector", remedy)
+    if paths and not np.all(np.isfinite(sigma)):
+        remedy = "A record that is left out says nothing of its own value: leave it out of `runs`."
+        _checks.refuse("weighting", "be finite beside `per_record`", "infinite for some records", remedy)
+    return tuple(paths)
+
+
+def _spread(law: AbstractDamper, paths: Sequence[str], records: int) -> AbstractDamper:
+    """The law with a vector of values, one for each record, at some paths."""
+    values = {p.path: p.value for p in parameters(law)}
+    return with_values(law, {path: jnp.full(records, values[path]) for path in paths})
+
+
+def weights(weighting: str | Sequence[float], runs: Sequence[BenchRun]) -> list[float]:
+    """Standard deviation [N] by which each record's residuals are divided; infinite for a record to be left out."""
+    if isinstance(weighting, str):
+        _checks.one_of("weighting", weighting, ["samples", "runs"])
+        if weighting == "samples":
+            return [1.0] * len(runs)
+        sigma = [float(np.sqrt(np.mean(run.force**2) * len(run))) for run in runs]
+        _checks.positive("runs", np.array(sigma), "A record without force has no RMS force to be weighted by.")
+        return sigma
+    sigma = [float(s) for s in weighting]
+    if len(sigma) != len(runs):
+        _checks.refuse("weighting", f"give one number for each of {len(runs)} records", f"{len(sigma)} numbers")
+    kept = np.array([s for s in sigma if s != np.inf])
+    _checks.positive("weighting", kept)
+    if not kept.size:
+        _checks.refuse("weighting", "leave at least one record", "infinite for all")
+    return sigma

@@ -1,0 +1,101 @@
+"""What a fit minimises: residuals as functions of a model with free parameters."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers.base import Reach
+from jaxdamp.parameters import Coordinates, FreeParameters
+
+
+ROUNDING = 1e-8  # residual, relative to the force, below which there is nothing left to explain
+
+
+class AbstractResiduals(eqx.Module):
+    """Measured numbers that a model should explain."""
+
+    @abstractmethod
+    def __call__(self, model: Any) -> Float[Array, " samples"]:
+        """Weighted difference of the model from what was measured; zero for samples that do not count."""
+
+    @abstractmethod
+    def used(self) -> Bool[np.ndarray, " samples"]:
+        """Which samples count; the others are padding, or lie before the model has settled."""
+
+    @abstractmethod
+    def total_weight(self) -> Float[Array, ""]:
+        """Sum of the squared weights, the number of samples as measured where all weigh the same."""
+
+
+class Problem(NamedTuple):
+    """A fit to be solved.
+
+    Attributes:
+        free: the free parameters of the model, with their start.
+        residuals: what is minimised, as a sum of squares.
+        level: size of the measured forces in the units of the residuals, root of the sum of squares.
+        runs: the records given.
+        sigma: standard deviation [N] by which the residuals of each record are divided, infinite for one left out.
+        owner: the number of the record that each sample of the residuals belongs to.
+        reach: how far the fitted records go.
+        law: the model to start from with one value for each parameter.
+        per_record: paths of the parameters that have a value for each record.
+        each: whether every record has noise of its own.
+    """
+
+    free: FreeParameters
+    residuals: tuple[AbstractResiduals, ...]
+    level: float
+    runs: tuple[BenchRun, ...]
+    sigma: tuple[float, ...]
+    owner: Int[np.ndarray, " samples"]
+    reach: Reach
+    law: AbstractDamper
+    per_record: tuple[str, ...]
+    each: bool
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """Those of a search within bounds."""
+        return Coordinates(self.free, smooth="ordered")
+
+    @property
+    def used(self) -> Bool[np.ndarray, " samples"]:
+        """Which samples of all residuals count."""
+        return np.concatenate([residuals.used() for residuals in self.residuals])
+
+    @property
+    def fitted_to(self) -> list[BenchRun]:
+        """The records that are not left out."""
+        return [run for run, s in zip(self.runs, self.sigma, strict=True) if np.isfinite(s)]
+
+    def started_at(self, values: Float[np.ndarray, " free"]) -> "Problem":
+        """The same with another start."""
+        return self._replace(free=self.free.started_at(values))
+
+    def is_rounding(self, squares: float) -> bool:
+        """Whether a sum of squares is so small that it is made of rounding, not of noise."""
+        return squares <= (ROUNDING * self.level) ** 2
+
+
+@eqx.filter_jit
+def linearised(
+    free: FreeParameters, values: Float[Array, " free"], residuals: Sequence[AbstractResiduals]
+) -> tuple[Float[Array, " samples"], Float[Array, "samples free"]]:
+    """All residuals and their Jacobian with respect to the physical values, in one forward pass."""
+
+    def both(values: Array) -> tuple[Array, Array]:
+        model = free.build(values)
+        together = jnp.concatenate([part(model) for part in residuals])
+        return together, together
+
+    jacobian, together = jax.jacfwd(both, has_aux=True)(values)
+    return together, jacobian

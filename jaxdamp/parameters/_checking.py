@@ -1,0 +1,49 @@
+"""Checking what a module refuses when it is built: kinds of fields, domains, and conditions between fields."""
+
+import dataclasses
+from typing import TypeVar
+
+import equinox as eqx
+
+from jaxdamp import _checks
+from jaxdamp._field_types import check_field_types
+from jaxdamp.parameters._declaration import domain_of, modules_inside
+
+
+Tree = TypeVar("Tree")
+
+
+def check_parameters(module: eqx.Module) -> None:
+    """Refuse fields of another kind than their annotation and values outside their domain (traced values pass).
+
+    Modules call it in `__check_init__`.
+    """
+    check_field_types(module)
+    for field in dataclasses.fields(module):
+        declared = field.metadata.get("parameter") or field.metadata.get("setting")
+        value = _checks.concrete(getattr(module, field.name)) if declared else None
+        if declared is None or value is None:
+            continue
+        argument = f"{type(module).__name__}.{field.name}"
+        _checks.finite(argument, value)
+        domain = domain_of(declared, module)
+        if not domain.contains(value):
+            unit = f" [{declared['unit']}]" if declared["unit"] else ""
+            _checks.refuse(argument, f"be {domain.name}{unit}", value, f"It is the {declared['meaning']}.")
+
+
+def checked(tree: Tree) -> Tree:
+    """The same tree, after all modules in it have checked again what their constructors check.
+
+    For trees whose values were set without a constructor: fields of another kind, values outside their domains, and
+    conditions between fields or on a law inside are refused (traced values pass). Modules inside are checked before
+    those around them, and base classes before derived ones, so that the error names the cause.
+
+    Raises:
+        ValueError: what a module refuses.
+    """
+    for _, module in reversed(list(modules_inside(tree))):
+        for kind in reversed(type(module).__mro__):
+            if "__check_init__" in kind.__dict__:
+                kind.__dict__["__check_init__"](module)
+    return tree

@@ -1,0 +1,147 @@
+"""The coordinates in which searches move parameters: numbers of order one, with bounds and order constraints."""
+
+from typing import Literal, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from jaxdamp.parameters._declaration import Parameter
+from jaxdamp.parameters._free import FreeParameters
+
+
+OPEN_END = 1e-6  # distance, in coordinates, that is kept from an end that does not belong to a domain
+TOUCHING = 1e-4  # gap between ordered numbers, relative to the largest, that counts as none
+LEAST_GAP = 1e-6  # gap between ordered numbers that a search keeps, relative to the largest
+
+
+class Bounds(NamedTuple):
+    """Limits of coordinates, infinite where there is none."""
+
+    lower: Float[Array, " free"] | Float[np.ndarray, " free"]
+    upper: Float[Array, " free"] | Float[np.ndarray, " free"]
+
+
+class Coordinates(eqx.Module):
+    """Free parameters as a search sees them, and back.
+
+    A coordinate is its parameter divided by a unit: the magnitude of its start, or for a fit the width of its range
+    where that is finite (a tuning has bounds of its own, near the start). So the force is linear in it where it is in
+    the parameter, and a search can end on a bound. Or it is the raw number of the domain's smooth map, which has no
+    bounds, but crawls towards the edge of its domain. Which of the two depends on what the search can handle:
+
+    - `smooth="none"`: bounds and linear constraints (tuning). Ordered vectors are kept in order by `order`.
+    - `smooth="ordered"`: bounds (fits). Ordered vectors have a smooth map.
+    - `smooth="all"`: neither (training).
+
+    Attributes:
+        free: the parameters, with their start.
+        smooth: which of them have a smooth map.
+    """
+
+    free: FreeParameters
+    smooth: Literal["none", "ordered", "all"] = eqx.field(static=True)
+
+    @property
+    def units(self) -> list[Array]:
+        """The value of each parameter where its coordinate is one, if that is a quotient."""
+        return [
+            jnp.full_like(p.value, p.domain.upper - p.domain.lower)
+            if self.smooth != "none" and _has_range(p)
+            else _magnitude(p.value)
+            for p in self.free.chosen
+        ]
+
+    def to_physical(self, y: Float[Array, " free"]) -> Float[Array, " free"]:
+        """Physical values of coordinates."""
+        parts = zip(self.free.chosen, self.units, self.free.split(y), strict=True)
+        return _joined([p.domain.from_raw(a, _scale(p)) if self._is_smooth(p) else a * u for p, u, a in parts])
+
+    def from_physical(self, values: Float[Array, " free"]) -> Float[Array, " free"]:
+        """Coordinates of physical values."""
+        parts = zip(self.free.chosen, self.units, self.free.split(values), strict=True)
+        return _joined([p.domain.to_raw(a, _scale(p)) if self._is_smooth(p) else a / u for p, u, a in parts])
+
+    @property
+    def start(self) -> Float[Array, " free"]:
+        """Coordinates of the values to start from."""
+        return self.from_physical(self.free.values)
+
+    def bounds(self) -> Bounds:
+        """Limits of the coordinates; a small distance is kept from ends that do not belong to a domain."""
+        lower, upper = [], []
+        for p, unit in zip(self.free.chosen, self.units, strict=True):
+            low, high, margin = -np.inf, np.inf, 0.0
+            if not self._is_smooth(p):
+                low, high = p.domain.lower, p.domain.upper
+                belongs = not (_has_range(p) or p.domain.ordered) and p.domain.contains(np.asarray(low))
+                margin = 0.0 if belongs else OPEN_END
+            lower.append(np.ravel(low / np.asarray(unit)) + margin)
+            upper.append(np.ravel(high / np.asarray(unit)) - margin)
+        return Bounds(np.concatenate(lower), np.concatenate(upper))
+
+    def order(self) -> tuple[Float[np.ndarray, "rows free"], Float[np.ndarray, " rows"]]:
+        """Rows A and numbers b with A y ≥ b where vectors that must increase do so."""
+        units = np.concatenate([np.ravel(np.asarray(unit, np.float64)) for unit in self.units])
+        ends = np.cumsum([p.value.size for p in self.free.chosen])
+        rows, gaps = [np.zeros((0, units.size))], [np.zeros(0)]
+        for p, end in zip(self.free.chosen, ends, strict=True):
+            if p.domain.ordered and not self._is_smooth(p):
+                own = np.arange(end - p.value.size, end)
+                rows.append(np.diff(np.diag(units)[own], axis=0))
+                gaps.append(np.full(own.size - 1, LEAST_GAP * units[own].max()))
+        return np.concatenate(rows), np.concatenate(gaps)
+
+    def at_ends(self, values: Float[np.ndarray, " free"]) -> Float[np.ndarray, " free"]:
+        """−1 where a number lies on the lower end of its range, 1 on the upper, else 0.
+
+        Neighbours of ordered numbers are ends too.
+        """
+        pieces = self.free.split(values)
+        y = np.concatenate([np.ravel(value / np.asarray(u)) for value, u in zip(pieces, self.units, strict=True)])
+        low, high = self.bounds()
+        sides = np.where(y <= low + OPEN_END, -1.0, np.where(y >= high - OPEN_END, 1.0, 0.0))
+        parts = zip(self.free.chosen, pieces, strict=True)
+        return sides + np.concatenate([_met(p, a) if p.domain.ordered else np.zeros(a.size) for p, a in parts])
+
+    @property
+    def ordered(self) -> Bool[np.ndarray, " free"]:
+        """Which numbers belong to ordered vectors."""
+        return np.array([p.domain.ordered for p in self.free.owners])
+
+    def _is_smooth(self, p: Parameter) -> bool:
+        return self.smooth == "all" or (self.smooth == "ordered" and p.domain.ordered)
+
+
+def _has_range(p: Parameter) -> bool:
+    """Whether both ends of the range are finite."""
+    return not p.domain.ordered and bool(np.isfinite(p.domain.upper - p.domain.lower))
+
+
+def _magnitude(value: Array) -> Array:
+    """Typical magnitude of each number, never zero; small ones beside large ones count as larger than they are."""
+    magnitude = jnp.abs(jax.lax.stop_gradient(value))
+    largest = jnp.max(magnitude, initial=0.0)
+    floor = jnp.maximum(1e-3 * largest, jnp.finfo(value.dtype).tiny)
+    return jnp.where(magnitude > floor, magnitude, jnp.where(largest == 0, 1.0, largest))
+
+
+def _scale(p: Parameter) -> Array:
+    """The scale of the smooth map of a domain: the magnitude of the start, or of the steps of an ordered vector."""
+    return _magnitude(p.value if p.domain.steps is None else p.domain.steps(p.value))
+
+
+def _joined(pieces: list[Array]) -> Float[Array, " free"]:
+    return jnp.concatenate([jnp.ravel(piece) for piece in pieces])
+
+
+def _met(p: Parameter, value: Float[np.ndarray, " _"]) -> Float[np.ndarray, " _"]:
+    """−1 where an ordered number has met the one below it, 1 where it has met the one above, else 0."""
+    ends = [a for a in (p.domain.lower, p.domain.upper) if np.isfinite(a)]
+    extent = np.ptp(ends) if len(ends) == 2 else np.abs(value).max()
+    low = p.domain.lower if np.isfinite(p.domain.lower) else value[0] - extent
+    high = p.domain.upper if np.isfinite(p.domain.upper) else value[-1] + extent
+    touching = np.diff(np.concatenate([[low], value, [high]])) < TOUCHING * extent
+    return np.where(touching[:-1], -1.0, np.where(touching[1:], 1.0, 0.0))

@@ -1,0 +1,144 @@
+"""Declaring parameters and settings beside the fields of a class, and listing them."""
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, dataclass_transform
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from jaxdamp import _checks
+from jaxdamp.parameters._domains import Domain, real
+
+
+def as_float(value: Any, name: str = "value") -> Array:
+    """A JAX array of the default float type; arrays that are floating already keep their type.
+
+    Raises:
+        ValueError: something that is no number, under the name of its argument.
+    """
+    if isinstance(value, jax.Array) and jnp.issubdtype(value.dtype, jnp.floating):
+        return value
+    if value is None or isinstance(value, str | bytes | type | eqx.Module):
+        _checks.refuse(name, "be a number", _checks.described(value))
+    try:
+        return jnp.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        if isinstance(value, list | tuple | dict | set | np.ndarray):
+            raise ValueError(f"Argument `{name}` must be numbers, but is {value!r}: {error}") from error
+        raise
+
+
+def parameter(
+    unit: str, meaning: str, domain: Domain | Callable[[Any], Domain] = real, *, linear: bool = False, **field: Any
+) -> Any:
+    """Declare a field of an equinox module to be a parameter.
+
+    Arguments:
+        unit: SI unit in words that pint reads, `""` for a pure number.
+        meaning: one line for tables and labels.
+        domain: the values it may take; a function of the instance where that depends on a setting.
+        linear: the law's force is linear in all its parameters marked so, so that a fit has a closed form.
+        field: passed on to `equinox.field`, such as `default=0.0`.
+    """
+    return _number("parameter", {"unit": unit, "meaning": meaning, "domain": domain, "linear": linear}, field)
+
+
+def setting(unit: str, meaning: str, domain: Domain = real, *, command: bool = False, **field: Any) -> Any:
+    """Declare a field that is a number with a unit but never changed by a fit or a tuning, such as a knee width.
+
+    A `command` is set from outside, run by run, such as a coil current (`dampers.with_command`).
+    """
+    return _number("setting", {"unit": unit, "meaning": meaning, "domain": domain, "command": command}, field)
+
+
+def _number(kind: str, declared: dict[str, Any], options: dict[str, Any]) -> Any:
+    """A field that makes arrays of numbers, and names itself where it is given something else."""
+
+    def convert(value: Any) -> Array:
+        return as_float(value, field.name)
+
+    field = eqx.field(converter=convert, metadata={kind: declared}, **options)
+    return field
+
+
+if TYPE_CHECKING:
+
+    @dataclass_transform(field_specifiers=(parameter, setting, eqx.field))
+    class _DeclaringMeta(type(eqx.Module)):
+        """What tells type checkers that `parameter` and `setting` declare fields."""
+
+    class Module(eqx.Module, metaclass=_DeclaringMeta):
+        """An equinox module whose fields may be parameters and settings."""
+
+else:
+    Module = eqx.Module
+
+
+class Parameter(eqx.Module):
+    """One parameter of a tree, as `parameters` lists it."""
+
+    path: str = eqx.field(static=True)
+    value: Any
+    unit: str = eqx.field(static=True)
+    meaning: str = eqx.field(static=True)
+    domain: Domain = eqx.field(static=True)
+    linear: bool = eqx.field(static=True)
+
+
+def modules_inside(tree: Any, prefix: str = "") -> Iterator[tuple[str, eqx.Module]]:
+    """All modules in a tree, each with the prefix of the paths of its fields, before those inside it."""
+    if isinstance(tree, tuple | list):
+        for index, item in enumerate(tree):
+            yield from modules_inside(item, f"{prefix}{index}.")
+    elif isinstance(tree, eqx.Module):
+        yield prefix, tree
+        for field in dataclasses.fields(tree):
+            yield from modules_inside(getattr(tree, field.name), f"{prefix}{field.name}.")
+
+
+def domain_of(declared: dict[str, Any], module: eqx.Module) -> Domain:
+    """The domain of a declared field; one that depends on a setting is a function of the module."""
+    domain = declared["domain"]
+    return domain if isinstance(domain, Domain) else domain(module)
+
+
+def parameters(tree: Any, prefix: str = "") -> list[Parameter]:
+    """All parameters of a law, vehicle or any other module, depth first in the order of their fields.
+
+    >>> from jaxdamp.dampers import Lag, Linear
+    >>> [(p.path, p.unit, float(p.value)) for p in parameters(Lag(Linear(1500.0), lag_time=0.004))]
+    [('law.rate', 'N s/m', 1500.0), ('lag_time', 's', 0.004)]
+    """
+    found = []
+    if isinstance(tree, tuple | list):
+        for index, item in enumerate(tree):
+            found += parameters(item, f"{prefix}{index}.")
+    elif isinstance(tree, eqx.Module):
+        for field in dataclasses.fields(tree):
+            value = getattr(tree, field.name)
+            declared = field.metadata.get("parameter")
+            if declared is None:
+                found += parameters(value, f"{prefix}{field.name}.")
+            else:
+                domain, others = domain_of(declared, tree), (declared["unit"], declared["meaning"])
+                found.append(Parameter(prefix + field.name, value, *others, domain, declared["linear"]))
+    return found
+
+
+def readable(module: eqx.Module) -> str:
+    """The module as a line with its numbers: `Lag(law=Linear(rate=1500.0), lag_time=0.004)`."""
+
+    def text(value: Any) -> str:
+        if isinstance(value, tuple | list):
+            return f"({', '.join(map(text, value))}{',' if len(value) == 1 else ''})"
+        if isinstance(value, jax.Array | np.ndarray):
+            numbers = _checks.concrete(value)
+            return eqx.tree_pformat(value) if numbers is None or numbers.size > 50 else repr(numbers.tolist())
+        return repr(value)
+
+    fields = [f"{field.name}={text(getattr(module, field.name))}" for field in dataclasses.fields(module) if field.repr]
+    return f"{type(module).__name__}({', '.join(fields)})"

@@ -1,0 +1,167 @@
+"""The parameters that a fit or a tuning may change, as one vector."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp.parameters._declaration import Parameter, parameters
+from jaxdamp.parameters._domains import interval, ordered_interval
+from jaxdamp.parameters._paths import match_paths, name_patterns, with_values
+from jaxdamp.parameters._ties import resolve_ties
+
+
+class FreeParameters(eqx.Module):
+    """The free parameters of a tree as one vector of physical values, and back. Made by `free_parameters`.
+
+    Attributes:
+        tree: the law, vehicle or other module, with the values to start from.
+        chosen: the free parameters in the order of the vector; of a group of tied ones, the one that the others follow.
+        ties: tied parameters, each as (path, path that it takes its value from).
+    """
+
+    tree: Any
+    chosen: tuple[Parameter, ...]
+    ties: tuple[tuple[str, str], ...] = eqx.field(static=True, default=())
+
+    @property
+    def names(self) -> list[str]:
+        """One name for each number: `"slopes[2]"` for an element of a vector."""
+        return [name for p in self.chosen for name in _numbered(p.path, p)]
+
+    @property
+    def owners(self) -> list[Parameter]:
+        """The parameter that each number belongs to."""
+        return [p for p in self.chosen for _ in range(p.value.size)]
+
+    @property
+    def followers(self) -> list[tuple[str, ...]]:
+        """The names of the numbers that are tied to each number."""
+        tied = [[_numbered(path, p) for path, leader in self.ties if leader == p.path] for p in self.chosen]
+        return [
+            tuple(names[i] for names in group)
+            for p, group in zip(self.chosen, tied, strict=True)
+            for i in range(p.value.size)
+        ]
+
+    @property
+    def values(self) -> Float[Array, " free"]:
+        """The physical values as one vector."""
+        return jnp.concatenate([jnp.ravel(p.value) for p in self.chosen])
+
+    def split(self, vector: Array | np.ndarray) -> list[Any]:
+        """A vector of numbers cut into the shapes of the parameters."""
+        ends = np.cumsum([p.value.size for p in self.chosen])[:-1]
+        pieces = (np if isinstance(vector, np.ndarray) else jnp).split(vector, ends)
+        return [piece.reshape(p.value.shape) for piece, p in zip(pieces, self.chosen, strict=True)]
+
+    def build(self, values: Float[Array, " free"]) -> Any:
+        """The tree with these physical values, unchecked."""
+        return self._placed(self.split(values))
+
+    def _placed(self, pieces: list[Any]) -> Any:
+        by_path = {p.path: piece for p, piece in zip(self.chosen, pieces, strict=True)}
+        return with_values(self.tree, by_path | {path: by_path[leader] for path, leader in self.ties})
+
+    def started_at(self, values: Float[np.ndarray, " free"]) -> "FreeParameters":
+        """The same parameters with other values to start from."""
+        pairs = list(zip(self.chosen, self.split(values), strict=True))
+        pieces = [jnp.asarray(piece, p.value.dtype) for p, piece in pairs]
+        chosen = tuple(eqx.tree_at(lambda p: p.value, p, a) for (p, _), a in zip(pairs, pieces, strict=True))
+        return FreeParameters(self._placed(pieces), chosen, self.ties)
+
+    def limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper limit of each number, as its domain or an extra bound gives them."""
+        return np.array([p.domain.lower for p in self.owners]), np.array([p.domain.upper for p in self.owners])
+
+
+def _numbered(path: str, p: Parameter) -> list[str]:
+    """A name for each number of a parameter."""
+    return [path] if p.value.ndim == 0 else [f"{path}[{i}]" for i in range(p.value.size)]
+
+
+def free_parameters(
+    tree: Any,
+    *,
+    over: Sequence[str] | None = None,
+    freeze: Sequence[str] = (),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    tie: Mapping[str, str] | None = None,
+) -> FreeParameters:
+    """Choose the parameters that a fit or a tuning may change.
+
+    Arguments:
+        tree: a law, a vehicle or any module.
+        over: paths, last parts of paths or patterns with `*`; all parameters if not given.
+        freeze: the same, to be left as they are.
+        bounds: extra limits `{path: (lower, upper)}` in the parameter's unit.
+        tie: parameters that take the values of others, as `{"front.damper.*": "rear.damper.*"}`; what a `*` stands for
+            must be the same on both sides. A group of tied parameters is one free value: it is free where `over` names
+            one of them, stays as it is where `freeze` does, and the bounds of one hold for all.
+
+    Raises:
+        ValueError: a name that fits no parameter; nothing left to change; bounds of a parameter that is not free, or of
+            a wrong shape; a start value outside its bounds; a mapping where names belong; ties of parameters that
+            differ in unit, shape, domain or start value.
+
+    >>> from jaxdamp.vehicles.presets import half_car_002
+    >>> from jaxdamp.dampers import Linear
+    >>> free_parameters(half_car_002(Linear(1000.0)), over=["rate"], tie={"front.*.rate": "rear.*.rate"}).names
+    ['rear.damper.rate']
+    """
+    all_parameters = parameters(tree)
+    known = [p.path for p in all_parameters]
+    keep = match_paths(known, name_patterns("over", over)) if over is not None else known
+    frozen = match_paths(known, name_patterns("freeze", freeze))
+    leaders = resolve_ties(all_parameters, tie)
+
+    def group(paths: Sequence[str]) -> set[str]:
+        return {leaders.get(path, path) for path in paths}
+
+    free = group(keep) - group(frozen)
+    limits = _limits_by_path(known, free, leaders, bounds or {})
+    linear = free - {leader for path, leader in leaders.items() if not all_parameters[known.index(path)].linear}
+    chosen = [
+        Parameter(p.path, p.value, p.unit, p.meaning, _limited(p, limits.get(p.path)), p.linear and p.path in linear)
+        for p in all_parameters
+        if p.path in free
+    ]
+    if not chosen:
+        raise ValueError(f"All parameters are frozen, nothing is left to change: {', '.join(known)}.")
+    return FreeParameters(tree, tuple(chosen), tuple(pair for pair in leaders.items() if pair[1] in free))
+
+
+def _limits_by_path(
+    known: Sequence[str], free: set[str], leaders: Mapping[str, str], bounds: Mapping[str, Any]
+) -> dict[str, tuple[float, float]]:
+    """Extra limits by path, checked. Of two names for one parameter the later counts."""
+    if not isinstance(bounds, Mapping):
+        _checks.refuse("bounds", "be a mapping as {'rate': (1000.0, 5000.0)}", repr(bounds))
+    limits = {}
+    for name, pair in bounds.items():
+        if np.shape(pair) != (2,) or not np.all(np.isfinite(pair)) or not pair[0] < pair[1]:
+            remedy = "A side that should stay open gets a number that is never reached."
+            _checks.refuse(f"bounds[{name!r}]", "be two finite numbers in increasing order", pair, remedy)
+        named = [leaders.get(path, path) for path in match_paths(known, [name])]
+        if free and not free & set(named):
+            remedy = "Take it out of `freeze`, or leave out its bounds: what stays as it is needs none."
+            _checks.refuse(f"bounds[{name!r}]", "bound a parameter that is free", "one that is not", remedy)
+        limits |= dict.fromkeys(named, (float(pair[0]), float(pair[1])))
+    return limits
+
+
+def _limited(p: Parameter, limits: tuple[float, float] | None) -> Any:
+    """The domain of a parameter within extra limits."""
+    if limits is None:
+        return p.domain
+    limited = ordered_interval if p.domain.ordered else interval
+    domain = limited(max(limits[0], p.domain.lower), min(limits[1], p.domain.upper))
+    value = np.asarray(p.value)
+    if not np.all((value > domain.lower) & (value < domain.upper)):
+        remedy = "Start inside the bounds or widen them."
+        _checks.refuse(p.path, f"start strictly {domain.name} [{p.unit}]", value, remedy)
+    return domain
