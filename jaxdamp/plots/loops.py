@@ -1,6 +1,5 @@
 """The fit over its records: loops of force over velocity and over stroke, and what is left."""
 
-import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -8,8 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.bench.motion import cycle_instants
+from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle
 from jaxdamp.identify import FitResult
 from jaxdamp.plots import _style
 
@@ -55,7 +53,7 @@ def fit_loops(
     handles = []
     for index, (run, force) in enumerate(zip(shown, forces, strict=True)):
         colour = _style.graded(index, len(shown))
-        part = last_cycle(run)
+        part = last_steady_cycle(run)
         time = run.time[part]
         velocity, stroke, measured, fitted = run.velocity[part], 1e3 * run.stroke[part], run.force[part], force[part]
         for axes, x in ((loops, velocity), (football, stroke)):
@@ -110,17 +108,3 @@ def spread(runs: Sequence[BenchRun], most: int) -> list[BenchRun]:
         left.remove(nearest)
         chosen.append(nearest)
     return sorted(chosen, key=lambda run: run.peak_velocity)
-
-
-def last_cycle(run: BenchRun) -> slice:
-    """The samples of the last full cycle, or all of them if there is none.
-
-    Cycles whose stroke is 10 % off the median one, as when a machine runs down, do not count.
-    """
-    ends = np.searchsorted(run.time, cycle_instants(run.time, run.stroke))
-    cycles = [slice(int(first), int(last) + 1) for first, last in itertools.pairwise(ends)]
-    if not cycles:
-        return slice(None)
-    ranges = np.array([np.ptp(run.stroke[cycle]) for cycle in cycles])
-    steady = np.abs(ranges / np.median(ranges) - 1.0) < 0.1
-    return cycles[int(np.flatnonzero(steady)[-1])] if steady.any() else cycles[-1]
