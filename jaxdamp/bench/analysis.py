@@ -124,7 +124,8 @@ def continuous_velocity_loop(runs: BenchRun | Iterable[BenchRun], points: int = 
             _checks.refuse("runs", "be records with a full cycle", f"{run.name!r}, without one", remedy)
         means.append(_mean_cycle(run, np.array(instants), points))
         cycles.append(len(instants))
-    return VelocityLoops(*np.stack(means, axis=1), tuple(cycles))
+    time, stroke, velocity, force = np.stack(means, axis=1)
+    return VelocityLoops(time, stroke, velocity, force, tuple(cycles))
 
 
 def _records(runs: BenchRun | Iterable[BenchRun], call: str) -> tuple[BenchRun, ...]:

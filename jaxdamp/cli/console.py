@@ -14,9 +14,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from jaxdamp._tables import Column, Table
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.wording import message
-from jaxdamp.report import Column, Table
 
 
 Advance = Callable[[str, int], None]

@@ -20,8 +20,11 @@ EXIT_CODE = 130  # 128 + SIGINT, as shells have it
 SHOW_CURSOR = "\x1b[?25h"
 
 
-class Interrupted(Exception):
-    """A command was stopped between two computations; the message says what was written and what was not."""
+class Interrupted(BaseException):
+    """A command was stopped between two computations; the message says what was written and what was not.
+
+    No `Exception`, so that what goes on after an error does not go on after Ctrl-C.
+    """
 
 
 class _Watch:

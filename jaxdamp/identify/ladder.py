@@ -26,6 +26,7 @@ from jaxdamp.dampers import (
     Table,
 )
 from jaxdamp.identify.fitting import NUMERICAL, Start
+from jaxdamp.identify.laws import NAMED_LAWS
 
 
 def lag_time(runs: Sequence[BenchRun]) -> float:
@@ -63,7 +64,7 @@ _MEMORYLESS = {
     "besinger": Besinger.guess,
     "linear_friction": _friction,
 }
-LAWS = (*_MEMORYLESS, "besinger_lag", "besinger_series_spring", "linear_friction_lag", "bouc_wen", "lugre_spring")
+LAWS = tuple(NAMED_LAWS)
 
 
 def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dict[str, Start]:

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks, metrics
+from jaxdamp._tables import typeset_unit
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.simulation import Response
 
@@ -144,7 +145,7 @@ def _spectrum(
 
 
 def _unit(response: Response, channel: str) -> str:
-    return response.units[channel].replace("^2", "²") or "–"
+    return typeset_unit(response.units[channel], "–")
 
 
 def _factor(response: Response, channel: str) -> float:

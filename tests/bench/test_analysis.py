@@ -65,7 +65,7 @@ def test_peak_points_of_several_records_lie_on_the_closed_form():
     points = peak_velocity_points(runs)
     assert points.velocity.shape == points.force.shape == (3, 2)
     for (compression, rebound), forces, f in zip(points.velocity, points.force, (1.0, 3.0, 8.0), strict=True):
-        # Over |angle| ≤ a with cos a = 0.98 the mean of cos is sin(a)/a; that of the force, whose sine part is odd there:
+        # Over |angle| ≤ a with cos a = 0.98 the mean of cos is sin(a)/a, and the force's sine part is odd there.
         a, peak = np.arccos(0.98), 2 * np.pi * f * 0.01
         mean = np.sin(a) / a
         assert (compression, rebound) == pytest.approx((-peak * mean, peak * mean), rel=1e-3)

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from jaxdamp import roads, simulate, vehicles
-from jaxdamp.cli.ranges import fitted_range_table, notes_of, range_use_table, said_in_tables
+from jaxdamp.cli.run_warnings import said_in_tables
 from jaxdamp.dampers import Bilinear, FittedRange, Linear, with_fitted_range
 from jaxdamp.export import from_json, to_json
+from jaxdamp.report import fitted_range_table, notes_of, range_use_table
 
 from .invoking import jaxdamp
 
