@@ -175,7 +175,12 @@ def plain(value: Any) -> Any:
         return value
     if isinstance(value, float):
         return float(value) if np.isfinite(value) else None
-    return plain(np.asarray(value).tolist())
+    array = np.asarray(value)
+    if array.dtype.kind not in "biufU":
+        raise TypeError(
+            f"A {type(value).__name__} is no number, word, list or dictionary, which plain data are made of."
+        )
+    return plain(array.tolist())
 
 
 def with_unit(value: Any, unit: str) -> dict[str, Any]:

@@ -25,6 +25,8 @@ def test_plain_data_hold_units_and_no_number_that_json_does_not_know() -> None:
     }
     found = plain({"a": np.arange(2), 1: (np.float32(0.5), np.inf), "b": np.bool_(True), "c": np.array(2.0)})
     assert found == {"a": [0, 1], "1": [0.5, None], "b": True, "c": 2.0} and found["b"] is True
+    with pytest.raises(TypeError, match="A object is no number, word"):
+        plain({"a": object()})
 
 
 def test_text_stands_in_columns() -> None:

@@ -14,7 +14,7 @@ from jaxdamp.cli.demo_rides import TRUE, add_rides, ride_table, show_rides
 from jaxdamp.cli.demo_tuning import COMFORT, fresh_verdict, limits, outcome, purpose
 from jaxdamp.cli.fitting import Fitted, fit_laws, write_fits, write_table
 from jaxdamp.cli.results import Results, results_folder
-from jaxdamp.cli.run_warnings import said_in_tables
+from jaxdamp.cli.run_warnings import without_range_warnings
 from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper, Besinger, SeriesSpring
 from jaxdamp.identify import FitResult
@@ -124,10 +124,10 @@ def record(screen: Screen, scenario: Scenario, folder: Path) -> BenchSet:
         scenario.law, force_noise=scenario.force_noise, stroke_noise=scenario.stroke_noise, seed=scenario.seed
     )
     with screen.stage(f"Virtual bench: {len(scenario.tests)} tests", len(scenario.tests)) as advance:
-        made = dyno.run(scenario.tests, progress=lambda done, of: advance("", done))
+        records = dyno.run(scenario.tests, progress=lambda done, of: advance("", done))
     with screen.stage("Files written and read back"):
-        made.write(folder / "records")
-        return bench.read([folder / "records" / f"{name}.csv" for name in made.names])
+        records.write(folder / "records")
+        return bench.read([folder / "records" / f"{name}.csv" for name in records.names])
 
 
 def _iso_road(seed: int) -> AbstractRoad:
@@ -152,7 +152,7 @@ def ride(screen: Screen, title: str, road: AbstractRoad, fits: Fitted, scenario:
     with screen.stage(f"Quarter car on {title}", len(laws)) as advance:
         for done, (name, law) in enumerate(laws.items()):
             advance(name, done)
-            with said_in_tables():
+            with without_range_warnings():
                 responses[name] = simulate(_car(law), road, duration=duration)
     return responses
 
@@ -280,7 +280,7 @@ def _report_truth(truth: FitResult | None, scenario: Scenario, report: Report) -
 
 def _report_tuning(tuned: TuneResult, fresh: Rescore, before: Response, scenario: Scenario, report: Report) -> None:
     def rides() -> "Figure":
-        with said_in_tables():
+        with without_range_warnings():
             after = simulate(tuned.vehicle, _roads(scenario)[ISO], duration=scenario.duration)
             return plots.ride({"before": before, "after": after})
 

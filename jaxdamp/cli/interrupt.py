@@ -44,8 +44,8 @@ class _Watch:
             _say("\nStopping as soon as this computation is done, to keep what is finished. Ctrl-C again: at once.")
             return
         with self.busy:
-            left = " ".join(text for text in (tidy() for tidy in reversed(self.closing)) if text)
-            _say(f"\nStopped. {left or 'Nothing was written.'}")
+            remaining = " ".join(text for text in (tidy() for tidy in reversed(self.closing)) if text)
+            _say(f"\nStopped. {remaining or 'Nothing was written.'}")
             os._exit(EXIT_CODE)
 
 

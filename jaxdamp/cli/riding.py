@@ -8,7 +8,7 @@ from jaxdamp import _checks, export, roads, simulate, vehicles
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.results import results_folder
-from jaxdamp.cli.run_warnings import said_in_tables, with_step_warnings
+from jaxdamp.cli.run_warnings import with_step_warnings, without_range_warnings
 from jaxdamp.cli.unusual import unusual
 from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper
@@ -23,8 +23,8 @@ USUAL = 10.0  # s, a ride on a road without an end of its own
 
 def presets() -> dict[str, Callable[..., AbstractVehicle]]:
     """The published vehicles that take a damper, by name."""
-    known = inspect.getmembers(vehicles.presets, inspect.isfunction)
-    return {name: make for name, make in known if "damper" in inspect.signature(make).parameters}
+    functions = inspect.getmembers(vehicles.presets, inspect.isfunction)
+    return {name: make for name, make in functions if "damper" in inspect.signature(make).parameters}
 
 
 def vehicles_table() -> Table:
@@ -86,7 +86,7 @@ def run_ride(
                 car = make(damper=damper)
                 under = parse_road(road, speed=speed, duration=duration or USUAL, seed=seed)
                 length = duration or under.duration or USUAL
-                with said_in_tables():
+                with without_range_warnings():
                     responses[name], warned = with_step_warnings(
                         lambda car=car, u=under, t=length: simulate(car, u, duration=t, dt=dt)
                     )

@@ -9,7 +9,7 @@ from jaxdamp.simulation import CoarseStepWarning, Response
 
 
 @contextlib.contextmanager
-def said_in_tables() -> Iterator[None]:
+def without_range_warnings() -> Iterator[None]:
     """No Python warnings of laws outside their range: the tables and remarks of the command say it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OutsideFittedRangeWarning)

@@ -58,13 +58,13 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: AbstractDa
     columns = [Column("parameter"), Column("unit"), Column("value", spec=".5g"), Column("standard error", spec=".2g")]
     columns += [Column("true", spec=".5g"), Column("(value − true)/se", spec="+.1f")] * (truth is not None)
     columns += [Column("note"), Column("meaning")]
-    known = {} if truth is None else _numbers(truth)
+    true_values = {} if truth is None else _numbers(truth)
     rows: list[tuple[Cell, ...]] = []
     for e in estimates:
         value, error = rounded(e.value, e.standard_error)
         row: tuple[Cell, ...] = (e.name, e.unit or "–", Shown(e.value, value), Shown(e.standard_error, error))
         if truth is not None:
-            true = known.get(e.name)
+            true = true_values.get(e.name)
             row += (true, None if true is None else (e.value - true) / e.standard_error)
         rows.append((*row, e.note, e.meaning))
     return Table(title, tuple(columns), tuple(rows))

@@ -37,11 +37,11 @@ def verdict(rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> tuple[str, .
         elif rung is not best:
             factor = rung.error / best.error
             sentences.append(f"{best.name} has a {factor:.1f} times smaller error.")
-    left = best.result.error_shares
-    if not is_memoryless(best.result.law) and left.hysteresis >= HYSTERESIS:
-        sentences.append(f"Of what {best.name} leaves, {100 * left.hysteresis:.0f} % is still hysteresis.")
-    if left.shape >= SHAPE:
-        part = 100 * left.shape
+    remaining = best.result.error_shares
+    if not is_memoryless(best.result.law) and remaining.hysteresis >= HYSTERESIS:
+        sentences.append(f"Of what {best.name} leaves, {100 * remaining.hysteresis:.0f} % is still hysteresis.")
+    if remaining.shape >= SHAPE:
+        part = 100 * remaining.shape
         sentences.append(f"{part:.0f} % of the squared error of {best.name} is shape: another curve would fit better.")
     return tuple(sentences)
 

@@ -34,11 +34,11 @@ def damper_use(
         ValueError: no response, an unknown damper, a vehicle without one.
     """
     responses = _style.by_name("responses", responses, Response, "a response", _style.SIMULATE)
-    known: tuple[str, ...] = next(iter(responses.values())).dampers
-    if not known:
+    dampers: tuple[str, ...] = next(iter(responses.values())).dampers
+    if not dampers:
         _checks.refuse("responses", "be of a vehicle with a damper", "of one without")
-    damper = known[0] if damper is None else damper
-    _checks.one_of("damper", damper, known)
+    damper = dampers[0] if damper is None else damper
+    _checks.one_of("damper", damper, dampers)
     figure = _style.new_figure(12.0, 4.6)
     trace, time_share, energy_share = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.0))
     records = {name: _record(response, damper) for name, response in responses.items()}

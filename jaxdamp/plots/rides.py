@@ -72,8 +72,8 @@ def ride(
     styles = _line_styles(responses, reference)
     for name, response in responses.items():
         style = styles[name]
-        time, found = np.asarray(response.time), response.channels
-        values = {channel: np.asarray(found[channel]) for channel in channels}
+        time, all_channels = np.asarray(response.time), response.channels
+        values = {channel: np.asarray(all_channels[channel]) for channel in channels}
         seen = (time >= start) & (time <= stop)
         if not seen.any():
             _checks.refuse("window", f"hold instants of the run, 0 to {time[-1]:g} s", (start, stop))
@@ -84,8 +84,8 @@ def ride(
         frequency, density = _spectrum(values[channels[0]], time, frequencies)
         if weighting is not None:
             dt = float(time[1] - time[0])
-            felt = metrics.weighted_rms(values[channels[0]], dt, weighting, method="step", remove_mean=False)
-            label += f", {weighting} {_style.short(float(felt))}"
+            weighted = metrics.weighted_rms(values[channels[0]], dt, weighting, method="step", remove_mean=False)
+            label += f", {weighting} {_style.short(float(weighted))}"
             gain = np.asarray(metrics.weighting_factor(frequency, weighting))
             spectrum.loglog(frequency, gain**2 * density, ":", color=style["color"], linewidth=1.1)
         handles += spectrum.loglog(frequency, density, label=label, **style)
@@ -154,6 +154,6 @@ def _factor(response: Response, channel: str) -> float:
 
 
 def _label(response: Response, channel: str) -> str:
-    known = _WORDS.get(channel)
+    words = _WORDS.get(channel)
     unit = "mm" if response.units[channel] == "m" else _unit(response, channel)
-    return known or f"{channel.replace('_', ' ')} [{unit}]"
+    return words or f"{channel.replace('_', ' ')} [{unit}]"

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 class SweepResults:
     """Tables, plain data and pictures of a sweep.
 
+    Datasets have it once a sweep was made, or this module imported (for results read back from a file).
+
     >>> import jaxdamp
     >>> data = jaxdamp.sweep(lambda p: {"area": p["a"] * p["b"]}, {"a": [1.0, 2.0], "b": [3.0, 4.0]})
     >>> print(data.jaxdamp.table())
