@@ -4,6 +4,14 @@ Stroke and velocity are positive in extension (rebound), force is positive when 
 """
 
 from jaxdamp.bench import programmes
+from jaxdamp.bench.analysis import (
+    PeakVelocityPoints,
+    VelocityLoops,
+    continuous_velocity_loop,
+    last_steady_cycle,
+    peak_velocity_points,
+    steady_cycles,
+)
 from jaxdamp.bench.contradictions import Contradiction, contradictions, contradictions_in_words
 from jaxdamp.bench.programmes import RandomTest, SineTest
 from jaxdamp.bench.read import read
@@ -17,13 +25,19 @@ __all__ = [
     "BenchRun",
     "BenchSet",
     "Contradiction",
+    "PeakVelocityPoints",
     "RandomTest",
     "SineTest",
+    "VelocityLoops",
     "VirtualDyno",
     "as_runs",
+    "continuous_velocity_loop",
     "contradictions",
     "contradictions_in_words",
     "estimate_velocity",
+    "last_steady_cycle",
+    "peak_velocity_points",
     "programmes",
     "read",
+    "steady_cycles",
 ]

@@ -161,6 +161,6 @@ def list_vehicles() -> None:
 def laws() -> None:
     """List the laws that can be fitted by name."""
     from jaxdamp.cli.console import Screen
-    from jaxdamp.cli.findings import laws_table
+    from jaxdamp.identify import laws_table
 
     Screen().table(laws_table())

@@ -14,9 +14,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from jaxdamp._tables import Column, Table
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.wording import message
-from jaxdamp.report import Column, Table
 
 
 Advance = Callable[[str, int], None]
@@ -47,12 +47,12 @@ class Screen:
     def table(self, table: Table, mark: str | None = None) -> None:
         """A table without its meanings, which are for the files; rows whose first cell is `mark` in bold."""
         shown = RichTable(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
-        kept = [index for index, column in enumerate(table.columns) if column.name != "meaning"]
-        for index in kept:
+        visible = [index for index, column in enumerate(table.columns) if column.name != "meaning"]
+        for index in visible:
             side = "right" if table.is_number(index) else "left"
             shown.add_column(Text(table.columns[index].heading), justify=side, overflow="fold", no_wrap=index == 0)
         for row in table.texts():
-            shown.add_row(*(Text(row[index]) for index in kept), style="bold" if row[0] == mark else "")
+            shown.add_row(*(Text(row[index]) for index in visible), style="bold" if row[0] == mark else "")
         self.heading(table.title)
         self.console.print(Padding(shown, (0, 0, 0, 2), expand=False))
 

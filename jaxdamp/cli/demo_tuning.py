@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from jaxdamp.report import Column, Table
 from jaxdamp.tune import Rescore, TuneResult
 
 
@@ -40,49 +39,6 @@ def outcome(tuned: TuneResult) -> str:
     cost = f"The price: {worse}." if worse else "Nothing else gets worse."
     stop = "; ".join(stops)
     return f"The body shakes {gain:.0f} % less. What ends the search: {stop}. {cost}"
-
-
-def tuning_tables(tuned: TuneResult) -> tuple[Table, Table]:
-    """Parameters and metrics before and after."""
-    sides = (Column("before"), Column("after"), Column("change", "%", "+.1f"))
-    changed = tuple(
-        (p.name, p.unit, p.before, p.after, 100 * (p.after / p.before - 1), p.lower, p.upper, p.note)
-        for p in tuned.parameters
-    )
-    columns = (Column("parameter"), Column("unit"), *sides, Column("lower"), Column("upper"), Column("note"))
-    parameters_changed = Table("Parameters, with the bounds of the search", columns, changed)
-    marks = {
-        name: f"limit {top:.4g}{', reached' * (name in tuned.active_limits)}" for name, top in tuned.limits.items()
-    }
-    rows = tuple(
-        (
-            name,
-            tuned.units[name].replace("^2", "²") or "–",
-            before,
-            tuned.after[name],
-            100 * (tuned.after[name] / before - 1) if before else None,
-            "minimised" if name == tuned.metric else marks.get(name, ""),
-        )
-        for name, before in tuned.before.items()
-    )
-    return parameters_changed, Table("Ride metrics", (Column("metric"), Column("unit"), *sides, Column("note")), rows)
-
-
-def fresh_table(fresh: Rescore) -> Table:
-    """Means over fresh roads, and the smallest and the largest change."""
-    columns = (Column("metric"), Column("unit"), Column("before"), Column("after"), Column("change", "%", "+.1f"))
-    columns += (Column("smallest", "%", "+.1f"), Column("largest", "%", "+.1f"))
-    rows = []
-    for name, before in fresh.before.items():
-        if not np.all(before > 0):
-            continue
-        change = 100 * fresh.change(name)
-        unit = fresh.units[name].replace("^2", "²") or "–"
-        means = float(before.mean()), float(fresh.after[name].mean())
-        rows.append((name, unit, *means, float(change.mean()), float(change.min()), float(change.max())))
-    return Table(
-        f"The same on {fresh.roads} fresh roads of that class (means, and the change on each)", columns, tuple(rows)
-    )
 
 
 def fresh_verdict(fresh: Rescore) -> str:

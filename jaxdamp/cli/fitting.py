@@ -3,21 +3,42 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from jaxdamp import _checks, identify
+from jaxdamp import _checks, export, identify
+from jaxdamp._tables import Table
 from jaxdamp.bench import BenchSet
-from jaxdamp.cli import findings as tables
 from jaxdamp.cli import interrupt
-from jaxdamp.cli.attempts import Attempts
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.fit_files import draw_findings, write_findings
-from jaxdamp.cli.fitted import Findings
 from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.options import ReadOptions, decisions, law_names, split
-from jaxdamp.cli.ranges import fitted_range_table
-from jaxdamp.cli.residual import Shares, residual_shares
 from jaxdamp.cli.results import results_folder
+from jaxdamp.cli.wording import message
 from jaxdamp.identify import Comparison, Failure, Rung
-from jaxdamp.report import Report
+from jaxdamp.report import (
+    Attempts,
+    failure_sentences,
+    fit_report,
+    fitted_range_table,
+    fitted_velocities,
+    parameters_of,
+    records_table,
+)
+
+
+class Fitted:
+    """The fits of a command, and the laws that an interruption left without one.
+
+    Attributes:
+        comparison: the fits.
+        failures: the laws without a fit, and why, a sentence each.
+        missing: what is still to be written after laws and tables.
+    """
+
+    def __init__(self, comparison: Comparison, interrupted: Sequence[str]) -> None:
+        self.comparison = comparison
+        left = [f"{name} was not fitted: interrupted." for name in interrupted]
+        self.failures = failure_sentences(comparison) + left
+        laws = f"the fits of {', '.join(interrupted)}, " if interrupted else ""
+        self.missing = f"{laws}the pictures and the report"
 
 
 def run_fit(
@@ -37,35 +58,32 @@ def run_fit(
     """
     names = law_names(laws)
     _checks.one_of("weighting", weighting, ("samples", "runs"))
+    attempts = Attempts(interrupt.check, message)
     with results_folder(out, "fit", replace=replace) as results:
         with screen.stage("Reading the records"):
             runs = options.read(files)
         fitted, held = split(runs, held_out)
-        screen.table(tables.records_table(tuple(runs), tuple(held)))
-        screen.points(decisions(tuple(runs)))
+        remarks = decisions(tuple(runs))
+        screen.table(records_table(tuple(runs), tuple(held)))
+        screen.points(remarks)
         screen.say()
-        findings = fit_laws(screen, names, fitted, held, weighting)
-        show(screen, findings)
-        attempts = Attempts()
+        fits = fit_laws(screen, names, fitted, held, weighting)
+        show(screen, fits)
         with interrupt.saving(), screen.stage("Laws and tables"):
-            write_findings(results.draft, findings, runs, attempts)
-            results.publish(findings.missing)
-        report = Report("Damper laws fitted to bench records")
-        report.heading("Records")
-        report.table(tables.records_table(tuple(runs), tuple(held)))
-        report.points(decisions(tuple(runs)))
+            write_fits(results.draft, fits.comparison, runs, attempts)
+            results.publish(fits.missing)
         with screen.stage("Pictures and report"):
-            draw_findings(results.draft, findings, report, attempts)
-            report.points(attempts.troubles)
+            places = {"folder": results.draft, "attempts": attempts}
+            report = fit_report(fits.comparison, runs=runs, remarks=remarks, failures=fits.failures, **places)
             report.write(results.draft / "report.html")
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
-    return findings.comparison
+    return fits.comparison
 
 
 def fit_laws(
     screen: Screen, names: Sequence[str], runs: BenchSet, held_out: BenchSet, weighting: str = "samples"
-) -> Findings:
+) -> Fitted:
     """Fit the laws of these names, one after the other. Ctrl-C keeps those that are finished.
 
     Raises:
@@ -73,7 +91,6 @@ def fit_laws(
     """
     title = f"Fitting {len(names)} law{'s' * (len(names) > 1)} to {len(runs)} record{'s' * (len(runs) > 1)}"
     outcomes: list[Rung | Failure] = []
-    shares: dict[str, Shares] = {}
     with screen.stage(title, total=len(names)) as advance:
         try:
             starts = identify.default_ladder(tuple(runs), names)
@@ -84,25 +101,45 @@ def fit_laws(
                 progress=lambda name: advance(name, len(outcomes)),
                 weighting=weighting,
             ):
-                if isinstance(outcome, Rung):
-                    shares[outcome.name] = residual_shares(outcome.result)
-                    interrupt.keep()
                 outcomes.append(outcome)
+                if isinstance(outcome, Rung):
+                    interrupt.keep()
         except Interrupted:
-            if not shares:
+            if not any(isinstance(outcome, Rung) for outcome in outcomes):
                 raise
     done = {outcome.name for outcome in outcomes}
-    comparison = Comparison.of(outcomes, tuple(held_out))
-    return Findings(comparison, shares, tuple(name for name in names if name not in done))
+    return Fitted(Comparison.of(outcomes, tuple(held_out)), [name for name in names if name not in done])
 
 
-def show(screen: Screen, findings: Findings) -> None:
+def show(screen: Screen, fits: Fitted) -> None:
     """The fits at the terminal: the ladder, the parameters of the best law, and what to think of them."""
-    best = findings.comparison.best
-    screen.table(findings.ladder, mark=best.name)
-    screen.points(findings.failures, style="red")
-    screen.table(tables.parameter_table(best.name, best.result))
+    best = fits.comparison.best
+    screen.table(fits.comparison.table(), mark=best.name)
+    screen.points(fits.failures, style="red")
+    screen.table(parameters_of(best))
     if best.result.law.fitted_to is not None:
         screen.table(fitted_range_table(best.result.law.fitted_to))
-    screen.say(" ".join(findings.verdict))
+    screen.say(" ".join(fits.comparison.verdict))
     screen.points(best.result.warnings, style="yellow")
+
+
+def write_fits(folder: Path, comparison: Comparison, runs: BenchSet, attempts: Attempts) -> None:
+    """Laws and tables of the fits, each of which may fail by itself."""
+    best = comparison.best.result.law
+    (folder / "laws").mkdir()
+    (folder / "tables").mkdir()
+    write_table(folder, "records", records_table(tuple(runs), comparison.held_out))
+    write_table(folder, "ladder", comparison.table())
+    for rung in comparison.rungs:
+        with attempts.part(f"The files of the law {rung.name}"):
+            write_table(folder, f"parameters_{rung.name}", parameters_of(rung))
+            export.to_json(rung.result.law, folder / "laws" / f"{rung.name}.json")
+    with attempts.part("best_law.json"):
+        export.to_json(best, folder / "best_law.json")
+    with attempts.part("best_law_force_velocity.csv"):
+        export.to_csv(best, folder / "best_law_force_velocity.csv", fitted_velocities(comparison))
+
+
+def write_table(folder: Path, name: str, table: Table) -> None:
+    """One table as CSV."""
+    (folder / "tables" / f"{name}.csv").write_text(table.to_csv(), encoding="utf-8")

@@ -20,8 +20,11 @@ EXIT_CODE = 130  # 128 + SIGINT, as shells have it
 SHOW_CURSOR = "\x1b[?25h"
 
 
-class Interrupted(Exception):
-    """A command was stopped between two computations; the message says what was written and what was not."""
+class Interrupted(BaseException):
+    """A command was stopped between two computations; the message says what was written and what was not.
+
+    No `Exception`, so that what goes on after an error does not go on after Ctrl-C.
+    """
 
 
 class _Watch:
@@ -41,8 +44,8 @@ class _Watch:
             _say("\nStopping as soon as this computation is done, to keep what is finished. Ctrl-C again: at once.")
             return
         with self.busy:
-            left = " ".join(text for text in (tidy() for tidy in reversed(self.closing)) if text)
-            _say(f"\nStopped. {left or 'Nothing was written.'}")
+            remaining = " ".join(text for text in (tidy() for tidy in reversed(self.closing)) if text)
+            _say(f"\nStopped. {remaining or 'Nothing was written.'}")
             os._exit(EXIT_CODE)
 
 

@@ -35,15 +35,15 @@ def assignments(option: str, texts: Sequence[str]) -> dict[str, str]:
     >>> assignments("columns", ["time=t,stroke=Displacement, in", "force=2"])
     {'time': 't', 'stroke': 'Displacement, in', 'force': '2'}
     """
-    found = {}
+    assigned = {}
     for text in texts:
         for part in re.split(rf",(?=\s*(?:{'|'.join(ROLES)})\s*=)", text):
             role, equals, value = (piece.strip() for piece in part.partition("="))
             if not equals or not value:
                 raise ValueError(f"Option --{option} must read like stroke=..., but is {part!r}.")
             _checks.one_of(option, role, ROLES)
-            found[role] = value
-    return found
+            assigned[role] = value
+    return assigned
 
 
 def column_numbers(columns: Mapping[str, str]) -> dict[str, str | int | None]:
@@ -82,8 +82,8 @@ def decisions(runs: Sequence[BenchRun]) -> list[str]:
     """What the reader decided; notes that differ only in their numbers are said once, with those of the first."""
     kinds: dict[str, list[str]] = {}
     for run in runs:
-        for said in run.notes:
-            note = in_options(said, (_COMPRESSION,))
+        for text in run.notes:
+            note = in_options(text, (_COMPRESSION,))
             kinds.setdefault(re.sub(r"[+-]?\d[\d.]*(?:e[+-]?\d+)?", "#", note), []).append(note)
     sentences = []
     for notes in kinds.values():

@@ -1,25 +1,32 @@
 """From bench records to a damper law: `fit` one law, `compare` many, and say how well the records determine them."""
 
 from jaxdamp._status import Status
-from jaxdamp.identify.comparing import Comparison, Failure, Rung, compare, fit_each
+from jaxdamp.identify.comparing import Comparison, compare, fit_each
 from jaxdamp.identify.cross_validation import CrossValidation, cross_validate
+from jaxdamp.identify.estimates import Estimate, rounded
 from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.ladder import LAWS, default_ladder, ladder_starts
+from jaxdamp.identify.laws import NAMED_LAWS, NamedLaw, laws_table
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals, Problem
-from jaxdamp.identify.result import Estimate, FitResult, Score, fit_percent, rounded
+from jaxdamp.identify.residual import ErrorShares, error_shares
+from jaxdamp.identify.result import FitResult, Score, fit_percent
+from jaxdamp.identify.rungs import Failure, Rung
 from jaxdamp.identify.training import Training, train
 
 
 __all__ = [
     "LAWS",
+    "NAMED_LAWS",
     "AbstractResiduals",
     "Comparison",
     "CrossValidation",
+    "ErrorShares",
     "Estimate",
     "Failure",
     "FitResult",
+    "NamedLaw",
     "Problem",
     "Rung",
     "Score",
@@ -28,11 +35,13 @@ __all__ = [
     "compare",
     "cross_validate",
     "default_ladder",
+    "error_shares",
     "fit",
     "fit_each",
     "fit_percent",
     "judge",
     "ladder_starts",
+    "laws_table",
     "prepare",
     "rounded",
     "solve",

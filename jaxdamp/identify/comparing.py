@@ -2,37 +2,20 @@
 
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from jaxdamp._progress import Progress
+from jaxdamp._tables import Table, with_unit
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.result import FitResult
+from jaxdamp.identify.rungs import Failure, Rung, best_of, ladder_table
 from jaxdamp.identify.starting import Start, check_starts
+from jaxdamp.identify.verdict import verdict
 
 
-class Rung(NamedTuple):
-    """One law of a comparison."""
-
-    name: str
-    parameters: int
-    fit_percent: float
-    rmse: float  # N
-    held_out_fit_percent: float | None
-    held_out_rmse: float | None  # N
-    result: FitResult
-
-    @property
-    def error(self) -> float:
-        """RMSE [N] by which laws are ranked: on the held-out records, or on the fitted ones if there are none."""
-        return self.rmse if self.held_out_rmse is None else self.held_out_rmse
-
-
-class Failure(NamedTuple):
-    """A law of a comparison that has no fit."""
-
-    name: str
-    reason: str  # in words
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -68,7 +51,7 @@ class Comparison:
     @property
     def best(self) -> Rung:
         """The law with the smallest error on the held-out records, or on the fitted ones if there are none."""
-        return min(self.rungs, key=lambda rung: rung.error)
+        return best_of(self.rungs)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -83,6 +66,39 @@ class Comparison:
                 return rung.result
         why = "".join(f" {failure.name} failed: {failure.reason}" for failure in self.failed if failure.name == name)
         raise KeyError(f"No law is named {name!r}; there are {', '.join(r.name for r in self.rungs)}.{why}")
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """How good the best law is, and what the errors are made of (shape, hysteresis, noise), a sentence each."""
+        return verdict(self.rungs, self.held_out)
+
+    def table(self) -> Table:
+        """Each law with its number of free parameters, its errors, what these are made of, and what is doubtful."""
+        return ladder_table(self.rungs, self.failed)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""
+        laws = {
+            rung.name: {
+                **rung.result.to_dict(),
+                "held_out_fit": with_unit(rung.held_out_fit_percent, "%"),
+                "held_out_rmse": with_unit(rung.held_out_rmse, "N"),
+            }
+            for rung in self.rungs
+        }
+        return {
+            "best": self.best.name,
+            "verdict": list(self.verdict),
+            "held_out": [run.name for run in self.held_out],
+            "laws": laws,
+            "failed": {failure.name: failure.reason for failure in self.failed},
+        }
+
+    def plot(self) -> "Figure":
+        """The errors of the laws side by side."""
+        from jaxdamp.plots import ladder
+
+        return ladder(self)
 
     def __repr__(self) -> str:
         head = f"{'law':<24}{'free':>5}{'fit %':>8}{'RMSE N':>9}" + f"{'held-out %':>12}{'RMSE N':>9}" * bool(

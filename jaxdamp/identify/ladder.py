@@ -26,6 +26,7 @@ from jaxdamp.dampers import (
     Table,
 )
 from jaxdamp.identify.fitting import NUMERICAL
+from jaxdamp.identify.laws import NAMED_LAWS
 from jaxdamp.identify.starting import Start, started
 
 
@@ -64,7 +65,7 @@ _MEMORYLESS = {
     "besinger": Besinger.guess,
     "linear_friction": _friction,
 }
-LAWS = (*_MEMORYLESS, "besinger_lag", "besinger_series_spring", "linear_friction_lag", "bouc_wen", "lugre_spring")
+LAWS = tuple(NAMED_LAWS)
 
 
 def ladder_starts(names: Sequence[str] = LAWS) -> dict[str, Start]:

@@ -1,6 +1,7 @@
 """What a fit found, how well it is determined and how good it is."""
 
 import dataclasses
+import functools
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -8,51 +9,16 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp._status import Status
+from jaxdamp._tables import Table, plain, with_unit
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify.traces import predict_runs, used_samples
+from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
+from jaxdamp.identify.residual import ErrorShares, error_shares
+from jaxdamp.identify.traces import predict_by_record, predict_runs, used_samples
 
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-PLACES = 3  # behind the point, of a value too large or too small to be written out
-
-
-class Estimate(NamedTuple):
-    """One fitted number.
-
-    The standard error counts every other free number as unknown, also those that ended on an edge of their range, and
-    is what it would be without any edge.
-    """
-
-    name: str
-    value: float
-    unit: str
-    standard_error: float
-    interval: tuple[float, float]  # 95 %, cut at the edges of the range
-    meaning: str
-    note: str  # "", "not identifiable" or "at a bound"
-    tied: tuple[str, ...] = ()  # the numbers that have the same value
-
-
-def rounded(value: float, error: float) -> tuple[str, str]:
-    """A value and its standard error as text, with the digits that mean something.
-
-    The error gets two digits, the value those down to the second digit of the error, but one at least.
-
-    >>> rounded(14361.27, 61.8), rounded(0.9035, 0.2912), rounded(3.2, float("inf"))
-    (('14361', '62'), ('0.90', '0.29'), ('3.2', 'inf'))
-    """
-    if not (np.isfinite(error) and np.isfinite(value) and error > 0):
-        return f"{value:.5g}", f"{error:.2g}"
-    place = int(np.floor(np.log10(error))) - 1
-    place_of_value = min(place, int(np.floor(np.log10(abs(value))))) if value else place
-    if max(abs(value), error) >= 1e9 or place_of_value < -9:
-        return f"{value:.{PLACES}e}", f"{error:.1e}"
-    texts = (f"{round(number, -at):.{max(-at, 0)}f}" for number, at in ((value, place_of_value), (error, place)))
-    return next(texts), next(texts)
 
 
 class Minimum(NamedTuple):
@@ -90,10 +56,7 @@ def score(
     counted: Sequence[bool] | np.ndarray | None = None,
 ) -> tuple[float, float, tuple[Score, ...]]:
     """Fit percent and RMSE [N] of a law, or of one for each record, over the records that count, and for each."""
-    if isinstance(law, AbstractDamper):
-        forces, laws = predict_runs(law, runs), [law] * len(runs)
-    else:
-        forces, laws = [predict_runs(own, [run])[0] for own, run in zip(law, runs, strict=True)], law
+    laws, forces = predict_by_record(law, runs)
     kept = [used_samples(own, run) for own, run in zip(laws, runs, strict=True)]
     measured = [run.force[k] for run, k in zip(runs, kept, strict=True)]
     predicted = [force[k] for force, k in zip(forces, kept, strict=True)]
@@ -183,6 +146,42 @@ class FitResult(AbstractFitted):
             if estimate.name == name:
                 return estimate
         raise KeyError(f"No parameter is named {name!r}; there are {', '.join(e.name for e in self.parameters)}.")
+
+    @functools.cached_property
+    def error_shares(self) -> ErrorShares:
+        """What the squared error over the records is made of: shape, hysteresis, rest (`identify.error_shares`)."""
+        return error_shares(self.record_laws or self.law, self.runs)
+
+    def table(self, truth: AbstractDamper | None = None, *, title: str = "") -> Table:
+        """The parameters with units, standard errors and meanings, beside those of a true law where it is known."""
+        return parameter_table(title or f"Parameters of {type(self.law).__name__}", self.parameters, truth)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None.
+
+        The law itself is written by `export.to_json`.
+        """
+        scores = [
+            {
+                "record": s.name,
+                "fit": with_unit(s.fit_percent, "%"),
+                "rmse": with_unit(s.rmse, "N"),
+                "largest_error": with_unit(s.largest_error, "N"),
+            }
+            for s in self.scores
+        ]
+        return {
+            "law": repr(self.law),
+            "fit": with_unit(self.fit_percent, "%"),
+            "rmse": with_unit(self.rmse, "N"),
+            "error_shares": plain(self.error_shares._asdict()),
+            "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
+            "covariance": plain(self.covariance),
+            "scores": scores,
+            "status": self.status.name.lower(),
+            "converged": self.converged,
+            "warnings": list(self.warnings),
+        }
 
     def plot(self, runs: Iterable[BenchRun] | None = None, **options: Any) -> "Figure":
         """Loops of force over velocity and over stroke, measured and fitted, with residuals."""

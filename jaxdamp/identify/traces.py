@@ -281,6 +281,15 @@ def predict_runs(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[np.ndarr
     return spread
 
 
+def predict_by_record(
+    law: AbstractDamper | Sequence[AbstractDamper], runs: Sequence[BenchRun]
+) -> tuple[list[AbstractDamper], list[np.ndarray]]:
+    """The law of each record and its force [N] there, of one law for all records or of one for each."""
+    if isinstance(law, AbstractDamper):
+        return [law] * len(runs), predict_runs(law, runs)
+    return list(law), [predict_runs(own, [run])[0] for own, run in zip(law, runs, strict=True)]
+
+
 def used_samples(law: AbstractDamper, run: BenchRun) -> slice:
     """The samples of a record that a fit of this law looks at: all, or those after settling."""
     return slice(0 if is_memoryless(law) else int(np.ceil(settling_time(run) * run.sampling_rate)), None)

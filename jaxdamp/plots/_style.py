@@ -101,13 +101,13 @@ def by_name(argument: str, given: Any, kind: type, words: str, remedy: str, alon
     Raises:
         ValueError: none, or objects of another kind.
     """
-    found = dict(given) if isinstance(given, Mapping) else {alone: given}
-    if not found:
+    items = dict(given) if isinstance(given, Mapping) else {alone: given}
+    if not items:
         _checks.refuse(argument, "hold at least one", "empty", remedy)
-    for name, item in found.items():
+    for name, item in items.items():
         label = f"{argument}[{name!r}]" if isinstance(given, Mapping) else argument
         _checks.instance(label, item, kind, f"be {words}", remedy)
-    return found
+    return items
 
 
 def note_below(figure: "matplotlib.figure.Figure", sentences: Sequence[str]) -> None:

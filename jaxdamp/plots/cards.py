@@ -36,11 +36,11 @@ class _Loops(NamedTuple):
 @eqx.filter_jit
 def _response(free: FreeParameters, dt: jax.Array, x: jax.Array, v: jax.Array) -> tuple[jax.Array, jax.Array]:
     def force(values: jax.Array) -> tuple[jax.Array, jax.Array]:
-        found = march(free.build(values), dt, x, v, 1)
-        return found, found
+        forces = march(free.build(values), dt, x, v, 1)
+        return forces, forces
 
-    slopes, found = jax.jacfwd(force, has_aux=True)(free.values)
-    return found, slopes * free.values[None, :]
+    slopes, forces = jax.jacfwd(force, has_aux=True)(free.values)
+    return forces, slopes * free.values[None, :]
 
 
 def _loops(law: AbstractDamper, amplitude: float, frequencies: Sequence[float]) -> _Loops:
@@ -49,8 +49,8 @@ def _loops(law: AbstractDamper, amplitude: float, frequencies: Sequence[float]) 
     rows = []
     for frequency in frequencies:
         x, v = amplitude * np.sin(phase), 2 * np.pi * frequency * amplitude * np.cos(phase)
-        found = _response(free, *(jnp.asarray(a) for a in (1.0 / (frequency * _SAMPLES), x, v)))
-        rows.append([np.asarray(a)[-_SAMPLES - 1 :] for a in (x, v, *found)])
+        response = _response(free, *(jnp.asarray(a) for a in (1.0 / (frequency * _SAMPLES), x, v)))
+        rows.append([np.asarray(a)[-_SAMPLES - 1 :] for a in (x, v, *response)])
     return _Loops(*(np.stack(column) for column in zip(*rows, strict=True)))
 
 

@@ -7,6 +7,7 @@ import equinox as eqx
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp._types import VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style, fitted_range
@@ -76,11 +77,11 @@ def _bars(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
     """Relative change of each metric, with its values."""
     names = list(result.before)
     rows = np.arange(len(names), dtype=float)
-    change = [100.0 * (result.after[n] / result.before[n] - 1.0) if result.before[n] else 0.0 for n in names]
+    change = [percent_change(result.before[n], result.after[n]) or 0.0 for n in names]
     colours = [_style.COLOURS[1] if c > 0 else _style.COLOURS[2] for c in change]
     axes.barh(rows, change, 0.65, color=colours)
     for row, name, value in zip(rows, names, change, strict=True):
-        unit = result.units[name].replace("^2", "²")
+        unit = typeset_unit(result.units[name])
         values = f"{_style.short(result.before[name])} → {_style.short(result.after[name])} {unit}".rstrip()
         text = f"{values}  ({value:+.1f} %)".replace("-", "−")
         axes.annotate(
@@ -109,6 +110,6 @@ def _search(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
     history = np.array([result.before[result.metric], *result.history])
     axes.plot(np.arange(len(history)), history, "o-", color=_style.COLOURS[0], markersize=3.5, linewidth=1.3)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    unit = result.units[result.metric].replace("^2", "²") or "–"
+    unit = typeset_unit(result.units[result.metric], "–")
     title = f"Search of {result.metric.replace('_', ' ')}"
     _style.dress(axes, "step of the search", f"metric [{unit}]", title)

@@ -8,10 +8,9 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._types import VectorLike
-from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle, peak_velocity_points
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style, fitted_range
-from jaxdamp.plots.loops import last_cycle
 from jaxdamp.rig import quasi_static
 
 
@@ -97,30 +96,17 @@ def _range(runs: Sequence[BenchRun]) -> tuple[float, float]:
     return 1.05 * float(min(lower, 0.0)), 1.05 * float(max(upper, 0.0))
 
 
-def peak_points(run: BenchRun) -> Float[np.ndarray, "2 2"]:
-    """Velocity [m/s] and force [N] at the compression and the rebound peak of the velocity in the last cycle.
-
-    Means over the samples within 2 % of the peak, so that one noisy sample decides nothing.
-    """
-    part = last_cycle(run)
-    velocity, force = run.velocity[part], run.force[part]
-    near = [velocity <= 0.98 * velocity.min(), velocity >= 0.98 * velocity.max()]
-    return np.array([[velocity[at].mean(), force[at].mean()] for at in near])
-
-
 def _measured(axes: "matplotlib.axes.Axes", runs: Sequence[BenchRun]) -> list:
     """Samples as a cloud and peak-velocity points as rings; the handles for the legend."""
     if not runs:
         return []
-    parts = [(run.velocity[last_cycle(run)], run.force[last_cycle(run)]) for run in runs]
-    thin = [slice(None, None, max(len(velocity) // 400, 1)) for velocity, _ in parts]
-    velocity = np.concatenate([v[every] for (v, _), every in zip(parts, thin, strict=True)])
-    force = np.concatenate([f[every] for (_, f), every in zip(parts, thin, strict=True)])
+    cycles = [np.stack([run.velocity, run.force])[:, last_steady_cycle(run)] for run in runs]
+    velocity, force = np.concatenate([cycle[:, :: max(cycle.shape[1] // 400, 1)] for cycle in cycles], axis=1)
     cloud = axes.plot(velocity, force, ".", color="0.78", markersize=2.0, label="measured, last cycles", zorder=0)
-    peaks = np.concatenate([peak_points(run) for run in runs])
+    peaks = peak_velocity_points(runs)
     rings = axes.plot(
-        peaks[:, 0],
-        peaks[:, 1],
+        peaks.velocity.ravel(),
+        peaks.force.ravel(),
         "o",
         color=_style.BLACK,
         markerfacecolor="white",

@@ -18,12 +18,6 @@ if TYPE_CHECKING:
 _BINS, _POINTS, _SHADE_POINTS = 41, 81, 2001
 
 
-def dampers_of(response: Response) -> tuple[str, ...]:
-    """Names of the dampers of a vehicle, such as "damper" or "front_damper"."""
-    names = response.vehicle.frame().element_names
-    return tuple(name for name in names if f"{name}_velocity" in response.units)
-
-
 def damper_use(
     responses: Response | Mapping[str, Response], *, damper: str | None = None
 ) -> "matplotlib.figure.Figure":
@@ -40,11 +34,11 @@ def damper_use(
         ValueError: no response, an unknown damper, a vehicle without one.
     """
     responses = _style.by_name("responses", responses, Response, "a response", _style.SIMULATE)
-    known = dampers_of(next(iter(responses.values())))
-    if not known:
+    dampers: tuple[str, ...] = next(iter(responses.values())).dampers
+    if not dampers:
         _checks.refuse("responses", "be of a vehicle with a damper", "of one without")
-    damper = known[0] if damper is None else damper
-    _checks.one_of("damper", damper, known)
+    damper = dampers[0] if damper is None else damper
+    _checks.one_of("damper", damper, dampers)
     figure = _style.new_figure(12.0, 4.6)
     trace, time_share, energy_share = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.0))
     records = {name: _record(response, damper) for name, response in responses.items()}

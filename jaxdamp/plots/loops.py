@@ -1,6 +1,5 @@
 """The fit over its records: loops of force over velocity and over stroke, and what is left."""
 
-import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -8,8 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.bench.motion import cycle_instants
+from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle
 from jaxdamp.identify import FitResult
 from jaxdamp.plots import _style
 
@@ -48,30 +46,30 @@ def fit_loops(
         _checks.refuse("runs", "hold at least one record", "empty")
     shown = spread(runs, most)
     # All records at once: their shapes are those of the fit's scores, for which all is compiled.
-    known = dict(zip(map(id, runs), result.predict(runs), strict=True))
-    forces = [known[id(run)] for run in shown]
+    predicted = dict(zip(map(id, runs), result.predict(runs), strict=True))
+    forces = [predicted[id(run)] for run in shown]
     figure = _style.new_figure(12.0, 8.0)
     (loops, football), (over_velocity, over_time) = figure.subplots(2, 2, height_ratios=(1.6, 1.0))
     handles = []
     for index, (run, force) in enumerate(zip(shown, forces, strict=True)):
         colour = _style.graded(index, len(shown))
-        part = last_cycle(run)
+        part = last_steady_cycle(run)
         time = run.time[part]
         velocity, stroke, measured, fitted = run.velocity[part], 1e3 * run.stroke[part], run.force[part], force[part]
         for axes, x in ((loops, velocity), (football, stroke)):
             axes.plot(x, measured, color=colour, linewidth=4.0, alpha=0.3, solid_capstyle="round")
             axes.plot(x, fitted, color=colour, linewidth=1.3)
-        left = fitted - measured
-        every = max(len(left) // _MOST_POINTS, 1)
-        over_velocity.plot(velocity[::every], left[::every], ".", color=colour, markersize=2.5, alpha=0.6)
+        residual = fitted - measured
+        every = max(len(residual) // _MOST_POINTS, 1)
+        over_velocity.plot(velocity[::every], residual[::every], ".", color=colour, markersize=2.5, alpha=0.6)
         phase = _block_means((time - time[0]) * run.frequency, every)
-        over_time.plot(phase, _block_means(left, every), color=colour, linewidth=1.0)
+        over_time.plot(phase, _block_means(residual, every), color=colour, linewidth=1.0)
         handles.append(Line2D([], [], color=colour, linewidth=2.0, label=f"{run.name} ({run.peak_velocity:.2g} m/s)"))
-    residual = "fitted − measured [N]"
+    label = "fitted − measured [N]"
     _style.dress(loops, _style.VELOCITY, _style.FORCE, "Force over velocity")
     _style.dress(football, _style.STROKE, _style.FORCE, "Force over stroke")
-    _style.dress(over_velocity, _style.VELOCITY, residual, "Residual over velocity")
-    _style.dress(over_time, "time in the cycle, over its period [–]", residual, "Residual over the cycle")
+    _style.dress(over_velocity, _style.VELOCITY, label, "Residual over velocity")
+    _style.dress(over_time, "time in the cycle, over its period [–]", label, "Residual over the cycle")
     for axes in (loops, football, over_velocity):
         _style.cross(axes)
         axes.locator_params(axis="x", nbins=7)
@@ -88,7 +86,7 @@ def fit_loops(
 def _title(result: FitResult, runs: Sequence[BenchRun], shown: Sequence[BenchRun]) -> str:
     own = runs is result.runs
     percent, rmse = (result.fit_percent, result.rmse) if own else result.score(runs)[:2]
-    new = not any(run is known for run in runs for known in result.runs)
+    new = not any(run is fitted for run in runs for fitted in result.runs)
     records = f"{len(runs)} record{'s' * (len(runs) > 1)}{' not fitted' * new}"
     score = f"{_style.law_name(result.law)}: fit {percent:.1f} %, RMSE {_style.short(rmse)} N on {records}"
     return score + (f"\n{len(shown)} of them shown, last full cycle of each" if len(shown) < len(runs) else "")
@@ -101,26 +99,12 @@ def _block_means(values: Float[np.ndarray, " samples"], size: int) -> Float[np.n
 
 def spread(runs: Sequence[BenchRun], most: int) -> list[BenchRun]:
     """At most so many records, spread evenly over the peak velocities, slowest first."""
-    left = sorted(runs, key=lambda run: run.peak_velocity)
-    if len(left) <= most:
-        return left
+    remaining = sorted(runs, key=lambda run: run.peak_velocity)
+    if len(remaining) <= most:
+        return remaining
     chosen = []
-    for target in np.linspace(left[-1].peak_velocity, left[0].peak_velocity, most):
-        nearest = min(left, key=lambda run: abs(run.peak_velocity - target))
-        left.remove(nearest)
+    for target in np.linspace(remaining[-1].peak_velocity, remaining[0].peak_velocity, most):
+        nearest = min(remaining, key=lambda run: abs(run.peak_velocity - target))
+        remaining.remove(nearest)
         chosen.append(nearest)
     return sorted(chosen, key=lambda run: run.peak_velocity)
-
-
-def last_cycle(run: BenchRun) -> slice:
-    """The samples of the last full cycle, or all of them if there is none.
-
-    Cycles whose stroke is 10 % off the median one, as when a machine runs down, do not count.
-    """
-    ends = np.searchsorted(run.time, cycle_instants(run.time, run.stroke))
-    cycles = [slice(int(first), int(last) + 1) for first, last in itertools.pairwise(ends)]
-    if not cycles:
-        return slice(None)
-    ranges = np.array([np.ptp(run.stroke[cycle]) for cycle in cycles])
-    steady = np.abs(ranges / np.median(ranges) - 1.0) < 0.1
-    return cycles[int(np.flatnonzero(steady)[-1])] if steady.any() else cycles[-1]

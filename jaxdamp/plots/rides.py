@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks, metrics
+from jaxdamp._tables import typeset_unit
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.simulation import Response
 from jaxdamp.vehicles import ChannelKind
@@ -72,8 +73,8 @@ def ride(
     styles = _line_styles(responses, reference)
     for name, response in responses.items():
         style = styles[name]
-        time, found = np.asarray(response.time), response.channels
-        values = {channel: np.asarray(found[channel]) for channel in channels}
+        time, all_channels = np.asarray(response.time), response.channels
+        values = {channel: np.asarray(all_channels[channel]) for channel in channels}
         seen = (time >= start) & (time <= stop)
         if not seen.any():
             _checks.refuse("window", f"hold instants of the run, 0 to {time[-1]:g} s", (start, stop))
@@ -84,8 +85,8 @@ def ride(
         frequency, density = _spectrum(values[channels[0]], time, frequencies)
         if weighting is not None:
             dt = float(time[1] - time[0])
-            felt = metrics.weighted_rms(values[channels[0]], dt, weighting, method="step", remove_mean=False)
-            label += f", {weighting} {_style.short(float(felt))}"
+            weighted = metrics.weighted_rms(values[channels[0]], dt, weighting, method="step", remove_mean=False)
+            label += f", {weighting} {_style.short(float(weighted))}"
             gain = np.asarray(metrics.weighting_factor(frequency, weighting))
             spectrum.loglog(frequency, gain**2 * density, ":", color=style["color"], linewidth=1.1)
         handles += spectrum.loglog(frequency, density, label=label, **style)
@@ -147,7 +148,7 @@ def _spectrum(
 
 
 def _unit(response: Response, channel: str) -> str:
-    return response.units[channel].replace("^2", "²") or "–"
+    return typeset_unit(response.units[channel], "–")
 
 
 def _factor(response: Response, channel: str) -> float:
@@ -156,6 +157,6 @@ def _factor(response: Response, channel: str) -> float:
 
 
 def _label(response: Response, channel: str) -> str:
-    known = _WORDS.get(channel)
+    words = _WORDS.get(channel)
     unit = "mm" if response.units[channel] == "m" else _unit(response, channel)
-    return known or f"{channel.replace('_', ' ')} [{unit}]"
+    return words or f"{channel.replace('_', ' ')} [{unit}]"

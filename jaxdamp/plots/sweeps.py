@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._tables import typeset_unit
 from jaxdamp.plots import _style
 
 
@@ -120,10 +121,10 @@ def _map(
 def _label(data: Any, name: str) -> str:
     """A name in words with its unit."""
     words = name.rpartition(".")[2].replace("_", " ")
-    unit = data[name].attrs.get("units", "").replace("^2", "²")
+    unit = typeset_unit(data[name].attrs.get("units", ""))
     return f"{words} [{unit}]" if unit else words
 
 
 def _unit(data: Any, name: str) -> str:
-    unit = data[name].attrs.get("units", "").replace("^2", "²")
+    unit = typeset_unit(data[name].attrs.get("units", ""))
     return f" {unit}" if unit else ""

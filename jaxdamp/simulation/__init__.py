@@ -4,7 +4,17 @@ from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride
 from jaxdamp.simulation.run import simulate
 from jaxdamp.simulation.step_size import CoarseStepWarning
+from jaxdamp.simulation.tables import comfort_table, metrics_table
 from jaxdamp.simulation.wheels import AxleTiming, moves_axles
 
 
-__all__ = ["AxleTiming", "CoarseStepWarning", "Response", "Ride", "moves_axles", "simulate"]
+__all__ = [
+    "AxleTiming",
+    "CoarseStepWarning",
+    "Response",
+    "Ride",
+    "comfort_table",
+    "metrics_table",
+    "moves_axles",
+    "simulate",
+]

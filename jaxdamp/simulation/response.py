@@ -12,18 +12,21 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks, metrics
+from jaxdamp._tables import Table, with_unit
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import MetricValues
 from jaxdamp.simulation.exponential import settled
 from jaxdamp.simulation.notes import tyres_in_tension
 from jaxdamp.simulation.range_notes import range_sentences, range_uses
+from jaxdamp.simulation.tables import comfort_table, comfort_units, metrics_table
 from jaxdamp.simulation.wheels import AxleTiming
 from jaxdamp.vehicles import AbstractVehicle, LinearMap, RideMetric, System, chosen_metrics
 
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
 
 class Comfort(NamedTuple):
@@ -105,6 +108,11 @@ class Response(eqx.Module):
     def descriptions(self) -> dict[str, str]:
         """What each channel is, its positive direction, and of how many dampers or wheels it is."""
         return self.vehicle.descriptions
+
+    @property
+    def dampers(self) -> tuple[str, ...]:
+        """Names of the dampers, such as "damper" or "front_damper"."""
+        return tuple(name for name in self.vehicle.frame().element_names if f"{name}_velocity" in self.units)
 
     @property
     def units(self) -> dict[str, str]:
@@ -272,6 +280,40 @@ class Response(eqx.Module):
     def range_use(self) -> dict[str, list[RangeUse]]:
         """What each damper did beside the range that its law was fitted to; only of laws that have one."""
         return range_uses(self.vehicle, self.system.form, self.motion, self.road, self.road_rate, self.port_force)
+
+    def table(self) -> Table:
+        """The ride metrics with units. `simulation.metrics_table({"before": ..., "after": ...})` compares several."""
+        return metrics_table({"value": self})
+
+    def comfort_table(self) -> Table:
+        """Comfort by ISO 2631-1 of every acceleration, with units."""
+        return comfort_table({"value": self})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Metrics, comfort, energies and notes of the run, ready for JSON; numbers that are not finite are None."""
+        values, comfort = self.metrics(), self.comfort()
+        return {
+            "vehicle": type(self.vehicle).__name__,
+            "start": with_unit(self.time[0], "s"),
+            "end": with_unit(self.time[-1], "s"),
+            "axles": str(self.axle_timing),
+            "metrics": {name: with_unit(values[name], unit) for name, unit in self.metric_units().items()},
+            "comfort": {
+                channel: {
+                    name: with_unit(getattr(numbers, name), unit)
+                    for name, unit in comfort_units(self.units[channel]).items()
+                }
+                for channel, numbers in comfort.items()
+            },
+            "energy_balance": {name: with_unit(value, "J") for name, value in self.energy_balance().items()},
+            "notes": list(self.notes),
+        }
+
+    def plot(self, **options: Any) -> "Figure":
+        """Channels over time and the spectrum of the first (`plots.ride`)."""
+        from jaxdamp.plots import ride
+
+        return ride(self, **options)
 
     def to_xarray(self) -> "xarray.Dataset":
         """All channels as an `xarray.Dataset` over time, with units."""

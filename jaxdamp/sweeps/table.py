@@ -75,6 +75,8 @@ class Table:
         """The results with the names, values and units of the axes."""
         import xarray
 
+        from jaxdamp.sweeps import accessor  # noqa: F401  (gives datasets their `.jaxdamp`)
+
         dims, lengths = list(self.points.shape), list(self.points.shape.values())
         variables = {}
         for name, values in self.values.items():

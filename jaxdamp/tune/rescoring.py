@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.result import TuneResult
@@ -40,18 +41,40 @@ class Rescore:
         before, after = self.before[name], self.after[name]
         return np.divide(after, before, out=np.full(len(before), np.nan), where=before != 0.0) - 1.0
 
-    def __repr__(self) -> str:
-        labels = {name: f"{name} [{unit or '-'}]" for name, unit in self.units.items()}
-        width = max(map(len, labels.values()))
-        head = f"{f'mean of {self.roads} roads':<{width}}{'before':>12}{'after':>12}{'change':>9}   smallest to largest"
-        lines = [head]
+    @property
+    def summary(self) -> str:
+        """On how many roads the metric that was minimised falls, and by how much, in a sentence."""
+        gain = -100 * self.change(self.metric)
+        return (
+            f"On {np.count_nonzero(gain > 0)} of {self.roads} roads {self.metric} falls, by {gain.mean():.0f} % on "
+            f"average ({gain.min():.0f} to {gain.max():.0f} %)."
+        )
+
+    def table(self) -> Table:
+        """Means over the roads, the mean of the change, and its smallest and largest value on a road.
+
+        Metrics that are zero or negative on a road, which have no change in percent there, are left out.
+        """
+        rows = []
         for name, before in self.before.items():
-            change = 100.0 * self.change(name)
-            numbers = f"{before.mean():>12.5g}{self.after[name].mean():>12.5g}"
-            spread = f"{change.mean():+8.1f}%   {change.min():+.1f}% to {change.max():+.1f}%"
-            mark = "  <- minimised" if name == self.metric else ""
-            lines.append(f"{labels[name]:<{width}}{numbers}{spread if before.any() else ''}{mark}")
-        return "\n".join(lines)
+            if np.all(before > 0):
+                change, means = 100 * self.change(name), (float(before.mean()), float(self.after[name].mean()))
+                ends = (float(change.min()), float(change.max()))
+                rows.append(Compared(name, self.units[name], means, float(change.mean()), ends))
+        title = f"The same on {self.roads} fresh roads (means, and the change on each)"
+        more = (Column("smallest", "%", "+.1f"), Column("largest", "%", "+.1f"))
+        return comparison_table(title, "metric", ("before", "after"), rows, more)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All metrics on each road with units, ready for JSON; numbers that are not finite are None."""
+        metrics = {
+            name: {"before": plain(before), "after": plain(self.after[name]), "unit": self.units[name]}
+            for name, before in self.before.items()
+        }
+        return {"summary": self.summary, "metric": self.metric, "roads": self.roads, "metrics": metrics}
+
+    def __repr__(self) -> str:
+        return f"{self.summary}\n{self.table().to_text()}"
 
 
 def rescore(

@@ -4,6 +4,7 @@ import dataclasses
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from jaxdamp._status import Status
+from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_tied, with_unit
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -25,6 +26,11 @@ class Change(NamedTuple):
     lower: float
     upper: float
     tied: tuple[str, ...] = ()  # the numbers that have the same value
+
+    @property
+    def remark(self) -> str:
+        """The note, and the numbers tied to this one, in words."""
+        return with_tied(self.note, self.tied)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -82,24 +88,47 @@ class TuneResult(Generic[V]):
         parts = [f"{state} after {len(self.history)} steps", *stops, *[inside] * bool(inside)]
         return f"{self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
 
+    def table(self) -> Table:
+        """The ride metrics before and after, and which one was minimised and which are limited."""
+        notes = {n: f"limit {top:.4g}{', reached' * (n in self.active_limits)}" for n, top in self.limits.items()}
+        notes[self.metric] = "minimised"
+        rows = [
+            Compared(name, self.units[name], (before, after), percent_change(before, after), (notes.get(name, ""),))
+            for (name, before), after in zip(self.before.items(), self.after.values(), strict=True)
+        ]
+        return comparison_table("Ride metrics", "metric", ("before", "after"), rows, (Column("note"),))
+
+    def parameter_table(self) -> Table:
+        """The free numbers before and after, with the bounds of the search."""
+        rows = [
+            Compared(
+                p.name, p.unit, (p.before, p.after), percent_change(p.before, p.after), (p.lower, p.upper, p.remark)
+            )
+            for p in self.parameters
+        ]
+        more = (Column("lower"), Column("upper"), Column("note"))
+        return comparison_table(
+            "Parameters, with the bounds of the search", "parameter", ("before", "after"), rows, more
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The tuning as numbers with units and words, ready for JSON; numbers that are not finite are None."""
+        sides = {"before": self.before, "after": self.after}
+        return {
+            "summary": self.summary,
+            "metric": self.metric,
+            "converged": self.converged,
+            "metrics": {
+                name: {side: plain(values[name]) for side, values in sides.items()} | {"unit": unit}
+                for name, unit in self.units.items()
+            },
+            "parameters": [plain(change._asdict()) for change in self.parameters],
+            "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
+            "active_limits": list(self.active_limits),
+            "history": plain(self.history),
+            "warnings": list(self.warnings),
+        }
+
     def __repr__(self) -> str:
-        metrics = {name: f"{name} [{unit or '-'}]" for name, unit in self.units.items()}
-        numbers = {p.name: f"{p.name} [{p.unit or '-'}]" for p in self.parameters}
-        width = max(map(len, [*metrics.values(), *numbers.values()]))
-        lines = [self.summary, f"{'':<{width}}{'before':>12}{'after':>12}{'change':>9}"]
-        for name, before in self.before.items():
-            after, mark = self.after[name], "  <- minimised" if name == self.metric else ""
-            if name in self.limits:
-                mark += f"  <- limit {self.limits[name]:.4g}" + ", reached" * (name in self.active_limits)
-            lines.append(f"{metrics[name]:<{width}}{_before_after(before, after)}{mark}")
-        for p in self.parameters:
-            bounds = f"  ({p.lower:.5g} to {p.upper:.5g}{', ' * bool(p.note)}{p.note})"
-            tied = f"  = {', '.join(p.tied)}" * bool(p.tied)
-            lines.append(f"{numbers[p.name]:<{width}}{_before_after(p.before, p.after)}{bounds}{tied}")
-        return "\n".join(lines + [f"warning: {warning}" for warning in self.warnings])
-
-
-def _before_after(before: float, after: float) -> str:
-    """Two numbers and the relative change."""
-    share = f"{100 * (after / before - 1):+8.1f}%" if before else ""
-    return f"{before:>12.5g}{after:>12.5g}{share:>9}"
+        tables = [self.table().to_text(), self.parameter_table().to_text()]
+        return "\n".join([self.summary, *tables, *(f"warning: {warning}" for warning in self.warnings)])

@@ -1,29 +1,16 @@
 """A law that fails costs itself alone: its fit, its files, its picture."""
 
-import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from jaxdamp import export, plots, rig
-from jaxdamp.cli.attempts import Attempts
 from jaxdamp.dampers import AbstractDamper, Bilinear, Linear
 from jaxdamp.export import from_json
 from jaxdamp.identify import ladder
 
 from .invoking import jaxdamp
-
-
-def test_what_fails_is_named_and_the_rest_goes_on() -> None:
-    attempts = Attempts()
-    with attempts.part("The picture a.png"):
-        raise KeyError("colour")
-    with attempts.part("The table"):
-        warnings.warn("b.csv: rows left out.", stacklevel=1)
-    with attempts.part("The rest"):
-        pass
-    assert attempts.troubles == ["The picture a.png could not be made: 'colour'", "b.csv: rows left out."]
 
 
 def test_a_law_that_cannot_be_started_or_fitted_is_named_and_the_others_are_complete(

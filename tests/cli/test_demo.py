@@ -6,7 +6,8 @@ import pytest
 from jaxdamp import bench
 from jaxdamp.bench import SineTest
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.demo import TRUE, Scenario, run_demo
+from jaxdamp.cli.demo import Scenario, run_demo
+from jaxdamp.cli.demo_rides import TRUE
 from jaxdamp.dampers import Besinger
 from jaxdamp.export import from_json
 

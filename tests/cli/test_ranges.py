@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from jaxdamp import roads, simulate, vehicles
-from jaxdamp.cli.ranges import fitted_range_table, notes_of, range_use_table, said_in_tables
+from jaxdamp.cli.run_warnings import without_range_warnings
 from jaxdamp.dampers import Bilinear, FittedRange, Linear, with_fitted_range
 from jaxdamp.export import from_json, to_json
+from jaxdamp.report import fitted_range_table, notes_of, range_use_table
 
 from .invoking import jaxdamp
 
@@ -48,7 +49,7 @@ def test_a_ride_beyond_the_range_is_said_in_table_report_and_words(tmp_path: Pat
 def test_tables_and_remarks() -> None:
     car = vehicles.presets.quarter_car_000(with_fitted_range(Linear(1500.0), SLOW))
     bump = roads.cosine_bump(0.05, start=0.1, duration=0.2)
-    with said_in_tables(), warnings.catch_warnings(record=True) as caught:
+    with without_range_warnings(), warnings.catch_warnings(record=True) as caught:
         run = simulate(car, bump, duration=1.0, dt=0.002)
     plain = simulate(vehicles.presets.quarter_car_000(), bump, duration=1.0, dt=0.002)
     assert not caught

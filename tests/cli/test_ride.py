@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from jaxdamp import roads, simulate, vehicles
-from jaxdamp.cli.riding import comfort_table, metrics_table, parse_road, presets, with_step_warnings
+from jaxdamp.cli.riding import parse_road, presets
+from jaxdamp.cli.run_warnings import with_step_warnings
 from jaxdamp.dampers import AbstractDamper, Bilinear, Linear
 from jaxdamp.export import to_json
 
@@ -85,12 +86,3 @@ def test_every_preset_with_a_damper_takes_the_law() -> None:
     for make in presets().values():
         laws = make(damper=Linear(1234.0)).elements()
         assert any("1234.0" in repr(law) for law in laws)
-
-
-def test_tables_of_one_law_have_no_change() -> None:
-    car = vehicles.presets.quarter_car_000()
-    run = simulate(car, roads.cosine_bump(0.05, start=0.1, duration=0.2), duration=1.0, dt=0.002)
-    for table in (metrics_table({"law": run}), comfort_table({"law": run})):
-        assert [column.name for column in table.columns][1:] == ["unit", "law"]
-    units = {str(row[0]).rpartition("acceleration ")[2]: row[1] for row in comfort_table({"law": run}).rows}
-    assert units["vibration dose value"] == "m/s^1.75" and units["weighted rms"] == "m/s²"

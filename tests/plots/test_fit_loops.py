@@ -3,9 +3,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from jaxdamp import plots
-from jaxdamp.bench import BenchRun, BenchSet
+from jaxdamp.bench import BenchRun, BenchSet, last_steady_cycle
 from jaxdamp.identify import Comparison
-from jaxdamp.plots.loops import last_cycle, spread
+from jaxdamp.plots.loops import spread
 
 
 def test_axes_say_what_they_show_with_unit_and_sign(comparison: Comparison) -> None:
@@ -20,11 +20,11 @@ def test_axes_say_what_they_show_with_unit_and_sign(comparison: Comparison) -> N
     ]
 
 
-def test_lines_are_the_measured_and_the_fitted_last_cycle(runs: BenchSet, comparison: Comparison) -> None:
+def test_lines_are_the_measured_and_the_fitted_last_steady_cycle(runs: BenchSet, comparison: Comparison) -> None:
     result, run = comparison["bilinear"], runs[3]
     figure = plots.fit_loops(result, run)
     loops, football, over_velocity, over_time = figure.axes
-    part = last_cycle(run)
+    part = last_steady_cycle(run)
     fitted = result.predict(run)[0]
     measured_line, fitted_line = loops.get_lines()[:2]
     np.testing.assert_array_equal(measured_line.get_xydata(), np.stack([run.velocity[part], run.force[part]], axis=1))
@@ -46,33 +46,11 @@ def test_the_residual_of_a_slow_record_is_drawn_in_means_over_the_cycle(comparis
         0.01 * np.sin(2 * np.pi * np.arange(8000) / 2000),
         np.random.default_rng(0).normal(size=8000),
     )
-    part, every = last_cycle(slow), 6
+    part, every = last_steady_cycle(slow), 6
     residual = result.predict(slow)[0][part] - slow.force[part]
     over_time = np.asarray(plots.fit_loops(result, slow).axes[3].get_lines()[0].get_ydata())
     assert len(over_time) == len(residual) // every
     assert over_time[5] == pytest.approx(residual[30:36].mean())
-
-
-def test_the_last_cycle_is_one_period_at_the_end(runs: BenchSet) -> None:
-    run = runs[1]  # 2 Hz for 2 s, sampled at 500 Hz
-    part = last_cycle(run)
-    assert len(run.time[part]) == pytest.approx(250, abs=2)
-    assert run.time[part][0] > 0.9
-
-
-def test_a_cycle_in_which_the_machine_runs_down_is_passed_over() -> None:
-    time = np.arange(5000) / 1000
-    size = np.where(time < 4.0, 0.01, 0.006)
-    run = BenchRun.from_arrays("stop", time, size * np.sin(2 * np.pi * time), np.cos(2 * np.pi * time))
-    part = last_cycle(run)
-    assert run.time[part][-1] == pytest.approx(4.0, abs=0.01) and np.ptp(run.stroke[part]) > 0.0199
-
-
-def test_a_record_without_a_full_cycle_is_drawn_whole() -> None:
-    time = np.arange(50) / 100
-    run = BenchRun.from_arrays("half", time, 0.01 * np.sin(2 * time), np.cos(2 * time))
-    assert run.cycles == 0
-    assert len(run.time[last_cycle(run)]) == 50
 
 
 def test_of_many_records_some_are_shown_and_the_title_says_so(runs: BenchSet, comparison: Comparison) -> None:

@@ -1,3 +1,5 @@
+import json
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -290,3 +292,34 @@ def test_settings_are_checked():
         random({"rate": (0.1, 1.0)}, 4, log=["rates"])
     with pytest.raises(ValueError, match="`count` must be one or more"):
         random({"a": (0.0, 1.0)}, 0)
+
+
+# ---- what the dataset can do
+
+
+def test_a_grid_as_a_table_has_a_row_for_each_point():
+    data = jaxdamp.sweep(decay(), AXES)
+    table = data.jaxdamp.table()
+    assert [column.name for column in table.columns] == ["a", "b", "sum", "square"]  # the profile is no number
+    assert {column.name: column.unit for column in table.columns}["sum"] == "m"
+    rows = table.records()
+    assert len(rows) == len(AXES["a"]) * len(AXES["b"])
+    for row in rows:
+        assert row["sum"] == float(data["sum"].sel(a=row["a"], b=row["b"]))
+
+
+def test_points_that_failed_have_a_reason_and_no_number():
+    def root(point):
+        return {"root": jnp.sqrt(point["a"])}
+
+    with pytest.warns(UserWarning, match="1 of 3 points"):
+        data = jaxdamp.sweep(root, points({"a": [-1.0, 0.0, 4.0]}))
+    assert data.jaxdamp.table().rows == ((-1.0, None, "root is not finite"), (0.0, 0.0, ""), (4.0, 2.0, ""))
+    plain = json.loads(json.dumps(data.jaxdamp.to_dict(), allow_nan=False))
+    assert plain["data_vars"]["root"]["data"] == [None, 0.0, 2.0] and plain["attrs"] == {"failed_points": 1}
+
+
+def test_a_dataset_draws_itself():
+    data = jaxdamp.sweep(product, {"a": [1.0, 2.0], "b": [3.0, 4.0, 5.0]})
+    (axes,) = data.jaxdamp.plot("product", over="b").axes
+    assert axes.get_xlabel() == "b" and len(axes.get_lines()) == 2

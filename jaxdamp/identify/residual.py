@@ -1,17 +1,17 @@
 """What the error of a law is made of: shape, hysteresis, noise."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp.bench import BenchRun
-from jaxdamp.identify import FitResult
-from jaxdamp.identify.traces import used_samples
+from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.traces import predict_by_record, used_samples
 
 
-class Shares(NamedTuple):
+class ErrorShares(NamedTuple):
     """Parts of the mean squared error; together 1."""
 
     shape: float  # another curve of force over velocity would remove it
@@ -19,25 +19,34 @@ class Shares(NamedTuple):
     rest: float  # noise, and what changes from cycle to cycle
 
 
-def residual_shares(result: FitResult, runs: Sequence[BenchRun] | None = None) -> Shares:
-    """Split the squared error of a fitted law, record by record, by an analysis of variance.
+def error_shares(law: AbstractDamper | Sequence[AbstractDamper], runs: BenchRun | Iterable[BenchRun]) -> ErrorShares:
+    """Split the squared force error of a law over records, record by record, by an analysis of variance.
 
     The samples of a record are sorted by velocity into bins, and each bin by the half of the stroke they were taken
     in: a cycle passes every velocity twice, once above and once below mid-stroke. The mean of a bin is what another
     curve over velocity could remove (*shape*), the distance of the two halves from it is *hysteresis* (or a force that
     depends on the stroke), the scatter about them is the *rest*. What the means owe to the scatter is taken off.
 
+    `FitResult.error_shares` is this of a fit over its own records.
+
     Arguments:
-        result: a fit.
-        runs: other records than those of the fit.
+        law: a law, fitted or not; or one for each record.
+        runs: one record or several.
+
+    >>> from jaxdamp import bench
+    >>> from jaxdamp.dampers import Bilinear, Linear
+    >>> runs = bench.VirtualDyno(Bilinear(2600.0, 1200.0), force_noise=5.0).run(bench.SineTest(0.01, 2.0))
+    >>> error_shares(Linear(1900.0), runs).shape > 0.9
+    True
     """
-    runs = result.runs if runs is None else tuple(runs)
+    runs = as_runs(runs, call="error_shares(law, runs)")
     sums = np.zeros(3)
-    for run, force in zip(runs, result.predict(runs), strict=True):
-        part = used_samples(result.law, run)
+    laws, forces = predict_by_record(law, runs)
+    for own, run, force in zip(laws, runs, forces, strict=True):
+        part = used_samples(own, run)
         sums += _sums(run.velocity[part], run.stroke[part], force[part] - run.force[part])
     shape, hysteresis, rest = sums / max(sums.sum(), np.finfo(float).tiny)
-    return Shares(float(shape), float(hysteresis), float(rest))
+    return ErrorShares(float(shape), float(hysteresis), float(rest))
 
 
 def _sums(

@@ -1,20 +1,10 @@
-"""What laws were fitted to, by how much rides leave it, and what else rides say of themselves."""
+"""What laws were fitted to, and by how much rides leave it, as tables."""
 
-import contextlib
-import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
-from jaxdamp.dampers import FittedRange, OutsideFittedRangeWarning
-from jaxdamp.report import Cell, Column, Table
+from jaxdamp._tables import Cell, Column, Table
+from jaxdamp.dampers import FittedRange
 from jaxdamp.simulation import Response
-
-
-@contextlib.contextmanager
-def said_in_tables() -> Iterator[None]:
-    """No Python warnings of laws outside their range: the tables and remarks of the command say it."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", OutsideFittedRangeWarning)
-        yield
 
 
 def fitted_range_table(covered: FittedRange) -> Table:
@@ -39,8 +29,3 @@ def range_use_table(responses: Mapping[str, Response]) -> Table | None:
     if not rows:
         return None
     return Table("Use of the dampers beside the records of their laws", tuple(columns), tuple(rows))
-
-
-def notes_of(responses: Mapping[str, Response]) -> list[str]:
-    """What each response says of itself, after its name."""
-    return [f"{name}: {note}" for name, response in responses.items() for note in response.notes]

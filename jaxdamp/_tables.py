@@ -1,0 +1,193 @@
+"""Tables of results: columns with units, rows of words and numbers; as text, HTML, CSV and plain data."""
+
+import csv
+import html
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+Cell = str | float | int | None
+
+
+class Shown(float):
+    """A number with the text that a reader is shown; files keep all its digits.
+
+    >>> number = Shown(14361.2734, "14361")
+    >>> f"{number:.4g}", str(number)
+    ('14361', '14361.2734')
+    """
+
+    text: str
+
+    def __new__(cls, value: float, text: str) -> "Shown":
+        """The number, and its text."""
+        self = super().__new__(cls, value)
+        self.text = text
+        return self
+
+    def __format__(self, spec: str) -> str:
+        return self.text
+
+
+class Column(NamedTuple):
+    """A column: its name, its unit, and how a number in it is written for reading."""
+
+    name: str
+    unit: str = ""
+    spec: str = ".4g"
+
+    @property
+    def heading(self) -> str:
+        """Name with unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    def text(self, cell: Cell) -> str:
+        """A cell for reading; nothing where there is no value."""
+        if cell is None:
+            return ""
+        return cell if isinstance(cell, str) else format(cell, self.spec)
+
+
+@dataclass(frozen=True, repr=False)
+class Table:
+    """A table with a title, columns with units, and rows of words and numbers. Notebooks show it as HTML.
+
+    >>> table = Table("Laws", (Column("law"), Column("RMSE", "N", ".1f")), (("linear", 88.93), ("besinger", 45.02)))
+    >>> print(table)
+    Laws
+    law       RMSE [N]
+    linear        88.9
+    besinger      45.0
+    >>> print(table.to_csv().splitlines())
+    ['law,RMSE [N]', 'linear,88.93', 'besinger,45.02']
+    >>> table.records()[1]
+    {'law': 'besinger', 'RMSE': 45.02}
+    """
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+    def texts(self) -> list[tuple[str, ...]]:
+        """The rows for reading."""
+        return [tuple(c.text(cell) for c, cell in zip(self.columns, row, strict=True)) for row in self.rows]
+
+    def records(self) -> list[dict[str, Cell]]:
+        """The rows as dictionaries by the names of the columns: a list that `pandas.DataFrame` takes as it is."""
+        return [dict(zip((c.name for c in self.columns), row, strict=True)) for row in self.rows]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Title, columns with units, and rows, ready for JSON; numbers that are not finite are None."""
+        columns = [{"name": column.name, "unit": column.unit} for column in self.columns]
+        return {"title": self.title, "columns": columns, "rows": plain(self.rows)}
+
+    def is_number(self, column: int) -> bool:
+        """Whether a column holds numbers, to be set to the right."""
+        return any(isinstance(row[column], float | int) for row in self.rows)
+
+    def to_text(self) -> str:
+        """The rows for reading, in columns of equal width."""
+        lines = [tuple(column.heading for column in self.columns), *self.texts()]
+        widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
+        sides = [">" if self.is_number(i) else "<" for i in range(len(self.columns))]
+        padded = (
+            "  ".join(f"{text:{side}{width}}" for text, side, width in zip(line, sides, widths, strict=True))
+            for line in lines
+        )
+        return "\n".join([self.title, *(line.rstrip() for line in padded)])
+
+    def to_csv(self) -> str:
+        """All digits, with headings that carry the units."""
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(column.heading for column in self.columns)
+        writer.writerows(["" if cell is None else cell for cell in row] for row in self.rows)
+        return out.getvalue()
+
+    def to_html(self) -> str:
+        """The rows for reading, as HTML."""
+        sides = [' class="number"' if self.is_number(i) else "" for i in range(len(self.columns))]
+        head = "".join(f"<th{s}>{html.escape(c.heading)}</th>" for c, s in zip(self.columns, sides, strict=True))
+        lines = [
+            "<tr>" + "".join(f"<td{s}>{html.escape(text)}</td>" for text, s in zip(row, sides, strict=True)) + "</tr>"
+            for row in self.texts()
+        ]
+        caption = f"<caption>{html.escape(self.title)}</caption>"
+        return "\n".join([f"<table>{caption}", f"<tr>{head}</tr>", *lines, "</table>"])
+
+    _repr_html_ = to_html
+    __repr__ = to_text
+
+
+def typeset_unit(unit: str, none: str = "") -> str:
+    """A unit as it is printed: "m/s²" for "m/s^2", and `none` where there is no unit."""
+    return unit.replace("^2", "²") or none
+
+
+def percent_change(before: float, after: float) -> float | None:
+    """Relative change [%]; none from zero."""
+    return 100.0 * (after / before - 1.0) if before else None
+
+
+class Compared(NamedTuple):
+    """A row of a comparison: one quantity under several conditions."""
+
+    name: str
+    unit: str
+    values: Sequence[float]  # one for each condition
+    change: float | None  # from the first to the last [%]
+    more: tuple[Cell, ...] = ()
+
+
+def comparison_table(
+    title: str, quantity: str, conditions: Sequence[str], rows: Iterable[Compared], more: tuple[Column, ...] = ()
+) -> Table:
+    """Quantities under several conditions, such as before and after, with the change from the first to the last.
+
+    Arguments:
+        title: of the table.
+        quantity: heading of the names.
+        conditions: heading of each value. Of a single condition there is no change.
+        rows: the quantities.
+        more: further columns.
+    """
+    several = len(conditions) > 1
+    change = (Column("change", "%", "+.1f"),) if several else ()
+    columns = (Column(quantity), Column("unit"), *map(Column, conditions), *change, *more)
+    cells = (
+        (row.name, typeset_unit(row.unit, "–"), *row.values, *((row.change,) if several else ()), *row.more)
+        for row in rows
+    )
+    return Table(title, columns, tuple(cells))
+
+
+def plain(value: Any) -> Any:
+    """Numbers, words, lists and dictionaries as JSON has them; numbers that are not finite become None."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float):
+        return float(value) if np.isfinite(value) else None
+    array = np.asarray(value)
+    if array.dtype.kind not in "biufU":
+        raise TypeError(
+            f"A {type(value).__name__} is no number, word, list or dictionary, which plain data are made of."
+        )
+    return plain(array.tolist())
+
+
+def with_unit(value: Any, unit: str) -> dict[str, Any]:
+    """A number or an array with its unit, as plain data."""
+    return {"value": plain(value), "unit": unit}
+
+
+def with_tied(note: str, tied: Sequence[str]) -> str:
+    """The remark on a number: its note, and the names of the numbers that are tied to it."""
+    return "; ".join([note] * bool(note) + [f"also {', '.join(tied)}"] * bool(tied))

@@ -1,0 +1,164 @@
+"""What a record says of its damper without a law: steady cycles, peak-velocity points, the loop over velocity."""
+
+import itertools
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp import _checks
+from jaxdamp.bench.motion import cycle_instants
+from jaxdamp.bench.runs import BenchRun
+from jaxdamp.bench.sets import as_runs
+
+
+STEADY = 0.1  # by which the stroke range of a steady cycle may differ from the median one
+NEAR_PEAK = 0.98  # of the peak velocity, beyond which samples count as taken at the peak
+
+
+class PeakVelocityPoints(NamedTuple):
+    """Points of the force-velocity curve, of shape (records, 2): compression in column 0, rebound in column 1.
+
+    A row for each record, in their order. `np.ravel` of both gives the points of a curve.
+    """
+
+    velocity: Float[np.ndarray, "records 2"]  # m/s, positive in rebound
+    force: Float[np.ndarray, "records 2"]  # N, positive when it resists extension
+
+
+class VelocityLoops(NamedTuple):
+    """Mean cycles of records, of shape (records, points), at equal steps of time over the period.
+
+    A row for each record, in their order. A loop is closed: its first point follows its last one.
+    """
+
+    time: Float[np.ndarray, "records points"]  # s, from the first point of the cycle
+    stroke: Float[np.ndarray, "records points"]  # m, positive in rebound
+    velocity: Float[np.ndarray, "records points"]  # m/s, positive in rebound
+    force: Float[np.ndarray, "records points"]  # N, positive when it resists extension
+    cycles: tuple[int, ...]  # over so many the mean of each record is taken
+
+
+def steady_cycles(run: BenchRun) -> list[slice]:
+    """The samples of each full cycle whose stroke range is within 10 % of the median one.
+
+    So the cycles in which a machine runs up or down are left out. Empty for a record without a full cycle.
+    """
+    return [_samples(run, *ends) for ends in _steady_instants(run)]
+
+
+def last_steady_cycle(run: BenchRun) -> slice:
+    """The samples of the last steady cycle (`steady_cycles`), or all of them in a record without a full cycle."""
+    return next(reversed(steady_cycles(run)), slice(None))
+
+
+def peak_velocity_points(runs: BenchRun | Iterable[BenchRun]) -> PeakVelocityPoints:
+    """Force at the compression and the rebound peak of the velocity, in the last steady cycle of each record.
+
+    The points of a peak-velocity-pick-off (PVP) test. Each is the mean over the samples within 2 % of the peak, so that
+    one noisy sample decides nothing; a record without a full cycle is searched as a whole, and where it moves in one
+    direction only, the other point is NaN.
+
+    Arguments:
+        runs: one record or several.
+
+    Returns:
+        Velocity [m/s] and force [N], each of shape (records, 2).
+
+    Raises:
+        ValueError: no record.
+
+    >>> from jaxdamp import bench
+    >>> from jaxdamp.dampers import Bilinear
+    >>> runs = bench.VirtualDyno(Bilinear(2600.0, 1200.0)).run([bench.SineTest(0.01, f) for f in (1.0, 2.0)])
+    >>> points = bench.peak_velocity_points(runs)
+    >>> np.round(points.force / points.velocity)
+    array([[1200., 2600.],
+           [1200., 2600.]])
+    """
+    rows = []
+    for run in _records(runs, "peak_velocity_points(runs)"):
+        part = last_steady_cycle(run)
+        velocity, force = run.velocity[part], run.force[part]
+        peaks = (min(velocity.min(), 0.0), max(velocity.max(), 0.0))
+        at_peaks = [(velocity / peak >= NEAR_PEAK) if peak else np.zeros(len(velocity), bool) for peak in peaks]
+        rows.append([(velocity[at].mean(), force[at].mean()) if at.any() else (np.nan, np.nan) for at in at_peaks])
+    points = np.array(rows, dtype=float)
+    return PeakVelocityPoints(points[..., 0], points[..., 1])
+
+
+def continuous_velocity_loop(runs: BenchRun | Iterable[BenchRun], points: int = 200) -> VelocityLoops:
+    """The loop of force over velocity of each record: the mean of its steady cycles, at equal steps of time.
+
+    What a continuous-velocity-pick-off (CVP) test shows: compression and rebound, opening and closing. Cycles are cut
+    where the stroke passes its middle, read at equal fractions of their own period by straight lines between the
+    samples, and averaged, so that white noise falls with the root of their number. The first point is the first one
+    with the stroke above its middle on the way into rebound.
+
+    Arguments:
+        runs: one record or several; their frequencies may differ.
+        points: of a loop.
+
+    Returns:
+        Time, stroke, velocity and force, each of shape (records, points), and the number of cycles averaged.
+
+    Raises:
+        ValueError: no record, one without a full cycle, fewer than 4 points.
+
+    >>> from jaxdamp import bench
+    >>> from jaxdamp.dampers import Linear
+    >>> run = bench.VirtualDyno(Linear(2000.0), force_noise=20.0).run(bench.SineTest(0.01, 2.0, cycles=50))[0]
+    >>> loops = bench.continuous_velocity_loop(run)
+    >>> error = loops.force - 2000.0 * loops.velocity
+    >>> loops.force.shape, loops.cycles, bool(np.std(error) < 4.0)  # N
+    ((1, 200), (50,), True)
+    """
+    if points < 4:
+        _checks.refuse("points", "be 4 or more", points)
+    means, cycles = [], []
+    for run in _records(runs, "continuous_velocity_loop(runs)"):
+        instants = _steady_instants(run)
+        if not instants:
+            remedy = "Take `run.velocity` and `run.force` of a record without one as they are."
+            _checks.refuse("runs", "be records with a full cycle", f"{run.name!r}, without one", remedy)
+        means.append(_mean_cycle(run, np.array(instants), points))
+        cycles.append(len(instants))
+    time, stroke, velocity, force = np.stack(means, axis=1)
+    return VelocityLoops(time, stroke, velocity, force, tuple(cycles))
+
+
+def _records(runs: BenchRun | Iterable[BenchRun], call: str) -> tuple[BenchRun, ...]:
+    """One record or several, but not none."""
+    chosen = as_runs(runs, call=call)
+    if not chosen:
+        _checks.refuse("runs", "hold at least one record", "empty")
+    return chosen
+
+
+def _samples(run: BenchRun, start: float, stop: float) -> slice:
+    first, last = np.searchsorted(run.time, (start, stop))
+    return slice(int(first), int(last) + 1)
+
+
+def _steady_instants(run: BenchRun) -> list[tuple[float, float]]:
+    """Start and end [s] of each steady cycle."""
+    cycles = list(itertools.pairwise(cycle_instants(run.time, run.stroke).tolist()))
+    if not cycles:
+        return []
+    ranges = np.array([np.ptp(run.stroke[_samples(run, *ends)]) for ends in cycles])
+    steady = np.abs(ranges / np.median(ranges) - 1.0) < STEADY
+    return [ends for ends, yes in zip(cycles, steady, strict=True) if yes] or cycles[-1:]
+
+
+def _mean_cycle(run: BenchRun, cycles: Float[np.ndarray, "cycles 2"], points: int) -> Float[np.ndarray, "4 points"]:
+    """Time, stroke, velocity and force of the mean cycle, from mid-stroke into rebound on."""
+    starts, periods = cycles[:, 0], cycles[:, 1] - cycles[:, 0]
+    fractions = np.arange(points) / points
+    instants = starts[:, None] + periods[:, None] * fractions
+    channels = [
+        np.interp(instants, run.time, channel).mean(axis=0) for channel in (run.stroke, run.velocity, run.force)
+    ]
+    above = channels[0] > 0.5 * (channels[0].max() + channels[0].min())
+    first = int(np.argmax(above & ~np.roll(above, 1)))
+    return np.stack([periods.mean() * fractions, *(np.roll(channel, -first) for channel in channels)])

@@ -1,0 +1,82 @@
+"""Fitted numbers with their uncertainty, and how they are written."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxdamp._tables import Cell, Column, Shown, Table, with_tied
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import free_parameters
+
+
+PLACES = 3  # behind the point, of a value too large or too small to be written out
+
+
+class Estimate(NamedTuple):
+    """One fitted number.
+
+    The standard error counts every other free number as unknown, also those that ended on an edge of their range, and
+    is what it would be without any edge.
+    """
+
+    name: str
+    value: float
+    unit: str
+    standard_error: float
+    interval: tuple[float, float]  # 95 %, cut at the edges of the range
+    meaning: str
+    note: str  # "", "not identifiable" or "at a bound"
+    tied: tuple[str, ...] = ()  # the numbers that have the same value
+
+    @property
+    def remark(self) -> str:
+        """The note, and the numbers tied to this one, in words."""
+        return with_tied(self.note, self.tied)
+
+
+def rounded(value: float, error: float) -> tuple[str, str]:
+    """A value and its standard error as text, with the digits that mean something.
+
+    The error gets two digits, the value those down to the second digit of the error, but one at least.
+
+    >>> rounded(14361.27, 61.8), rounded(0.9035, 0.2912), rounded(3.2, float("inf"))
+    (('14361', '62'), ('0.90', '0.29'), ('3.2', 'inf'))
+    """
+    if not (np.isfinite(error) and np.isfinite(value) and error > 0):
+        return f"{value:.5g}", f"{error:.2g}"
+    place = int(np.floor(np.log10(error))) - 1
+    place_of_value = min(place, int(np.floor(np.log10(abs(value))))) if value else place
+    if max(abs(value), error) >= 1e9 or place_of_value < -9:
+        return f"{value:.{PLACES}e}", f"{error:.1e}"
+    texts = (f"{round(number, -at):.{max(-at, 0)}f}" for number, at in ((value, place_of_value), (error, place)))
+    return next(texts), next(texts)
+
+
+def parameter_table(title: str, estimates: Sequence[Estimate], truth: AbstractDamper | None = None) -> Table:
+    """Fitted values with standard errors, beside the true ones where these are known.
+
+    Arguments:
+        title: of the table.
+        estimates: of a fit.
+        truth: a law of which the numbers of the same names are the true ones, as on a virtual bench.
+    """
+    columns = [Column("parameter"), Column("unit"), Column("value", spec=".5g"), Column("standard error", spec=".2g")]
+    columns += [Column("true", spec=".5g"), Column("(value − true)/se", spec="+.1f")] * (truth is not None)
+    columns += [Column("note"), Column("meaning")]
+    true_values = {} if truth is None else _numbers(truth)
+    rows: list[tuple[Cell, ...]] = []
+    for e in estimates:
+        value, error = rounded(e.value, e.standard_error)
+        row: tuple[Cell, ...] = (e.name, e.unit or "–", Shown(e.value, value), Shown(e.standard_error, error))
+        if truth is not None:
+            true = true_values.get(e.name)
+            row += (true, None if true is None else (e.value - true) / e.standard_error)
+        rows.append((*row, e.remark, e.meaning))
+    return Table(title, tuple(columns), tuple(rows))
+
+
+def _numbers(law: AbstractDamper) -> dict[str, float]:
+    """Every number of a law by name."""
+    free = free_parameters(law)
+    return {name: float(value) for name, value in zip(free.names, free.values, strict=True)}

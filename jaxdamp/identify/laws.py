@@ -1,0 +1,37 @@
+"""The laws that can be fitted by name: what each name stands for."""
+
+from typing import NamedTuple
+
+from jaxdamp._tables import Column, Table
+
+
+class NamedLaw(NamedTuple):
+    """What the name of a law stands for."""
+
+    hysteresis: bool
+    meaning: str
+
+
+NAMED_LAWS = {
+    "linear": NamedLaw(False, "one damping coefficient"),
+    "bilinear": NamedLaw(False, "one coefficient in rebound, one in compression"),
+    "power_law": NamedLaw(False, "power of the velocity with an offset, on each side"),
+    "polynomial": NamedLaw(False, "odd and even powers of the velocity, up to the fifth"),
+    "segmented_polynomial": NamedLaw(False, "five polynomials that join, monotone"),
+    "piecewise_linear": NamedLaw(False, "straight lines between knees"),
+    "table": NamedLaw(False, "forces at fixed velocities, straight lines between them"),
+    "besinger": NamedLaw(False, "smooth change from compression to rebound, with a blow-off valve"),
+    "linear_friction": NamedLaw(False, "one coefficient and smooth Coulomb friction"),
+    "besinger_lag": NamedLaw(True, "besinger behind a first-order lag"),
+    "besinger_series_spring": NamedLaw(True, "besinger in series with a spring: mount, bushing or oil column"),
+    "linear_friction_lag": NamedLaw(True, "linear_friction behind a first-order lag"),
+    "bouc_wen": NamedLaw(True, "one coefficient, friction that gives before it slides, a spring"),
+    "lugre_spring": NamedLaw(True, "friction that sticks, breaks away and slides, one coefficient, a spring"),
+}
+
+
+def laws_table() -> Table:
+    """The laws of `default_ladder`, from plain to rich: name, whether they have hysteresis, what they are."""
+    columns = (Column("law"), Column("hysteresis"), Column("what it is"))
+    rows = ((name, "yes" if law.hysteresis else "no", law.meaning) for name, law in NAMED_LAWS.items())
+    return Table("Laws", columns, tuple(rows))

@@ -1,0 +1,61 @@
+"""The laws of a comparison: each fit with its errors, side by side."""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from jaxdamp._tables import Cell, Column, Table
+from jaxdamp.identify.residual import ErrorShares
+from jaxdamp.identify.result import FitResult
+
+
+class Rung(NamedTuple):
+    """One law of a comparison."""
+
+    name: str
+    parameters: int
+    fit_percent: float
+    rmse: float  # N
+    held_out_fit_percent: float | None
+    held_out_rmse: float | None  # N
+    result: FitResult
+
+    @property
+    def error(self) -> float:
+        """RMSE [N] by which laws are ranked: on the held-out records, or on the fitted ones if there are none."""
+        return self.rmse if self.held_out_rmse is None else self.held_out_rmse
+
+
+class Failure(NamedTuple):
+    """A law of a comparison that has no fit."""
+
+    name: str
+    reason: str  # in words
+
+
+def best_of(rungs: Iterable[Rung]) -> Rung:
+    """The law with the smallest error on the held-out records, or on the fitted ones if there are none."""
+    return min(rungs, key=lambda rung: rung.error)
+
+
+def ladder_table(rungs: Sequence[Rung], failed: Sequence[Failure] = ()) -> Table:
+    """Each law with its errors, and what these are made of; then the laws that failed."""
+    held = any(rung.held_out_rmse is not None for rung in rungs)
+    columns = [Column("law"), Column("free", spec="d"), Column("fit", "%", ".1f"), Column("RMSE", "N", ".1f")]
+    columns += [Column("held-out fit", "%", ".1f"), Column("held-out RMSE", "N", ".1f")] * held
+    columns += [Column(name, "%", ".0f") for name in ErrorShares._fields]
+    columns += [Column("note")]
+    rows: list[tuple[Cell, ...]] = []
+    for rung in rungs:
+        scores = (rung.name, rung.parameters, rung.fit_percent, rung.rmse)
+        scores += (rung.held_out_fit_percent, rung.held_out_rmse) if held else ()
+        rows.append((*scores, *(100 * share for share in rung.result.error_shares), _short_note(rung.result)))
+    rows += [(failure.name, *[None] * (len(columns) - 2), "failed") for failure in failed]
+    return Table("Laws (shape, hysteresis and rest are shares of the squared error)", tuple(columns), tuple(rows))
+
+
+def _short_note(result: FitResult) -> str:
+    weak = sum(e.note == "not identifiable" for e in result.parameters)
+    bound = sum(e.note == "at a bound" for e in result.parameters)
+    parts = ["not converged"] * (not result.converged)
+    parts += [f"{weak} not identifiable"] * bool(weak) + [f"{bound} at a bound"] * bool(bound)
+    return ", ".join(parts)

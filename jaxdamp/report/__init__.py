@@ -1,0 +1,44 @@
+"""What a fit, a ride or a tuning says on a page: one HTML file with tables and pictures that needs nothing beside it.
+
+- Pages: `fit_report(comparison)`, `ride_report(responses)`, `tuning_report(result)`; each gives a `Report`, to which
+  more can be added before `write(path)`.
+- A page of your own: `Report`, with `add_fits` and `add_tuning` as ready sections.
+- Tables that stand on these pages: `records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
+"""
+
+from jaxdamp._tables import Column, Table
+from jaxdamp.report.attempts import Attempts
+from jaxdamp.report.fits import (
+    add_fits,
+    failure_sentences,
+    fit_report,
+    fitted_velocities,
+    parameters_of,
+    records_table,
+)
+from jaxdamp.report.page import Report
+from jaxdamp.report.ranges import fitted_range_table, range_use_table
+from jaxdamp.report.rides import axles_sentence, notes_of, ride_report, ride_tables
+from jaxdamp.report.tunings import add_tuning, tuning_report
+
+
+__all__ = [
+    "Attempts",
+    "Column",
+    "Report",
+    "Table",
+    "add_fits",
+    "add_tuning",
+    "axles_sentence",
+    "failure_sentences",
+    "fit_report",
+    "fitted_range_table",
+    "fitted_velocities",
+    "notes_of",
+    "parameters_of",
+    "range_use_table",
+    "records_table",
+    "ride_report",
+    "ride_tables",
+    "tuning_report",
+]

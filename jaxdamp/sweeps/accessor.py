@@ -1,0 +1,69 @@
+"""What a sweep's `xarray.Dataset` can do: `data.jaxdamp.table()`, `.to_dict()`, `.plot(metric)`."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+import xarray
+
+from jaxdamp._tables import Column, Table, plain, typeset_unit
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@final
+@xarray.register_dataset_accessor("jaxdamp")
+class SweepResults:
+    """Tables, plain data and pictures of a sweep.
+
+    Datasets have it once a sweep was made, or this module imported (for results read back from a file).
+
+    >>> import jaxdamp
+    >>> data = jaxdamp.sweep(lambda p: {"area": p["a"] * p["b"]}, {"a": [1.0, 2.0], "b": [3.0, 4.0]})
+    >>> print(data.jaxdamp.table())
+    Sweep over a, b
+    a  b  area
+    1  3     3
+    1  4     4
+    2  3     6
+    2  4     8
+    """
+
+    def __init__(self, data: xarray.Dataset) -> None:
+        self._data = data
+
+    def table(self) -> Table:
+        """A row for each point: its axes, the results that are one number, and why it failed, where one did."""
+        data = self._data
+        dims = data["failed"].dims
+        axes = [name for name, axis in data.coords.items() if name not in ("failed", "reason") and _is_in(axis, dims)]
+        results = [name for name, result in data.data_vars.items() if result.dims == dims]
+        names = [*axes, *results]
+        columns = [Column(str(name), typeset_unit(data[name].attrs.get("units", ""))) for name in names]
+        cells = [data[name].broadcast_like(data["failed"]).transpose(*dims).values.ravel().tolist() for name in names]
+        if data["failed"].any():
+            columns, cells = [*columns, Column("reason")], [*cells, data["reason"].values.ravel().tolist()]
+        rows = tuple(zip(*([_cell(cell) for cell in column] for column in cells), strict=True))
+        return Table(f"Sweep over {', '.join(map(str, axes))}", tuple(columns), rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `Dataset.to_dict`, ready for JSON: numbers that are not finite are None."""
+        return plain(self._data.to_dict())
+
+    def plot(self, metric: str, over: Sequence[str] | None = None) -> "Figure":
+        """A result over one axis as a curve, over two as a map (`plots.sweep`)."""
+        from jaxdamp.plots import sweep
+
+        return sweep(self._data, metric, over)
+
+
+def _is_in(axis: xarray.DataArray, dims: tuple[Any, ...]) -> bool:
+    """Whether a coordinate belongs to the points, not to an axis of a result."""
+    return bool(axis.dims) and set(axis.dims) <= set(dims)
+
+
+def _cell(value: Any) -> Any:
+    """Nothing in place of a result that there is not."""
+    return None if isinstance(value, float) and np.isnan(value) else value

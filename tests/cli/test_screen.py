@@ -1,0 +1,55 @@
+"""What the terminal shows: stages, tables, what the reader decided."""
+
+import io
+from types import SimpleNamespace
+
+import pytest
+from rich.console import Console
+
+from jaxdamp import bench
+from jaxdamp.bench import SineTest
+from jaxdamp.cli import console
+from jaxdamp.cli.console import Screen
+from jaxdamp.cli.options import assignments, column_numbers, decisions
+from jaxdamp.dampers import Linear
+from jaxdamp.report import Column, Table
+
+
+def test_notes_of_one_kind_are_said_once() -> None:
+    tests = [SineTest(0.01, f) for f in (1.0, 3.0)]
+    runs = tuple(bench.VirtualDyno(Linear(2000.0), sampling_rate=1000.0, force_noise=5.0).run(tests))
+    notes = decisions(runs)
+    assert len(notes) == 2 and notes[0].endswith("(all records)")
+    assert notes[1].endswith("(all records, numbers of the first)")
+    assert decisions(runs[:1]) == list(runs[0].notes)
+
+
+def test_assignments_may_hold_commas() -> None:
+    found = assignments("columns", ["time=t_s,stroke=Displacement, in", "force=2,velocity=none"])
+    assert found == {"time": "t_s", "stroke": "Displacement, in", "force": "2", "velocity": "none"}
+    assert column_numbers(found) == {"time": "t_s", "stroke": "Displacement, in", "force": 2, "velocity": None}
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_stage_shows_progress_and_keeps_its_time(terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([100.0, 102.34])
+    monkeypatch.setattr(console, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    screen = Screen()
+    screen.console = Console(file=io.StringIO(), force_terminal=terminal, width=100)
+    with screen.stage("Work [N]", 2) as advance:
+        advance("[m/s]", 0)
+        advance("", 2)
+    file = screen.console.file
+    assert isinstance(file, io.StringIO) and "Work [N]: done in 2.3 s" in file.getvalue()
+    assert screen.times["Work [N]"] == pytest.approx(2.34)
+    assert screen.times_table().rows[0][0] == "Work [N]"
+
+
+def test_brackets_are_not_taken_for_markup() -> None:
+    screen = Screen()
+    screen.console = Console(file=io.StringIO(), width=100)
+    screen.table(Table("Title [m]", (Column("velocity", "m/s"),), (("[red]",),)))
+    screen.points(["[bold]"])
+    file = screen.console.file
+    assert isinstance(file, io.StringIO)
+    assert all(text in file.getvalue() for text in ("Title [m]", "velocity [m/s]", "[red]", "[bold]"))

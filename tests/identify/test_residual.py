@@ -1,0 +1,119 @@
+"""What the error of a law is made of, and the verdict on it."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from jaxdamp import bench, identify
+from jaxdamp.bench import BenchSet, SineTest
+from jaxdamp.dampers import AbstractDamper, Bilinear, Lag, Linear
+from jaxdamp.identify import error_shares
+
+
+TESTS = [SineTest(0.01, f) for f in (1.0, 3.0, 6.0)]
+
+
+def _runs(law: AbstractDamper, noise: float) -> BenchSet:
+    return bench.VirtualDyno(law, sampling_rate=1000.0, force_noise=noise).run(TESTS)
+
+
+def test_the_error_of_the_true_law_is_noise() -> None:
+    shares = identify.fit(Linear, tuple(_runs(Linear(2000.0), 5.0))).error_shares
+    assert shares.rest > 0.93 and sum(shares) == pytest.approx(1.0)
+
+
+def test_the_error_of_a_wrong_curve_is_shape() -> None:
+    shares = identify.fit(Linear, tuple(_runs(Bilinear(3000.0, 1000.0), 5.0))).error_shares
+    assert shares.shape > 0.9 and shares.hysteresis < 0.02
+
+
+def test_the_error_of_a_static_law_on_a_lagging_damper_is_hysteresis() -> None:
+    runs = tuple(_runs(Lag(Linear(2000.0), 0.008), 5.0))
+    shares = identify.fit(Linear, runs).error_shares
+    # The fitted coefficient is one for three frequencies, between which the lag changes it: a little shape is left.
+    assert shares.hysteresis > 0.75 and shares.hysteresis > 5 * shares.shape
+    with_lag = identify.fit(Lag(Linear(1800.0), 0.005), runs).error_shares
+    assert with_lag.rest > 0.9
+
+
+def test_the_shares_can_be_taken_on_other_records() -> None:
+    result = identify.fit(Linear, tuple(_runs(Linear(2000.0), 5.0)))
+    other = _runs(Bilinear(3000.0, 1000.0), 5.0)
+    assert error_shares(result.law, other).shape > 0.9
+    assert error_shares(result.law, other[0]).shape > 0.9
+
+
+def test_the_verdict_says_that_hysteresis_is_left() -> None:
+    runs = tuple(_runs(Lag(Linear(2000.0), 0.008), 5.0))
+    comparison = identify.compare({"linear": Linear, "bilinear": Bilinear}, runs)
+    text = " ".join(comparison.verdict)
+    assert "is hysteresis" in text and "Try a law with hysteresis" in text
+
+
+def test_the_verdict_names_the_law_that_has_what_the_static_one_lacks() -> None:
+    runs = tuple(_runs(Lag(Linear(2000.0), 0.008), 5.0))
+    starts = {"linear": Linear, "lagging": Lag(Linear(1800.0), 0.005)}
+    comparison = identify.compare(starts, runs[:2], held_out=runs[2:])
+    first, second, third = comparison.verdict
+    largest = float(np.abs(runs[2].force).max())
+    assert first.startswith("Smallest error on the held-out records: lagging, RMSE 4.9 N, ")
+    assert f"of their largest force of {largest:.0f} N" in first
+    assert second.startswith("The best law of velocity alone is linear: ") and "is hysteresis" in second
+    rungs = {rung.name: rung for rung in comparison.rungs}
+    assert third == f"lagging has a {rungs['linear'].error / rungs['lagging'].error:.1f} times smaller error."
+
+
+# ---- tables and plain data
+
+
+def test_fitted_numbers_stand_beside_the_true_ones() -> None:
+    truth = Bilinear(2600.0, 1200.0)
+    result = identify.fit(Bilinear, tuple(_runs(truth, 5.0)))
+    (cells, _) = result.table(truth).records()
+    assert cells["true"] == 2600.0 and cells["unit"] == "N s/m"
+    e = result["rebound_rate"]
+    assert cells["(value − true)/se"] == pytest.approx((e.value - 2600.0) / e.standard_error)
+
+
+def test_a_comparison_as_a_table_and_as_plain_data() -> None:
+    runs = tuple(_runs(Bilinear(3000.0, 1000.0), 5.0))
+
+    def no_start(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
+        raise ValueError("too few knees")
+
+    comparison = identify.compare({"linear": Linear, "table": no_start}, runs[:2], held_out=runs[2:])
+    table, result = comparison.table(), comparison["linear"]
+    row, failed = table.records()
+    assert {column.name: column.unit for column in table.columns}["held-out RMSE"] == "N"
+    assert (row["law"], row["free"], row["RMSE"]) == ("linear", 1, result.rmse)
+    assert row["shape"] == pytest.approx(100 * result.error_shares.shape)
+    assert (failed["law"], failed["RMSE"], failed["note"]) == ("table", None, "failed")
+    data = json.loads(json.dumps(comparison.to_dict(), allow_nan=False))
+    assert data["best"] == "linear" and data["failed"] == {"table": "too few knees"}
+    assert data["laws"]["linear"]["held_out_rmse"] == {"value": comparison.rungs[0].held_out_rmse, "unit": "N"}
+    (rate,) = data["laws"]["linear"]["parameters"]
+    estimate = result["rate"]
+    assert (rate["value"], rate["unit"], rate["interval"]) == (estimate.value, "N s/m", list(estimate.interval))
+    assert data["verdict"] == list(comparison.verdict)
+
+
+def test_numbers_that_are_not_known_are_none_in_plain_data() -> None:
+    runs = tuple(_runs(Linear(2000.0), 5.0))
+    result = identify.fit(Bilinear, runs)
+    first = result.parameters[0]._replace(standard_error=np.inf, interval=(-np.inf, np.inf))
+    unknown = dataclasses.replace(result, parameters=(first, *result.parameters[1:]))
+    data = json.loads(json.dumps(unknown.to_dict(), allow_nan=False))
+    assert data["parameters"][0]["standard_error"] is None and data["parameters"][0]["interval"] == [None, None]
+
+
+def test_every_law_of_the_ladder_has_a_line_that_says_whether_it_has_hysteresis() -> None:
+    run = _runs(Linear(2000.0), 5.0)[0]
+    starts = identify.default_ladder([run])
+    rows = {row["law"]: row for row in identify.laws_table().records()}
+    assert list(rows) == list(identify.LAWS) == list(starts)
+    for name, start in starts.items():
+        assert isinstance(start, AbstractDamper)
+        assert rows[name]["hysteresis"] == ("yes" if start.initial_state().size else "no")
+        assert len(str(rows[name]["what it is"]).split()) > 2

@@ -1,0 +1,66 @@
+"""A page: what it escapes, what may fail, where its pictures go."""
+
+import warnings
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+
+from jaxdamp.report import Attempts, Report
+
+
+def test_what_fails_is_named_and_the_rest_goes_on() -> None:
+    attempts = Attempts()
+    with attempts.part("The picture a.png"):
+        raise KeyError("colour")
+    with attempts.part("The table"):
+        warnings.warn("b.csv: rows left out.", stacklevel=1)
+    with attempts.part("The rest"):
+        pass
+    assert attempts.troubles == ["The picture a.png could not be made: 'colour'", "b.csv: rows left out."]
+
+
+def test_a_report_escapes_what_it_is_told() -> None:
+    report = Report("a < b")
+    report.text("x", "& y")
+    report.text("")
+    report.points([])
+    body = report.to_html().partition("<body>")[2].partition("</body>")[0]
+    assert body.split("\n") == ["", "<h1>a &lt; b</h1>", "<p>x &amp; y</p>", ""]
+
+
+def test_pictures_stand_in_the_page_and_in_the_folder(tmp_path: Path) -> None:
+    report = Report("title", tmp_path)
+    report.picture(Figure(), "a < b", "empty.png")
+    report.picture(lambda: Figure(), "drawn", "drawn.png")
+    assert Report("title").write(tmp_path / "other.html").read_text().count("<figure>") == 0
+    text = report.to_html()
+    assert text.count("data:image/png;base64,") == 2 and "<figcaption>a &lt; b</figcaption>" in text
+    assert all((tmp_path / name).read_bytes().startswith(b"\x89PNG") for name in ("empty.png", "drawn.png"))
+
+
+def test_a_picture_that_fails_is_named_at_the_end(tmp_path: Path) -> None:
+    def broken() -> Figure:
+        raise RuntimeError("no font")
+
+    report = Report("title", tmp_path)
+    report.picture(broken, "caption", "broken.png")
+    report.text("The rest.")
+    lines = report.to_html().split("\n")
+    assert lines[lines.index("<p>The rest.</p>") + 1] == (
+        "<ul><li>The picture broken.png could not be made: no font</li></ul>"
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_stop_between_parts_is_not_taken_for_a_failure() -> None:
+    class Stopped(BaseException):
+        pass
+
+    def check() -> None:
+        raise Stopped
+
+    attempts = Attempts(check)
+    with pytest.raises(Stopped), attempts.part("The picture"):
+        pass
+    assert attempts.troubles == []
