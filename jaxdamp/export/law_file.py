@@ -13,8 +13,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._types import Number
-from jaxdamp.dampers import AbstractDamper, FittedRange
-from jaxdamp.dampers.fitted_range import UNITS, has_fitted_range
+from jaxdamp.dampers import UNITS, AbstractDamper, FittedRange, has_fitted_range
 from jaxdamp.export._write import write_whole
 from jaxdamp.parameters import as_float, check_invariants
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from jaxdamp.dampers.base import laws_inside
+from jaxdamp.dampers import laws_inside
 from jaxdamp.parameters import FreeParameters, Parameter
 
 

@@ -13,10 +13,14 @@ import scipy.optimize
 
 from jaxdamp import _checks, dampers
 from jaxdamp.bench import BenchRun, as_runs, contradictions, contradictions_in_words
-from jaxdamp.dampers import AbstractDamper, with_fitted_range, without_fitted_ranges
-from jaxdamp.dampers._points import drives_motion
-from jaxdamp.dampers.command import takes_command
-from jaxdamp.dampers.coverage import coverage
+from jaxdamp.dampers import (
+    AbstractDamper,
+    coverage,
+    drives_motion,
+    takes_command,
+    with_fitted_range,
+    without_fitted_ranges,
+)
 from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.coordinates import box, to_values
 from jaxdamp.identify.covered import covered_range

@@ -11,8 +11,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
-from jaxdamp.dampers.base import laws_inside
-from jaxdamp.dampers.conditions import margins
+from jaxdamp.dampers import laws_inside, margins
 from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.coordinates import OPEN_EDGE, Box, box, start, to_values
 from jaxdamp.identify.traces import Batch

@@ -12,8 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers.base import Reach, laws_inside
-from jaxdamp.dampers.conditions import keeps_conditions
+from jaxdamp.dampers import Reach, keeps_conditions, laws_inside
 from jaxdamp.identify.result import Minimum
 from jaxdamp.identify.search import Found, Problem, finite, search, squares
 from jaxdamp.parameters import FreeParameters

@@ -11,9 +11,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
-from jaxdamp.dampers.command import takes_command, with_command
-from jaxdamp.dampers.coverage import require_finite_force
+from jaxdamp.dampers import AbstractDamper, require_finite_force, takes_command, with_command, without_fitted_ranges
 from jaxdamp.rig import march
 
 

@@ -10,8 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar, Signal
 from jaxdamp.simulation.exponential import Saved, road_rate
-from jaxdamp.vehicles import AbstractVehicle, Ports, rest_position
-from jaxdamp.vehicles.ports import States
+from jaxdamp.vehicles import AbstractVehicle, Ports, States, rest_position
 
 
 STEPS_PER_INSTANT = 100  # on average: more are a law too fast for the solver, and would take for ever

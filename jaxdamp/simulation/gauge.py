@@ -10,9 +10,7 @@ from jax.ad_checkpoint import checkpoint_name
 from jaxtyping import Array
 
 from jaxdamp._types import Scalar
-from jaxdamp.metrics import STATISTICS
-from jaxdamp.metrics.statistics import Kept, weighting_of
-from jaxdamp.metrics.weighting import discrete_weighting
+from jaxdamp.metrics import STATISTICS, Kept, discrete_weighting, weighting_of
 from jaxdamp.simulation._vectors import Matrix, Vector, plus, rows, scalars, times
 from jaxdamp.simulation.stepper import FOR_REVERSE, Ground, Now
 from jaxdamp.vehicles import AbstractVehicle, Instant, RideMetric

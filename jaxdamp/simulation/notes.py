@@ -6,8 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp._types import Signal
-from jaxdamp.vehicles import AbstractVehicle
-from jaxdamp.vehicles.parts import prefixed
+from jaxdamp.vehicles import AbstractVehicle, prefixed
 
 
 LEAST = 1e-3  # of the static load, by which a load must be below zero

@@ -11,17 +11,14 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal
-from jaxdamp.dampers import without_fitted_ranges
-from jaxdamp.dampers.coverage import coverage
-from jaxdamp.dampers.range_use import warn_outside
+from jaxdamp.dampers import coverage, warn_outside, without_fitted_ranges
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.exponential import exponential_steps
 from jaxdamp.simulation.range_notes import range_sentences
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.step_size import checked_substeps
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
-from jaxdamp.vehicles import AbstractVehicle, static_equilibrium
-from jaxdamp.vehicles.equilibrium import refuse_restless
+from jaxdamp.vehicles import AbstractVehicle, refuse_restless, static_equilibrium
 
 
 if TYPE_CHECKING:

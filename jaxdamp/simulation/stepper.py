@@ -29,8 +29,7 @@ from jaxdamp.simulation._vectors import (
     times,
 )
 from jaxdamp.simulation.propagator import Propagator
-from jaxdamp.vehicles import AbstractVehicle, Ports
-from jaxdamp.vehicles.ports import Earlier, States
+from jaxdamp.vehicles import AbstractVehicle, Earlier, Ports, States
 
 
 FOR_REVERSE = "needed by reverse derivatives"  # the rest of a step is cheap to repeat, or linear and not needed

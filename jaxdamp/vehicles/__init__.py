@@ -16,22 +16,21 @@ from jaxdamp.vehicles.cab import Cab
 from jaxdamp.vehicles.channels import Instant, RideMetric
 from jaxdamp.vehicles.corner import Corner
 from jaxdamp.vehicles.cubic_spring import CubicSpring
-from jaxdamp.vehicles.equilibrium import rest_position, static_equilibrium
+from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position, static_equilibrium
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
 from jaxdamp.vehicles.full_car import FullCar
 from jaxdamp.vehicles.half_car import HalfCar
-from jaxdamp.vehicles.lift_off import LiftOff
 from jaxdamp.vehicles.linear import LinearVehicle, linearise
 from jaxdamp.vehicles.modes import Modes, modes
-from jaxdamp.vehicles.parts import Body, Element, Link, Place, Wheel
+from jaxdamp.vehicles.parts import Body, Element, Link, Place, Wheel, prefixed
 from jaxdamp.vehicles.points import Point
-from jaxdamp.vehicles.port_form import Connection, PortForm, assemble
-from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.port_form import PortForm
+from jaxdamp.vehicles.ports import Earlier, Ports, States
 from jaxdamp.vehicles.quarter_car import QuarterCar
 from jaxdamp.vehicles.roll_car import RollCar
 from jaxdamp.vehicles.seat import Seat, SeatMass
-from jaxdamp.vehicles.stationary import lyapunov, stationary_rms
+from jaxdamp.vehicles.stationary import stationary_rms
 from jaxdamp.vehicles.tandem import IndependentTandem, WalkingBeam
 from jaxdamp.vehicles.tandem_truck import TandemTruck
 from jaxdamp.vehicles.tracked_hull import PitchDecay, TrackedHull
@@ -43,16 +42,15 @@ __all__ = [
     "Axle",
     "Body",
     "Cab",
-    "Connection",
     "Corner",
     "CubicSpring",
+    "Earlier",
     "Element",
     "Frame",
     "FullCar",
     "HalfCar",
     "IndependentTandem",
     "Instant",
-    "LiftOff",
     "LinearVehicle",
     "Link",
     "LumpedVehicle",
@@ -67,17 +65,18 @@ __all__ = [
     "RollCar",
     "Seat",
     "SeatMass",
+    "States",
     "TandemTruck",
     "TrackedHull",
     "WalkingBeam",
     "Wheel",
-    "assemble",
     "chosen_metrics",
     "frequency_response",
     "linearise",
-    "lyapunov",
     "modes",
+    "prefixed",
     "presets",
+    "refuse_restless",
     "rest_position",
     "spectral_rms",
     "static_equilibrium",
