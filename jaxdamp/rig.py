@@ -11,10 +11,17 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal, SignalLike
-from jaxdamp.dampers import AbstractDamper, Motion, range_use, without_fitted_ranges
-from jaxdamp.dampers.coverage import coverage, require_finite_force
-from jaxdamp.dampers.fitted_range import has_fitted_range
-from jaxdamp.dampers.range_use import sentence, warn_outside
+from jaxdamp.dampers import (
+    AbstractDamper,
+    Motion,
+    coverage,
+    has_fitted_range,
+    range_use,
+    require_finite_force,
+    sentence,
+    warn_outside,
+    without_fitted_ranges,
+)
 from jaxdamp.parameters import as_float
 
 

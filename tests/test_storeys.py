@@ -1,4 +1,4 @@
-"""The storeys of the package: imports only go down, packages of one storey do not know one another."""
+"""The storeys of the package: imports only go down, and a package is entered by its front door."""
 
 import ast
 import subprocess
@@ -55,6 +55,25 @@ def imported_modules(source: str, package: list[str]) -> Iterator[tuple[list[str
         yield from ((name, id(node) in inside) for name in names if name[0] == "jaxdamp")
 
 
+def public_names(part: str) -> set[str] | None:
+    """What a package of jaxdamp hands to the others, the `__all__` of its `__init__`; none of a single module."""
+    door = ROOT / part / "__init__.py"
+    if not door.exists():
+        return None
+    for node in ast.parse(door.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+            return set(ast.literal_eval(node.value))
+    return set()
+
+
+def goes_behind_the_door(name: list[str], own: str) -> bool:
+    """Whether an import from another package names a file of it, or what its `__init__` does not list."""
+    if len(name) < 3 or name[1] == own:
+        return False
+    names = public_names(name[1])
+    return names is not None and (len(name) > 3 or name[2] not in names)
+
+
 def faults(source: str, package: list[str], own: str) -> list[str]:
     """What is wrong with the imports of a source text in the part `own` of jaxdamp."""
     level, found = storey(own), []
@@ -64,6 +83,8 @@ def faults(source: str, package: list[str], own: str) -> list[str]:
             if level < TOP:
                 found.append(f"{own} imports {'.'.join(name)}, the front of the package, which stands above it")
             continue
+        if goes_behind_the_door(name, own):
+            found.append(f"{own} imports {'.'.join(name)}, past the __all__ of jaxdamp.{other}")
         if late and (own, other) in DRAWS_ITSELF:
             continue
         if other != own and 0 < level < TOP and storey(other) >= level:
@@ -110,9 +131,25 @@ def test_imports_that_go_up_or_sideways_are_found(own, source):
 @pytest.mark.parametrize(
     ("own", "source"),
     [
+        ("identify", "from jaxdamp.dampers.base import AbstractDamper"),
+        ("identify", "from jaxdamp.dampers import base"),
+        ("identify", "import jaxdamp.dampers.base"),
+        ("vehicles", "from ..dampers.lag import Lag"),
+        ("cli", "def f():\n    from jaxdamp.plots.rides import ride"),
+    ],
+)
+def test_imports_past_the_front_door_are_found(own, source):
+    (fault,) = faults(source, ["jaxdamp", own], own)
+    assert "past the __all__" in fault
+
+
+@pytest.mark.parametrize(
+    ("own", "source"),
+    [
         ("dampers", "import jax\nfrom jaxdamp import _checks\nfrom jaxdamp.parameters import positive"),
         ("dampers", "from jaxdamp.dampers.base import Sum\nfrom .lag import Lag"),
-        ("simulation", "from jaxdamp import metrics\nfrom jaxdamp.vehicles import QuarterCar"),
+        ("simulation", "from jaxdamp import metrics\nfrom jaxdamp.vehicles import QuarterCar, presets"),
+        ("simulation", "import jaxdamp.vehicles\nfrom jaxdamp.rig import quasi_static"),
         ("identify", "def plot():\n    from jaxdamp import plots"),
         ("cli", "import jaxdamp\nfrom jaxdamp.report import Report"),
         ("report", "from jaxdamp import plots\nfrom jaxdamp.export import to_csv"),

@@ -18,8 +18,7 @@ from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sampling import FEWEST
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.velocity import estimate_velocity
-from jaxdamp.dampers import AbstractDamper
-from jaxdamp.dampers.coverage import require_finite_force
+from jaxdamp.dampers import AbstractDamper, require_finite_force
 from jaxdamp.rig import respond
 
 

@@ -4,12 +4,16 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 `law + law`, `2.0 * law`, `SeriesSpring(law, ...)`, `Lag(law, ...)`, `MotionRatio(law, ...)`.
 """
 
+from jaxdamp.dampers._commands import command_paths
+from jaxdamp.dampers._points import drives_motion
+from jaxdamp.dampers._starts import Reach
 from jaxdamp.dampers.acceleration_surface import AccelerationSurface
 from jaxdamp.dampers.base import (
     AbstractDamper,
     AbstractMemoryless,
     AbstractStateful,
     AbstractStateless,
+    laws_inside,
     own_states,
 )
 from jaxdamp.dampers.besinger import Besinger
@@ -18,13 +22,17 @@ from jaxdamp.dampers.bouc_wen import BoucWen
 from jaxdamp.dampers.bump_stop import BumpStop
 from jaxdamp.dampers.bushing import Bushing
 from jaxdamp.dampers.command import takes_command, with_command
+from jaxdamp.dampers.conditions import keeps_conditions, margins
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
+from jaxdamp.dampers.coverage import coverage, require_finite_force
 from jaxdamp.dampers.dahl import Dahl
 from jaxdamp.dampers.degressive import Degressive
 from jaxdamp.dampers.digressive_progressive import DigressiveProgressive
 from jaxdamp.dampers.fitted_range import (
+    UNITS,
     FittedRange,
     OutsideFittedRangeWarning,
+    has_fitted_range,
     without_fitted_ranges,
 )
 from jaxdamp.dampers.force_surface import ForceSurface
@@ -45,7 +53,7 @@ from jaxdamp.dampers.piecewise_linear import PiecewiseLinear
 from jaxdamp.dampers.piston_flow import PistonFlow
 from jaxdamp.dampers.polynomial import Polynomial
 from jaxdamp.dampers.power_law import PowerLaw
-from jaxdamp.dampers.range_use import RangeUse, extrapolated, range_use
+from jaxdamp.dampers.range_use import RangeUse, extrapolated, range_use, sentence, warn_outside
 from jaxdamp.dampers.saturating import Saturating
 from jaxdamp.dampers.scaled import Scaled
 from jaxdamp.dampers.scheduled import Scheduled
@@ -64,6 +72,7 @@ from jaxdamp.dampers.wrapper import AbstractWrapper
 
 
 __all__ = [
+    "UNITS",
     "AbstractDamper",
     "AbstractMemoryless",
     "AbstractStateful",
@@ -100,6 +109,7 @@ __all__ = [
     "Polynomial",
     "PowerLaw",
     "RangeUse",
+    "Reach",
     "Saturating",
     "Scaled",
     "Scheduled",
@@ -113,10 +123,20 @@ __all__ = [
     "Table",
     "TemperatureScaled",
     "Traits",
+    "command_paths",
+    "coverage",
+    "drives_motion",
     "extrapolated",
+    "has_fitted_range",
+    "keeps_conditions",
+    "laws_inside",
+    "margins",
     "own_states",
     "range_use",
+    "require_finite_force",
+    "sentence",
     "takes_command",
+    "warn_outside",
     "with_command",
     "with_fitted_range",
     "without_fitted_ranges",

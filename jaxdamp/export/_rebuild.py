@@ -10,8 +10,7 @@ from jax.tree_util import Partial
 
 from jaxdamp import _checks
 from jaxdamp._types import Number
-from jaxdamp.dampers import AbstractDamper, FittedRange
-from jaxdamp.dampers.fitted_range import UNITS
+from jaxdamp.dampers import UNITS, AbstractDamper, FittedRange
 from jaxdamp.export._plain import FITTED_TO, declared, known_classes, known_functions, own_fields
 from jaxdamp.parameters import as_float
 

@@ -8,8 +8,7 @@ from typing import Any, NoReturn
 import equinox as eqx
 
 from jaxdamp import _checks
-from jaxdamp.dampers import AbstractDamper
-from jaxdamp.dampers.fitted_range import has_fitted_range
+from jaxdamp.dampers import AbstractDamper, has_fitted_range
 from jaxdamp.export._plain import FITTED_TO, plain_module
 from jaxdamp.export._rebuild import rebuilt
 from jaxdamp.export._write import write_whole

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp.dampers.base import laws_inside
+from jaxdamp.dampers import laws_inside
 from jaxdamp.parameters import Coordinates
 
 

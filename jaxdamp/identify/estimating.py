@@ -7,7 +7,7 @@ import numpy as np
 import scipy.stats
 from jaxtyping import Bool, Float
 
-from jaxdamp.dampers.base import Reach
+from jaxdamp.dampers import Reach
 from jaxdamp.identify.ends import at_ends
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.profile import Profile, profile

@@ -7,10 +7,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
-from jaxdamp.dampers import AbstractDamper, with_fitted_range
-from jaxdamp.dampers._points import drives_motion
-from jaxdamp.dampers.command import takes_command
-from jaxdamp.dampers.coverage import coverage
+from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, takes_command, with_fitted_range
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.estimating import estimate, on_correlation
 from jaxdamp.identify.noise import noise_of

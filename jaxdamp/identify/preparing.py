@@ -7,8 +7,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.dampers import AbstractDamper
-from jaxdamp.dampers.base import Reach
+from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, started
 from jaxdamp.identify.traces import batches, owners

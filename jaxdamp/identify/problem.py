@@ -11,8 +11,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper
-from jaxdamp.dampers.base import Reach
+from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.parameters import Coordinates, FreeParameters
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jaxdamp.dampers.conditions import keeps_conditions
+from jaxdamp.dampers import keeps_conditions
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, search
 

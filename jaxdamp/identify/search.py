@@ -10,8 +10,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp._status import Status
-from jaxdamp.dampers.base import laws_inside
-from jaxdamp.dampers.conditions import margins
+from jaxdamp.dampers import laws_inside, margins
 from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.problem import AbstractResiduals, Problem, linearised
 from jaxdamp.parameters import Bounds, Coordinates

@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp.dampers.base import Reach, laws_inside
-from jaxdamp.dampers.conditions import keeps_conditions
+from jaxdamp.dampers import Reach, keeps_conditions, laws_inside
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.result import Minimum
 from jaxdamp.identify.search import SearchEnd, search

@@ -11,10 +11,14 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
-from jaxdamp.dampers._commands import command_paths
-from jaxdamp.dampers.command import takes_command, with_command
-from jaxdamp.dampers.coverage import require_finite_force
+from jaxdamp.dampers import (
+    AbstractDamper,
+    command_paths,
+    require_finite_force,
+    takes_command,
+    with_command,
+    without_fitted_ranges,
+)
 from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.parameters import get, with_values
 from jaxdamp.rig import march

@@ -60,11 +60,11 @@ from jaxdamp.metrics.roughness_index import (
 )
 from jaxdamp.metrics.running import max_transient_value, running_rms
 from jaxdamp.metrics.spectrum import power_spectral_density
-from jaxdamp.metrics.statistics import STATISTICS, Statistic
+from jaxdamp.metrics.statistics import STATISTICS, Kept, Statistic
 from jaxdamp.metrics.transfer import coherence, transmissibility
 from jaxdamp.metrics.tyre_load import dynamic_load_coefficient, lift_off_fraction, road_stress_factor
 from jaxdamp.metrics.weighted import weighted_rms, weighted_signal
-from jaxdamp.metrics.weighting import weighting_factor, weighting_response, weighting_state_space
+from jaxdamp.metrics.weighting import discrete_weighting, weighting_factor, weighting_response, weighting_state_space
 from jaxdamp.metrics.working_space import (
     gaussian_exceedance,
     working_space_exceedance,
@@ -78,6 +78,7 @@ __all__ = [
     "AXES",
     "STATISTICS",
     "Evaluation",
+    "Kept",
     "MetricValues",
     "RoughnessBySegment",
     "ShockRatios",
@@ -92,6 +93,7 @@ __all__ = [
     "current_names",
     "damper_temperature",
     "damping_ratio",
+    "discrete_weighting",
     "dissipated_energy",
     "dissipated_power",
     "dissipation_histogram",

@@ -9,8 +9,7 @@ from jaxtyping import Bool, Float
 
 from jaxdamp.dampers import AbstractDamper, extrapolated
 from jaxdamp.plots import _style
-from jaxdamp.simulation import Response
-from jaxdamp.simulation.range_notes import range_sentences
+from jaxdamp.simulation import Response, range_sentences
 
 
 if TYPE_CHECKING:

@@ -1,5 +1,6 @@
 """A vehicle on a road: `simulate`, its two engines, the `Response`; and `Ride`, which keeps the metrics only."""
 
+from jaxdamp.simulation.range_notes import named_laws, range_sentences
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride
 from jaxdamp.simulation.run import simulate
@@ -16,5 +17,7 @@ __all__ = [
     "comfort_table",
     "metrics_table",
     "moves_axles",
+    "named_laws",
+    "range_sentences",
     "simulate",
 ]

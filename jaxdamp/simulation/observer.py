@@ -9,9 +9,7 @@ from jax.ad_checkpoint import checkpoint_name
 
 from jaxdamp._types import Scalar
 from jaxdamp._vectors import Vector, scalars
-from jaxdamp.metrics import STATISTICS
-from jaxdamp.metrics.statistics import Kept
-from jaxdamp.metrics.weighting import discrete_weighting
+from jaxdamp.metrics import STATISTICS, Kept, discrete_weighting
 from jaxdamp.simulation.stepper import FOR_REVERSE, RoadInput, StepState
 from jaxdamp.vehicles import RideMetric, System
 

@@ -9,9 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp.dampers import AbstractDamper, Motion, RangeUse, range_use
-from jaxdamp.dampers.fitted_range import has_fitted_range
-from jaxdamp.dampers.range_use import sentence
+from jaxdamp.dampers import AbstractDamper, Motion, RangeUse, has_fitted_range, range_use, sentence
 from jaxdamp.vehicles import AbstractVehicle, PortForm
 
 

@@ -16,8 +16,7 @@ from jaxdamp._many_points import outside_domains
 from jaxdamp._types import Scalar
 from jaxdamp._vectors import scalars
 from jaxdamp.configuration import fuses_loops
-from jaxdamp.dampers import RangeUse
-from jaxdamp.dampers.fitted_range import has_fitted_range
+from jaxdamp.dampers import RangeUse, has_fitted_range
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import match_paths, parameters, replace
 from jaxdamp.roads import AbstractRoad

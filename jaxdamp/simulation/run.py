@@ -11,8 +11,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal
-from jaxdamp.dampers.coverage import coverage
-from jaxdamp.dampers.range_use import warn_outside
+from jaxdamp.dampers import coverage, warn_outside
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.exponential import exponential_steps
 from jaxdamp.simulation.range_notes import range_sentences

@@ -5,11 +5,9 @@ import warnings
 import numpy as np
 import scipy.special
 
-from jaxdamp.dampers import Motion, RangeUse, range_use
-from jaxdamp.dampers.fitted_range import has_fitted_range
+from jaxdamp.dampers import Motion, RangeUse, has_fitted_range, range_use
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import CoarseStepWarning, Ride
-from jaxdamp.simulation.range_notes import named_laws, range_sentences
+from jaxdamp.simulation import CoarseStepWarning, Ride, named_laws, range_sentences
 from jaxdamp.vehicles import AbstractVehicle, linearise, stationary_rms
 
 

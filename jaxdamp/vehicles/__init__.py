@@ -21,10 +21,9 @@ from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
 from jaxdamp.vehicles.full_car import FullCar
 from jaxdamp.vehicles.half_car import HalfCar
-from jaxdamp.vehicles.lift_off import LiftOff
 from jaxdamp.vehicles.linear import LinearVehicle, linearise
 from jaxdamp.vehicles.modes import Modes, modes
-from jaxdamp.vehicles.parts import Body, Element, Link, Place, Wheel
+from jaxdamp.vehicles.parts import Body, Element, Link, Place, Wheel, prefixed
 from jaxdamp.vehicles.points import Point
 from jaxdamp.vehicles.port_form import LinearMap, PortForm
 from jaxdamp.vehicles.ports import Earlier, Ports, States
@@ -32,7 +31,7 @@ from jaxdamp.vehicles.quarter_car import QuarterCar
 from jaxdamp.vehicles.ride_metrics import RideMetric
 from jaxdamp.vehicles.roll_car import RollCar
 from jaxdamp.vehicles.seat import Seat, SeatMass
-from jaxdamp.vehicles.stationary import lyapunov, stationary_rms
+from jaxdamp.vehicles.stationary import stationary_rms
 from jaxdamp.vehicles.suspension import Suspension
 from jaxdamp.vehicles.system import Layout, System
 from jaxdamp.vehicles.tandem import IndependentTandem, WalkingBeam
@@ -57,7 +56,6 @@ __all__ = [
     "HalfCar",
     "IndependentTandem",
     "Layout",
-    "LiftOff",
     "LinearMap",
     "LinearVehicle",
     "Link",
@@ -83,8 +81,8 @@ __all__ = [
     "chosen_metrics",
     "frequency_response",
     "linearise",
-    "lyapunov",
     "modes",
+    "prefixed",
     "presets",
     "refuse_restless",
     "rest_position",

@@ -24,7 +24,7 @@ class AbstractCorner(Module):
     bump_stop: AbstractDamper | None = None
     friction: AbstractDamper | None = None
     tyre_lifts: bool = eqx.field(static=True, default=False)
-    damper_count: eqx.AbstractVar[int]
+    damper_count: eqx.AbstractVar[int]  # pyright: ignore[reportGeneralTypeIssues]  # no field here
 
     def parts(
         self,

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp.dampers.coverage import coverage
+from jaxdamp.dampers import coverage
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.port_form import PortForm
 from jaxdamp.vehicles.ports import Ports

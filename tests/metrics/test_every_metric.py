@@ -73,6 +73,7 @@ METRICS = {
 OTHERS = {
     "AXES",
     "Evaluation",
+    "Kept",
     "MetricValues",
     "RoughnessBySegment",
     "STATISTICS",
@@ -86,6 +87,7 @@ OTHERS = {
     "weighting_factor",
     "weighting_response",
     "weighting_state_space",
+    "discrete_weighting",
 }
 COUNTS = {"lift_off_fraction", "working_space_exceedance"}
 DIFFERENTIABLE = [name for name in METRICS if name not in COUNTS]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers, roads, simulate
-from jaxdamp.vehicles import Frame, LiftOff, LumpedVehicle, presets
-from jaxdamp.vehicles.lift_off import LiftOffWithLaws
+from jaxdamp.vehicles import Frame, LumpedVehicle, presets
+from jaxdamp.vehicles.lift_off import LiftOff, LiftOffWithLaws
 
 from ..vehicles.fleet import bumps, tracks
 
