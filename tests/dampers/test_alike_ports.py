@@ -1,13 +1,12 @@
 """Laws of one kind at several ports are stacked and computed together, as if each were called by itself.
 
-Several laws share a car, each kind at both ends with its own numbers, so that few programs are compiled.
+Every law is held to this by `check_alike_ports` in `test_contract.py`; here three that once could not be stacked.
 """
 
 import numpy as np
 
 from jaxdamp import roads, simulate
 from jaxdamp.parameters import free_parameters
-from jaxdamp.testing import check_alike_ports
 from jaxdamp.testing.places import SLOTS, half_car, two_bumps
 from jaxdamp.vehicles.ports import Ports
 
@@ -18,7 +17,7 @@ ONCE_CRASHED = ["scheduled", "network and spring", "lag of a network"]
 
 
 def test_laws_that_could_not_be_stacked():
-    """`simulate` and `Ride`, against the same laws of which one is wrapped, so that each is called by itself."""
+    """`simulate`, against the same laws of which one is wrapped, so that each is called by itself."""
     front = {slot: LAWS[name]() for slot, name in zip(SLOTS, ONCE_CRASHED, strict=False)}
     free = {slot: free_parameters(law) for slot, law in front.items()}
     rear = {slot: f.build(f.values * 1.02) for slot, f in free.items()}
@@ -32,4 +31,3 @@ def test_laws_that_could_not_be_stacked():
     scale = np.max(np.abs(separate), axis=0)
     assert np.all(scale > 1e-4)
     np.testing.assert_allclose(together / scale, separate / scale, atol=1e-11)
-    check_alike_ports(*front.values(), rtol=1e-10)

@@ -273,6 +273,7 @@ def test_at_alike_ports_in_single_precision(group):
         check_alike_ports(*(LAWS[name]() for name in group), rtol=5e-5)
 
 
+@pytest.mark.slow
 def test_the_whole_contract_of_one_law_in_single_and_double_precision():
     check_law(Linear(1500.0))
     with jax.enable_x64(False):
