@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from jaxdamp.tune import Change, Rescore, TuneResult
+from jaxdamp.tune import Change, Rescore, Status, TuneResult
 from jaxdamp.vehicles import presets
 
 
@@ -21,7 +21,7 @@ RESULT = TuneResult(
     limits={"rms_dynamic_tyre_load": 550.0},
     active_limits=("rms_dynamic_tyre_load",),
     warnings=("Mind the kink.",),
-    converged=True,
+    status=Status.CONVERGED,
     history=(1.8, 1.5),
 )
 FRESH = Rescore(
