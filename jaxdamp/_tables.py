@@ -190,4 +190,4 @@ def with_unit(value: Any, unit: str) -> dict[str, Any]:
 
 def with_tied(note: str, tied: Sequence[str]) -> str:
     """The remark on a number: its note, and the names of the numbers that are tied to it."""
-    return "; ".join([note] * bool(note) + [f"also {', '.join(tied)}"] * bool(tied))
+    return "; ".join([note] * bool(note) + [f"= {', '.join(tied)}"] * bool(tied))
