@@ -15,7 +15,7 @@ PREPARE = """
 import json, sys
 import numpy as np
 import jaxdamp
-from jaxdamp import bench, dampers, export, identify, plots, respond, Ride, roads, simulate, sweep, tune, vehicles
+from jaxdamp import bench, dampers, export, identify, metrics, plots, respond, Ride, roads, simulate, sweep, tune, vehicles
 
 car = vehicles.presets.quarter_car_000()
 road = roads.iso8608("C", speed=20.0, seed=1)
@@ -84,6 +84,7 @@ ANSWERS = {  # call: words that its refusal holds
     "identify.default_ladder(runs, ['linaer'])": ("`law` must be one of", "Did you mean 'linear'?"),
     "identify.default_ladder('a.csv')": ("`runs` must be a record or records", "bench.read(paths)"),
     "tune.minimise(car, 'rms', road)": ("`metric` must be", "is a QuarterCar", "`minimise(metric, vehicle, road)`"),
+    "Ride(car, road, metrics=metrics.Metric('stroke', 'rms'))": ("`metrics` must be a list", "`metrics=[metric]`"),
     "tune.minimise('rms_sprung_acceleration', road, car)": ("`vehicle` must be a vehicle", "is an Iso8608"),
     "sweep({'damper.rate': [1.0]}, lambda point: point)": ("`function` must be a function", "`sweep(function, over)`"),
     "bench.VirtualDyno(1500.0)": ("`law` must be a damper law", "dampers.Linear(1500.0)"),

@@ -20,7 +20,8 @@ signal gives NaN. Only what answers in words (`evaluation_method`, `comfort_reac
   `dissipation_histogram`, `temperature_rise`, `damper_temperature`.
 - Fatigue: `spectral_moments`, `spectral_damage`.
 - Road: `international_roughness_index`, `international_roughness_by_segment`.
-- Gathered while a simulation runs: `STATISTICS`; values by name: `MetricValues`.
+- Of a vehicle's channel, also gathered while a simulation runs: `Metric`, with one of `STATISTICS`, `percentile` or a
+  `Statistic` of your own; values by name: `MetricValues`.
 
 >>> import jax
 >>> import jax.numpy as jnp
@@ -52,6 +53,7 @@ from jaxdamp.metrics.evaluation import Evaluation, ShockRatios, evaluation_metho
 from jaxdamp.metrics.fatigue import spectral_damage, spectral_moments
 from jaxdamp.metrics.heat import damper_temperature, temperature_rise
 from jaxdamp.metrics.histogram import dissipation_histogram, velocity_histogram
+from jaxdamp.metrics.metric import Metric
 from jaxdamp.metrics.names import RENAMED, MetricValues, current_name, current_names
 from jaxdamp.metrics.roughness_index import (
     RoughnessBySegment,
@@ -60,7 +62,7 @@ from jaxdamp.metrics.roughness_index import (
 )
 from jaxdamp.metrics.running import max_transient_value, running_rms
 from jaxdamp.metrics.spectrum import power_spectral_density
-from jaxdamp.metrics.statistics import STATISTICS, Kept, Statistic
+from jaxdamp.metrics.statistics import STATISTICS, Gathered, Reduction, Statistic, Term, percentile
 from jaxdamp.metrics.transfer import coherence, transmissibility
 from jaxdamp.metrics.tyre_load import dynamic_load_coefficient, lift_off_fraction, road_stress_factor
 from jaxdamp.metrics.weighted import weighted_rms, weighted_signal
@@ -78,12 +80,15 @@ __all__ = [
     "AXES",
     "STATISTICS",
     "Evaluation",
-    "Kept",
+    "Gathered",
+    "Metric",
     "MetricValues",
+    "Reduction",
     "RoughnessBySegment",
     "ShockRatios",
     "StateSpace",
     "Statistic",
+    "Term",
     "aggregate_force",
     "aggregate_force_percentile",
     "coherence",
@@ -110,6 +115,7 @@ __all__ = [
     "motion_sickness_dose",
     "motion_sickness_percentage",
     "peak",
+    "percentile",
     "power_spectral_density",
     "rms",
     "road_stress_factor",

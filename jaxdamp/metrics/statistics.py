@@ -1,72 +1,149 @@
-"""Statistics: numbers made of a record at once, or gathered sample by sample while a simulation runs.
+"""Statistics: numbers of a record, taken of all samples at once or gathered sample by sample while a simulation runs.
 
-A ride metric is a statistic of a channel of a vehicle. Both ways give the same number up to rounding; gathered, it
-needs no memory for the record.
+A statistic is written once, as sums and extremes of functions of a sample and what follows from these. Both ways give
+the same number up to rounding; gathered, it needs no memory for the record.
 """
 
+import dataclasses
+import enum
+import functools
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, final
 
 import jax.numpy as jnp
+from jaxtyping import Array, Float
 
-from jaxdamp._limits import at_least, at_most
+from jaxdamp import _checks
+from jaxdamp._limits import at_least, at_most, largest
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.metrics._signals import root
-from jaxdamp.metrics.amplitude import peak, rms
-from jaxdamp.metrics.dissipation import dissipated_power
-from jaxdamp.metrics.dose import vibration_dose_value
-from jaxdamp.metrics.tyre_load import lift_off_fraction, road_stress_factor
-from jaxdamp.metrics.working_space import working_space_mean, working_space_peak_to_peak, working_space_rms
+from jaxdamp.metrics.running import max_transient_value
 
 
-Kept: TypeAlias = tuple[Scalar, ...]
+Gathered: TypeAlias = tuple[Scalar, ...]  # the terms of a statistic so far
+Samples: TypeAlias = Float[Array, "..."]  # one sample, or all of a record at once
 
 
-class Statistic(NamedTuple):
+class Reduction(enum.Enum):
+    """What a term takes of its values over the samples."""
+
+    SUM = "sum"
+    LARGEST = "largest"
+    SMALLEST = "smallest"
+    FIRST = "first"
+    LAST = "last"
+
+    def join(self, before: Scalar, value: Scalar) -> Scalar:
+        """With one value more."""
+        match self:
+            case Reduction.SUM:
+                return before + value
+            case Reduction.LARGEST:
+                return at_least(before, value)
+            case Reduction.SMALLEST:
+                return at_most(before, value)
+            case Reduction.FIRST:
+                return before
+            case Reduction.LAST:
+                return value
+
+    def of(self, values: Signal) -> Scalar:
+        """Of all values at once."""
+        match self:
+            case Reduction.SUM:
+                return jnp.sum(values)
+            case Reduction.LARGEST:
+                return largest(values)
+            case Reduction.SMALLEST:
+                return -largest(-values)
+            case Reduction.FIRST:
+                return values[0]
+            case Reduction.LAST:
+                return values[-1]
+
+
+class Term(NamedTuple):
+    """A function of a sample y and of the first sample, and what is taken of its values."""
+
+    reduction: Reduction
+    value: Callable[[Samples, Scalar], Samples] = lambda y, first: y
+
+
+@final
+@dataclasses.dataclass(frozen=True, repr=False)
+class Statistic:
     """One number of a record.
 
+    It is given either by terms, which a run gathers, or by a function of the whole record, for which a run has to save
+    its channel.
+
     Arguments:
-        of: it, from the whole record and its sampling interval [s].
-        begin: what is kept of the first sample.
-        add: what is kept with one sample more.
-        end: it, from what is kept, the number of samples and their interval [s].
+        name: in names of metrics.
+        terms: sums and extremes over the samples. Where one is a function of the first sample, the first term is it.
+        end: the statistic, from the terms, the number of samples and their interval [s].
+        of_record: the statistic, from the whole record and its interval [s], in place of terms and end.
         unit: its unit, from that of the record.
-        weighted: whether the record is weighted by ISO 2631-1 first.
         of_rms: it, from the RMS of a stationary Gaussian record without mean; None where that does not say.
         differentiable: whether its slope says anything; a count has none.
         signed: whether it may be negative, so that a change of it in percent says nothing.
+
+    Raises:
+        ValueError: neither terms with an end nor a function of the record, or both.
+
+    >>> mean_cube = Statistic("mean_cube", (Term(Reduction.SUM, lambda y, first: y**3),), lambda k, n, dt: k[0] / n)
+    >>> float(mean_cube.of(jnp.array([1.0, 2.0]), 0.1))
+    4.5
     """
 
-    of: Callable[[Signal, ScalarLike], Scalar]
-    begin: Callable[[Scalar], Kept]
-    add: Callable[[Kept, Scalar], Kept]
-    end: Callable[[Kept, int, ScalarLike], Scalar]
+    name: str
+    terms: tuple[Term, ...] = ()
+    end: Callable[[Gathered, int, ScalarLike], Scalar] | None = None
+    of_record: Callable[[Signal, ScalarLike], Scalar] | None = None
     unit: Callable[[str], str] = lambda unit: unit
-    weighted: bool = False
     of_rms: Callable[[Scalar], Scalar] | None = None
     differentiable: bool = True
     signed: bool = False
+
+    def __post_init__(self) -> None:
+        gathered = bool(self.terms) and self.end is not None
+        if gathered == (self.of_record is not None) or bool(self.terms) != (self.end is not None):
+            _checks.refuse("Statistic", "have terms and an end, or a function of the record", repr(self.name))
+
+    def __repr__(self) -> str:
+        return self.name
+
+    @property
+    def needs_record(self) -> bool:
+        """Whether a run has to save the channel."""
+        return self.of_record is not None
+
+    def begin(self, y: Scalar) -> Gathered:
+        """The terms of the first sample."""
+        return tuple(term.value(y, y) for term in self.terms)
+
+    def add(self, gathered: Gathered, y: Scalar) -> Gathered:
+        """The terms with one sample more."""
+        pairs = zip(self.terms, gathered, strict=True)
+        return tuple(term.reduction.join(before, term.value(y, gathered[0])) for term, before in pairs)
+
+    def of(self, record: Signal, dt: ScalarLike) -> Scalar:
+        """The statistic of a whole record, samples dt [s] apart."""
+        if self.of_record is not None:
+            return self.of_record(record, dt)
+        assert self.end is not None
+        gathered = tuple(term.reduction.of(term.value(record, record[0])) for term in self.terms)
+        return self.end(gathered, record.shape[0], dt)
 
 
 _ON_THE_ROAD = -1.0 + 1e-9  # relative tyre load; rounding counts as lifted
 
 
-def _mean_square(kept: Kept, count: int, _: ScalarLike) -> Scalar:
-    return root(kept[0] / count)
+def _mean_square(gathered: Gathered, count: int, _: ScalarLike) -> Scalar:
+    return root(gathered[0] / count)
 
 
-def _squares(kept: Kept, y: Scalar) -> Kept:
-    return (kept[0] + y * y,)
-
-
-def _spread(kept: Kept, y: Scalar) -> Kept:
-    """Sums about the first sample, which keeps their digits where the mean is large."""
-    first, total, squares = kept
-    return first, total + (y - first), squares + (y - first) ** 2
-
-
-def _deviation(kept: Kept, count: int, _: ScalarLike) -> Scalar:
-    _, total, squares = kept
+def _deviation(gathered: Gathered, count: int, _: ScalarLike) -> Scalar:
+    _, total, squares = gathered
     return root(squares / count - (total / count) ** 2)
 
 
@@ -74,88 +151,87 @@ def _stress(deviation: Scalar) -> Scalar:
     return 1.0 + 6.0 * deviation**2 + 3.0 * deviation**4
 
 
-def _lifted(y: Scalar) -> Scalar:
+def _lifted(y: Samples, _: Scalar) -> Samples:
     return jnp.where(jnp.isnan(y), y, (y <= _ON_THE_ROAD).astype(y.dtype))
 
 
-def _from_zero(y: Scalar) -> Kept:
-    return y, jnp.zeros_like(y), jnp.zeros_like(y)
-
-
-def _power(kept: Kept, count: int, _: ScalarLike) -> Scalar:
-    total, first, last = kept
+def _power(gathered: Gathered, count: int, _: ScalarLike) -> Scalar:
+    total, first, last = gathered
     return (total - 0.5 * (first + last)) / (count - 1)
 
 
-def _of_relative_load(metric: Callable[..., Scalar]) -> Callable[[Signal, ScalarLike], Scalar]:
-    return lambda record, _: metric(record, 1.0)
+def _itself(value: Scalar) -> Scalar:
+    return value
 
 
-# By name. `lift_off_fraction` and `road_stress_factor` are of a tyre's load beyond its static load over its static
-# load; `dissipated_power` is of the product of a force and its velocity.
-STATISTICS: dict[str, Statistic] = {
-    "rms": Statistic(
-        lambda record, _: rms(record), lambda y: (y * y,), _squares, _mean_square, of_rms=lambda value: value
+def _dimensionless(_: str) -> str:
+    return ""
+
+
+# Sums about the first sample keep their digits where the mean is large.
+_SPREAD = (
+    Term(Reduction.FIRST),
+    Term(Reduction.SUM, lambda y, first: y - first),
+    Term(Reduction.SUM, lambda y, first: (y - first) ** 2),
+)
+_ALL = (
+    Statistic("rms", (Term(Reduction.SUM, lambda y, _: y * y),), _mean_square, of_rms=_itself),
+    Statistic("peak", (Term(Reduction.LARGEST, lambda y, _: jnp.abs(y)),), lambda gathered, *_: gathered[0]),
+    Statistic("maximum", (Term(Reduction.LARGEST),), lambda gathered, *_: gathered[0], signed=True),
+    Statistic("minimum", (Term(Reduction.SMALLEST),), lambda gathered, *_: gathered[0], signed=True),
+    Statistic(
+        "peak_to_peak",
+        (Term(Reduction.SMALLEST), Term(Reduction.LARGEST)),
+        lambda gathered, *_: gathered[1] - gathered[0],
     ),
-    "peak": Statistic(
-        lambda record, _: peak(record),
-        lambda y: (jnp.abs(y),),
-        lambda kept, y: (at_least(kept[0], jnp.abs(y)),),
-        lambda kept, *_: kept[0],
-    ),
-    "peak_to_peak": Statistic(
-        lambda record, _: working_space_peak_to_peak(record),
-        lambda y: (y, y),
-        lambda kept, y: (at_most(kept[0], y), at_least(kept[1], y)),
-        lambda kept, *_: kept[1] - kept[0],
-    ),
-    "standard_deviation": Statistic(
-        lambda record, _: working_space_rms(record), _from_zero, _spread, _deviation, of_rms=lambda value: value
-    ),
-    "mean": Statistic(
-        lambda record, _: working_space_mean(record),
-        lambda y: (y,),
-        lambda kept, y: (kept[0] + y,),
-        lambda kept, count, _: kept[0] / count,
-        signed=True,
-    ),
-    "road_stress_factor": Statistic(
-        _of_relative_load(road_stress_factor),
-        _from_zero,
-        _spread,
-        lambda kept, count, dt: _stress(_deviation(kept, count, dt)),
-        unit=lambda _: "",
+    Statistic("standard_deviation", _SPREAD, _deviation, of_rms=_itself),
+    Statistic("mean", (Term(Reduction.SUM),), lambda gathered, count, _: gathered[0] / count, signed=True),
+    Statistic(
+        "road_stress_factor",
+        _SPREAD,
+        lambda gathered, count, dt: _stress(_deviation(gathered, count, dt)),
+        unit=_dimensionless,
         of_rms=_stress,
     ),
-    "lift_off_fraction": Statistic(
-        lambda record, _: lift_off_fraction(record, _ON_THE_ROAD),
-        lambda y: (_lifted(y),),
-        lambda kept, y: (kept[0] + _lifted(y),),
-        lambda kept, count, _: kept[0] / count,
-        unit=lambda _: "",
+    Statistic(
+        "lift_off_fraction",
+        (Term(Reduction.SUM, _lifted),),
+        lambda gathered, count, _: gathered[0] / count,
+        unit=_dimensionless,
         differentiable=False,
     ),
-    "dissipated_power": Statistic(
-        lambda record, _: dissipated_power(record, jnp.ones_like(record)),
-        lambda y: (y, y, y),
-        lambda kept, y: (kept[0] + y, kept[1], y),
+    Statistic(
+        "dissipated_power",
+        (Term(Reduction.SUM), Term(Reduction.FIRST), Term(Reduction.LAST)),
         _power,
         unit=lambda _: "W",
     ),
-    "weighted_rms": Statistic(
-        lambda record, _: rms(record),
-        lambda y: (y * y,),
-        _squares,
-        _mean_square,
-        weighted=True,
-        of_rms=lambda value: value,
-    ),
-    "vibration_dose_value": Statistic(
-        lambda record, dt: vibration_dose_value(record, dt, None),
-        lambda y: ((y * y) ** 2,),
-        lambda kept, y: (kept[0] + (y * y) ** 2,),
-        lambda kept, _, dt: root(kept[0] * jnp.asarray(dt, kept[0].dtype), 4),
+    Statistic(
+        "vibration_dose_value",
+        (Term(Reduction.SUM, lambda y, _: (y * y) ** 2),),
+        lambda gathered, _, dt: root(gathered[0] * jnp.asarray(dt, gathered[0].dtype), 4),
         unit=lambda unit: unit.replace("^2", "^1.75"),
-        weighted=True,
     ),
-}
+    Statistic("max_transient_value", of_record=lambda record, dt: max_transient_value(record, dt, None)),
+)
+# By name. `lift_off_fraction` and `road_stress_factor` are of a tyre's load beyond its static load over its static
+# load; `dissipated_power` is of the product of a force and its velocity.
+STATISTICS: dict[str, Statistic] = {statistic.name: statistic for statistic in _ALL}
+
+
+@functools.cache
+def percentile(share: float | int) -> Statistic:
+    """The value that a share of the samples of a record stays below.
+
+    Arguments:
+        share: in percent, 0 to 100; 50 is the median.
+
+    Raises:
+        ValueError: a share outside 0 to 100.
+
+    >>> float(percentile(50).of(jnp.array([3.0, 1.0, 2.0]), 0.1))
+    2.0
+    """
+    if not 0 <= share <= 100:
+        _checks.refuse("share", "be 0 to 100 percent", share)
+    return Statistic(f"percentile_{share:g}", of_record=lambda record, _: jnp.percentile(record, share), signed=True)

@@ -6,12 +6,13 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from jax.ad_checkpoint import checkpoint_name
+from jaxtyping import Array, Int
 
-from jaxdamp._types import Scalar
+from jaxdamp._types import Scalar, Signal
 from jaxdamp._vectors import Vector, scalars
-from jaxdamp.metrics import STATISTICS, Kept, discrete_weighting
+from jaxdamp.metrics import Gathered, Metric, discrete_weighting
 from jaxdamp.simulation.stepper import FOR_REVERSE, RoadInput, StepState
-from jaxdamp.vehicles import RideMetric, System
+from jaxdamp.vehicles import System
 
 
 class Filter(NamedTuple):
@@ -46,60 +47,102 @@ class Accumulators(NamedTuple):
 
     channels: tuple[Scalar, ...]
     weighting_states: tuple[tuple[Scalar, ...], ...]
-    statistics: tuple[Kept, ...]
+    statistics: tuple[Gathered, ...]
     rest: tuple[Scalar, ...]  # channels that count from the static equilibrium, as they are there
+    samples: tuple[Scalar, ...]  # of the metrics that need the whole record, at this instant
+    instant: Int[Array, ""] | None  # number of it, where a metric has a window
 
 
 class MetricObserver:
-    """Which channels and weightings the metrics need, and how they are gathered."""
+    """Which channels and weightings the metrics need, and how they are gathered.
 
-    def __init__(self, system: System, metrics: Sequence[RideMetric], dt: float, *, apart: bool) -> None:
+    Arguments:
+        system: the vehicle.
+        metrics: of its channels.
+        dt: interval of the instants [s].
+        count: number of the instants.
+        apart: whether the engine takes numbers one by one.
+    """
+
+    def __init__(self, system: System, metrics: Sequence[Metric], dt: float, count: int, *, apart: bool) -> None:
         pairs = [name for m in metrics for name in (m.channel, m.by) if name]
-        self.names, self.metrics, self.dt = list(dict.fromkeys(pairs)), metrics, dt
+        self.names, self.metrics, self.dt, self.count = list(dict.fromkeys(pairs)), metrics, dt, count
         self.from_rest = list(dict.fromkeys(m.channel for m in metrics if m.from_rest))
+        self.windows = [m.samples(count, dt) for m in metrics]
         outputs = system.channels(self.names)
         self.outputs = outputs.scalars() if apart else outputs
-        felt = dict.fromkeys(m.channel for m in metrics if STATISTICS[m.statistic].weighted)
-        self.weighted = {name: Filter(*discrete_weighting(system.layout.weighting(name), dt)) for name in felt}
+        pairs = dict.fromkeys((m.channel, m.weighting) for m in metrics if m.weighting is not None)
+        self.weighted = {pair: Filter(*discrete_weighting(pair[1], dt)) for pair in pairs}
 
     def begin(self, now: StepState, ground: RoadInput) -> Accumulators:
         """At the first instant, the vehicle in its static equilibrium and weightings at rest."""
         values = self._values(now, ground)
         still = tuple((jnp.zeros_like(values[0]),) * f.output.size for f in self.weighted.values())
         rest = tuple(values[self.names.index(name)] for name in self.from_rest)
-        records = self._records(values, still, rest)
-        return Accumulators(values, still, tuple(STATISTICS[m.statistic].begin(y) for m, y in records), rest)
+        samples = self._samples(values, still, rest)
+        gathered = tuple(m.statistic.begin(y) for m, y in zip(self.metrics, samples, strict=True))
+        instant = jnp.zeros((), int) if any(m.window for m in self.metrics) else None
+        return Accumulators(values, still, gathered, rest, self._saved(samples), instant)
 
     def add(self, old: Accumulators, now: StepState, ground: RoadInput) -> Accumulators:
         """One instant more."""
         values = self._values(now, ground)
-        inputs = [(old.channels[i], values[i]) for i in map(self.names.index, self.weighted)]
-        felt = tuple(f(s, *u) for f, s, u in zip(self.weighted.values(), old.weighting_states, inputs, strict=True))
-        pairs = zip(self._records(values, felt, old.rest), old.statistics, strict=True)
-        kept = tuple(STATISTICS[m.statistic].add(before, y) for (m, y), before in pairs)
-        return Accumulators(values, felt, kept, old.rest)
+        inputs = [(old.channels[i], values[i]) for i in (self.names.index(name) for name, _ in self.weighted)]
+        states = tuple(f(s, *u) for f, s, u in zip(self.weighted.values(), old.weighting_states, inputs, strict=True))
+        samples = self._samples(values, states, old.rest)
+        instant = None if old.instant is None else old.instant + 1
+        parts = zip(self.metrics, self.windows, old.statistics, samples, strict=True)
+        gathered = tuple(_with_sample(*part, instant) for part in parts)
+        return Accumulators(values, states, gathered, old.rest, self._saved(samples), instant)
 
-    def end(self, gathered: Accumulators, count: int) -> dict[str, Scalar]:
-        """The metrics of so many instants."""
-        pairs = zip(self.metrics, gathered.statistics, strict=True)
-        return {m.name: STATISTICS[m.statistic].end(kept, count, self.dt) for m, kept in pairs}
+    def end(self, gathered: Accumulators, records: Sequence[Signal]) -> dict[str, Scalar]:
+        """The metrics of the run.
+
+        Arguments:
+            gathered: at the last instant.
+            records: `Accumulators.samples` of all instants.
+        """
+        found, saved = {}, iter(records)
+        for m, (first, last), terms in zip(self.metrics, self.windows, gathered.statistics, strict=True):
+            if m.statistic.end is None:
+                found[m.name] = m.statistic.of(next(saved)[first : last + 1], self.dt)
+            else:
+                found[m.name] = m.statistic.end(terms, last - first + 1, self.dt)
+        return found
 
     def _values(self, now: StepState, ground: RoadInput) -> tuple[Scalar, ...]:
         """The channels."""
         values = self.outputs(now.motion, now.force, ground.height, ground.rate)
         return checkpoint_name(values if isinstance(values, tuple) else scalars(values), FOR_REVERSE)
 
-    def _records(
-        self, values: Sequence[Scalar], felt: Sequence[Vector], rest: Sequence[Scalar]
-    ) -> list[tuple[RideMetric, Scalar]]:
+    def _samples(
+        self, values: Sequence[Scalar], weighting_states: Sequence[Vector], rest: Sequence[Scalar]
+    ) -> list[Scalar]:
         """The sample of each metric's record."""
-        weighted = {name: f.of(s) for (name, f), s in zip(self.weighted.items(), felt, strict=True)}
         plain = dict(zip(self.names, values, strict=True))
+        pairs = zip(self.weighted.items(), weighting_states, strict=True)
+        weighted = {pair: f.of(s) for (pair, f), s in pairs}
         moved = {name: plain[name] - level for name, level in zip(self.from_rest, rest, strict=True)}
 
-        def sample(m: RideMetric) -> Scalar:
-            if m.from_rest:
-                return moved[m.channel]
-            return (weighted if STATISTICS[m.statistic].weighted else plain)[m.channel]
+        def sample(m: Metric) -> Scalar:
+            if m.weighting is not None:
+                return weighted[m.channel, m.weighting]
+            return (moved if m.from_rest else plain)[m.channel]
 
-        return [(m, sample(m) * (plain[m.by] if m.by else 1.0)) for m in self.metrics]
+        return [sample(m) * (plain[m.by] if m.by else 1.0) for m in self.metrics]
+
+    def _saved(self, samples: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        """The samples of metrics that need the whole record."""
+        return tuple(y for m, y in zip(self.metrics, samples, strict=True) if m.statistic.needs_record)
+
+
+def _with_sample(
+    metric: Metric, window: tuple[int, int], before: Gathered, y: Scalar, instant: Int[Array, ""] | None
+) -> Gathered:
+    """The terms of a metric with one sample more, if it lies in the window."""
+    more = metric.statistic.add(before, y)
+    if metric.window is None or instant is None:
+        return more
+    (first, last), start = window, metric.statistic.begin(y)
+    inside = (jnp.where(instant <= last, new, old) for new, old in zip(more, before, strict=True))
+    return tuple(jnp.where(instant <= first, new, old) for new, old in zip(start, inside, strict=True))

@@ -15,13 +15,13 @@ from jaxdamp import _checks, metrics
 from jaxdamp._tables import Table, with_unit
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.dampers import RangeUse
-from jaxdamp.metrics import MetricValues
+from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.simulation.exponential import settled
 from jaxdamp.simulation.notes import tyres_in_tension
 from jaxdamp.simulation.range_notes import range_sentences, range_uses
 from jaxdamp.simulation.tables import comfort_table, comfort_units, metrics_table
 from jaxdamp.simulation.wheels import AxleTiming
-from jaxdamp.vehicles import AbstractVehicle, LinearMap, RideMetric, System, chosen_metrics
+from jaxdamp.vehicles import AbstractVehicle, LinearMap, System
 
 
 if TYPE_CHECKING:
@@ -137,26 +137,39 @@ class Response(eqx.Module):
             _COMPUTED.setdefault(id(self), {})[channel] = values
         return values
 
-    def metrics(self, names: Sequence[str] | None = None) -> dict[str, Scalar]:
-        """The vehicle's ride metrics by name, or those of these names, over the run or the part of it that this is.
+    def metrics(self, names: Sequence[str | Metric] | None = None) -> dict[str, Scalar]:
+        """The vehicle's ride metrics by name, or those wanted, over the run or the part of it that this is.
+
+        Wanted are names of ride metrics, or a `metrics.Metric` of any channel.
 
         Weighted ones take heights by Wk and angles by We, exactly for accelerations straight from sample to sample; the
         ride starts from rest, so its mean counts. Differentiable but for peaks, which have the slope of one instant,
         and counts, which have none.
         """
-        return MetricValues(self._metrics(chosen_metrics(self.vehicle, names, "names"), self._dt()))
+        chosen, dt = self.vehicle.chosen_metrics(names, "names"), self._dt()
+        return MetricValues(self._metrics([(m, self._samples_of(m, dt)) for m in chosen], dt))
+
+    def _samples_of(self, metric: Metric, dt: ScalarLike) -> tuple[int, int]:
+        """Numbers of the first and the last instant that count."""
+        time = _checks.concrete(self.time)
+        if metric.window is None:
+            return metric.samples(self.time.size, 1.0)
+        if time is None:
+            remedy = "Inside compiled code, take the metric from a `Ride`, or cut the channel."
+            _checks.refuse(f"window of {metric.name!r}", "be asked of a run whose times are known", "traced", remedy)
+        return metric.samples(time.size, float(dt), float(time[0]))
 
     @eqx.filter_jit
-    def _metrics(self, chosen: Sequence[RideMetric], dt: ScalarLike) -> dict[str, Scalar]:
+    def _metrics(self, chosen: Sequence[tuple[Metric, tuple[int, int]]], dt: ScalarLike) -> dict[str, Scalar]:
         found = {}
-        weighted = {m.channel for m in chosen if metrics.STATISTICS[m.statistic].weighted}
-        felt = {name: self._weighted(name, dt) for name in sorted(weighted)}
-        rest = self._at_rest() if any(m.from_rest for m in chosen) else jnp.zeros(0)
-        for m in chosen:
-            statistic = metrics.STATISTICS[m.statistic]
-            record = (felt if statistic.weighted else self)[m.channel]
+        pairs = {(m.channel, m.weighting) for m, _ in chosen if m.weighting is not None}
+        weighted = {(channel, own): self._weighted(channel, own, dt) for channel, own in sorted(pairs)}
+        rest = self._at_rest() if any(m.from_rest for m, _ in chosen) else jnp.zeros(0)
+        for m, (first, last) in chosen:
+            record = self[m.channel] if m.weighting is None else weighted[m.channel, m.weighting]
             record = record - rest[self.system.layout.numbers[m.channel]] if m.from_rest else record
-            found[m.name] = statistic.of(record * self[m.by] if m.by else record, dt)
+            record = record * self[m.by] if m.by else record
+            found[m.name] = m.statistic.of(record[first : last + 1], dt)
         return found
 
     def metric_units(self) -> dict[str, str]:
@@ -169,12 +182,11 @@ class Response(eqx.Module):
         known = _checks.concrete(time)
         return time[1] - time[0] if known is None else float(known[1] - known[0])
 
-    def _weighted(self, name: str, dt: ScalarLike) -> Signal:
+    def _weighted(self, name: str, weighting: str, dt: ScalarLike) -> Signal:
         """An acceleration weighted by ISO 2631-1 from the start of the run."""
         run = self if self.whole is None else self.whole
-        weighting = self.system.layout.weighting(name)
-        felt = metrics.weighted_signal(run[name], dt, weighting, method="step", remove_mean=False)
-        return felt if self.whole is None else jax.lax.dynamic_slice_in_dim(felt, self.begin, self.time.size)
+        weighted = metrics.weighted_signal(run[name], dt, weighting, method="step", remove_mean=False)
+        return weighted if self.whole is None else jax.lax.dynamic_slice_in_dim(weighted, self.begin, self.time.size)
 
     def _at_rest(self) -> Float[Array, " channels"]:
         """The channels in the static equilibrium on the first heights of the run, forces left out."""
@@ -225,10 +237,10 @@ class Response(eqx.Module):
         found = {}
         layout = self.system.layout
         for name in dict.fromkeys(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting):
-            felt = self._weighted(name, dt)
-            transient = metrics.max_transient_value(felt, dt, None)
-            dose = metrics.vibration_dose_value(felt, dt, None)
-            found[name] = Comfort(metrics.rms(felt), transient, dose)
+            weighted = self._weighted(name, layout.weighting(name), dt)
+            transient = metrics.max_transient_value(weighted, dt, None)
+            dose = metrics.vibration_dose_value(weighted, dt, None)
+            found[name] = Comfort(metrics.rms(weighted), transient, dose)
         return found
 
     @eqx.filter_jit

@@ -13,21 +13,22 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._many_points import outside_domains
-from jaxdamp._types import Scalar
+from jaxdamp._types import Scalar, Signal
 from jaxdamp._vectors import scalars
 from jaxdamp.configuration import fuses_loops
 from jaxdamp.dampers import RangeUse, has_fitted_range
-from jaxdamp.metrics import MetricValues
+from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.parameters import match_paths, parameters, replace
-from jaxdamp.roads import AbstractRoad
+from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation.exponential import exponential_steps, settled
 from jaxdamp.simulation.observer import Accumulators, MetricObserver
 from jaxdamp.simulation.range_notes import range_uses
 from jaxdamp.simulation.run import half_sampled, sampled
+from jaxdamp.simulation.stationary import stationary_metrics, stationary_range_use
 from jaxdamp.simulation.step_size import checked_substeps
 from jaxdamp.simulation.stepper import FOR_REVERSE, RoadInput, Stepper, StepState
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
-from jaxdamp.vehicles import AbstractVehicle, RideMetric, chosen_metrics
+from jaxdamp.vehicles import AbstractVehicle, is_stationary
 
 
 Carry: TypeAlias = tuple[StepState, Accumulators, RoadInput, tuple[Array, Array]]
@@ -47,17 +48,24 @@ class Ride(eqx.Module):
     Where the road reaches the rear axles by the vehicle's own axle positions, parameters that move an axle take part:
     its road is then computed anew.
 
+    On a white road (`roads.white`) the same call gives the stationary ride of the linearised vehicle: the metrics that
+    follow from an RMS, without a run. `duration`, `dt` and `substeps` then mean nothing.
+
+    Metrics are gathered, but for those that need the whole record (`percentile`, "max_transient_value", a function of
+    your own): their channels are saved, so that memory grows with the run.
+
     Arguments:
         vehicle: where parameters that are not given come from.
-        road: as in `simulate`.
-        metrics: names among `vehicle.ride_metrics`; all of them if left out. Fewer are faster.
+        road: as in `simulate`, or `roads.white(...)`.
+        metrics: names among `vehicle.ride_metrics`, or a `metrics.Metric` of any channel; all ride metrics if left out.
+            Fewer are faster.
         duration: as in `simulate`.
         dt: as in `simulate`; it is checked here, with the numbers of this vehicle. Points far from it, of a sweep for
             instance, are driven with the same steps unchecked.
         substeps: of the engine between two instants; as many as the laws of this vehicle need if left out.
 
     Raises:
-        ValueError: an unknown metric or parameter; what `simulate` refuses.
+        ValueError: an unknown metric or parameter; a metric that a white road does not give; what `simulate` refuses.
 
     >>> from jaxdamp import roads, vehicles
     >>> car = vehicles.presets.quarter_car_000()
@@ -68,31 +76,40 @@ class Ride(eqx.Module):
     """
 
     vehicle: AbstractVehicle
-    heights: Float[Array, "time wheels"]
-    road: AbstractRoad | None  # where the delay of its axles follows from the vehicle
+    heights: Float[Array, "time wheels"] | None  # of a road that is driven over
+    road: AbstractRoad | WhiteRoad | None  # a white one, or where the delay of its axles follows from the vehicle
     dt: float = eqx.field(static=True)
     substeps: int = eqx.field(static=True)
-    metrics: tuple[RideMetric, ...] = eqx.field(static=True)
+    metrics: tuple[Metric, ...] = eqx.field(static=True)
     many: bool
 
     def __init__(
         self,
         vehicle: AbstractVehicle,
-        road: AbstractRoad,
+        road: AbstractRoad | WhiteRoad,
         *,
-        metrics: Sequence[str] | None = None,
+        metrics: Sequence[str | Metric] | None = None,
         duration: float | None = None,
         dt: float = 1e-3,
         substeps: int | None = None,
     ) -> None:
         check_module("vehicle", vehicle, (AbstractVehicle,), "Ride(vehicle, road)")
-        check_module("road", road, (AbstractRoad,), "Ride(vehicle, road)")
+        check_module("road", road, (AbstractRoad, WhiteRoad), "Ride(vehicle, road)")
         self.vehicle, self.dt, self.many = vehicle, dt, False
+        chosen = vehicle.chosen_metrics(metrics)
+        if isinstance(road, WhiteRoad):
+            _refuse_run("duration", duration)
+            _refuse_run("substeps", substeps)
+            self.road, self.heights, self.substeps = road, None, 1
+            self.metrics = _stationary(vehicle, chosen, all_of_them=metrics is None)
+            return
         _, self.heights = sampled(vehicle, road, duration, dt)
         self.road = road if delays_by_itself(vehicle, road) else None
         half = functools.partial(half_sampled, vehicle, road, self.heights.shape[0] - 1, dt)
         self.substeps = checked_substeps(vehicle.system(), self.heights, half, dt, substeps=substeps, grid=road.grid)
-        self.metrics = tuple(chosen_metrics(vehicle, metrics, "metrics"))
+        self.metrics = tuple(chosen)
+        for metric in self.metrics:
+            metric.samples(self.heights.shape[0], dt)  # a window that does not fit is refused here
 
     @property
     def units(self) -> dict[str, str]:
@@ -107,10 +124,14 @@ class Ride(eqx.Module):
         """How many cars a CPU core drives best side by side: if loops are fused, what stays in its nearest cache."""
         return 128 if fuses_loops() else 2048
 
+    def of_vehicle(self, vehicle: AbstractVehicle) -> "Ride":
+        """The same ride of another vehicle, on the same heights under its wheels."""
+        return eqx.tree_at(lambda ride: ride.vehicle, self, vehicle)
+
     def on_axles_of(self, vehicle: AbstractVehicle) -> "Ride":
         """The same ride of another vehicle, with the road under its axles wherever they are."""
-        ride = eqx.tree_at(lambda ride: ride.vehicle, self, vehicle)
-        if self.road is None:
+        ride = self.of_vehicle(vehicle)
+        if self.road is None or self.heights is None or isinstance(self.road, WhiteRoad):
             return ride
         time = self.dt * jnp.arange(self.heights.shape[0], dtype=float)
         return eqx.tree_at(lambda ride: ride.heights, ride, heights_under_wheels(vehicle, self.road, time))
@@ -122,13 +143,18 @@ class Ride(eqx.Module):
     def range_use(self, point: Mapping[str, Any] | None = None) -> dict[str, list[RangeUse]]:
         """What each damper does at a point beside the range that its law was fitted to; only of laws that have one.
 
-        It drives the run once more and keeps it: ask it of the few points that matter, not of a whole sweep.
+        It drives the run once more and keeps it: ask it of the few points that matter, not of a whole sweep. On a white
+        road the velocity of each damper is normally distributed, and reaches three standard deviations.
+
         `dampers.range_use` says what is compared; `RangeUse.outside` says whether a range is left.
         """
         vehicle = replace(self.vehicle, dict(point or {}))
         if not has_fitted_range(vehicle):
             return {}
+        if isinstance(self.road, WhiteRoad):
+            return stationary_range_use(vehicle, self.road)
         heights, step = self.on_axles_of(vehicle).heights, jnp.asarray(self.dt, dtype=float)
+        assert heights is not None
         system = vehicle.system()
         saved = exponential_steps(system, heights, step, None, self.substeps, 1)
         return range_uses(vehicle, system.form, saved.motion, saved.road, saved.road_rate, saved.port_force)
@@ -159,24 +185,29 @@ class Ride(eqx.Module):
 def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     """The loop over time; of a long run reverse derivatives keep the beginnings of blocks only."""
     vehicle = replace(ride.vehicle, point)
+    if isinstance(ride.road, WhiteRoad):
+        return stationary_metrics(vehicle, ride.road, ride.metrics)
     if ride.road is not None and point and moves_axles(lambda point: replace(ride.vehicle, point), point):
         ride = ride.on_axles_of(vehicle)
     heights, dt = ride.heights, ride.dt
+    assert heights is not None
+    instants = heights.shape[0]
     system = vehicle.system()
     apart = ride.many or (fuses_loops() and 2 * len(system.layout.coordinates) <= FEW_STATES)
     stepper = Stepper(system, jnp.asarray(dt / ride.substeps, dtype=float), apart=apart, many=ride.many)
-    observer = MetricObserver(system, ride.metrics, dt, apart=apart)
+    observer = MetricObserver(system, ride.metrics, dt, instants, apart=apart)
     half_rate = jnp.asarray(0.5 / dt, dtype=heights.dtype)
 
     def at(height: Array, rate: Array) -> RoadInput:
         return RoadInput(scalars(height), scalars(rate)) if apart else RoadInput(height, rate)
 
-    def step(carry: Carry, ahead: Array) -> tuple[Carry, None]:
+    def step(carry: Carry, ahead: Array) -> tuple[Carry, tuple[Scalar, ...]]:
         """To the next instant, with the height of the one after it, from which the rate at its end follows."""
         now, gathered, begin, (height, coming) = carry
         end = at(coming, half_rate * (ahead - height))
         after = stepper.over(now, begin, end, ride.substeps)
-        return (after, observer.add(gathered, after, end), end, (coming, ahead)), None
+        more = observer.add(gathered, after, end)
+        return (after, more, end, (coming, ahead)), more.samples
 
     first = at(heights[0], 2.0 * half_rate * (heights[1] - heights[0]))
     now = stepper.at_rest(settled(system, heights[0]), first)
@@ -184,12 +215,33 @@ def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     road = jnp.concatenate([heights[2:], 2.0 * heights[-1:] - heights[-2:-1]])  # it ends as straight as it came
     lean = jax.checkpoint(step, policy=jax.checkpoint_policies.save_only_these_names(FOR_REVERSE), prevent_cse=False)
 
-    def drive(carry: Carry, road: Array) -> tuple[Carry, None]:
+    def drive(carry: Carry, road: Array) -> tuple[Carry, tuple[Signal, ...]]:
         return jax.lax.scan(lean, carry, road)
 
+    saved = [tuple(y[None] for y in carry[1].samples)]
     count = road.shape[0]
     whole = count // BLOCK * BLOCK if count > BLOCK else 0
     if whole:
-        carry, _ = jax.lax.scan(jax.checkpoint(drive), carry, road[:whole].reshape(-1, BLOCK, *road.shape[1:]))
-    carry, _ = drive(carry, road[whole:])
-    return observer.end(carry[1], count + 1)
+        carry, samples = jax.lax.scan(jax.checkpoint(drive), carry, road[:whole].reshape(-1, BLOCK, *road.shape[1:]))
+        saved.append(tuple(y.reshape(-1) for y in samples))
+    carry, samples = drive(carry, road[whole:])
+    records = [jnp.concatenate(parts) for parts in zip(*saved, samples, strict=True)]
+    return observer.end(carry[1], records)
+
+
+def _refuse_run(argument: str, value: Any) -> None:
+    """Refuse what only a run in time has."""
+    if value is not None:
+        remedy = "Leave it out: the answer is that of the stationary motion, without a run."
+        _checks.refuse(argument, "not be given on a white road", value, remedy)
+
+
+def _stationary(vehicle: AbstractVehicle, chosen: Sequence[Metric], *, all_of_them: bool) -> tuple[Metric, ...]:
+    """The metrics among these that a white road gives; where they are wanted by name, all of them must be."""
+    known = tuple(m for m in chosen if is_stationary(m, vehicle.layout.by_name))
+    missing = [m.name for m in chosen if m not in known]
+    if missing and not all_of_them:
+        names = [m.name for m in vehicle.ride_metrics if is_stationary(m, vehicle.layout.by_name)]
+        remedy = f"It has no peaks, counts, means or powers, but {', '.join(names)}. Drive over `roads.iso8608(...)`."
+        _checks.refuse("metrics", "follow from an RMS on a white road", ", ".join(missing), remedy)
+    return known

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from jaxdamp import metrics
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
 
 
@@ -18,7 +17,7 @@ def metrics_table(responses: "Mapping[str, Response]") -> Table:
     """
     first = next(iter(responses.values()))
     values = [response.metrics() for response in responses.values()]
-    signed = {m.name for m in first.vehicle.ride_metrics if metrics.STATISTICS[m.statistic].signed}
+    signed = {m.name for m in first.vehicle.ride_metrics if m.statistic.signed}
     rows = []
     for name, unit in first.metric_units().items():
         numbers = [float(of[name]) for of in values]

@@ -3,29 +3,29 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jaxdamp import _checks, metrics
+from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
-from jaxdamp._types import Scalar
+from jaxdamp.metrics import Metric, MetricValues, current_name
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, moves_axles
+from jaxdamp.tune.objective import Function, objective_of
 from jaxdamp.tune.range_notes import range_notes
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import TuneResult, V
 from jaxdamp.tune.searching import Evaluator, Measured, active, search
 from jaxdamp.tune.step_notes import step_notes
 from jaxdamp.tune.wording import bound_notes, changes_of, early_end
-from jaxdamp.vehicles import AbstractVehicle, RideMetric, linearise, stationary_rms, with_weightings
+from jaxdamp.vehicles import AbstractVehicle
 
 
 def minimise(
-    metric: str,
+    metric: str | Metric | Function,
     vehicle: V,
     road: AbstractRoad | WhiteRoad,
     *,
@@ -34,6 +34,7 @@ def minimise(
     bounds: Mapping[str, Any] | None = None,
     tie: Mapping[str, str] | None = None,
     limits: Mapping[str, float] | None = None,
+    metrics: Sequence[str | Metric] = (),
     duration: float | None = None,
     dt: float = 1e-3,
     max_steps: int = 100,
@@ -56,7 +57,9 @@ def minimise(
     Domains hold in any case. A result at a bound is named in its `warnings`: the optimum may lie beyond it.
 
     Arguments:
-        metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`.
+        metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`; a `metrics.Metric` of any
+            channel; or a differentiable function of the metrics by name, such as
+            `lambda m: m["rms_sprung_acceleration"] / 1.5 + m["dynamic_load_coefficient"] / 0.2`.
         vehicle: where to start.
         road: a road to drive over, the same in every step; or `roads.white(...)`, for the stationary response of the
             linearised vehicle, which has no peaks.
@@ -70,6 +73,7 @@ def minimise(
             for each group (see `jaxdamp.parameters.free_parameters`).
         limits: hard limits `{metric: largest value}` in the metric's unit, such as
             `{"working_space_peak_to_peak": 0.1}`.
+        metrics: further metrics, each with a name that the function and the limits may use.
         duration: length of the run [s], as in `simulate`.
         dt: step [s], as in `simulate`.
         max_steps: of the search.
@@ -93,26 +97,28 @@ def minimise(
     'at its upper bound'
     """
     call = "minimise(metric, vehicle, road)"
-    _checks.instance("metric", metric, str, "be the name of a ride metric", f"The call is `{call}`.")
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
     check_module("road", road, (AbstractRoad, WhiteRoad), call)
-    known = [m.name for m in vehicle.ride_metrics]
-    metric = metrics.current_name(metric, known)
-    limits = {metrics.current_name(name, known): top for name, top in (limits or {}).items()}
     if max_steps < 1:
         _checks.refuse("max_steps", "be 1 or more", max_steps)
-    chosen = chosen_metrics(vehicle, road, (metric, *limits))
-    white = isinstance(road, WhiteRoad)
+    names = [m.name for m in (*vehicle.ride_metrics, *(m for m in metrics if isinstance(m, Metric)))]
+    limits = {current_name(name, names): top for name, top in (limits or {}).items()}
+    objective = objective_of(metric, vehicle, road, metrics, list(limits))
+    white, name = isinstance(road, WhiteRoad), objective.name
     space = search_range(vehicle, over, freeze, bounds, tie)
-    ride = stationary_ride(road, chosen) if white else driven_ride(vehicle, road, chosen, duration, dt, space.free)
-    evaluator = Evaluator(ride, space.free, [m.name for m in chosen])
+
+    def ride_of(vehicle: AbstractVehicle) -> Ride:
+        return Ride(vehicle, road, metrics=objective.metrics, duration=duration, dt=dt)
+
+    measured = driven(ride_of(vehicle), space.free)
+    evaluator = Evaluator(lambda vehicle: objective.of(measured(vehicle)), space.free, list(objective.units(vehicle)))
     before, _ = evaluator.at(space.start)
     if not np.all(np.isfinite(list(before.values()))):
         remedy = "`simulate` it on this road, which says what the step or the law lacks."
-        _checks.refuse("vehicle", "have finite metrics to start from", f"{metric} = {before[metric]}", remedy)
+        _checks.refuse("vehicle", "have finite metrics to start from", f"{name} = {before[name]}", remedy)
     with Progress("Tuning") as shown:
-        progress = progress or (lambda step, value: shown(f"step {step}, {metric} {value:.5g}"))
-        ended = search(evaluator, space, metric, limits, max_steps, progress)
+        progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
+        ended = search(evaluator, space, name, limits, max_steps, progress)
     after, _ = evaluator.at(ended.values)
     reached = active(limits, after, evaluator.tolerance)
     missed = [name for name in reached if after[name] > limits[name] * (1 + evaluator.tolerance.limit)]
@@ -128,72 +134,28 @@ def minimise(
     if status in (Status.STEP_LIMIT, Status.NO_BETTER_STEP):
         notes.append(early_end(ended, max_steps))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
-    coarse = [] if white else step_notes(vehicle, tuned, road, [m.name for m in chosen], duration, dt)
+    coarse = [] if white else step_notes(vehicle, tuned, ride_of)
     notes += coarse
-    if white or not any("does not bear" in note for note in coarse):
-        notes += range_notes(vehicle, tuned, road, duration, dt)
+    if not any("does not bear" in note for note in coarse):
+        notes += range_notes(vehicle, tuned, ride_of)
     return TuneResult(
         vehicle=tuned,
         start=vehicle,
-        metric=metric,
+        metric=name,
         parameters=changes,
-        before=metrics.MetricValues(before),
-        after=metrics.MetricValues(after),
-        units={m.name: m.unit(vehicle.units) for m in chosen},
+        before=MetricValues(before),
+        after=MetricValues(after),
+        units=objective.units(vehicle),
         limits=limits,
         active_limits=reached,
         warnings=tuple(notes),
         status=status,
         history=ended.history,
+        objective=objective,
     )
 
 
-def chosen_metrics(vehicle: AbstractVehicle, road: AbstractRoad | WhiteRoad, wanted: Sequence[str]) -> list[RideMetric]:
-    """The ride metrics that are wanted, and all others that this kind of road gives without weighting or counting.
-
-    A white road gives what follows from an RMS, so no peaks. Means, which may be negative, only if they are wanted.
-    """
-    white, kinds = isinstance(road, WhiteRoad), metrics.STATISTICS
-    known = [m for m in vehicle.ride_metrics if not white or m.is_stationary(vehicle.layout.by_name)]
-    for name in wanted:
-        _checks.one_of("metric", name, [m.name for m in known])
-    still = [m.name for m in known if not kinds[m.statistic].differentiable]
-    for name in wanted:
-        if name in still:
-            _checks.refuse("metric", "have a slope", f"{name!r}, a count", "Tune on the dynamic load coefficient.")
-    plain = [m for m in known if not (kinds[m.statistic].weighted or kinds[m.statistic].signed)]
-    others = [m for m in plain if m.name not in still]
-    return [m for m in known if m in others or m.name in wanted]
-
-
-def stationary_ride(road: WhiteRoad, chosen: Sequence[RideMetric]) -> Measured:
-    """Ride metrics of the linearised vehicle on a white road."""
-    weighted = list(dict.fromkeys(m.channel for m in chosen if metrics.STATISTICS[m.statistic].weighted))
-
-    def ride(vehicle: AbstractVehicle) -> dict[str, Scalar]:
-        linear = linearise(vehicle)
-        if weighted:
-            linear = with_weightings(linear, [(name, vehicle.layout.weighting(name)) for name in weighted])
-        rms, found = stationary_rms(linear, road.velocity_psd, speed=road.speed), {}
-        for m in chosen:
-            statistic = metrics.STATISTICS[m.statistic]
-            assert statistic.of_rms is not None
-            found[m.name] = statistic.of_rms(rms[f"weighted_{m.channel}" if statistic.weighted else m.channel])
-        return found
-
-    return ride
-
-
-def driven_ride(
-    vehicle: AbstractVehicle,
-    road: AbstractRoad,
-    chosen: Sequence[RideMetric],
-    duration: float | None = None,
-    dt: float = 1e-3,
-    free: FreeParameters | None = None,
-) -> Measured:
-    """Ride metrics of a run; the road is sampled once, which also checks the arguments, or for axles that move."""
-    driven = Ride(vehicle, road, metrics=[m.name for m in chosen], duration=duration, dt=dt)
-    if driven.road is not None and free is not None and moves_axles(free.build, free.values):
-        return lambda vehicle: driven.on_axles_of(vehicle)()
-    return lambda vehicle: eqx.tree_at(lambda ride: ride.vehicle, driven, vehicle)()
+def driven(ride: Ride, free: FreeParameters) -> Measured:
+    """A ride as a function of its vehicle; the road is sampled once, or anew for axles that the parameters move."""
+    follows = ride.road is not None and moves_axles(free.build, free.values)
+    return lambda vehicle: (ride.on_axles_of(vehicle) if follows else ride.of_vehicle(vehicle))()

@@ -1,7 +1,7 @@
 """`rescore`: what a tuning is worth on roads that it has not seen."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -9,9 +9,11 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
+from jaxdamp._types import Scalar
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.result import TuneResult
+from jaxdamp.vehicles import AbstractVehicle
 
 
 @final
@@ -103,10 +105,16 @@ def rescore(
     """
     if not roads:
         _checks.refuse("roads", "hold one or more", roads)
-    rides = [[Ride(car, road, duration=duration, dt=dt)() for road in roads] for car in (result.start, result.vehicle)]
+    known, objective = list(result.start.ride_metrics), result.objective
+    known += [m for m in (objective.metrics if objective else ()) if m not in known]
+    units = {m.name: m.unit(result.start.units) for m in known} | (objective.units(result.start) if objective else {})
+
+    def drive(car: AbstractVehicle, road: AbstractRoad) -> Mapping[str, Scalar]:
+        values = Ride(car, road, metrics=known, duration=duration, dt=dt)()
+        return objective.of(values) if objective else values
+
+    before, after = ([drive(car, road) for road in roads] for car in (result.start, result.vehicle))
     before, after = (
-        {m.name: np.array([float(found[m.name]) for found in runs]) for m in result.start.ride_metrics}
-        for runs in rides
+        {name: np.array([float(values[name]) for values in runs]) for name in units} for runs in (before, after)
     )
-    units = {m.name: m.unit(result.start.units) for m in result.start.ride_metrics}
     return Rescore(before, after, units, result.metric)

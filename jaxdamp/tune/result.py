@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_tied, with_unit
+from jaxdamp.tune.objective import Objective
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -50,6 +51,7 @@ class TuneResult(Generic[V]):
         warnings: what a user should know, in words.
         status: how the search ended; `CONVERGED` only at a point where the gradient says optimum.
         history: the metric after each step of the search.
+        objective: what was minimised, with all metrics of the tuning.
     """
 
     vehicle: V
@@ -64,6 +66,7 @@ class TuneResult(Generic[V]):
     warnings: tuple[str, ...]
     status: Status
     history: tuple[float, ...]
+    objective: Objective | None = None
 
     @property
     def converged(self) -> bool:

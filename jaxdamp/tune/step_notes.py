@@ -1,43 +1,28 @@
 """What the tuned vehicle says of the step, which was chosen for the start."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable
 
-from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import CoarseStepWarning, Ride
 from jaxdamp.vehicles import AbstractVehicle
 
 
-def step_notes(
-    start: AbstractVehicle,
-    tuned: AbstractVehicle,
-    road: AbstractRoad,
-    names: Sequence[str],
-    duration: float | None,
-    dt: float,
-) -> list[str]:
+def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]) -> list[str]:
     """A sentence where the step is too long or too coarse for the tuned vehicle, or its laws need more substeps.
 
     Arguments:
         start: the vehicle before, for which the substeps were chosen.
         tuned: the vehicle after.
-        road: of the tuning.
-        names: of the metrics.
-        duration: of the run [s], as in `minimise`.
-        dt: step of the run [s].
+        ride_of: the ride of a vehicle, on a road that is driven over.
     """
-
-    def substeps(vehicle: AbstractVehicle) -> int:
-        return Ride(vehicle, road, metrics=names, duration=duration, dt=dt).substeps
-
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("ignore")
-        taken = substeps(start)
+        taken = ride_of(start).substeps
         warnings.simplefilter("always", CoarseStepWarning)
         try:
-            needed = substeps(tuned)
+            needed = ride_of(tuned).substeps
         except ValueError as error:
-            return [f"The tuned vehicle does not bear the step of {dt:g} s. {error}"]
+            return [f"The tuned vehicle does not bear the step. {error}"]
     notes = [str(warning.message) for warning in caught]
     if needed > taken:
         notes.append(

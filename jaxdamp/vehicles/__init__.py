@@ -11,7 +11,7 @@ z is up, pitch positive nose up, roll positive left side up.
 
 from jaxdamp.vehicles import presets
 from jaxdamp.vehicles.axle import Axle
-from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle, chosen_metrics
+from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle
 from jaxdamp.vehicles.cab import Cab
 from jaxdamp.vehicles.channels import Channel, ChannelKind
 from jaxdamp.vehicles.corner import Corner
@@ -28,7 +28,7 @@ from jaxdamp.vehicles.points import Point
 from jaxdamp.vehicles.port_form import LinearMap, PortForm
 from jaxdamp.vehicles.ports import Earlier, Ports, States
 from jaxdamp.vehicles.quarter_car import QuarterCar
-from jaxdamp.vehicles.ride_metrics import RideMetric
+from jaxdamp.vehicles.ride_metrics import is_stationary
 from jaxdamp.vehicles.roll_car import RollCar
 from jaxdamp.vehicles.seat import Seat, SeatMass
 from jaxdamp.vehicles.stationary import stationary_rms
@@ -67,7 +67,6 @@ __all__ = [
     "PortForm",
     "Ports",
     "QuarterCar",
-    "RideMetric",
     "RollCar",
     "Seat",
     "SeatMass",
@@ -78,8 +77,8 @@ __all__ = [
     "TrackedHull",
     "WalkingBeam",
     "Wheel",
-    "chosen_metrics",
     "frequency_response",
+    "is_stationary",
     "linearise",
     "modes",
     "prefixed",

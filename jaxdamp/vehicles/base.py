@@ -9,15 +9,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
-from jaxdamp.metrics import current_names
+from jaxdamp.metrics import Metric
 from jaxdamp.parameters import Module, check_parameters, readable
 from jaxdamp.vehicles.channels import channels_of
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
-from jaxdamp.vehicles.ride_metrics import RideMetric
+from jaxdamp.vehicles.ride_metrics import chosen_metrics
 from jaxdamp.vehicles.system import Layout, System, assemble, layout_of
 
 
@@ -79,9 +78,17 @@ class AbstractVehicle(Module):
         return {channel.name: channel.description for channel in self.layout.channels}
 
     @property
-    def ride_metrics(self) -> tuple[RideMetric, ...]:
+    def ride_metrics(self) -> tuple[Metric, ...]:
         """The numbers that say how the vehicle rides."""
         return self.layout.metrics
+
+    def chosen_metrics(self, wanted: Sequence[str | Metric] | None, argument: str = "metrics") -> list[Metric]:
+        """These metrics, by the names of ride metrics or as a `Metric` of any channel; all ride metrics if None.
+
+        Raises:
+            ValueError: an unknown name or channel, with the nearest one; `argument` is what the error calls them.
+        """
+        return chosen_metrics(self.layout.metrics, self.layout.by_name, wanted, argument)
 
     def static_wheel_loads(self) -> Float[Array, " wheels"]:
         """Load of each wheel at rest on level ground [N] (see `Frame.static_wheel_loads`)."""
@@ -107,19 +114,6 @@ class AbstractVehicle(Module):
 @eqx.filter_jit
 def _assembled(vehicle: AbstractVehicle) -> System:
     return assemble(vehicle.frame())
-
-
-def chosen_metrics(vehicle: AbstractVehicle, names: Sequence[str] | None, argument: str) -> list[RideMetric]:
-    """The ride metrics of these names, all of them if `names` is None; `argument` is what errors call the names.
-
-    Raises:
-        ValueError: a name that no ride metric has, with the nearest one; no name.
-    """
-    known = {m.name: m for m in vehicle.ride_metrics}
-    if names is not None and not len(names):
-        some = ", ".join(map(repr, list(known)[:3]))
-        _checks.refuse(argument, "name one or more", "empty", f"Write [{some}], or leave it out for all.")
-    return [known[name] for name in (known if names is None else current_names(argument, names, known))]
 
 
 @final

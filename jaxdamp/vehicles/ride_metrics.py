@@ -1,47 +1,20 @@
 """The numbers that say how a vehicle rides."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
-from jaxdamp.metrics import STATISTICS
+from jaxdamp import _checks
+from jaxdamp.metrics import Metric, current_names
 from jaxdamp.vehicles.channels import Channel, ChannelKind
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Link, Wheel, prefixed
 
 
-class RideMetric(NamedTuple):
-    """A number that says how a vehicle rides.
-
-    Arguments:
-        name: what it is called.
-        channel: what it is made of.
-        statistic: how, one of `metrics.STATISTICS`.
-        by: a second channel, which the first is multiplied with.
-        from_rest: whether the channel is counted from its value in the static equilibrium on the road's first heights.
-    """
-
-    name: str
-    channel: str
-    statistic: str
-    by: str = ""
-    from_rest: bool = False
-
-    def unit(self, units: Mapping[str, str]) -> str:
-        """Its unit, from those of the channels."""
-        return STATISTICS[self.statistic].unit(units[self.channel])
-
-    def is_stationary(self, channels: Mapping[str, Channel]) -> bool:
-        """Whether the RMS of its channel on a white road gives it; a height wanders with the road and has none."""
-        wanders = self.from_rest and channels[self.channel].kind is ChannelKind.HEIGHT
-        return STATISTICS[self.statistic].of_rms is not None and not wanders
-
-
-def ride_metrics_of(frame: Frame, channels: Sequence[Channel]) -> tuple[RideMetric, ...]:
+def ride_metrics_of(frame: Frame, channels: Sequence[Channel]) -> tuple[Metric, ...]:
     """What a ride is judged by, in groups: bodies and places, suspensions, tyres."""
     return (*_of_bodies(frame, channels), *_of_elements(frame), *_of_tyres(frame))
 
 
-def _of_bodies(frame: Frame, channels: Sequence[Channel]) -> list[RideMetric]:
+def _of_bodies(frame: Frame, channels: Sequence[Channel]) -> list[Metric]:
     """Accelerations of the bodies that are not wheels and of the places, unweighted and weighted by ISO 2631-1.
 
     Displacements and angles of these bodies, from the static equilibrium.
@@ -50,43 +23,100 @@ def _of_bodies(frame: Frame, channels: Sequence[Channel]) -> list[RideMetric]:
     main = frame.main_body.name
     bodies = {body.name for body in frame.bodies if body.name == main or on_wheels.isdisjoint(body.masses)}
     places = bodies | {place.name for place in frame.places}
-    felt = [c.name for c in channels if c.kind.weighting is not None and c.place in places]
-    of_acceleration = ("rms", "peak", "weighted_rms", "vibration_dose_value")
-    metrics = [RideMetric(f"{statistic}_{name}", name, statistic) for name in felt for statistic in of_acceleration]
+    metrics: list[Metric] = []
+    for c in channels:
+        if c.kind.weighting is not None and c.place in places:
+            metrics += [Metric(c.name, statistic) for statistic in ("rms", "peak")]
+            metrics += [
+                Metric(c.name, "rms", c.kind.weighting, name=f"weighted_rms_{c.name}"),
+                Metric(c.name, "vibration_dose_value", c.kind.weighting, name=f"vibration_dose_value_{c.name}"),
+            ]
     for c in channels:
         if c.place in bodies and c.kind in (ChannelKind.HEIGHT, ChannelKind.ANGLE):
             word = f"{c.place}_displacement" if c.kind is ChannelKind.HEIGHT else f"{c.name}_angle"
-            metrics += [RideMetric(f"{s}_{word}", c.name, s, from_rest=True) for s in ("rms", "peak")]
+            metrics += [Metric(c.name, s, from_rest=True, name=f"{s}_{word}") for s in ("rms", "peak")]
     return metrics
 
 
-def _of_elements(frame: Frame) -> list[RideMetric]:
+def _of_elements(frame: Frame) -> list[Metric]:
     """Working space and velocity of every link with laws, and the power that each law takes."""
-    metrics: list[RideMetric] = []
+    metrics: list[Metric] = []
     parts: list[Link | Wheel] = [*frame.links, *frame.wheels]
     for part in parts:
         stroke, velocity = prefixed(part.name, "stroke"), prefixed(part.name, "damper_velocity")
         if part.elements:
             space = prefixed(part.name, "working_space")
             metrics += [
-                RideMetric(f"{space}_rms", stroke, "standard_deviation"),
-                RideMetric(f"{space}_mean", stroke, "mean", from_rest=True),
-                RideMetric(f"{space}_peak_to_peak", stroke, "peak_to_peak"),
-                RideMetric(f"peak_{velocity}", velocity, "peak"),
+                Metric(stroke, "standard_deviation", name=f"{space}_rms"),
+                Metric(stroke, "mean", from_rest=True, name=f"{space}_mean"),
+                Metric(stroke, "peak_to_peak", name=f"{space}_peak_to_peak"),
+                Metric(velocity, "peak"),
             ]
         for element in part.elements:
             name = prefixed(part.name, element.name)
-            metrics.append(RideMetric(f"{name}_dissipated_power", f"{name}_force", "dissipated_power", velocity))
+            power = f"{name}_dissipated_power"
+            metrics.append(Metric(f"{name}_force", "dissipated_power", by=velocity, name=power))
     return metrics
 
 
-def _of_tyres(frame: Frame) -> list[RideMetric]:
+def _of_tyres(frame: Frame) -> list[Metric]:
     """Variation of the tyre loads, and how often a wheel lifts off."""
-    metrics: list[RideMetric] = []
+    metrics: list[Metric] = []
     for wheel in frame.wheels:
         load, relative = prefixed(wheel.name, "dynamic_tyre_load"), prefixed(wheel.name, "relative_tyre_load")
         coefficient = prefixed(wheel.name, "dynamic_load_coefficient")
-        metrics += [RideMetric(f"rms_{load}", load, "rms"), RideMetric(coefficient, relative, "standard_deviation")]
+        metrics += [Metric(load, "rms"), Metric(relative, "standard_deviation", name=coefficient)]
         of_load = ("road_stress_factor", "lift_off_fraction")
-        metrics += [RideMetric(prefixed(wheel.name, statistic), relative, statistic) for statistic in of_load]
+        metrics += [Metric(relative, statistic, name=prefixed(wheel.name, statistic)) for statistic in of_load]
     return metrics
+
+
+def is_stationary(metric: Metric, channels: Mapping[str, Channel]) -> bool:
+    """Whether the RMS of its channel on a white road gives a metric; a height wanders with the road and has none."""
+    wanders = metric.from_rest and channels[metric.channel].kind is ChannelKind.HEIGHT
+    return metric.statistic.of_rms is not None and not (wanders or metric.by or metric.window)
+
+
+def chosen_metrics(
+    metrics: Sequence[Metric], channels: Mapping[str, Channel], wanted: Sequence[str | Metric] | None, argument: str
+) -> list[Metric]:
+    """The metrics that are wanted, ready to be computed.
+
+    Arguments:
+        metrics: those that have names of their own, the ride metrics of a vehicle.
+        channels: of the vehicle, by name.
+        wanted: names among the ride metrics, or metrics of any channel; None for all ride metrics.
+        argument: what errors call `wanted`.
+
+    Raises:
+        ValueError: none; an unknown name or channel, with the nearest one; a weighting of what no person feels; two
+            metrics of one name.
+    """
+    known = {m.name: m for m in metrics}
+    if wanted is None:
+        return list(metrics)
+    if isinstance(wanted, Metric):
+        _checks.refuse(argument, "be a list", "one Metric", f"Write `{argument}=[metric]`.")
+    if not len(wanted):
+        some = ", ".join(map(repr, list(known)[:3]))
+        _checks.refuse(argument, "name one or more", "empty", f"Write [{some}], or leave it out for all.")
+    names = [m for m in wanted if not isinstance(m, Metric)] if not isinstance(wanted, str) else wanted
+    current = iter(current_names(argument, names, known))
+    chosen = [of_channel(m, channels, argument) if isinstance(m, Metric) else known[next(current)] for m in wanted]
+    by_name: dict[str, Metric] = {}
+    for metric in chosen:
+        if by_name.setdefault(metric.name, metric) != metric:
+            remedy = "Give one of them another: `Metric(..., name=...)`."
+            _checks.refuse(argument, "have one metric of each name", f"two of {metric.name!r}", remedy)
+    return list(by_name.values())
+
+
+def of_channel(metric: Metric, channels: Mapping[str, Channel], argument: str) -> Metric:
+    """A metric whose channels exist, with the weighting of its channel in place of "default"."""
+    for name in (metric.channel, metric.by) if metric.by else (metric.channel,):
+        _checks.one_of(f"channel of {argument}", name, channels)
+    own = channels[metric.channel].kind.weighting
+    if metric.weighting is not None and own is None:
+        remedy = f"Leave its `weighting` out; {metric.channel} is {channels[metric.channel].kind.meaning}."
+        _checks.refuse(argument, "weight an acceleration, as ISO 2631-1 does", repr(metric.channel), remedy)
+    return metric.weighted_by(own) if metric.weighting == "default" else metric

@@ -13,11 +13,12 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.metrics import Metric
 from jaxdamp.vehicles.channels import Channel, ChannelKind, Measured, channels_of, signals
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.points import matrix
 from jaxdamp.vehicles.port_form import LinearMap, PortForm
-from jaxdamp.vehicles.ride_metrics import RideMetric, ride_metrics_of
+from jaxdamp.vehicles.ride_metrics import ride_metrics_of
 
 
 @final
@@ -41,7 +42,7 @@ class Layout:
     axles: tuple[int, ...]
     lifts: tuple[bool, ...]
     channels: tuple[Channel, ...]
-    metrics: tuple[RideMetric, ...]
+    metrics: tuple[Metric, ...]
 
     @property
     def axle_names(self) -> tuple[str, ...]:

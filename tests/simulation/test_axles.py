@@ -8,7 +8,7 @@ import pytest
 from jaxdamp import Ride, roads, simulate
 from jaxdamp.parameters import free_parameters, replace
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
-from jaxdamp.tune.minimising import driven_ride
+from jaxdamp.tune.minimising import driven
 from jaxdamp.vehicles import RollCar, frequency_response, spectral_rms, stationary_rms
 from jaxdamp.vehicles.presets import full_car_jazar, half_car_002, m113_003, quarter_car_000, truck_001
 
@@ -136,8 +136,7 @@ def test_ride_means_the_same_and_follows_axles_that_move():
 
 def test_a_tuning_follows_axles_that_move():
     free = free_parameters(HALF, over=["rear_distance"])
-    chosen = [metric for metric in HALF.ride_metrics if metric.name in NAMES]
-    measured = driven_ride(HALF, GROUND, chosen, 0.5, 0.002, free)
+    measured = driven(Ride(HALF, GROUND, metrics=NAMES, duration=0.5, dt=0.002), free)
     moved = free.build(jnp.array([2.4]))
     expected = simulate(moved, GROUND, duration=0.5, dt=0.002).metrics(NAMES)
     for name, value in measured(moved).items():

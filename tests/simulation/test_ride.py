@@ -53,6 +53,8 @@ def test_the_lifting_car_lifts_and_steps_are_divided():
 def test_every_statistic_is_the_same_gathered_and_at_once(rng):
     record = jnp.asarray(3.0 * rng.normal(size=200) - 0.4)
     for name, statistic in metrics.STATISTICS.items():
+        if statistic.needs_record:
+            continue
         kept = statistic.begin(record[0])
         for sample in record[1:]:
             kept = statistic.add(kept, sample)

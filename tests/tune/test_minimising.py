@@ -3,8 +3,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxdamp import dampers, parameters, roads, simulate, tune, vehicles
-from jaxdamp.tune.minimising import driven_ride
+from jaxdamp import Ride, dampers, parameters, roads, simulate, tune, vehicles
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.step_notes import step_notes
 
@@ -55,13 +54,13 @@ def test_simulated_roads_find_the_optimum_within_their_sampling_error():
 def test_gradient_through_the_simulation_agrees_with_differences():
     law = dampers.Bilinear(2600.0, 1400.0, knee_width=0.02)
     car = vehicles.presets.quarter_car_000(law)
-    ride = driven_ride(car, roads.iso8608("C", speed=20.0, seed=1), car.ride_metrics[:1], 3.0, 1e-3)
+    ride = Ride(car, roads.iso8608("C", speed=20.0, seed=1), metrics=["rms_sprung_acceleration"], duration=3.0)
 
     def metric(rates):
         changed = parameters.replace(
             car, {"damper.rebound_rate": rates[0], "damper.compression_rate": rates[1], "sprung_mass": rates[2]}
         )
-        return ride(changed)["rms_sprung_acceleration"]
+        return ride.of_vehicle(changed)()["rms_sprung_acceleration"]
 
     at = np.array([2600.0, 1400.0, 1200.0])
     slope = np.asarray(jax.jacfwd(metric)(jnp.asarray(at)))
@@ -277,13 +276,16 @@ def test_a_displacement_is_tuned_on_a_bump_and_refused_on_a_white_road():
 
 def test_a_tuned_vehicle_that_the_step_does_not_suit_is_noted():
     start, road = vehicles.presets.quarter_car_000(), roads.cosine_bump(0.05, start=0.1, duration=0.25)
-    names = ["rms_sprung_acceleration"]
+
+    def ride_of(car, dt=1e-3):
+        return Ride(car, road, metrics=["rms_sprung_acceleration"], duration=0.5, dt=dt)
+
     notes = [
-        step_notes(start, parameters.replace(start, change), road, names, 0.5, 1e-3)
+        step_notes(start, parameters.replace(start, change), ride_of)
         for change in ({"damper.rate": 2000.0}, {"damper.rate": 1e6}, {"tyre_stiffness": 1e9})
     ]
     assert notes[0] == []
     assert "need 9 steps between two instants, and the search took 1" in notes[1][0]
-    assert "does not bear the step of 0.001 s" in notes[2][0]
-    (coarse,) = step_notes(start, start, road, names, 0.5, 0.02)
+    assert "does not bear the step" in notes[2][0]
+    (coarse,) = step_notes(start, start, lambda car: ride_of(car, 0.02))
     assert "coarse" in coarse

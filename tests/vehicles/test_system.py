@@ -52,7 +52,7 @@ def test_every_channel_has_a_kind_and_a_place(vehicle):
     assert kinds.count(ChannelKind.FORCE) == len([name for name in layout.ports if "lift_off" not in name])
     turns = sum(len(body.turns) for body in frame.bodies)
     assert kinds.count(ChannelKind.ANGLE) == kinds.count(ChannelKind.ANGULAR_ACCELERATION) == turns
-    weighted = [m.channel for m in layout.metrics if m.statistic == "weighted_rms"]
+    weighted = [m.channel for m in layout.metrics if m.weighting is not None]
     assert {layout.weighting(name) for name in weighted} <= {"Wk", "We"}
     assert layout.weighting("sprung_acceleration") == "Wk"
 

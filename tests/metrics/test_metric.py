@@ -1,0 +1,68 @@
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxdamp.metrics import STATISTICS, Metric, Reduction, Statistic, Term, percentile
+
+
+def test_a_metric_is_named_after_its_parts():
+    assert Metric("stroke", "rms").name == "rms_stroke"
+    assert Metric("stroke", "rms", by="damper_force", window=(0.5, 2.0)).name == "rms_stroke_by_damper_force_0.5_to_2_s"
+    assert Metric("a", "rms", "default").name == "weighted_rms_a" and Metric("a", "rms", "Wd").name == "Wd_rms_a"
+    assert Metric("a", percentile(95)).name == "percentile_95_a"
+    assert Metric("a", "rms", "Wk", name="felt").weighted_by("Wd") == Metric("a", "rms", "Wd", name="felt")
+    assert Metric("a", "rms") == Metric("a", STATISTICS["rms"]) and hash(Metric("a", percentile(5))) is not None
+
+
+def test_units_follow_from_those_of_the_channels():
+    units = {"a": "m/s^2", "f": "N", "v": "m/s"}
+    assert Metric("a", "vibration_dose_value").unit(units) == "m/s^1.75"
+    assert Metric("f", "dissipated_power", by="v").unit(units) == "W"
+    assert Metric("f", "mean", by="v").unit(units) == "N m/s"
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"statistic": "rsm"}, "`statistic` must be one of .* Did you mean 'rms'"),
+        ({"weighting": "wk"}, "`weighting` must be one of .* Did you mean 'Wk'"),
+        ({"window": (2.0, 1.0)}, "`window` must begin at 0 s or later and end after that"),
+        ({"weighting": "Wk", "from_rest": True}, "`from_rest` must not stand beside a weighting"),
+    ],
+)
+def test_what_makes_no_metric_is_refused(more, words):
+    with pytest.raises(ValueError, match=words):
+        Metric("a", **({"statistic": "rms"} | more))
+
+
+def test_windows_are_numbers_of_samples():
+    assert Metric("a", "rms").samples(11, 0.1) == (0, 10)
+    assert Metric("a", "rms", window=(0.2, 0.5)).samples(11, 0.1) == (2, 5)
+    assert Metric("a", "rms", window=(0.2, 0.5)).samples(5, 0.1, begin=0.1) == (1, 4)
+    for begin in (0.0, 0.3):
+        with pytest.raises(ValueError, match=r"window of 'rms_a_0\.2_to_0\.5_s'` must lie in"):
+            Metric("a", "rms", window=(0.2, 0.5)).samples(5, 0.1, begin=begin)
+
+
+def test_a_statistic_of_terms_is_one_of_the_record(rng):
+    record = jnp.asarray(rng.normal(size=50) + 3.0)
+    skew = Statistic(
+        "third_moment",
+        (Term(Reduction.FIRST), Term(Reduction.SUM, lambda y, first: (y - first) ** 3)),
+        lambda terms, count, dt: terms[1] / count,
+    )
+    gathered = skew.begin(record[0])
+    for y in record[1:]:
+        gathered = skew.add(gathered, y)
+    expected = np.mean((np.asarray(record) - float(record[0])) ** 3)
+    assert float(skew.end(gathered, 50, 0.1)) == pytest.approx(expected)
+    assert float(skew.of(record, 0.1)) == pytest.approx(expected)
+
+
+def test_a_statistic_has_terms_or_a_function_of_the_record():
+    for more in ({}, {"end": max}, {"terms": (Term(Reduction.SUM),)}, {"end": max, "of_record": max}):
+        with pytest.raises(ValueError, match="have terms and an end, or a function of the record"):
+            Statistic("none", **more)
+    with pytest.raises(ValueError, match="`share` must be 0 to 100 percent"):
+        percentile(101)
+    assert percentile(95) is percentile(95)  # one program for all

@@ -1,0 +1,62 @@
+"""What a tuning minimises beside a name: a metric of any channel, and functions of metrics."""
+
+import numpy as np
+import pytest
+
+from jaxdamp import dampers, metrics, roads, tune, vehicles
+from jaxdamp.metrics import Metric
+
+
+CAR, WHITE = vehicles.presets.quarter_car_000(), roads.white("C", 20.0)
+BUMP = roads.cosine_bump(0.05, start=0.1, duration=0.2)
+
+
+def weighted_sum(m):
+    return m["rms_sprung_acceleration"] ** 2 + 1e-5 * m["rms_dynamic_tyre_load"] ** 2
+
+
+def test_a_function_of_metrics_is_minimised():
+    """The optimum of a sum lies between those of its parts, where its slope by the rate is zero."""
+    result = tune.minimise(weighted_sum, CAR, WHITE)
+    assert result.status is tune.Status.CONVERGED and result.metric == "weighted_sum"
+    best = float(result.vehicle.damper.rate)
+    parts = ("rms_sprung_acceleration", "rms_dynamic_tyre_load")
+    ends = [float(tune.minimise(name, CAR, WHITE).vehicle.damper.rate) for name in parts]
+    assert min(ends) + 1.0 < best < max(ends) - 1.0
+
+    def value(rate):
+        rms = vehicles.stationary_rms(
+            vehicles.linearise(vehicles.presets.quarter_car_000(dampers.Linear(rate))), WHITE.velocity_psd
+        )
+        return float(rms["sprung_acceleration"] ** 2 + 1e-5 * rms["dynamic_tyre_load"] ** 2)
+
+    assert value(best) < min(value(best * 0.99), value(best * 1.01))
+    assert result.after["weighted_sum"] == pytest.approx(value(best), rel=1e-9)
+    assert "weighted_sum" in repr(result) and result.units["weighted_sum"] == ""
+
+
+def test_a_metric_of_any_channel_is_minimised_and_limited():
+    deep, late = Metric("stroke", "minimum", name="deepest"), Metric("stroke", "standard_deviation", window=(0.4, 0.8))
+    limits = {"peak_damper_velocity": 10.0}
+    result = tune.minimise(late, CAR, BUMP, metrics=[deep], limits=limits, duration=0.8, max_steps=4)
+    assert result.metric == late.name and result.after[late.name] < result.before[late.name]
+    assert result.units["deepest"] == "m" and result.after["deepest"] < 0
+    again = tune.rescore(result, [BUMP], duration=0.8)
+    np.testing.assert_allclose(again.after[late.name], result.after[late.name], rtol=1e-9)
+
+
+def test_only_what_a_function_asks_for_is_computed():
+    result = tune.minimise(lambda m: m["weighted_rms_sprung_acceleration"], CAR, WHITE, max_steps=1)
+    assert result.metric == "objective" and "weighted_rms_sprung_acceleration" in result.after
+    assert "vibration_dose_value_sprung_acceleration" not in result.after
+
+
+def test_what_is_no_objective_is_refused():
+    with pytest.raises(KeyError, match="did you mean 'rms_sprung_acceleration'"):
+        tune.minimise(lambda m: m["rms_sprung_accel"], CAR, WHITE)
+    with pytest.raises(ValueError, match="`metric` must give one number"):
+        tune.minimise(lambda m: [m["rms_sprung_acceleration"]], CAR, WHITE)
+    with pytest.raises(ValueError, match="`metric` must have a slope, but is 'lift_off_fraction'"):
+        tune.minimise(lambda m: m["lift_off_fraction"], CAR, BUMP, duration=0.4)
+    with pytest.raises(ValueError, match=r"`metric` must be one of .*'rms_sprung_acceleration'"):
+        tune.minimise(Metric("stroke", metrics.percentile(95)), CAR, WHITE)
