@@ -15,7 +15,8 @@ PREPARE = """
 import json, sys
 import numpy as np
 import jaxdamp
-from jaxdamp import bench, dampers, export, identify, metrics, plots, respond, Ride, roads, simulate, sweep, tune, vehicles
+from jaxdamp import bench, dampers, export, identify, metrics, plots
+from jaxdamp import respond, Ride, roads, simulate, sweep, tune, vehicles
 
 car = vehicles.presets.quarter_car_000()
 road = roads.iso8608("C", speed=20.0, seed=1)

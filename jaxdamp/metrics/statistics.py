@@ -80,15 +80,15 @@ class Statistic:
     Arguments:
         name: in names of metrics.
         terms: sums and extremes over the samples. Where one is a function of the first sample, the first term is it.
-        end: the statistic, from the terms, the number of samples and their interval [s].
-        of_record: the statistic, from the whole record and its interval [s], in place of terms and end.
+        of_terms: the statistic, from the terms, the number of samples and their interval [s].
+        of_record: the statistic, from the whole record and its interval [s], in place of terms.
         unit: its unit, from that of the record.
         of_rms: it, from the RMS of a stationary Gaussian record without mean; None where that does not say.
         differentiable: whether its slope says anything; a count has none.
         signed: whether it may be negative, so that a change of it in percent says nothing.
 
     Raises:
-        ValueError: neither terms with an end nor a function of the record, or both.
+        ValueError: neither terms with a function of them nor a function of the record, or both.
 
     >>> mean_cube = Statistic("mean_cube", (Term(Reduction.SUM, lambda y, first: y**3),), lambda k, n, dt: k[0] / n)
     >>> float(mean_cube.of(jnp.array([1.0, 2.0]), 0.1))
@@ -97,7 +97,7 @@ class Statistic:
 
     name: str
     terms: tuple[Term, ...] = ()
-    end: Callable[[Gathered, int, ScalarLike], Scalar] | None = None
+    of_terms: Callable[[Gathered, int, ScalarLike], Scalar] | None = None
     of_record: Callable[[Signal, ScalarLike], Scalar] | None = None
     unit: Callable[[str], str] = lambda unit: unit
     of_rms: Callable[[Scalar], Scalar] | None = None
@@ -105,9 +105,9 @@ class Statistic:
     signed: bool = False
 
     def __post_init__(self) -> None:
-        gathered = bool(self.terms) and self.end is not None
-        if gathered == (self.of_record is not None) or bool(self.terms) != (self.end is not None):
-            _checks.refuse("Statistic", "have terms and an end, or a function of the record", repr(self.name))
+        gathered = bool(self.terms) and self.of_terms is not None
+        if gathered == (self.of_record is not None) or bool(self.terms) != (self.of_terms is not None):
+            _checks.refuse("Statistic", "have terms and a function of them, or one of the record", repr(self.name))
 
     def __repr__(self) -> str:
         return self.name
@@ -126,11 +126,15 @@ class Statistic:
         pairs = zip(self.terms, gathered, strict=True)
         return tuple(term.reduction.join(before, term.value(y, gathered[0])) for term, before in pairs)
 
+    def end(self, gathered: Gathered, count: int, dt: ScalarLike) -> Scalar:
+        """The statistic of so many samples, dt [s] apart, from their terms."""
+        assert self.of_terms is not None
+        return self.of_terms(gathered, count, dt)
+
     def of(self, record: Signal, dt: ScalarLike) -> Scalar:
         """The statistic of a whole record, samples dt [s] apart."""
         if self.of_record is not None:
             return self.of_record(record, dt)
-        assert self.end is not None
         gathered = tuple(term.reduction.of(term.value(record, record[0])) for term in self.terms)
         return self.end(gathered, record.shape[0], dt)
 

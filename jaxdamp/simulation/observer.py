@@ -104,7 +104,7 @@ class MetricObserver:
         """
         found, saved = {}, iter(records)
         for m, (first, last), terms in zip(self.metrics, self.windows, gathered.statistics, strict=True):
-            if m.statistic.end is None:
+            if m.statistic.needs_record:
                 found[m.name] = m.statistic.of(next(saved)[first : last + 1], self.dt)
             else:
                 found[m.name] = m.statistic.end(terms, last - first + 1, self.dt)

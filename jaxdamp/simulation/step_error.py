@@ -57,7 +57,7 @@ def step_error(
     first = 0 if start is not None else _roughest(heights, length)
     fine = half()[2 * first : 2 * (first + length) + 1]
     coarse = jnp.asarray(heights)[first : first + length + 1]
-    names = tuple(dict.fromkeys(m.channel for m in system.layout.metrics if m.statistic == "rms"))
+    names = tuple(dict.fromkeys(m.channel for m in system.layout.metrics if m.statistic.name == "rms"))
     if start is None:
         start = settled(system, coarse[0])
         if not np.all(np.isfinite(np.asarray(start))):  # no equilibrium, which the run will say

@@ -97,6 +97,9 @@ def minimise(
     'at its upper bound'
     """
     call = "minimise(metric, vehicle, road)"
+    if not isinstance(metric, str | Metric) and not callable(metric):
+        must = "be the name of a ride metric, a Metric, or a function of the metrics"
+        _checks.refuse("metric", must, _checks.described(metric), f"The call is `{call}`.")
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
     check_module("road", road, (AbstractRoad, WhiteRoad), call)
     if max_steps < 1:

@@ -75,12 +75,9 @@ def objective_of(
         limited: names of the metrics with limits.
 
     Raises:
-        ValueError: what is no objective; an unknown metric, one that this kind of road does not give, or one without a
+        ValueError: an unknown metric, one that this kind of road does not give, or one without a
             slope; a function that does not give one number.
     """
-    if not isinstance(wanted, str | Metric) and not callable(wanted):
-        must = "be the name of a ride metric, a Metric, or a function of the metrics"
-        _checks.refuse("metric", must, _checks.described(wanted), "The call is `minimise(metric, vehicle, road)`.")
     extra = vehicle.chosen_metrics(list(more), "metrics") if more else []
     extra += vehicle.chosen_metrics([wanted], "metric") if isinstance(wanted, Metric) else []
     known = {m.name: m for m in (*_given(vehicle, road, (*vehicle.ride_metrics, *extra)),)}

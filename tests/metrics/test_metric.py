@@ -60,9 +60,15 @@ def test_a_statistic_of_terms_is_one_of_the_record(rng):
 
 
 def test_a_statistic_has_terms_or_a_function_of_the_record():
-    for more in ({}, {"end": max}, {"terms": (Term(Reduction.SUM),)}, {"end": max, "of_record": max}):
-        with pytest.raises(ValueError, match="have terms and an end, or a function of the record"):
-            Statistic("none", **more)
+    terms = (Term(Reduction.SUM),)
+    for wrong in (
+        lambda: Statistic("none"),
+        lambda: Statistic("none", terms),
+        lambda: Statistic("none", of_terms=lambda terms, count, dt: terms[0]),
+        lambda: Statistic("none", terms, lambda terms, count, dt: terms[0], lambda record, dt: record[0]),
+    ):
+        with pytest.raises(ValueError, match="have terms and a function of them, or one of the record"):
+            wrong()
     with pytest.raises(ValueError, match="`share` must be 0 to 100 percent"):
         percentile(101)
     assert percentile(95) is percentile(95)  # one program for all

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxdamp import dampers, metrics, roads, simulate
+from jaxdamp import dampers, roads, simulate
 from jaxdamp.parameters import parameters, replace
 
 from .by_hand import CASES
@@ -19,7 +19,7 @@ STEPS, DT = 500, 1e-3
 
 def table(response):
     """All ride metrics but counts, which have no slope, and comfort, by name."""
-    names = [m.name for m in response.vehicle.ride_metrics if metrics.STATISTICS[m.statistic].differentiable]
+    names = [m.name for m in response.vehicle.ride_metrics if m.statistic.differentiable]
     comfort = {f"{name}/{k}": v for name, felt in response.comfort().items() for k, v in felt._asdict().items()}
     return response.metrics(names) | comfort
 
