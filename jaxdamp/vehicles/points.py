@@ -1,6 +1,6 @@
 """Points and angles of a vehicle as linear functions of its coordinates."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import equinox as eqx
@@ -45,6 +45,14 @@ class Point(eqx.Module):
 
     def __sub__(self, other: "Point") -> "Point":
         return self + -other
+
+    def of(self, values: Mapping[str, Any]) -> Any:
+        """Its value for values of the coordinates by name, such as a mode's.
+
+        >>> Point({"z_sprung": 1.0, "pitch": -1.0}).of({"z_sprung": 0.5, "pitch": 0.25})
+        0.25
+        """
+        return sum(coefficient * values[name] for name, coefficient in self.terms.items())
 
 
 def matrix(points: Sequence[Point], coordinates: Sequence[str]) -> Float[Array, "points coordinates"]:
