@@ -49,8 +49,8 @@ class Point(eqx.Module):
     def of(self, values: Mapping[str, Any]) -> Any:
         """Its value for values of the coordinates by name, such as a mode's.
 
-        >>> Point({"z_sprung": 1.0, "pitch": -1.2}).of({"z_sprung": 0.05, "pitch": 0.01})
-        0.038
+        >>> Point({"z_sprung": 1.0, "pitch": -1.0}).of({"z_sprung": 0.5, "pitch": 0.25})
+        0.25
         """
         return sum(coefficient * values[name] for name, coefficient in self.terms.items())
 
