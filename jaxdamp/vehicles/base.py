@@ -50,8 +50,7 @@ class AbstractVehicle(Module):
         leaves, structure = jax.tree.flatten(without_fitted_ranges(self))
         key = structure, tuple(leaf.shape if eqx.is_array(leaf) else leaf for leaf in leaves)
         if key not in _LAYOUTS:
-            frame = self.frame()
-            _LAYOUTS[key] = layout_of(frame, channels_of(frame))
+            eqx.filter_eval_shape(lambda vehicle: _remember_layout(key, vehicle), self)  # leaves no trace in a program
         return _LAYOUTS[key]
 
     def port_form(self) -> PortForm:
@@ -109,6 +108,11 @@ class AbstractVehicle(Module):
         """Largest distance between left and right wheels [m]; zero where a wheel stands for both sides."""
         offsets = jnp.stack([wheel.left for wheel in self.frame().wheels])
         return jnp.max(offsets) - jnp.min(offsets)
+
+
+def _remember_layout(key: Any, vehicle: AbstractVehicle) -> None:
+    frame = vehicle.frame()
+    _LAYOUTS[key] = layout_of(frame, channels_of(frame))
 
 
 @eqx.filter_jit

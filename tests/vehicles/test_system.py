@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers, simulate
+from jaxdamp.parameters import replace
 from jaxdamp.simulation import response
-from jaxdamp.vehicles import Body, ChannelKind, Frame, LumpedVehicle, QuarterCar, Suspension, Wheel
+from jaxdamp.vehicles import Body, ChannelKind, Frame, LumpedVehicle, QuarterCar, Suspension, Wheel, base
 
 from .fleet import bumps, tracks, vehicles
 
@@ -104,3 +105,14 @@ def test_a_suspension_of_a_vehicle_of_ones_own():
     ready = QuarterCar(600.0, 60.0, 45e3, 4e5, dampers.Linear(3e3))
     assert own.layout == ready.layout
     np.testing.assert_array_equal(own.system().outputs.motion, ready.system().outputs.motion)
+
+
+def test_asking_for_the_layout_leaves_no_trace_in_a_program(monkeypatch):
+    """A program is the same whether the layout is known already or not."""
+    monkeypatch.setattr(base, "_LAYOUTS", {})
+
+    def program() -> str:
+        return str(jax.make_jaxpr(lambda mass: mass * len(replace(CAR, {"sprung_mass": mass}).coordinates))(500.0))
+
+    assert program() == program()
+    assert base._LAYOUTS
