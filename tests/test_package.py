@@ -12,6 +12,7 @@ import jaxdamp
 def test_everything_public_is_listed_and_there() -> None:
     listed = dir(jaxdamp)
     assert {"bench", "identify", "tune", "sweep", "plots", "export", "__version__"} <= set(listed)
+    assert not {"Any", "TYPE_CHECKING", "import_module"} & set(listed)
     assert all(getattr(jaxdamp, name) is not None for name in jaxdamp.__all__)
 
 

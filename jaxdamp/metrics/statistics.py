@@ -8,7 +8,7 @@ import dataclasses
 import enum
 import functools
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias, final
+from typing import Any, NamedTuple, TypeAlias, final
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -63,10 +63,14 @@ class Reduction(enum.Enum):
 
 
 class Term(NamedTuple):
-    """A function of a sample y and of the first sample, and what is taken of its values."""
+    """A function of a sample y and of the first sample, and what is taken of its values.
+
+    The first sample is known to all terms of a statistic whose first term is `Term(Reduction.FIRST)`; to those of
+    others it is None, because a run does not save it for them.
+    """
 
     reduction: Reduction
-    value: Callable[[Samples, Scalar], Samples] = lambda y, first: y
+    value: Callable[[Samples, Any], Samples] = lambda y, first: y
 
 
 @final
@@ -79,7 +83,8 @@ class Statistic:
 
     Arguments:
         name: in names of metrics.
-        terms: sums and extremes over the samples. Where one is a function of the first sample, the first term is it.
+        terms: sums and extremes over the samples. Where one is a function of the first sample, the first term is
+            `Term(Reduction.FIRST)`, which saves it.
         of_terms: the statistic, from the terms, the number of samples and their interval [s].
         of_record: the statistic, from the whole record and its interval [s], in place of terms.
         unit: its unit, from that of the record.
@@ -119,12 +124,12 @@ class Statistic:
 
     def begin(self, y: Scalar) -> Gathered:
         """The terms of the first sample."""
-        return tuple(term.value(y, y) for term in self.terms)
+        return self._values(y, y)
 
     def add(self, gathered: Gathered, y: Scalar) -> Gathered:
         """The terms with one sample more."""
-        pairs = zip(self.terms, gathered, strict=True)
-        return tuple(term.reduction.join(before, term.value(y, gathered[0])) for term, before in pairs)
+        triples = zip(self.terms, gathered, self._values(y, *gathered[:1]), strict=True)
+        return tuple(term.reduction.join(before, value) for term, before, value in triples)
 
     def end(self, gathered: Gathered, count: int, dt: ScalarLike) -> Scalar:
         """The statistic of so many samples, dt [s] apart, from their terms."""
@@ -135,8 +140,19 @@ class Statistic:
         """The statistic of a whole record, samples dt [s] apart."""
         if self.of_record is not None:
             return self.of_record(record, dt)
-        gathered = tuple(term.reduction.of(term.value(record, record[0])) for term in self.terms)
-        return self.end(gathered, record.shape[0], dt)
+        pairs = zip(self.terms, self._values(record, record[0]), strict=True)
+        return self.end(tuple(term.reduction.of(values) for term, values in pairs), record.shape[0], dt)
+
+    def _values(self, y: Samples, first: Scalar | None = None) -> tuple[Samples, ...]:
+        """The functions of the terms; only a statistic that saves the first sample may take it."""
+        saved = first if self.terms[:1] == (Term(Reduction.FIRST),) else None
+        try:
+            return tuple(term.value(y, saved) for term in self.terms)
+        except TypeError:
+            if saved is None:
+                remedy = "A term of it is a function of the first sample, which no other term saves."
+                _checks.refuse("terms", "begin with `Term(Reduction.FIRST)`", repr(self.name), remedy)
+            raise
 
 
 _ON_THE_ROAD = -1.0 + 1e-9  # relative tyre load; rounding counts as lifted

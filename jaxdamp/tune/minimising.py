@@ -18,7 +18,7 @@ from jaxdamp.tune.objective import Function, objective_of
 from jaxdamp.tune.range_notes import range_notes
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import TuneResult, V
-from jaxdamp.tune.searching import Evaluator, Measured, active, search
+from jaxdamp.tune.searching import Evaluator, Measured, active, limits_of, search
 from jaxdamp.tune.step_notes import step_notes
 from jaxdamp.tune.wording import bound_notes, changes_of, early_end
 from jaxdamp.vehicles import AbstractVehicle
@@ -121,10 +121,11 @@ def minimise(
         _checks.refuse("vehicle", "have finite metrics to start from", f"{name} = {before[name]}", remedy)
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
-        ended = search(evaluator, space, name, limits, max_steps, progress)
+        scaled = limits_of(limits, before)
+        ended = search(evaluator, space, name, scaled, max_steps, progress)
     after, _ = evaluator.at(ended.values)
-    reached = active(limits, after, evaluator.tolerance)
-    missed = [name for name in reached if after[name] > limits[name] * (1 + evaluator.tolerance.limit)]
+    reached = active(scaled, after, evaluator.tolerance)
+    missed = [name for name in reached if scaled[name].margin(after[name]) < -evaluator.tolerance.limit]
     changes = changes_of(space, ended.values)
     if missed:
         status = Status.LIMIT_NOT_MET

@@ -23,6 +23,20 @@ class Tolerance(NamedTuple):
 
 
 DOUBLE, SINGLE = Tolerance(1e-4, 1e-6), Tolerance(1e-2, 1e-4)
+
+
+class Limit(NamedTuple):
+    """Largest allowed value of a metric, which may be negative or zero, and the size by which distances to it count."""
+
+    top: float
+    scale: float
+
+    def margin(self, value: float) -> float:
+        """Relative distance to the limit, negative beyond it."""
+        return (self.top - value) / self.scale
+
+
+Limits = Mapping[str, Limit]
 Measured = Callable[[AbstractVehicle], dict[str, Scalar]]
 Slopes = Mapping[str, np.ndarray]
 OUT_OF_STEPS = 9  # SLSQP's own code
@@ -76,7 +90,7 @@ def search(
     evaluator: Evaluator,
     space: SearchRange,
     metric: str,
-    limits: Mapping[str, float],
+    limits: Limits,
     max_steps: int,
     progress: Callable[[int, float], None],
 ) -> Ended:
@@ -117,28 +131,33 @@ def search(
     return ended
 
 
-def active(limits: Mapping[str, float], values: Mapping[str, float], tolerance: Tolerance) -> tuple[str, ...]:
+def active(limits: Limits, values: Mapping[str, float], tolerance: Tolerance) -> tuple[str, ...]:
     """The limits that a vehicle is at, or beyond."""
-    return tuple(name for name, top in limits.items() if values[name] > top * (1 - tolerance.limit))
+    return tuple(name for name, limit in limits.items() if limit.margin(values[name]) < tolerance.limit)
 
 
-def _constraints(evaluator: Evaluator, space: SearchRange, limits: Mapping[str, float]) -> list[dict]:
+def limits_of(tops: Mapping[str, float], start: Mapping[str, float]) -> dict[str, Limit]:
+    """The limits with their scales: their own size, or that of the metric at the start where a limit is zero."""
+    return {name: Limit(top, abs(top) or abs(start[name]) or 1.0) for name, top in tops.items()}
+
+
+def _constraints(evaluator: Evaluator, space: SearchRange, limits: Limits) -> list[dict]:
     """Metrics below their limits, and vectors that must increase in order."""
     unit = space.unit
     below = [
         {
             "type": "ineq",
-            "fun": lambda u, n=name, top=top: 1.0 - evaluator.at(u * unit)[0][n] / top,
-            "jac": lambda u, n=name, top=top: -evaluator.at(u * unit)[1][n] * unit / top,
+            "fun": lambda u, n=name, limit=limit: limit.margin(evaluator.at(u * unit)[0][n]),
+            "jac": lambda u, n=name, limit=limit: -evaluator.at(u * unit)[1][n] * unit / limit.scale,
         }
-        for name, top in limits.items()
+        for name, limit in limits.items()
     ]
     rows, gaps = space.coordinates.order()
     return below + [{"type": "ineq", "fun": lambda u: rows @ u - gaps, "jac": lambda u: rows}] * bool(gaps.size)
 
 
 def _slope_left(
-    evaluator: Evaluator, space: SearchRange, values: np.ndarray, metric: str, limits: Mapping[str, float]
+    evaluator: Evaluator, space: SearchRange, values: np.ndarray, metric: str, limits: Limits
 ) -> float:
     """Length of the scaled gradient that neither a bound nor an active limit holds back, relative to the metric."""
     found, slopes = evaluator.at(values)

@@ -59,6 +59,14 @@ def test_a_statistic_of_terms_is_one_of_the_record(rng):
     assert float(skew.of(record, 0.1)) == pytest.approx(expected)
 
 
+def test_only_a_statistic_that_saves_the_first_sample_has_it():
+    """Otherwise a run would take its first term for it, and differ from the whole record in silence."""
+    drift = Statistic("drift", (Term(Reduction.SUM, lambda y, first: y - first),), lambda terms, count, dt: terms[0])
+    for use in (lambda: drift.of(jnp.arange(3.0), 0.1), lambda: drift.begin(jnp.zeros(()))):
+        with pytest.raises(ValueError, match=r"begin with `Term\(Reduction.FIRST\)`"):
+            use()
+
+
 def test_a_statistic_has_terms_or_a_function_of_the_record():
     terms = (Term(Reduction.SUM),)
     for wrong in (

@@ -47,6 +47,19 @@ def test_a_metric_of_any_channel_is_minimised_and_limited():
     np.testing.assert_allclose(again.after[late.name], result.after[late.name], rtol=1e-9)
 
 
+@pytest.mark.parametrize("share", [0.9, 0.0])
+def test_limits_of_signed_metrics_hold(share):
+    """A negative metric below a negative limit, and a limit of zero, are as good as positive ones."""
+    highest, start = Metric("stroke", "maximum", window=(0.2, 0.22), name="highest"), -0.0404  # compressed all the time
+    result = tune.minimise(
+        "peak_damper_velocity", CAR, BUMP, metrics=[highest], limits={"highest": share * start}, duration=0.8
+    )
+    assert result.before["highest"] == pytest.approx(start, rel=1e-2)
+    assert result.after["peak_damper_velocity"] < 0.99 * result.before["peak_damper_velocity"]
+    assert result.after["highest"] < share * start + 1e-6 and result.status is tune.Status.CONVERGED
+    assert bool(result.active_limits) == (share > 0)
+
+
 def test_only_what_a_function_asks_for_is_computed():
     result = tune.minimise(lambda m: m["weighted_rms_sprung_acceleration"], CAR, WHITE, max_steps=1)
     assert result.metric == "objective" and "weighted_rms_sprung_acceleration" in result.after
