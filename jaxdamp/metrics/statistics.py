@@ -171,7 +171,7 @@ def _stress(deviation: Scalar) -> Scalar:
     return 1.0 + 6.0 * deviation**2 + 3.0 * deviation**4
 
 
-def _lifted(y: Samples, _: Scalar) -> Samples:
+def _lifted(y: Samples, _: Scalar | None) -> Samples:
     return jnp.where(jnp.isnan(y), y, (y <= _ON_THE_ROAD).astype(y.dtype))
 
 
