@@ -2,7 +2,6 @@
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import savgol_filter
 
 
 Samples = Float[np.ndarray, " time"]
@@ -76,8 +75,11 @@ def motion_amplitude(time: Samples, stroke: Samples) -> float:
     """Half the range of the stroke [m], zero to peak; noise faster than a twentieth of a period is smoothed."""
     window = round((len(time) - 1) / (time[-1] - time[0]) / dominant_frequency(time, stroke) / 20)
     window = min(window, len(stroke) - 1) // 2 * 2 + 1
-    smooth = np.asarray(savgol_filter(stroke, window, 4)) if window > 5 else stroke
-    return float(np.max(smooth) - np.min(smooth)) / 2
+    if window > 5:
+        from scipy.signal import savgol_filter  # takes a second to import, and not every record needs it
+
+        stroke = np.asarray(savgol_filter(stroke, window, 4))
+    return float(np.max(stroke) - np.min(stroke)) / 2
 
 
 def cycle_works(time: Samples, stroke: Samples, power: Samples) -> Float[np.ndarray, " cycles"]:

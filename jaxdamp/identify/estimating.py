@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import scipy.stats
+import scipy.special
 from jaxtyping import Bool, Float
 
 from jaxdamp.dampers import Reach
@@ -82,7 +82,7 @@ def _estimates(
 ) -> tuple[Estimate, ...]:
     free = problem.free
     lower, upper = free.limits()
-    reach = float(scipy.stats.t.ppf(0.975, max(samples - found.values.size, 1)))
+    reach = float(scipy.special.stdtrit(max(samples - found.values.size, 1), 0.975))  # quantile of Student's t
     rows = []
     for i, (name, p, tied) in enumerate(zip(free.names, free.owners, free.followers, strict=True)):
         value, error = float(found.values[i]), float(errors[i])

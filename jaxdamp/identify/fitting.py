@@ -4,9 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
-import scipy.optimize
 
 from jaxdamp import _checks
 from jaxdamp._status import Status
@@ -138,14 +136,16 @@ def _solve_linear(problem: Problem) -> Solution:
     residual, jacobian = (np.asarray(a) for a in linearised(free, free.values, problem.residuals))
     norms = np.linalg.norm(jacobian, axis=0)
     scale = np.where(norms > 0, norms, 1.0)
-    lower, upper = (np.asarray(coordinates.to_physical(jnp.asarray(y))) for y in coordinates.bounds())
+    lower, upper = (coordinates.to_physical(np.asarray(y)) for y in coordinates.bounds())
     target = jacobian @ begin - residual
     whole = triangle(np.concatenate([jacobian / scale, target[:, None]], axis=1))
     r, target = whole[: begin.size, : begin.size], whole[: begin.size, begin.size]
     values = np.linalg.lstsq(r, target, rcond=None)[0] / scale
     status = Status.CONVERGED
     if np.any((values < lower) | (values > upper)):
-        answer = scipy.optimize.lsq_linear(r, target, (lower * scale, upper * scale), method="bvls")
+        from scipy.optimize import lsq_linear  # few fits need it
+
+        answer = lsq_linear(r, target, (lower * scale, upper * scale), method="bvls")
         values = np.clip(answer.x / scale, lower, upper)
         status = Status.CONVERGED if answer.success else Status.STEP_LIMIT
     end = SearchEnd(values, residual + jacobian @ (values - begin), jacobian, status, 0)

@@ -64,7 +64,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
 
 def _fitted(problem: Problem, values: np.ndarray) -> tuple[AbstractDamper | list[AbstractDamper], AbstractDamper]:
     """The fitted law, of each record where they differ, and the one with the mean of what differs."""
-    covered, built = covered_range(problem.fitted_to), problem.free.build(jnp.asarray(values))
+    covered, built = covered_range(problem.fitted_to), problem.free.started_at(values).tree
     if not problem.per_record:
         law = with_fitted_range(built, covered)
         return law, law

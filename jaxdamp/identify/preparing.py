@@ -53,7 +53,8 @@ def prepare(
     _checks.finite("law", free.values)
     residuals, ranges = batches(begin, runs, sigma, samples_per_cycle, own)
     owner = owners(residuals, ranges)
-    level = float(np.sqrt(sum(np.sum(np.square(part.force * part.weight)) for part in residuals)))
+    weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
+    level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
     reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
     return Problem(free, residuals, level, runs, tuple(sigma), owner, reach, begin, own, weighting == "runs")
 

@@ -16,6 +16,7 @@ from jaxdamp.identify.search import SearchEnd, search
 
 
 STEPS = 15  # of each search; one cut short makes an error smaller, never larger
+TOLERANCE = 0.1  # standard errors that the last step of a search moves: 0.01 of chi-square
 MOST_STEPS = 250  # of all searches together, after which the linear errors stand for the numbers left
 CHI_SQUARE = 9.0  # increase up to which a moved parameter still fits: three standard errors
 GROWTH = 4.0  # of the distance, from one step to the next
@@ -59,7 +60,7 @@ def profile(
             moved = _moved(problem, end, i, found.values[i] + side * distance)
             if moved is None:
                 break
-            end = search(moved, STEPS, held=i)
+            end = search(moved, STEPS, held=i, tolerance=TOLERANCE)
             left -= end.steps
             rise = (end.squares - found.squares) / variance
             if not rise < CHI_SQUARE:

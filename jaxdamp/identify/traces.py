@@ -89,7 +89,7 @@ class _Row(NamedTuple):
 
 def is_memoryless(law: AbstractDamper) -> bool:
     """Whether the law has no states."""
-    return law.initial_state().size == 0
+    return jax.eval_shape(law.initial_state).size == 0
 
 
 def _round_up(count: int) -> int:
@@ -175,8 +175,8 @@ def _batch(rows: Sequence[_Row], fixed: Mapping[str, Sequence[float]], per_recor
     columns = [np.stack([_pad(row.signals[k], length) for row in rows]) for k in range(3)]
     weight = np.stack([_pad(row.weight, length, "constant") for row in rows])
     number = np.array([row.number for row in rows])
-    arrays = map(jnp.asarray, (np.array([row.dt for row in rows]), *columns, weight, number))
-    own = {path: jnp.asarray(np.array(values)[number], float) for path, values in fixed.items()}
+    arrays = map(_on_device, (np.array([row.dt for row in rows]), *columns, weight, number))
+    own = {path: _on_device(np.array(values, float)[number]) for path, values in fixed.items()}
     return Batch(*arrays, fixed=own, per_record=per_record, substeps=max(row.substeps for row in rows))
 
 
@@ -194,7 +194,12 @@ def _memoryless_batch(
     weight = np.repeat(np.sqrt(blocks) / np.asarray(sigma), counts)
     arrays = (np.ones(1), stroke, velocity, force, _pad(weight, length, "constant")[None], np.zeros(1, int))
     ranges = [SampleRange(0, 0, int(end) - n, int(end), b) for end, n, b in zip(ends, counts, blocks, strict=True)]
-    return (Batch(*map(jnp.asarray, arrays), fixed={}, per_record=(), substeps=1),), ranges
+    return (Batch(*map(_on_device, arrays), fixed={}, per_record=(), substeps=1),), ranges
+
+
+def _on_device(array: np.ndarray) -> Array:
+    """With a type stated, an array is copied; without one JAX compiles a program for that."""
+    return jnp.asarray(array, float if array.dtype.kind == "f" else int)
 
 
 def _stated(law: AbstractDamper, runs: Sequence[BenchRun]) -> dict[str, list[float]]:

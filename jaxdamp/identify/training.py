@@ -130,7 +130,7 @@ def train(
     level = float(np.sqrt(np.mean(np.concatenate([run.force for run in problem.fitted_to]) ** 2)))
     rule = _adam(learning_rate, steps) if optimiser is None else optimiser
 
-    raw = coordinates.start
+    raw = jnp.asarray(coordinates.start, problem.free.values.dtype)
     state = rule.init(raw)
     best, best_step, reached = raw, 0, float(_error(coordinates, raw, checked))
     if not np.isfinite(reached):

@@ -1,11 +1,12 @@
 """The coordinates in which searches move parameters: numbers of order one, with bounds and order constraints."""
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
 from jaxdamp.parameters._declaration import Parameter
@@ -15,6 +16,9 @@ from jaxdamp.parameters._free import FreeParameters
 OPEN_END = 1e-6  # distance, in coordinates, that is kept from an end that does not belong to a domain
 TOUCHING = 1e-4  # gap between ordered numbers, relative to the largest, that counts as none
 LEAST_GAP = 1e-6  # gap between ordered numbers that a search keeps, relative to the largest
+
+
+Vector = TypeVar("Vector", Float[Array, " free"], Float[np.ndarray, " free"])
 
 
 class Bounds(NamedTuple):
@@ -45,29 +49,29 @@ class Coordinates(eqx.Module):
     smooth: Literal["none", "ordered", "all"] = eqx.field(static=True)
 
     @property
-    def units(self) -> list[Array]:
+    def units(self) -> list[Any]:
         """The value of each parameter where its coordinate is one, if that is a quotient."""
         return [
-            jnp.full_like(p.value, p.domain.upper - p.domain.lower)
+            np.full(p.value.shape, p.domain.upper - p.domain.lower, p.value.dtype)
             if self.smooth != "none" and _has_range(p)
             else _magnitude(p.value)
             for p in self.free.chosen
         ]
 
-    def to_physical(self, y: Float[Array, " free"]) -> Float[Array, " free"]:
-        """Physical values of coordinates."""
+    def to_physical(self, y: Vector) -> Vector:
+        """Physical values of coordinates, NumPy's of NumPy's."""
         parts = zip(self.free.chosen, self.units, self.free.split(y), strict=True)
-        return _joined([p.domain.from_raw(a, _scale(p)) if self._is_smooth(p) else a * u for p, u, a in parts])
+        return _joined([p.domain.from_raw(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a * u for p, u, a in parts])
 
-    def from_physical(self, values: Float[Array, " free"]) -> Float[Array, " free"]:
-        """Coordinates of physical values."""
+    def from_physical(self, values: Vector) -> Vector:
+        """Coordinates of physical values, NumPy's of NumPy's."""
         parts = zip(self.free.chosen, self.units, self.free.split(values), strict=True)
-        return _joined([p.domain.to_raw(a, _scale(p)) if self._is_smooth(p) else a / u for p, u, a in parts])
+        return _joined([p.domain.to_raw(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a / u for p, u, a in parts])
 
     @property
-    def start(self) -> Float[Array, " free"]:
+    def start(self) -> Float[np.ndarray, " free"]:
         """Coordinates of the values to start from."""
-        return self.from_physical(self.free.values)
+        return np.asarray(self.from_physical(np.asarray(self.free.values)))
 
     def bounds(self) -> Bounds:
         """Limits of the coordinates; a small distance is kept from ends that do not belong to a domain."""
@@ -120,21 +124,28 @@ def _has_range(p: Parameter) -> bool:
     return not p.domain.ordered and bool(np.isfinite(p.domain.upper - p.domain.lower))
 
 
-def _magnitude(value: Array) -> Array:
-    """Typical magnitude of each number, never zero; small ones beside large ones count as larger than they are."""
-    magnitude = jnp.abs(jax.lax.stop_gradient(value))
-    largest = jnp.max(magnitude, initial=0.0)
-    floor = jnp.maximum(1e-3 * largest, jnp.finfo(value.dtype).tiny)
-    return jnp.where(magnitude > floor, magnitude, jnp.where(largest == 0, 1.0, largest))
+def _magnitude(value: Any) -> Any:
+    """Typical magnitude of each number, never zero; small ones beside large ones count as larger than they are.
+
+    Of numbers that JAX does not trace it is NumPy's, because each operation of JAX alone is a program to compile.
+    """
+    traced = isinstance(value, Tracer)
+    xp: Any = jnp if traced else np
+    magnitude = xp.abs(jax.lax.stop_gradient(value) if traced else np.asarray(value))
+    largest = xp.max(magnitude, initial=0.0)
+    floor = xp.maximum(1e-3 * largest, jnp.finfo(value.dtype).tiny)
+    return xp.where(magnitude > floor, magnitude, xp.where(largest == 0, 1.0, largest)).astype(value.dtype)
 
 
 def _scale(p: Parameter) -> Array:
     """The scale of the smooth map of a domain: the magnitude of the start, or of the steps of an ordered vector."""
-    return _magnitude(p.value if p.domain.steps is None else p.domain.steps(p.value))
+    scale = _magnitude(p.value if p.domain.steps is None else p.domain.steps(p.value))
+    return jnp.asarray(scale, scale.dtype)
 
 
-def _joined(pieces: list[Array]) -> Float[Array, " free"]:
-    return jnp.concatenate([jnp.ravel(piece) for piece in pieces])
+def _joined(pieces: list[Any]) -> Any:
+    xp: Any = np if all(isinstance(piece, np.ndarray | np.generic) for piece in pieces) else jnp
+    return xp.concatenate([xp.ravel(piece) for piece in pieces])
 
 
 def _met(p: Parameter, value: Float[np.ndarray, " _"]) -> Float[np.ndarray, " _"]:

@@ -25,6 +25,8 @@ def as_float(value: Any, name: str = "value") -> Array:
     if value is None or isinstance(value, str | bytes | type | eqx.Module):
         _checks.refuse(name, "be a number", _checks.described(value))
     try:
+        if isinstance(value, int | float | np.ndarray):
+            value = np.asarray(value)  # arrays of NumPy are copied; numbers would be converted by a compiled program
         return jnp.asarray(value, dtype=float)
     except (TypeError, ValueError) as error:
         if isinstance(value, list | tuple | dict | set | np.ndarray):

@@ -6,6 +6,7 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
@@ -51,7 +52,10 @@ class FreeParameters(eqx.Module):
     @property
     def values(self) -> Float[Array, " free"]:
         """The physical values as one vector."""
-        return jnp.concatenate([jnp.ravel(p.value) for p in self.chosen])
+        if any(isinstance(p.value, Tracer) for p in self.chosen):
+            return jnp.concatenate([jnp.ravel(p.value) for p in self.chosen])
+        values = np.concatenate([np.ravel(p.value) for p in self.chosen])  # an operation of JAX would be compiled
+        return jnp.asarray(values, values.dtype)
 
     def split(self, vector: Array | np.ndarray) -> list[Any]:
         """A vector of numbers cut into the shapes of the parameters."""

@@ -156,9 +156,7 @@ def _constraints(evaluator: Evaluator, space: SearchRange, limits: Limits) -> li
     return below + [{"type": "ineq", "fun": lambda u: rows @ u - gaps, "jac": lambda u: rows}] * bool(gaps.size)
 
 
-def _slope_left(
-    evaluator: Evaluator, space: SearchRange, values: np.ndarray, metric: str, limits: Limits
-) -> float:
+def _slope_left(evaluator: Evaluator, space: SearchRange, values: np.ndarray, metric: str, limits: Limits) -> float:
     """Length of the scaled gradient that neither a bound nor an active limit holds back, relative to the metric."""
     found, slopes = evaluator.at(values)
     unbound = np.array([not side for side in space.side(values)])
