@@ -1,8 +1,13 @@
 """`compare`: several laws on the same records, scored on records they were not fitted to."""
 
 import dataclasses
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
 
 from jaxdamp._progress import Progress
 from jaxdamp._tables import Table, with_unit
@@ -16,6 +21,9 @@ from jaxdamp.identify.verdict import verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+MOST_THREADS = 4  # fits side by side: more of them wait for Python's lock
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -167,21 +175,35 @@ def fit_each(
     progress: Callable[[str], None] = lambda name: None,
     **options: Any,
 ) -> Iterator[Rung | Failure]:
-    """The laws of a comparison one after the other, each as soon as it is fitted or has failed.
+    """The laws of a comparison in their order, each as soon as it and those before it are fitted or have failed.
+
+    Most of the time goes into compiling, so several laws are fitted side by side, each in a thread of its own.
 
     Arguments:
         laws: starts by name.
         runs: records to fit.
         held_out: records to score on, not fitted.
-        progress: called with each name before its fit.
+        progress: called with each name before its result is waited for.
         options: passed on to `fit`.
     """
-    for name, start in laws.items():
-        progress(name)
+    double = (
+        jnp.result_type(float) == jnp.float64
+    )  # a thread begins with the precision of the process, not that of its caller
+
+    def fitted(name: str, start: Start) -> Rung | Failure:
         try:
-            result = fit(start, runs, **options)
-            percent, rmse = result.score(held_out)[:2] if held_out else (None, None)
+            with jax.enable_x64(double):
+                result = fit(start, runs, **options)
+                percent, rmse = result.score(held_out)[:2] if held_out else (None, None)
         except NUMERICAL as error:
-            yield Failure(name, str(error))
-        else:
-            yield Rung(name, len(result.parameters), result.fit_percent, result.rmse, percent, rmse, result)
+            return Failure(name, str(error))
+        return Rung(name, len(result.parameters), result.fit_percent, result.rmse, percent, rmse, result)
+
+    pool = ThreadPoolExecutor(max_workers=min(os.cpu_count() or 1, MOST_THREADS))
+    try:
+        waiting = {name: pool.submit(fitted, name, start) for name, start in laws.items()}
+        for name, outcome in waiting.items():
+            progress(name)
+            yield outcome.result()
+    finally:
+        pool.shutdown(cancel_futures=True)

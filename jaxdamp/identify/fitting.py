@@ -10,6 +10,7 @@ from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.preparing import prepare
@@ -105,6 +106,7 @@ def fit(
     return judge(problem, solve(problem, starts=starts, max_steps=max_steps), force_noise=force_noise)
 
 
+@one_thread()
 def solve(problem: Problem, *, starts: int | None = None, max_steps: int = 200) -> Solution:
     """The second step of `fit`: minimise the sum of squares of a problem.
 

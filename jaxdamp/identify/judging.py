@@ -8,6 +8,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
 from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, takes_command, with_fitted_range
+from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.estimating import estimate, on_correlation
 from jaxdamp.identify.noise import noise_of
@@ -21,6 +22,7 @@ from jaxdamp.parameters import get, with_values
 _REMEDY = "Try another start, bounds, or fewer free parameters."
 
 
+@one_thread()
 def judge(problem: Problem, solution: Solution, *, force_noise: float | None = None) -> FitResult:
     """The third step of `fit`: what the minimum says, and how far it can be trusted.
 

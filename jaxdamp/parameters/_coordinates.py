@@ -61,12 +61,14 @@ class Coordinates(eqx.Module):
     def to_physical(self, y: Vector) -> Vector:
         """Physical values of coordinates, NumPy's of NumPy's."""
         parts = zip(self.free.chosen, self.units, self.free.split(y), strict=True)
-        return _joined([p.domain.from_raw(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a * u for p, u, a in parts])
+        maps = ((p.domain.from_raw, p, u, a) for p, u, a in parts)
+        return _joined([of(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a * u for of, p, u, a in maps])
 
     def from_physical(self, values: Vector) -> Vector:
         """Coordinates of physical values, NumPy's of NumPy's."""
         parts = zip(self.free.chosen, self.units, self.free.split(values), strict=True)
-        return _joined([p.domain.to_raw(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a / u for p, u, a in parts])
+        maps = ((p.domain.to_raw, p, u, a) for p, u, a in parts)
+        return _joined([of(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a / u for of, p, u, a in maps])
 
     @property
     def start(self) -> Float[np.ndarray, " free"]:

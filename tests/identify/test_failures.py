@@ -1,5 +1,6 @@
 """A law that cannot be fitted costs a comparison that law alone; a wrong call costs the whole of it."""
 
+import jax
 import numpy as np
 import pytest
 
@@ -35,6 +36,14 @@ def test_each_fit_is_there_as_soon_as_it_is_done(sines):
     fits = fit_each({"linear": Linear, "bilinear": Bilinear}, sines(TRUTH, noise=5.0), progress=seen.append)
     first = next(fits)
     assert isinstance(first, Rung) and first.name == "linear" and seen == ["linear"]
+
+
+def test_laws_side_by_side_have_the_precision_of_their_caller(sines):
+    runs = sines(TRUTH, noise=5.0)
+    with jax.enable_x64(False):
+        single = compare({"linear": Linear}, runs)["linear"]
+    assert single.law.rate.dtype == np.float32
+    assert compare({"linear": Linear}, runs)["linear"].law.rate.dtype == np.float64
 
 
 def test_a_comparison_without_any_fit_says_why(sines):
