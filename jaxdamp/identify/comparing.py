@@ -186,9 +186,8 @@ def fit_each(
         progress: called with each name before its result is waited for.
         options: passed on to `fit`.
     """
-    double = (
-        jnp.result_type(float) == jnp.float64
-    )  # a thread begins with the precision of the process, not that of its caller
+    # A thread begins with the precision of the process, not with that of its caller.
+    double = jnp.result_type(float) == jnp.float64
 
     def fitted(name: str, start: Start) -> Rung | Failure:
         try:
