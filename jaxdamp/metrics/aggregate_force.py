@@ -23,25 +23,25 @@ def aggregate_force(
     zero: a tyre does not pull. Only places that all axles pass within the record are returned. Differentiable in the
     loads (for n > 1 also at zero).
 
-    >>> loads = jnp.array([[1.0, 2.0, 3.0, 4.0], [10.0, 20.0, 30.0, 40.0]])
-    >>> aggregate_force(loads, [0.0, 0.02], 0.01, exponent=1)  # the second axle comes two samples later
-    Array([31., 42.], dtype=float64)
-
-    Args:
-        tyre_loads: Total tyre load, static part included [N], shape [axles, time].
-        delays: When each axle passes a place, after the first one [s], shape [axles]: distance/speed. Not negative,
+    Arguments:
+        tyre_loads: total tyre load, static part included [N], shape [axles, time].
+        delays: when each axle passes a place, after the first one [s], shape [axles]: distance/speed. Not negative,
             not traced, because the number of places depends on them.
-        dt: The sampling interval [s].
+        dt: the sampling interval [s].
         exponent: n [-], at least 1.
 
     Returns:
         A_k, shape [places].
 
     Raises:
-        ValueError: If shapes do not match, `dt` is not positive, a delay is negative or traced, the record is shorter
+        ValueError: if shapes do not match, `dt` is not positive, a delay is negative or traced, the record is shorter
             than the largest delay, or `exponent` is below 1.
 
     Source: Cole and Cebon's aggregate force; see Cebon, Vehicle System Dynamics 18 (1989) 107 (title verified only).
+
+    >>> loads = jnp.array([[1.0, 2.0, 3.0, 4.0], [10.0, 20.0, 30.0, 40.0]])
+    >>> aggregate_force(loads, [0.0, 0.02], 0.01, exponent=1)  # the second axle comes two samples later
+    Array([31., 42.], dtype=float64)
     """
     (loads,) = as_numbers(tyre_loads)
     if loads.ndim != 2:
@@ -83,19 +83,19 @@ def aggregate_force_percentile(
     `gaussian` it is mean + z standard deviation (z = 1.645 for 95 %), smooth in all places but right only as far as
     the places are normally distributed: fourth powers are skewed, and it comes out somewhat low for them.
 
+    Arguments:
+        aggregate: A_k from `aggregate_force` [N^n], shape [places].
+        percentile: between 0 and 100 [%].
+        gaussian: whether to take the smooth estimate.
+
+    Raises:
+        ValueError: if `aggregate` is empty or has more than one axis, or `percentile` is not between 0 and 100.
+
+    Source: Cole and Cebon take the 95th percentile (from memory, not verified).
+
     >>> places = jnp.arange(101.0)
     >>> round(float(aggregate_force_percentile(places)), 6)
     95.0
-
-    Args:
-        aggregate: A_k from `aggregate_force` [N^n], shape [places].
-        percentile: Between 0 and 100 [%].
-        gaussian: Whether to take the smooth estimate.
-
-    Raises:
-        ValueError: If `aggregate` is empty or has more than one axis, or `percentile` is not between 0 and 100.
-
-    Source: Cole and Cebon take the 95th percentile (from memory, not verified).
     """
     places = as_signal("aggregate", aggregate)
     level = _checks.concrete(percentile)

@@ -14,15 +14,15 @@ def rms(signal: SignalLike) -> Scalar:
 
     The gradient is x/(n rms); for a signal that is zero throughout, where the root has none, it is taken as zero.
 
+    Arguments:
+        signal: uniformly sampled values, shape [time], any unit.
+
+    Raises:
+        ValueError: if the signal is empty or has more than one axis.
+
     >>> import jax.numpy as jnp
     >>> round(float(rms(3.0 * jnp.sin(2.0 * jnp.pi * jnp.arange(100.0) / 100))), 6)  # 3/sqrt(2)
     2.12132
-
-    Args:
-        signal: Uniformly sampled values, shape [time], any unit.
-
-    Raises:
-        ValueError: If the signal is empty or has more than one axis.
     """
     return root(jnp.mean(as_signal("signal", signal) ** 2))
 
@@ -33,15 +33,15 @@ def peak(signal: SignalLike) -> Scalar:
     Only the sample that holds the peak has a gradient, of equal ones the first; it jumps where two samples compete.
     Tune on `smooth_peak` instead.
 
+    Arguments:
+        signal: uniformly sampled values, shape [time], any unit.
+
+    Raises:
+        ValueError: if the signal is empty or has more than one axis.
+
     >>> import jax.numpy as jnp
     >>> round(float(peak(jnp.array([0.2, -1.5, 1.0]))), 6)
     1.5
-
-    Args:
-        signal: Uniformly sampled values, shape [time], any unit.
-
-    Raises:
-        ValueError: If the signal is empty or has more than one axis.
     """
     return largest(jnp.abs(as_signal("signal", signal)))
 
@@ -54,17 +54,17 @@ def smooth_peak(signal: SignalLike, order: ScalarLike | int = 16) -> Scalar:
     Gaussian record gives 2.48 standard deviations, its peak some 4. It is computed relative to the largest sample, so
     nothing overflows. The gradient for a signal that is zero throughout is zero.
 
+    Arguments:
+        signal: uniformly sampled values, shape [time], any unit.
+        order: the power p, at least 2; 8 to 16 for tuning.
+
+    Raises:
+        ValueError: if the signal is empty or has more than one axis, or `order` is not finite or below 2.
+
     >>> import jax.numpy as jnp
     >>> x = jnp.sin(2.0 * jnp.pi * jnp.arange(100.0) / 100)
     >>> [round(float(smooth_peak(x, p)), 4) for p in (2, 8, 16, 64)]
     [0.7071, 0.8504, 0.9033, 0.9646]
-
-    Args:
-        signal: Uniformly sampled values, shape [time], any unit.
-        order: The power p, at least 2; 8 to 16 for tuning.
-
-    Raises:
-        ValueError: If the signal is empty or has more than one axis, or `order` is not finite or below 2.
     """
     x = as_signal("signal", signal)
     _checks.finite("order", order)
@@ -86,14 +86,14 @@ def crest_factor(signal: SignalLike) -> Scalar:
     ISO 2631-1 asks for more than the weighted RMS when that of the weighted acceleration exceeds 9. The gradient is
     that of `peak` and `rms`. A signal that is zero throughout has no crest factor: the result is NaN.
 
+    Arguments:
+        signal: uniformly sampled values, shape [time], any unit.
+
+    Raises:
+        ValueError: if the signal is empty or has more than one axis.
+
     >>> import jax.numpy as jnp
     >>> round(float(crest_factor(jnp.sin(2.0 * jnp.pi * jnp.arange(100.0) / 100))), 6)
     1.414214
-
-    Args:
-        signal: Uniformly sampled values, shape [time], any unit.
-
-    Raises:
-        ValueError: If the signal is empty or has more than one axis.
     """
     return peak(signal) / rms(signal)

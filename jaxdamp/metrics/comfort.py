@@ -63,22 +63,22 @@ def vibration_total_value(values: Mapping[str, ScalarLike], purpose: str = "comf
     feet; for health 1.4, 1.4, 1 on the seat. Axes that are not given count as zero. For health, ISO 2631-1 looks at
     the worst axis, and at this sum where axes are comparable. Differentiable; zero at zero, with zero gradient.
 
-    >>> round(float(vibration_total_value({"seat_x": 0.2, "seat_z": 0.5, "floor_z": 0.6})), 4)
-    0.5896
-    >>> round(float(vibration_total_value({"seat_x": 0.2, "seat_z": 0.5}, "health")), 4)
-    0.5731
-
-    Args:
-        values: Weighted RMS acceleration by axis [m/s^2] ([rad/s^2] for rotations), each with the weighting of
+    Arguments:
+        values: weighted RMS acceleration by axis [m/s^2] ([rad/s^2] for rotations), each with the weighting of
             `metrics.AXES[purpose]`: Wk for seat z and the floor, Wd for seat x and y and for back y and z, Wc for
             back x, We for rotations.
         purpose: "comfort" or "health".
 
     Raises:
-        ValueError: If an axis or the purpose is unknown, or if there is no axis.
+        ValueError: if an axis or the purpose is unknown, or if there is no axis.
 
     Source: ISO 2631-1. Its factors for seat, back and floor are confirmed by one public implementation; those for
     rotations and health are quoted from memory and not verified.
+
+    >>> round(float(vibration_total_value({"seat_x": 0.2, "seat_z": 0.5, "floor_z": 0.6})), 4)
+    0.5896
+    >>> round(float(vibration_total_value({"seat_x": 0.2, "seat_z": 0.5}, "health")), 4)
+    0.5731
     """
     _check_axes("values", values, purpose)
     parts = as_numbers(*values.values())
@@ -92,22 +92,22 @@ def total_vibration(
 ) -> Scalar:
     """Vibration total value of records: each weighted as its axis asks, then added as `vibration_total_value` [m/s^2].
 
-    >>> import jax.numpy as jnp
-    >>> a = jnp.sin(2.0 * jnp.pi * 5.0 * jnp.arange(8000.0) * 0.0025)
-    >>> round(float(total_vibration({"seat_z": a, "floor_z": 1.2 * a, "seat_pitch": 0.5 * a}, 0.0025)), 3)
-    0.814
-
-    Args:
-        accelerations: Records by axis, shape [time] each [m/s^2] ([rad/s^2] for rotations); axes see
+    Arguments:
+        accelerations: records by axis, shape [time] each [m/s^2] ([rad/s^2] for rotations); axes see
             `metrics.AXES[purpose]`.
-        dt: The sampling interval [s].
+        dt: the sampling interval [s].
         purpose: "comfort" or "health".
         method: "spectrum" or "step"; see `weighted_signal`.
 
     Raises:
-        ValueError: If an axis or the purpose is unknown, if there is no axis, or as `weighted_signal`.
+        ValueError: if an axis or the purpose is unknown, if there is no axis, or as `weighted_signal`.
 
     Source: see `vibration_total_value`.
+
+    >>> import jax.numpy as jnp
+    >>> a = jnp.sin(2.0 * jnp.pi * 5.0 * jnp.arange(8000.0) * 0.0025)
+    >>> round(float(total_vibration({"seat_z": a, "floor_z": 1.2 * a, "seat_pitch": 0.5 * a}, 0.0025)), 3)
+    0.814
     """
     _check_axes("accelerations", accelerations, purpose)
     values = {
@@ -124,16 +124,16 @@ def comfort_reaction(total_value: ScalarLike) -> tuple[str, ...]:
     2.5 very, from 2 extremely uncomfortable. The ranges overlap on purpose, each holds its lower end, and all that
     apply are returned. They are no limits of the standard. Words have no gradient and do not compile.
 
-    >>> comfort_reaction(0.55)
-    ('a little uncomfortable', 'fairly uncomfortable')
-
-    Args:
-        total_value: Weighted RMS or vibration total value [m/s^2].
+    Arguments:
+        total_value: weighted RMS or vibration total value [m/s^2].
 
     Raises:
-        ValueError: If it is negative, not finite, or traced.
+        ValueError: if it is negative, not finite, or traced.
 
     Source: ISO 2631-1, comfort annex; the numbers are quoted from memory and not verified.
+
+    >>> comfort_reaction(0.55)
+    ('a little uncomfortable', 'fairly uncomfortable')
     """
     known = _checks.concrete(total_value)
     if known is None:

@@ -25,20 +25,20 @@ def settling_time(
     the record ends outside the band, 0 if it is at rest throughout. The gradient is that of the last crossing alone;
     the value jumps where a half-wave slips in or out of the band. Tune on `smooth_settling_time` instead.
 
+    Arguments:
+        signal: the motion after a kick or step, shape [time], any unit.
+        dt: the sampling interval [s].
+        band: part of the largest deviation [-]: 0.05 or 0.02 are usual.
+        final: where the motion comes to rest, in the unit of the signal.
+
+    Raises:
+        ValueError: if there are fewer than two samples, `dt` is not positive, `band` is not between 0 and 1, or
+            `final` is not finite.
+
     >>> time = jnp.arange(5000.0) * 0.001
     >>> decay = jnp.exp(-2.0 * time)
     >>> round(float(settling_time(decay, 0.001)), 4)  # ln(20)/2
     1.4979
-
-    Args:
-        signal: The motion after a kick or step, shape [time], any unit.
-        dt: The sampling interval [s].
-        band: Part of the largest deviation [-]: 0.05 or 0.02 are usual.
-        final: Where the motion comes to rest, in the unit of the signal.
-
-    Raises:
-        ValueError: If there are fewer than two samples, `dt` is not positive, `band` is not between 0 and 1, or
-            `final` is not finite.
     """
     x = as_signal("signal", signal, least=2)
     check_interval(dt)
@@ -71,19 +71,19 @@ def smooth_settling_time(
     exp(-s t), and for an oscillation with that envelope up to a term of the order of (damping ratio)^2. The record
     must hold the whole decay, or it comes out short. Differentiable in everything; NaN for a signal at rest.
 
+    Arguments:
+        signal: the motion after a kick or step, shape [time], any unit, from the kick on.
+        dt: the sampling interval [s].
+        band: part of the envelope's start [-]: 0.05 or 0.02 are usual.
+        final: where the motion comes to rest, in the unit of the signal.
+
+    Raises:
+        ValueError: as `settling_time`.
+
     >>> time = jnp.arange(10000.0) * 0.001
     >>> swing = jnp.exp(-2.0 * time) * jnp.cos(2.0 * jnp.pi * 5.0 * time)
     >>> round(float(smooth_settling_time(swing, 0.001)), 2)  # ln(20)/2 = 1.50
     1.49
-
-    Args:
-        signal: The motion after a kick or step, shape [time], any unit, from the kick on.
-        dt: The sampling interval [s].
-        band: Part of the envelope's start [-]: 0.05 or 0.02 are usual.
-        final: Where the motion comes to rest, in the unit of the signal.
-
-    Raises:
-        ValueError: As `settling_time`.
     """
     x = as_signal("signal", signal, least=2)
     check_interval(dt)
@@ -103,18 +103,18 @@ def logarithmic_decrement(signal: SignalLike, *, final: ScalarLike | int = 0.0, 
     lows share the line, so an asymmetric damper gives the mean of its two directions. NaN with fewer than two turning
     points. Differentiable, but it jumps where a turning point enters or leaves.
 
+    Arguments:
+        signal: the free motion, shape [time], any unit; one mode, smooth enough that noise makes no turning points.
+        final: where the motion comes to rest, in the unit of the signal.
+        threshold: turning points below this part of the largest are left out [-].
+
+    Raises:
+        ValueError: if there are fewer than five samples, `final` is not finite, or `threshold` is not in [0, 1).
+
     >>> time = jnp.arange(4000.0) * 0.001
     >>> decay = jnp.exp(-0.8 * time) * jnp.cos(2.0 * jnp.pi * 2.0 * time)
     >>> round(float(logarithmic_decrement(decay)), 4)  # 0.8 * 0.5
     0.4
-
-    Args:
-        signal: The free motion, shape [time], any unit; one mode, smooth enough that noise makes no turning points.
-        final: Where the motion comes to rest, in the unit of the signal.
-        threshold: Turning points below this part of the largest are left out [-].
-
-    Raises:
-        ValueError: If there are fewer than five samples, `final` is not finite, or `threshold` is not in [0, 1).
     """
     x = as_signal("signal", signal, least=5)
     _checks.finite("final", final)
@@ -149,14 +149,14 @@ def damping_ratio(decrement: ScalarLike | int) -> Scalar:
 
     The inverse of delta = 2 pi zeta/sqrt(1 - zeta^2). Differentiable.
 
-    >>> round(float(damping_ratio(0.4)), 5)
-    0.06353
-
-    Args:
-        decrement: Logarithmic decrement per full cycle [-].
+    Arguments:
+        decrement: logarithmic decrement per full cycle [-].
 
     Raises:
-        ValueError: If `decrement` is not finite.
+        ValueError: if `decrement` is not finite.
+
+    >>> round(float(damping_ratio(0.4)), 5)
+    0.06353
     """
     _checks.finite("decrement", decrement, "A decay without two turning points has no decrement.")
     (delta,) = as_numbers(decrement)

@@ -19,19 +19,19 @@ def dissipated_energy(force: SignalLike, velocity: SignalLike, dt: ScalarLike | 
     and velocity in extension are positive. For one or more whole cycles of a steady motion it is the area of the
     force-stroke loops; elastic parts of the force then cancel. Differentiable.
 
+    Arguments:
+        force: damper force [N], shape [time].
+        velocity: damper velocity [m/s], shape [time].
+        dt: the sampling interval [s].
+
+    Raises:
+        ValueError: if the lengths differ, if there are fewer than two samples, or if `dt` is not positive.
+
     >>> import jax.numpy as jnp
     >>> time = jnp.linspace(0.0, 1.0, 1001)
     >>> v = 0.5 * jnp.cos(2.0 * jnp.pi * time)
     >>> round(float(dissipated_energy(2000.0 * v, v, 0.001)), 6)  # c V^2 T/2
     250.0
-
-    Args:
-        force: Damper force [N], shape [time].
-        velocity: Damper velocity [m/s], shape [time].
-        dt: The sampling interval [s].
-
-    Raises:
-        ValueError: If the lengths differ, if there are fewer than two samples, or if `dt` is not positive.
     """
     force, velocity = as_signal("force", force, least=2), as_signal("velocity", velocity, least=2)
     same_length("force", force, "velocity", velocity)
@@ -44,17 +44,17 @@ def dissipated_power(force: SignalLike, velocity: SignalLike) -> Scalar:
 
     As in `dissipated_energy`, elastic parts cancel over whole cycles or a long record. Differentiable.
 
+    Arguments:
+        force: damper force [N], shape [time]; positive resists extension.
+        velocity: damper velocity [m/s], shape [time]; positive in extension.
+
+    Raises:
+        ValueError: if the lengths differ, or if there are fewer than two samples.
+
     >>> import jax.numpy as jnp
     >>> v = 0.5 * jnp.cos(2.0 * jnp.pi * jnp.linspace(0.0, 1.0, 1001))
     >>> round(float(dissipated_power(2000.0 * v, v)), 6)  # c V^2/2
     250.0
-
-    Args:
-        force: Damper force [N], shape [time]; positive resists extension.
-        velocity: Damper velocity [m/s], shape [time]; positive in extension.
-
-    Raises:
-        ValueError: If the lengths differ, or if there are fewer than two samples.
     """
     energy = dissipated_energy(force, velocity, 1.0)
     return energy / (np.size(force) - 1)
@@ -67,18 +67,18 @@ def equivalent_damping(force: SignalLike, velocity: SignalLike) -> Scalar:
     energy of one cycle; it holds for any other motion as well. The record should span whole cycles, or be long, so
     that elastic and gas forces cancel. Differentiable; NaN if the damper does not move.
 
+    Arguments:
+        force: damper force [N], shape [time]; positive resists extension.
+        velocity: damper velocity [m/s], shape [time]; positive in extension.
+
+    Raises:
+        ValueError: if the lengths differ, or if there are fewer than two samples.
+
     >>> import jax.numpy as jnp
     >>> time = jnp.linspace(0.0, 1.0, 1001)
     >>> v = 0.5 * jnp.cos(2.0 * jnp.pi * time)
     >>> round(float(equivalent_damping(1000.0 * v**3, v)), 4)  # 3/4 of 1000 V^2
     187.5
-
-    Args:
-        force: Damper force [N], shape [time]; positive resists extension.
-        velocity: Damper velocity [m/s], shape [time]; positive in extension.
-
-    Raises:
-        ValueError: If the lengths differ, or if there are fewer than two samples.
     """
     force, velocity = as_signal("force", force, least=2), as_signal("velocity", velocity, least=2)
     same_length("force", force, "velocity", velocity)

@@ -14,20 +14,20 @@ def vibration_dose_value(acceleration: SignalLike, dt: ScalarLike | int, weighti
 
     Doses of several records add as fourth powers. Differentiable; the gradient for a record of zeros is zero.
 
+    Arguments:
+        acceleration: acceleration [m/s^2], shape [time].
+        dt: the sampling interval [s].
+        weighting: "Wk" and so on (see `weighting_response`), or None for a record that is weighted already.
+
+    Raises:
+        ValueError: as `weighted_signal`.
+
+    Source: ISO 2631-1, fourth power vibration dose method; BS 6841.
+
     >>> import jax.numpy as jnp
     >>> a = jnp.sin(2.0 * jnp.pi * jnp.arange(1600.0) / 100)
     >>> round(float(vibration_dose_value(a, 0.01, None)), 4)  # (16 s * 3/8)^(1/4)
     1.5651
-
-    Args:
-        acceleration: Acceleration [m/s^2], shape [time].
-        dt: The sampling interval [s].
-        weighting: "Wk" and so on (see `weighting_response`), or None for a record that is weighted already.
-
-    Raises:
-        ValueError: As `weighted_signal`.
-
-    Source: ISO 2631-1, fourth power vibration dose method; BS 6841.
     """
     signal = as_weighted(acceleration, dt, weighting)
     square = signal * signal
@@ -40,17 +40,17 @@ def estimated_vibration_dose_value(weighted_rms: ScalarLike, duration: ScalarLik
     For motion with a crest factor below about 6, without shocks; of a Gaussian record the true factor is
     3^(1/4) = 1.316, of a sine 1.107. Differentiable for a positive duration.
 
-    >>> round(float(estimated_vibration_dose_value(0.5, 3600.0)), 3)  # an hour at 0.5 m/s^2
-    5.422
-
-    Args:
-        weighted_rms: Weighted RMS acceleration [m/s^2], not negative.
-        duration: Duration of exposure [s].
+    Arguments:
+        weighted_rms: weighted RMS acceleration [m/s^2], not negative.
+        duration: duration of exposure [s].
 
     Raises:
-        ValueError: If `weighted_rms` is negative, if `duration` is not positive, or if either is not finite.
+        ValueError: if `weighted_rms` is negative, if `duration` is not positive, or if either is not finite.
 
     Source: BS 6841. The range of crest factors is quoted from memory and not verified.
+
+    >>> round(float(estimated_vibration_dose_value(0.5, 3600.0)), 3)  # an hour at 0.5 m/s^2
+    5.422
     """
     _checks.nonnegative("weighted_rms", weighted_rms, "It is the result of `weighted_rms` in m/s^2.")
     _checks.positive("duration", duration, "It is the duration of exposure in s.")
@@ -64,21 +64,21 @@ def motion_sickness_dose(acceleration: SignalLike, dt: ScalarLike | int, weighti
     It needs records of many minutes with content down to 0.1 Hz; take the vertical acceleration. Squares of the doses
     of several records add. Differentiable; the gradient for a record of zeros is zero.
 
+    Arguments:
+        acceleration: vertical acceleration [m/s^2], shape [time].
+        dt: the sampling interval [s].
+        weighting: "Wf", or None for a record that is weighted already.
+
+    Raises:
+        ValueError: as `weighted_signal`.
+
+    Source: ISO 2631-1, motion sickness.
+
     >>> import jax.numpy as jnp
     >>> a = 0.5 * jnp.sin(2.0 * jnp.pi * 0.2 * jnp.arange(12000.0) * 0.1)  # 20 minutes at 0.2 Hz
     >>> dose = motion_sickness_dose(a, 0.1)
     >>> round(float(dose), 1), round(float(motion_sickness_percentage(dose)), 1)
     (12.1, 4.0)
-
-    Args:
-        acceleration: Vertical acceleration [m/s^2], shape [time].
-        dt: The sampling interval [s].
-        weighting: "Wf", or None for a record that is weighted already.
-
-    Raises:
-        ValueError: As `weighted_signal`.
-
-    Source: ISO 2631-1, motion sickness.
     """
     signal = as_weighted(acceleration, dt, weighting)
     return root(jnp.sum(signal * signal) * jnp.asarray(dt, signal.dtype))
@@ -90,17 +90,17 @@ def motion_sickness_percentage(dose: ScalarLike, factor: ScalarLike = 1.0 / 3.0)
     For adults not used to the motion, exposed for about 20 minutes to 6 hours, and up to about 70 % (this range is
     quoted from memory and not verified). Differentiable below 100 %.
 
-    >>> round(float(motion_sickness_percentage(30.0)), 6)
-    10.0
-
-    Args:
+    Arguments:
         dose: `motion_sickness_dose` [m/s^1.5], not negative.
         factor: K_m [% s^1.5/m]: 1/3 for a mixed population of men and women.
 
     Raises:
-        ValueError: If either is negative or not finite.
+        ValueError: if either is negative or not finite.
 
     Source: ISO 2631-1, motion sickness, informative annex.
+
+    >>> round(float(motion_sickness_percentage(30.0)), 6)
+    10.0
     """
     _checks.nonnegative("dose", dose, "It is the result of `motion_sickness_dose` in m/s^1.5.")
     _checks.nonnegative("factor", factor)

@@ -42,20 +42,20 @@ def shock_ratios(acceleration: SignalLike, dt: ScalarLike | int, weighting: str 
     1.414, 1 and 1.107; Gaussian vibration about 4, little above 1 and 1.316. The gradient is that of `peak` and
     `max_transient_value`, at one sample or window each; VDV/(a_w T^(1/4)) is smooth. NaN for a record of zeros.
 
+    Arguments:
+        acceleration: acceleration [m/s^2], shape [time], at least 1 s.
+        dt: the sampling interval [s].
+        weighting: "Wk" and so on (see `weighting_response`), or None for a record that is weighted already.
+
+    Raises:
+        ValueError: as `weighted_signal` and `running_rms`.
+
+    Source: ISO 2631-1, applicability of the basic evaluation and additional methods.
+
     >>> import jax.numpy as jnp
     >>> ratios = shock_ratios(jnp.sin(2.0 * jnp.pi * jnp.arange(1600.0) / 100), 0.01, None)
     >>> [round(float(ratio), 3) for ratio in ratios]
     [1.414, 1.0, 1.107]
-
-    Args:
-        acceleration: Acceleration [m/s^2], shape [time], at least 1 s.
-        dt: The sampling interval [s].
-        weighting: "Wk" and so on (see `weighting_response`), or None for a record that is weighted already.
-
-    Raises:
-        ValueError: As `weighted_signal` and `running_rms`.
-
-    Source: ISO 2631-1, applicability of the basic evaluation and additional methods.
     """
     signal = as_weighted(acceleration, dt, weighting)
     size = rms(signal)
@@ -71,6 +71,16 @@ def evaluation_method(acceleration: SignalLike, dt: ScalarLike | int, weighting:
     The weighted RMS is enough unless the crest factor exceeds 9, MTVV/a_w exceeds 1.5 or VDV/(a_w T^(1/4)) exceeds
     1.75; then MTVV or VDV is to be given as well. Words have no gradient and do not compile: use `shock_ratios` there.
 
+    Arguments:
+        acceleration: acceleration [m/s^2], shape [time], at least 1 s.
+        dt: the sampling interval [s].
+        weighting: "Wk" and so on (see `weighting_response`), or None for a record that is weighted already.
+
+    Raises:
+        ValueError: as `shock_ratios`; if the record is zero, holds NaN, or is traced.
+
+    Source: ISO 2631-1, applicability of the basic evaluation and additional methods.
+
     >>> import jax.numpy as jnp
     >>> time = jnp.arange(20000.0) * 0.001
     >>> smooth = evaluation_method(jnp.sin(2.0 * jnp.pi * 6.0 * time), 0.001, "Wk")
@@ -79,16 +89,6 @@ def evaluation_method(acceleration: SignalLike, dt: ScalarLike | int, weighting:
     >>> kick = jnp.exp(-2.0 * time) * jnp.sin(2.0 * jnp.pi * 6.0 * time)
     >>> evaluation_method(kick[:8000], 0.001, "Wk").method
     'weighted RMS and MTVV or VDV: MTVV/a_w exceeds 1.5, VDV/(a_w T^0.25) exceeds 1.75'
-
-    Args:
-        acceleration: Acceleration [m/s^2], shape [time], at least 1 s.
-        dt: The sampling interval [s].
-        weighting: "Wk" and so on (see `weighting_response`), or None for a record that is weighted already.
-
-    Raises:
-        ValueError: As `shock_ratios`; if the record is zero, holds NaN, or is traced.
-
-    Source: ISO 2631-1, applicability of the basic evaluation and additional methods.
     """
     ratios = shock_ratios(acceleration, dt, weighting)
     if any(_checks.concrete(ratio) is None for ratio in ratios):

@@ -21,17 +21,17 @@ def spectral_moments(
     peaks. High moments hang on the upper end of the spectrum: cut it where the load ends and noise begins.
     Differentiable in the density.
 
+    Arguments:
+        frequency: frequencies [Hz], increasing, shape [frequencies]; as from `power_spectral_density`.
+        density: power spectral density at each [unit^2/Hz], not negative.
+        orders: the orders n, not negative.
+
+    Raises:
+        ValueError: if the lengths differ, if there are fewer than two frequencies, or if an order is negative.
+
     >>> f = jnp.linspace(0.0, 10.0, 1001)
     >>> spectral_moments(f, jnp.where(f >= 0.0, 2.0, 0.0)).round(1)  # flat: 2 * 10^(n+1)/(n+1)
     Array([   20. ,   100. ,   666.7, 40000.1], dtype=float64)
-
-    Args:
-        frequency: Frequencies [Hz], increasing, shape [frequencies]; as from `power_spectral_density`.
-        density: Power spectral density at each [unit^2/Hz], not negative.
-        orders: The orders n, not negative.
-
-    Raises:
-        ValueError: If the lengths differ, if there are fewer than two frequencies, or if an order is negative.
     """
     f, g = as_signal("frequency", frequency, least=2), as_signal("density", density, least=2)
     same_length("frequency", f, "density", g)
@@ -59,23 +59,23 @@ def spectral_damage(
     digits (irregularity factor within 1e-4 of one) the narrow-band value stands in. Differentiable in density and
     exponent; NaN for a spectrum of zeros.
 
+    Arguments:
+        frequency: frequencies [Hz], increasing, shape [frequencies]; as from `power_spectral_density`.
+        density: power spectral density of the load at each [unit^2/Hz].
+        exponent: k, the slope of the Woehler line [-], positive: 3 for welds to 8 or more for plain parts.
+        method: "dirlik" or "narrow-band".
+
+    Raises:
+        ValueError: if the lengths differ, there are fewer than two frequencies, `exponent` is not positive, or
+            `method` is unknown.
+
+    Source: Dirlik, thesis, University of Warwick 1985, as in public implementations.
+
     >>> f = jnp.linspace(0.0, 20.0, 2001)  # a flat spectrum: as wide a band as can be
     >>> g = jnp.where(f >= 0.0, 1.0, 0.0)
     >>> ratio = spectral_damage(f, g, 4) / spectral_damage(f, g, 4, method="narrow-band")
     >>> round(float(ratio), 2)
     0.76
-
-    Args:
-        frequency: Frequencies [Hz], increasing, shape [frequencies]; as from `power_spectral_density`.
-        density: Power spectral density of the load at each [unit^2/Hz].
-        exponent: k, the slope of the Woehler line [-], positive: 3 for welds to 8 or more for plain parts.
-        method: "dirlik" or "narrow-band".
-
-    Raises:
-        ValueError: If the lengths differ, there are fewer than two frequencies, `exponent` is not positive, or
-            `method` is unknown.
-
-    Source: Dirlik, thesis, University of Warwick 1985, as in public implementations.
     """
     _checks.positive("exponent", exponent, "It is the slope k of the line N S^k = K.")
     _checks.one_of("method", method, ["dirlik", "narrow-band"])

@@ -21,18 +21,18 @@ def temperature_rise(
     The solution of C T' = P - hA (T - T_ambient). It tends to P/hA; without cooling it is start + P t/C. One mass at
     one temperature: the oil is hotter than the tube at first. Differentiable in everything, also at cooling 0.
 
-    >>> [round(float(temperature_rise(90.0, t, 1200.0, 1.5)), 2) for t in (60.0, 800.0, 1e5)]  # tau = 800 s
-    [4.34, 37.93, 60.0]
-
-    Args:
-        power: Mean dissipated power P [W]; see `dissipated_power`.
-        time: Time since the start [s], any shape, not negative.
+    Arguments:
+        power: mean dissipated power P [W]; see `dissipated_power`.
+        time: time since the start [s], any shape, not negative.
         heat_capacity: C, that of oil and metal together [J/K].
         cooling: hA, heat transfer coefficient times surface [W/K].
-        start: Temperature above ambient at time 0 [K].
+        start: temperature above ambient at time 0 [K].
 
     Raises:
-        ValueError: If `heat_capacity` is not positive, if `time` or `cooling` is negative, or anything is not finite.
+        ValueError: if `heat_capacity` is not positive, if `time` or `cooling` is negative, or anything is not finite.
+
+    >>> [round(float(temperature_rise(90.0, t, 1200.0, 1.5)), 2) for t in (60.0, 800.0, 1e5)]  # tau = 800 s
+    [4.34, 37.93, 60.0]
     """
     _checks.finite("power", power)
     _checks.nonnegative("time", time)
@@ -62,25 +62,25 @@ def damper_temperature(
     Exact for a power that runs straight from sample to sample, for any interval: a mean power per second or minute
     serves as well as F v at 1 kHz. Differentiable in everything; the temperature scale is that of `ambient`.
 
-    >>> import jax.numpy as jnp
-    >>> minutes = damper_temperature(jnp.full(31, 90.0), 60.0, heat_capacity=1200.0, cooling=1.5, ambient=20.0)
-    >>> round(float(minutes[0]), 2), round(float(minutes[-1]), 2)
-    (20.0, 73.68)
-
-    Args:
-        power: Dissipated power F v, or means of it [W], shape [time].
-        dt: The sampling interval [s].
+    Arguments:
+        power: dissipated power F v, or means of it [W], shape [time].
+        dt: the sampling interval [s].
         heat_capacity: C, that of oil and metal together [J/K].
         cooling: hA, heat transfer coefficient times surface [W/K], positive.
-        ambient: Temperature of the air [K or degC].
-        start: Temperature at the first sample [K or degC]; ambient if not given.
+        ambient: temperature of the air [K or degC].
+        start: temperature at the first sample [K or degC]; ambient if not given.
 
     Returns:
         The temperature at each sample, in the scale of `ambient`, shape [time].
 
     Raises:
-        ValueError: If there are fewer than two samples, if `dt`, `heat_capacity` or `cooling` is not positive, or if a
+        ValueError: if there are fewer than two samples, if `dt`, `heat_capacity` or `cooling` is not positive, or if a
             temperature is not finite.
+
+    >>> import jax.numpy as jnp
+    >>> minutes = damper_temperature(jnp.full(31, 90.0), 60.0, heat_capacity=1200.0, cooling=1.5, ambient=20.0)
+    >>> round(float(minutes[0]), 2), round(float(minutes[-1]), 2)
+    (20.0, 73.68)
     """
     p = as_signal("power", power, least=2)
     check_interval(dt)

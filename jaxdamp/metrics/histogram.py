@@ -19,21 +19,21 @@ def velocity_histogram(
     with a `width` each edge becomes a logistic step 1/(1 + exp(-(v - edge)/width)), and the shares are smooth and
     still add up.
 
-    >>> v = 0.3 * jnp.sin(2.0 * jnp.pi * jnp.arange(1000.0) / 1000)
-    >>> velocity_histogram(v, [-jnp.inf, -0.15, 0.0, 0.15, jnp.inf]).round(3)
-    Array([0.333, 0.166, 0.168, 0.333], dtype=float64)
-
-    Args:
-        velocity: Damper velocity [m/s], shape [time]; positive in extension.
-        edges: Edges of the ranges [m/s], increasing, shape [bins + 1].
-        width: The width of an edge [m/s]; 0 counts samples.
+    Arguments:
+        velocity: damper velocity [m/s], shape [time]; positive in extension.
+        edges: edges of the ranges [m/s], increasing, shape [bins + 1].
+        width: the width of an edge [m/s]; 0 counts samples.
 
     Returns:
         The share of each range, shape [bins].
 
     Raises:
-        ValueError: If the record is empty, if `edges` are fewer than two, NaN or not increasing, or `width` is
+        ValueError: if the record is empty, if `edges` are fewer than two, NaN or not increasing, or `width` is
             negative.
+
+    >>> v = 0.3 * jnp.sin(2.0 * jnp.pi * jnp.arange(1000.0) / 1000)
+    >>> velocity_histogram(v, [-jnp.inf, -0.15, 0.0, 0.15, jnp.inf]).round(3)
+    Array([0.333, 0.166, 0.168, 0.333], dtype=float64)
     """
     v = as_signal("velocity", velocity)
     limits = _edges(edges, v, width)
@@ -49,21 +49,21 @@ def dissipation_histogram(
     range. Differentiable in the force, and with a `width` in the velocity too (see `velocity_histogram`). NaN if
     nothing is dissipated.
 
-    >>> v = 0.3 * jnp.sin(2.0 * jnp.pi * jnp.arange(1000.0) / 1000)
-    >>> dissipation_histogram(1500.0 * v, v, [-jnp.inf, -0.15, 0.15, jnp.inf]).round(3)
-    Array([0.471, 0.058, 0.471], dtype=float64)
-
-    Args:
-        force: Damper force [N], shape [time]; positive resists extension.
-        velocity: Damper velocity [m/s], shape [time]; positive in extension.
-        edges: Edges of the ranges [m/s], increasing, shape [bins + 1].
-        width: The width of an edge [m/s]; 0 counts samples.
+    Arguments:
+        force: damper force [N], shape [time]; positive resists extension.
+        velocity: damper velocity [m/s], shape [time]; positive in extension.
+        edges: edges of the ranges [m/s], increasing, shape [bins + 1].
+        width: the width of an edge [m/s]; 0 counts samples.
 
     Returns:
         The share of each range, shape [bins].
 
     Raises:
-        ValueError: If the lengths differ, or as `velocity_histogram`.
+        ValueError: if the lengths differ, or as `velocity_histogram`.
+
+    >>> v = 0.3 * jnp.sin(2.0 * jnp.pi * jnp.arange(1000.0) / 1000)
+    >>> dissipation_histogram(1500.0 * v, v, [-jnp.inf, -0.15, 0.15, jnp.inf]).round(3)
+    Array([0.471, 0.058, 0.471], dtype=float64)
     """
     f, v = as_signal("force", force), as_signal("velocity", velocity)
     same_length("force", f, "velocity", v)

@@ -60,24 +60,24 @@ def international_roughness_index(
     Differentiable in the profile wherever the car moves, and independent of the profile's offset and mean slope. The
     last k samples serve the slope only. `international_roughness_by_segment` gives it for every 100 m.
 
-    >>> x = jnp.arange(0.0, 200.0, 0.1)
-    >>> profile = 0.001 * 2.4 / (2.0 * jnp.pi) * jnp.sin(2.0 * jnp.pi * x / 2.4)  # slope 1 mm/m
-    >>> round(1000.0 * float(international_roughness_index(profile, 0.1)), 2)  # m/km
-    1.02
-
-    Args:
-        profile: Height of one wheel track [m], shape [samples], longer than 11.25 m.
-        spacing: The distance between samples [m], at most 0.3 m and known when compiled.
-        moving_average: The length of the moving average [m]; 0 for a profile that is averaged already, by a
+    Arguments:
+        profile: height of one wheel track [m], shape [samples], longer than 11.25 m.
+        spacing: the distance between samples [m], at most 0.3 m and known when compiled.
+        moving_average: the length of the moving average [m]; 0 for a profile that is averaged already, by a
             profilometer that reports means over 250 mm. It is rounded to a whole number of samples, at least one.
 
     Raises:
-        ValueError: If the profile is too short, `spacing` is not positive, above 0.3 m or traced, or `moving_average`
+        ValueError: if the profile is too short, `spacing` is not positive, above 0.3 m or traced, or `moving_average`
             is negative.
 
     Source: Sayers, Gillespie and Paterson, World Bank Technical Paper 46 (1986), whose coefficients for 250 mm are
     found to six digits; Sayers, Transportation Research Record 1501 (1995); ASTM E1926. The largest spacing is quoted
     from memory and not verified.
+
+    >>> x = jnp.arange(0.0, 200.0, 0.1)
+    >>> profile = 0.001 * 2.4 / (2.0 * jnp.pi) * jnp.sin(2.0 * jnp.pi * x / 2.4)  # slope 1 mm/m
+    >>> round(1000.0 * float(international_roughness_index(profile, 0.1)), 2)  # m/km
+    1.02
     """
     return jnp.mean(_rates(profile, spacing, moving_average)[0])
 

@@ -27,26 +27,26 @@ def running_rms(
     Before the record the signal counts as zero, so the first `time_constant` seconds rise from zero. Differentiable;
     where the window holds only zeros the gradient is zero.
 
-    >>> import jax.numpy as jnp
-    >>> burst = jnp.where(jnp.arange(400) < 100, 2.0, 0.0)  # 1 s of 2 m/s^2, then rest
-    >>> running_rms(burst, 0.01)[jnp.array([49, 99, 149, 249])].round(6)  # sqrt(2), 2, sqrt(2), 0
-    Array([1.414214, 2.      , 1.414214, 0.      ], dtype=float64)
-
-    Args:
-        signal: Uniformly sampled values, shape [time], any unit; weight it first (`weighted_signal`) where the
+    Arguments:
+        signal: uniformly sampled values, shape [time], any unit; weight it first (`weighted_signal`) where the
             standard says so.
-        dt: The sampling interval [s].
-        time_constant: The integration time tau [s], at least dt; 1 s in ISO 2631-1.
+        dt: the sampling interval [s].
+        time_constant: the integration time tau [s], at least dt; 1 s in ISO 2631-1.
         averaging: "linear" or "exponential".
 
     Returns:
         The running value in the unit of the signal, shape [time].
 
     Raises:
-        ValueError: If the record is shorter than `time_constant`, `time_constant` is shorter than `dt`, either is not
+        ValueError: if the record is shorter than `time_constant`, `time_constant` is shorter than `dt`, either is not
             positive, or `averaging` is unknown.
 
     Source: ISO 2631-1, running r.m.s. method.
+
+    >>> import jax.numpy as jnp
+    >>> burst = jnp.where(jnp.arange(400) < 100, 2.0, 0.0)  # 1 s of 2 m/s^2, then rest
+    >>> running_rms(burst, 0.01)[jnp.array([49, 99, 149, 249])].round(6)  # sqrt(2), 2, sqrt(2), 0
+    Array([1.414214, 2.      , 1.414214, 0.      ], dtype=float64)
     """
     signal = as_signal("signal", signal, least=2)
     check_interval(dt)
@@ -110,23 +110,23 @@ def max_transient_value(
     Only the window that holds the maximum has a gradient; it jumps where two windows compete. Tune on
     `smooth_peak(running_rms(...))` instead.
 
+    Arguments:
+        acceleration: acceleration [m/s^2], shape [time].
+        dt: the sampling interval [s].
+        weighting: "Wk" and so on (see `weighting_response`), or None for a record that is weighted already.
+        time_constant: the integration time tau [s].
+        averaging: "linear" or "exponential"; the two differ, for a short shock by up to a few per cent.
+
+    Raises:
+        ValueError: as `weighted_signal` and `running_rms`.
+
+    Source: ISO 2631-1, running r.m.s. method, tau = 1 s.
+
     >>> import jax.numpy as jnp
     >>> time = jnp.arange(10000.0) * 0.001
     >>> kick = jnp.where((time > 4.0) & (time < 4.5), 3.0, 0.0) * jnp.sin(2.0 * jnp.pi * 8.0 * time)
     >>> round(float(max_transient_value(kick, 0.001, None)), 4)  # 3/sqrt(2) for half of the second: 1.5
     1.5
-
-    Args:
-        acceleration: Acceleration [m/s^2], shape [time].
-        dt: The sampling interval [s].
-        weighting: "Wk" and so on (see `weighting_response`), or None for a record that is weighted already.
-        time_constant: The integration time tau [s].
-        averaging: "linear" or "exponential"; the two differ, for a short shock by up to a few per cent.
-
-    Raises:
-        ValueError: As `weighted_signal` and `running_rms`.
-
-    Source: ISO 2631-1, running r.m.s. method, tau = 1 s.
     """
     signal = as_weighted(acceleration, dt, weighting)
     return largest(running_rms(signal, dt, time_constant, averaging=averaging))

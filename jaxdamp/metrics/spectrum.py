@@ -45,6 +45,25 @@ def power_spectral_density(
     The relative standard deviation of each value is about 1/sqrt(number of independent segments). The result equals
     `scipy.signal.welch` with the same settings. Differentiable in `signal` and `dt`.
 
+    Arguments:
+        signal: uniformly sampled values, shape [time], any unit.
+        dt: the sampling interval [s].
+        segment_length: the number of samples in a segment. By default an eighth of the signal (at least 2), which
+            with half overlap gives 15 segments. The frequency resolution is 1/(segment_length dt).
+        overlap: the part of a segment shared with the next one, from 0 up to but not including 1; half is right for
+            "hann".
+        window: "hann", "hamming", "blackman" or "rectangular".
+        remove_mean: whether to subtract the mean of every segment first.
+
+    Returns:
+        The frequencies from 0 to 1/(2 dt) and the density at each, shape [segment_length // 2 + 1].
+
+    Raises:
+        ValueError: if `dt` is not positive, `segment_length` is not between 2 and the length of the signal, `overlap`
+            is not in [0, 1), or `window` is unknown.
+
+    Source: Welch, IEEE Trans. Audio Electroacoustics 15 (1967) 70-73.
+
     >>> import jax.numpy as jnp
     >>> x = jnp.sin(2.0 * jnp.pi * 5.0 * jnp.arange(4000.0) * 0.001)
     >>> frequency, psd = power_spectral_density(x, 0.001, segment_length=1000)
@@ -52,25 +71,6 @@ def power_spectral_density(
     5.0
     >>> round(float(jnp.sum(psd) * frequency[1]), 6)  # the variance of a sine, 1/2
     0.5
-
-    Args:
-        signal: Uniformly sampled values, shape [time], any unit.
-        dt: The sampling interval [s].
-        segment_length: The number of samples in a segment. By default an eighth of the signal (at least 2), which
-            with half overlap gives 15 segments. The frequency resolution is 1/(segment_length dt).
-        overlap: The part of a segment shared with the next one, from 0 up to but not including 1; half is right for
-            "hann".
-        window: "hann", "hamming", "blackman" or "rectangular".
-        remove_mean: Whether to subtract the mean of every segment first.
-
-    Returns:
-        The frequencies from 0 to 1/(2 dt) and the density at each, shape [segment_length // 2 + 1].
-
-    Raises:
-        ValueError: If `dt` is not positive, `segment_length` is not between 2 and the length of the signal, `overlap`
-            is not in [0, 1), or `window` is unknown.
-
-    Source: Welch, IEEE Trans. Audio Electroacoustics 15 (1967) 70-73.
     """
     signal = as_signal("signal", signal, least=2)
     weights, step = welch_plan(signal, dt, segment_length, overlap, window)

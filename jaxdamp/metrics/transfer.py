@@ -27,29 +27,29 @@ def transmissibility(
     it where `coherence` is near one. Where the input has no content the result is meaningless (at 0 Hz always, once
     the mean is removed) and NaN if its density is zero. Differentiable elsewhere.
 
-    >>> import jax
-    >>> x = jax.random.normal(jax.random.key(0), (4000,))
-    >>> frequency, h = transmissibility(x, -2.5 * x, 0.01, 400)
-    >>> round(float(h[40].real), 6), round(float(frequency[40]), 6)
-    (-2.5, 10.0)
-
-    Args:
-        input_signal: What excites, for example road or wheel, shape [time], any unit.
-        output_signal: What follows, for example the body, shape [time], any unit; say in words which ratio it is.
-        dt: The sampling interval [s].
-        segment_length: The number of samples in a segment; by default an eighth of the record.
-        overlap: The part of a segment shared with the next one, from 0 up to but not including 1.
+    Arguments:
+        input_signal: what excites, for example road or wheel, shape [time], any unit.
+        output_signal: what follows, for example the body, shape [time], any unit; say in words which ratio it is.
+        dt: the sampling interval [s].
+        segment_length: the number of samples in a segment; by default an eighth of the record.
+        overlap: the part of a segment shared with the next one, from 0 up to but not including 1.
         window: "hann", "hamming", "blackman" or "rectangular".
-        remove_mean: Whether to subtract the mean of every segment first.
+        remove_mean: whether to subtract the mean of every segment first.
 
     Returns:
         The frequencies from 0 to 1/(2 dt) and the response at each, shape [segment_length // 2 + 1]; its magnitude is
         `jnp.abs`, its phase `jnp.angle`.
 
     Raises:
-        ValueError: If the lengths differ, or as `power_spectral_density`.
+        ValueError: if the lengths differ, or as `power_spectral_density`.
 
     Source: Bendat and Piersol, Random Data; equals the ratio of `scipy.signal.csd` and `scipy.signal.welch`.
+
+    >>> import jax
+    >>> x = jax.random.normal(jax.random.key(0), (4000,))
+    >>> frequency, h = transmissibility(x, -2.5 * x, 0.01, 400)
+    >>> round(float(h[40].real), 6), round(float(frequency[40]), 6)
+    (-2.5, 10.0)
     """
     x, y = as_signal("input_signal", input_signal, least=2), as_signal("output_signal", output_signal, least=2)
     same_length("input_signal", x, "output_signal", y)
@@ -74,25 +74,25 @@ def coherence(
     inputs, or resonances narrower than a segment resolves. Unrelated signals give about 1/(number of independent
     segments), and a single segment would give one: it is refused. Differentiable; NaN where a density is zero.
 
+    Arguments:
+        input_signal: what excites, shape [time], any unit.
+        output_signal: what follows, shape [time], any unit.
+        dt: the sampling interval [s].
+        segment_length: the number of samples in a segment; by default an eighth of the record.
+        overlap: the part of a segment shared with the next one, from 0 up to but not including 1.
+        window: "hann", "hamming", "blackman" or "rectangular".
+        remove_mean: whether to subtract the mean of every segment first.
+
+    Raises:
+        ValueError: if the lengths differ, if the record holds a single segment, or as `power_spectral_density`.
+
+    Source: Bendat and Piersol, Random Data; equals `scipy.signal.coherence` with the same settings.
+
     >>> import jax
     >>> x, noise = jax.random.normal(jax.random.key(0), (2, 20000))
     >>> frequency, gamma2 = coherence(x, x + noise, 0.01, 400)
     >>> round(float(jnp.mean(gamma2)), 1)  # half of the output's power is noise
     0.5
-
-    Args:
-        input_signal: What excites, shape [time], any unit.
-        output_signal: What follows, shape [time], any unit.
-        dt: The sampling interval [s].
-        segment_length: The number of samples in a segment; by default an eighth of the record.
-        overlap: The part of a segment shared with the next one, from 0 up to but not including 1.
-        window: "hann", "hamming", "blackman" or "rectangular".
-        remove_mean: Whether to subtract the mean of every segment first.
-
-    Raises:
-        ValueError: If the lengths differ, if the record holds a single segment, or as `power_spectral_density`.
-
-    Source: Bendat and Piersol, Random Data; equals `scipy.signal.coherence` with the same settings.
     """
     x, y = as_signal("input_signal", input_signal, least=2), as_signal("output_signal", output_signal, least=2)
     same_length("input_signal", x, "output_signal", y)

@@ -14,17 +14,17 @@ def dynamic_load_coefficient(tyre_load_variation: SignalLike, static_tyre_load: 
     The mean is removed first, so the total tyre load may be given as well as its variation. Differentiable; the
     gradient for a constant load is zero.
 
+    Arguments:
+        tyre_load_variation: tyre load about its static value [N], shape [time].
+        static_tyre_load: the static load of the same tyre [N].
+
+    Raises:
+        ValueError: if the signal is empty or has more than one axis, or `static_tyre_load` is not positive.
+
     >>> import jax.numpy as jnp
     >>> load = 600.0 * jnp.sin(2.0 * jnp.pi * jnp.arange(100.0) / 100)
     >>> round(float(dynamic_load_coefficient(load, 3000.0)), 6)
     0.141421
-
-    Args:
-        tyre_load_variation: Tyre load about its static value [N], shape [time].
-        static_tyre_load: The static load of the same tyre [N].
-
-    Raises:
-        ValueError: If the signal is empty or has more than one axis, or `static_tyre_load` is not positive.
     """
     variation = as_signal("tyre_load_variation", tyre_load_variation)
     _checks.positive("static_tyre_load", static_tyre_load, "It is the weight carried by the tyre in N, positive.")
@@ -37,17 +37,17 @@ def road_stress_factor(tyre_load_variation: SignalLike, static_tyre_load: Scalar
     It is the mean of (F/F_static)^4, to which road wear is taken to be proportional, for a Gaussian tyre load with
     the static load as its mean. For other loads, such as those with lift-off, take that mean instead. Differentiable.
 
+    Arguments:
+        tyre_load_variation: tyre load about its static value [N], shape [time].
+        static_tyre_load: the static load of the same tyre [N].
+
+    Raises:
+        ValueError: if the signal is empty or has more than one axis, or `static_tyre_load` is not positive.
+
     >>> import jax.numpy as jnp
     >>> load = 600.0 * jnp.sin(2.0 * jnp.pi * jnp.arange(100.0) / 100)
     >>> round(float(road_stress_factor(load, 3000.0)), 6)  # 1 + 6 * 0.02 + 3 * 0.0004
     1.1212
-
-    Args:
-        tyre_load_variation: Tyre load about its static value [N], shape [time].
-        static_tyre_load: The static load of the same tyre [N].
-
-    Raises:
-        ValueError: If the signal is empty or has more than one axis, or `static_tyre_load` is not positive.
     """
     square = dynamic_load_coefficient(tyre_load_variation, static_tyre_load) ** 2
     return 1.0 + 6.0 * square + 3.0 * square**2
@@ -58,17 +58,17 @@ def lift_off_fraction(tyre_load: SignalLike, threshold: ScalarLike | int = 0.0) 
 
     It counts samples, so its gradient is zero everywhere: do not tune on it, tune on `dynamic_load_coefficient`.
 
-    >>> import jax.numpy as jnp
-    >>> round(float(lift_off_fraction(jnp.array([1500.0, 0.0, 0.0, 2500.0]))), 6)
-    0.5
-
-    Args:
-        tyre_load: Total tyre load, static part included [N], shape [time]; positive presses on the road.
-        threshold: The load [N] that counts as lifted off; give a small positive one for a tyre model with a smooth
+    Arguments:
+        tyre_load: total tyre load, static part included [N], shape [time]; positive presses on the road.
+        threshold: the load [N] that counts as lifted off; give a small positive one for a tyre model with a smooth
             lift-off.
 
     Raises:
-        ValueError: If the signal is empty or has more than one axis, or `threshold` is not finite.
+        ValueError: if the signal is empty or has more than one axis, or `threshold` is not finite.
+
+    >>> import jax.numpy as jnp
+    >>> round(float(lift_off_fraction(jnp.array([1500.0, 0.0, 0.0, 2500.0]))), 6)
+    0.5
     """
     load = as_signal("tyre_load", tyre_load)
     _checks.finite("threshold", threshold)

@@ -37,23 +37,23 @@ def weighted_signal(
     all weightings suppress a constant. Keep it where the record starts from rest and its jumps are real.
     Differentiable and linear in `acceleration`.
 
+    Arguments:
+        acceleration: acceleration [m/s^2] or angular acceleration [rad/s^2], shape [time].
+        dt: the sampling interval [s]; sample at 1 kHz or so for content up to 100 Hz.
+        weighting: "Wb", "Wc", "Wd", "We", "Wf", "Wj" or "Wk"; see `weighting_response`.
+        method: "spectrum" or "step".
+        remove_mean: whether to subtract the mean of the record first.
+
+    Raises:
+        ValueError: if there are fewer than two samples, `dt` is not positive, `weighting` or `method` is unknown, or
+            `dt` is traced with "spectrum", where it sets the size of an array.
+
+    Source: ISO 2631-1; parameters see `weighting_response`.
+
     >>> time = jnp.arange(8000.0) * 0.001
     >>> a = weighted_signal(jnp.sin(2.0 * jnp.pi * 8.0 * time), 0.001, "Wk")
     >>> round(float(jnp.max(a[6000:])), 3)  # |Wk| at 8 Hz is 1.036
     1.036
-
-    Args:
-        acceleration: Acceleration [m/s^2] or angular acceleration [rad/s^2], shape [time].
-        dt: The sampling interval [s]; sample at 1 kHz or so for content up to 100 Hz.
-        weighting: "Wb", "Wc", "Wd", "We", "Wf", "Wj" or "Wk"; see `weighting_response`.
-        method: "spectrum" or "step".
-        remove_mean: Whether to subtract the mean of the record first.
-
-    Raises:
-        ValueError: If there are fewer than two samples, `dt` is not positive, `weighting` or `method` is unknown, or
-            `dt` is traced with "spectrum", where it sets the size of an array.
-
-    Source: ISO 2631-1; parameters see `weighting_response`.
     """
     signal = as_signal("acceleration", acceleration, least=2)
     check_interval(dt)
@@ -104,20 +104,20 @@ def weighted_rms(
     The basic evaluation of ISO 2631-1. Differentiable; the gradient for a record of zeros is zero. Records should be
     much longer than the filter settles (a few seconds; a minute or more with Wf), whose start is counted.
 
+    Arguments:
+        acceleration: acceleration [m/s^2] or angular acceleration [rad/s^2], shape [time].
+        dt: the sampling interval [s].
+        weighting: "Wb", "Wc", "Wd", "We", "Wf", "Wj" or "Wk"; see `weighting_response`.
+        method: "spectrum" or "step"; see `weighted_signal`.
+        remove_mean: whether to subtract the mean of the record first.
+
+    Raises:
+        ValueError: as `weighted_signal`.
+
+    Source: ISO 2631-1, weighted root-mean-square acceleration.
+
     >>> time = jnp.arange(20000.0) * 0.001
     >>> round(float(weighted_rms(jnp.sin(2.0 * jnp.pi * 8.0 * time), 0.001, "Wk")), 3)  # 1.036/sqrt(2)
     0.732
-
-    Args:
-        acceleration: Acceleration [m/s^2] or angular acceleration [rad/s^2], shape [time].
-        dt: The sampling interval [s].
-        weighting: "Wb", "Wc", "Wd", "We", "Wf", "Wj" or "Wk"; see `weighting_response`.
-        method: "spectrum" or "step"; see `weighted_signal`.
-        remove_mean: Whether to subtract the mean of the record first.
-
-    Raises:
-        ValueError: As `weighted_signal`.
-
-    Source: ISO 2631-1, weighted root-mean-square acceleration.
     """
     return rms(weighted_signal(acceleration, dt, weighting, method=method, remove_mean=remove_mean))

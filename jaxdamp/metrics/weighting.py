@@ -71,21 +71,21 @@ def weighting_response(frequency: Float[ArrayLike, "*shape"], weighting: str) ->
     · (w5/w6)² (1 + s/(Q5 w5) + (s/w5)²)/(1 + s/(Q6 w6) + (s/w6)²), Q = 1/sqrt(2). The phase is that of the same
     analogue filter; only crest factor, MTVV and VDV depend on it. Differentiable.
 
-    >>> h = weighting_response(2.0, "Wk")
-    >>> round(float(jnp.abs(h)), 3), round(float(jnp.angle(h, deg=True)), 1)
-    (0.531, 36.5)
-
-    Args:
-        frequency: Frequency [Hz], any shape, not negative.
+    Arguments:
+        frequency: frequency [Hz], any shape, not negative.
         weighting: "Wk" (vertical, seated or standing), "Wd" (horizontal), "Wc" (backrest, fore and aft), "We"
             (rotations), "Wj" (head of a lying person), "Wb" (vertical, BS 6841 and ISO 2631-4), "Wf" (motion
             sickness).
 
     Raises:
-        ValueError: If a frequency is negative or not finite, or if the weighting is unknown.
+        ValueError: if a frequency is negative or not finite, or if the weighting is unknown.
 
     Source: parameters of ISO 8041 as printed in the Larson Davis HVM200 manual, Table 3.1; for Wk, Wd and Wf the same
     values stand in Chrono's ChFilters.cpp. The standard itself was not at hand.
+
+    >>> h = weighting_response(2.0, "Wk")
+    >>> round(float(jnp.abs(h)), 3), round(float(jnp.angle(h, deg=True)), 1)
+    (0.531, 36.5)
     """
     check_weighting(weighting)
     _checks.nonnegative("frequency", frequency, "Weightings are defined for frequencies in Hz.")
@@ -111,17 +111,17 @@ def weighting_factor(frequency: Float[ArrayLike, "*shape"], weighting: str) -> F
     is 0.202 and printed as 0.212. Use nominal frequencies (0.125, 0.16, ... Hz) for that table; ISO 8041 tabulates at
     the exact ones, 10^(n/10), which differ by up to 2.5 %. Differentiable; at 0 Hz value and slope are zero.
 
-    >>> weighting_factor(jnp.array([0.5, 1.0, 5.0, 20.0]), "Wk").round(3)
-    Array([0.418, 0.482, 1.039, 0.636], dtype=float64)
-
-    Args:
-        frequency: Frequency [Hz], any shape, not negative.
+    Arguments:
+        frequency: frequency [Hz], any shape, not negative.
         weighting: "Wb", "Wc", "Wd", "We", "Wf", "Wj" or "Wk"; see `weighting_response`.
 
     Raises:
-        ValueError: If a frequency is negative or not finite, or if the weighting is unknown.
+        ValueError: if a frequency is negative or not finite, or if the weighting is unknown.
 
     Source: see `weighting_response`.
+
+    >>> weighting_factor(jnp.array([0.5, 1.0, 5.0, 20.0]), "Wk").round(3)
+    Array([0.418, 0.482, 1.039, 0.636], dtype=float64)
     """
     return jnp.abs(weighting_response(frequency, weighting))
 
@@ -158,15 +158,7 @@ def weighting_state_space(weighting: str) -> StateSpace:
     follow one another (A is block lower triangular): 2 states each for high-pass, low-pass, transition and step, so
     8 for Wk, Wb and Wf, 6 for the others. D is zero, because the low-pass stands in every chain.
 
-    >>> system = weighting_state_space("Wk")
-    >>> system.state_matrix.shape, float(system.feed_through)
-    ((8, 8), 0.0)
-    >>> a, b, c = (part.astype(complex) for part in system[:3])
-    >>> x = jnp.linalg.solve(4j * jnp.pi * jnp.eye(8, dtype=complex) - a, b)  # the same filter, at s = 2 pi j 2 Hz
-    >>> round(float(jnp.abs(c @ x)), 3), round(float(weighting_factor(2.0, "Wk")), 3)
-    (0.531, 0.531)
-
-    Args:
+    Arguments:
         weighting: "Wb", "Wc", "Wd", "We", "Wf", "Wj" or "Wk".
 
     Returns:
@@ -174,9 +166,17 @@ def weighting_state_space(weighting: str) -> StateSpace:
         default floating-point type.
 
     Raises:
-        ValueError: If the weighting is unknown.
+        ValueError: if the weighting is unknown.
 
     Source: see `weighting_response`.
+
+    >>> system = weighting_state_space("Wk")
+    >>> system.state_matrix.shape, float(system.feed_through)
+    ((8, 8), 0.0)
+    >>> a, b, c = (part.astype(complex) for part in system[:3])
+    >>> x = jnp.linalg.solve(4j * jnp.pi * jnp.eye(8, dtype=complex) - a, b)  # the same filter, at s = 2 pi j 2 Hz
+    >>> round(float(jnp.abs(c @ x)), 3), round(float(weighting_factor(2.0, "Wk")), 3)
+    (0.531, 0.531)
     """
     check_weighting(weighting)
     return StateSpace(*(jnp.asarray(part, float) for part in cascade(weighting)))

@@ -20,16 +20,16 @@ def working_space_rms(deflection: SignalLike) -> Scalar:
     asymmetric damper shifts the mean ("jacking down"); that is `working_space_mean`. The ride metric of this name is
     the same number. The gradient for a constant deflection is zero.
 
+    Arguments:
+        deflection: suspension deflection z_sprung - z_unsprung [m], shape [time].
+
+    Raises:
+        ValueError: if the signal is empty or has more than one axis.
+
     >>> import jax.numpy as jnp
     >>> d = 0.2 + 0.03 * jnp.sin(2.0 * jnp.pi * jnp.arange(100.0) / 100)
     >>> round(float(working_space_rms(d)), 6)
     0.021213
-
-    Args:
-        deflection: Suspension deflection z_sprung - z_unsprung [m], shape [time].
-
-    Raises:
-        ValueError: If the signal is empty or has more than one axis.
     """
     deflection = as_signal("deflection", deflection)
     return rms(deflection - jnp.mean(deflection))
@@ -42,15 +42,15 @@ def working_space_mean(deflection: SignalLike) -> Scalar:
     mean is negative, and that travel in compression is lost. Counted from the static position, which the deflection of
     a measured record must be too.
 
+    Arguments:
+        deflection: suspension deflection z_sprung - z_unsprung from the static position [m], shape [time].
+
+    Raises:
+        ValueError: if the signal is empty or has more than one axis.
+
     >>> import jax.numpy as jnp
     >>> round(float(working_space_mean(jnp.array([0.0, -0.02, 0.01, -0.03]))), 6)
     -0.01
-
-    Args:
-        deflection: Suspension deflection z_sprung - z_unsprung from the static position [m], shape [time].
-
-    Raises:
-        ValueError: If the signal is empty or has more than one axis.
     """
     return jnp.mean(as_signal("deflection", deflection))
 
@@ -60,15 +60,15 @@ def working_space_peak_to_peak(deflection: SignalLike) -> Scalar:
 
     Independent of offsets. Only the two extreme samples have a gradient.
 
+    Arguments:
+        deflection: suspension deflection z_sprung - z_unsprung [m], shape [time].
+
+    Raises:
+        ValueError: if the signal is empty or has more than one axis.
+
     >>> import jax.numpy as jnp
     >>> round(float(working_space_peak_to_peak(jnp.array([0.0, 0.04, -0.02, 0.01]))), 6)
     0.06
-
-    Args:
-        deflection: Suspension deflection z_sprung - z_unsprung [m], shape [time].
-
-    Raises:
-        ValueError: If the signal is empty or has more than one axis.
     """
     deflection = as_signal("deflection", deflection)
     return largest(deflection) + largest(-deflection)
@@ -88,17 +88,17 @@ def working_space_exceedance(deflection: SignalLike, lower: ScalarLike | int, up
     It counts samples, so its gradient is zero everywhere: tune on
     `gaussian_exceedance(mean(d), working_space_rms(d), lower, upper)` instead.
 
+    Arguments:
+        deflection: suspension deflection z_sprung - z_unsprung [m], shape [time]; extension is positive.
+        lower: the end of the travel in compression [m], negative where deflections count from the static position.
+        upper: the end of the travel in extension [m].
+
+    Raises:
+        ValueError: if the signal is empty or has more than one axis, or `lower` is not below `upper`.
+
     >>> import jax.numpy as jnp
     >>> round(float(working_space_exceedance(jnp.array([0.0, 0.05, -0.02, -0.07]), -0.06, 0.04)), 6)
     0.5
-
-    Args:
-        deflection: Suspension deflection z_sprung - z_unsprung [m], shape [time]; extension is positive.
-        lower: The end of the travel in compression [m], negative where deflections count from the static position.
-        upper: The end of the travel in extension [m].
-
-    Raises:
-        ValueError: If the signal is empty or has more than one axis, or `lower` is not below `upper`.
     """
     d = as_signal("deflection", deflection)
     _check_range(lower, upper)
@@ -114,17 +114,17 @@ def gaussian_exceedance(
     With limits at -x and x about a zero mean it is 2 Q(x/s); Q is the upper tail of the normal distribution. Real
     suspensions stiffen towards their stops, so it overestimates large excursions. Differentiable in all arguments.
 
-    >>> round(float(gaussian_exceedance(0.0, 0.02, -0.06, 0.06)), 6)  # three standard deviations
-    0.0027
-
-    Args:
-        mean: Mean deflection [m].
-        standard_deviation: Its standard deviation [m], positive: `working_space_rms`, or a stationary response.
-        lower: The end of the travel in compression [m].
-        upper: The end of the travel in extension [m].
+    Arguments:
+        mean: mean deflection [m].
+        standard_deviation: its standard deviation [m], positive: `working_space_rms`, or a stationary response.
+        lower: the end of the travel in compression [m].
+        upper: the end of the travel in extension [m].
 
     Raises:
-        ValueError: If `standard_deviation` is not positive, anything is not finite, or `lower` is not below `upper`.
+        ValueError: if `standard_deviation` is not positive, anything is not finite, or `lower` is not below `upper`.
+
+    >>> round(float(gaussian_exceedance(0.0, 0.02, -0.06, 0.06)), 6)  # three standard deviations
+    0.0027
     """
     _checks.finite("mean", mean)
     _checks.positive("standard_deviation", standard_deviation, "It is that of the deflection in m.")

@@ -109,6 +109,18 @@ def assess_roughness(
     10 % and the waviness with one of 0.06. For any road driven at a constant speed, the spacing is that of the times
     multiplied by the speed:
 
+    Arguments:
+        height: the heights of one track at equal spacing [m].
+        spacing: the distance between them [m].
+        bands_per_octave: 1 for octaves, 3 for third octaves, ...
+
+    Raises:
+        ValueError: if `height` is not one-dimensional, too short for three bands, not finite or level, or if
+            `spacing` or `bands_per_octave` is not positive.
+
+    Source: ISO 8608 for range, reference and classes. The standard narrows its bands towards short waves; equal bands
+    are used here, so that every octave counts the same.
+
     >>> import jax.numpy as jnp
     >>> from jaxdamp.roads import iso8608
     >>> time = 0.005 * jnp.arange(20_000.0)
@@ -116,18 +128,6 @@ def assess_roughness(
     >>> found = assess_roughness(road.height(time)[:, 0], 20.0 * 0.005)
     >>> found.road_class, round(found.waviness, 1)
     ('C', 2.0)
-
-    Args:
-        height: The heights of one track at equal spacing [m].
-        spacing: The distance between them [m].
-        bands_per_octave: 1 for octaves, 3 for third octaves, ...
-
-    Raises:
-        ValueError: If `height` is not one-dimensional, too short for three bands, not finite or level, or if
-            `spacing` or `bands_per_octave` is not positive.
-
-    Source: ISO 8608 for range, reference and classes. The standard narrows its bands towards short waves; equal bands
-    are used here, so that every octave counts the same.
     """
     _checks.positive("spacing", spacing, "It is in m.")
     _checks.positive("bands_per_octave", bands_per_octave)

@@ -113,6 +113,17 @@ def delayed(
 
     Differentiable in `delays`, `positions` and `speed`.
 
+    Arguments:
+        road: any road, with one or several tracks.
+        delays: the time [s] by which each axle passes later than the front of the vehicle; 0 for the front axle.
+        positions: the distance [m] of each axle behind the front axle, instead of `delays`: 0 for the front axle.
+        speed: V, the speed of the vehicle [m/s], with `positions`; that of the road if it has one and this is left out.
+
+    Raises:
+        ValueError: if not exactly one of `delays` and `positions` is given, if one is negative or there is none, if
+            `speed` is missing, not positive, given with `delays`, or not the one the road was made with, or if the
+            road is one of `in_phase`.
+
     >>> import jax.numpy as jnp
     >>> from jaxdamp.roads import cosine_bump
     >>> bump = cosine_bump(0.06, start=1.0, length=2.0, speed=10.0)
@@ -121,17 +132,6 @@ def delayed(
     Array([[0.  , 0.  ],
            [0.06, 0.  ],
            [0.  , 0.06]], dtype=float64)
-
-    Args:
-        road: Any road, with one or several tracks.
-        delays: The time [s] by which each axle passes later than the front of the vehicle; 0 for the front axle.
-        positions: The distance [m] of each axle behind the front axle, instead of `delays`: 0 for the front axle.
-        speed: V, the speed of the vehicle [m/s], with `positions`; that of the road if it has one and this is left out.
-
-    Raises:
-        ValueError: If not exactly one of `delays` and `positions` is given, if one is negative or there is none, if
-            `speed` is missing, not positive, given with `delays`, or not the one the road was made with, or if the
-            road is one of `in_phase`.
     """
     check_module("road", road, (AbstractRoad,), "delayed(road, positions=vehicle.axle_positions, speed=20.0)")
     if road.columns.kind == "in phase":

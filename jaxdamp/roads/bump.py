@@ -88,23 +88,23 @@ def cosine_bump(
     instead, s^3 (10 - 15 s + 6 s^2), whose acceleration is continuous everywhere; its largest value, 40 H/(sqrt(3)
     T^2), is 17 % greater. Differentiable in every argument.
 
+    Arguments:
+        height: H, the height of the crest [m]; negative for a dip.
+        start: t0, the time [s] at which the wheel reaches the bump.
+        duration: T, the time [s] to cross the bump.
+        length: the length of the bump along the road [m], instead of `duration`.
+        speed: the speed of the vehicle [m/s], with `length`.
+        smooth: continuous acceleration.
+
+    Raises:
+        ValueError: if not exactly one of `duration` and `length` is given, if `speed` is missing with `length` or
+            given with `duration`, if one of the three is not positive, or if `height` or `start` is not finite.
+
+    Source: Barethiye, Pohit and Mitra (half car with a hybrid damper), equation 5: H = 0.06 m, 1 s <= t <= 1.25 s.
+
     >>> import jax.numpy as jnp
     >>> bump = cosine_bump(0.06, start=1.0, duration=0.25)
     >>> bump.height(jnp.array([0.5, 1.0625, 1.125, 2.0]))[:, 0].round(6)
     Array([0.  , 0.03, 0.06, 0.  ], dtype=float64)
-
-    Args:
-        height: H, the height of the crest [m]; negative for a dip.
-        start: t0, the time [s] at which the wheel reaches the bump.
-        duration: T, the time [s] to cross the bump.
-        length: The length of the bump along the road [m], instead of `duration`.
-        speed: The speed of the vehicle [m/s], with `length`.
-        smooth: Continuous acceleration.
-
-    Raises:
-        ValueError: If not exactly one of `duration` and `length` is given, if `speed` is missing with `length` or
-            given with `duration`, if one of the three is not positive, or if `height` or `start` is not finite.
-
-    Source: Barethiye, Pohit and Mitra (half car with a hybrid damper), equation 5: H = 0.06 m, 1 s <= t <= 1.25 s.
     """
     return place(Partial(quintic_bump if smooth else haversine), height, start, duration, length, speed)

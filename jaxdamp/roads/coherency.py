@@ -23,19 +23,19 @@ def coherency(
     the coherence (as estimated by `scipy.signal.coherence`) gamma^2. Differentiable in all arguments. Relative accuracy
     1e-12 for 2e-5 < x < 150; waves longer than 3e5 B count as that long.
 
-    >>> import jax.numpy as jnp
-    >>> coherency(jnp.array([0.01, 0.1, 1.0]), 1.5).round(4)
-    Array([0.9868, 0.6264, 0.0003], dtype=float64)
-
-    Args:
+    Arguments:
         spatial_frequency: n [cycle/m], positive.
         track_width: B, the distance between the tracks [m].
         waviness: w, positive.
 
     Raises:
-        ValueError: If an argument is not positive.
+        ValueError: if an argument is not positive.
 
     Source: isotropy of road surfaces, Kamash and Robson (1978); formula derived for jaxdamp and checked by quadrature.
+
+    >>> import jax.numpy as jnp
+    >>> coherency(jnp.array([0.01, 0.1, 1.0]), 1.5).round(4)
+    Array([0.9868, 0.6264, 0.0003], dtype=float64)
     """
     _checks.positive("spatial_frequency", spatial_frequency)
     _checks.positive("track_width", track_width)

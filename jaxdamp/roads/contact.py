@@ -81,21 +81,21 @@ def contact_patch(
     0.3 % of the rise over the patch where a corner lies under it. The road is evaluated at `points` times as many
     places.
 
+    Arguments:
+        road: any road, with one or several tracks.
+        length: L [m], 0.1 to 0.2 m for cars; the tyre of a track or a tractor is longer.
+        speed: V, the speed of the vehicle [m/s].
+        points: the number of points of the quadrature.
+
+    Raises:
+        ValueError: if `length`, `speed` or `points` is not positive, or if the road was made for another speed.
+
     >>> import jax.numpy as jnp
     >>> from jaxdamp.roads import sine
     >>> waves = sine(0.01, wavelength=0.3, speed=3.0)
     >>> z = contact_patch(waves, length=0.15, speed=3.0).height(jnp.array([0.025]))
     >>> round(float(z[0, 0]), 6)  # 0.01 sinc(1/2) = 0.02/pi
     0.006366
-
-    Args:
-        road: Any road, with one or several tracks.
-        length: L [m], 0.1 to 0.2 m for cars; the tyre of a track or a tractor is longer.
-        speed: V, the speed of the vehicle [m/s].
-        points: The number of points of the quadrature.
-
-    Raises:
-        ValueError: If `length`, `speed` or `points` is not positive, or if the road was made for another speed.
     """
     _checks.positive("length", length)
     speed = agreed_speed(road, speed, "length")
@@ -118,6 +118,16 @@ def rolling_disc(
     of the right place (5 mm for 0.3 m and the default). The road is evaluated at `points` times as many places: turn
     long random roads into a record first, `from_profile(time, road.height(time))`.
 
+    Arguments:
+        road: any road, with one or several tracks.
+        radius: R, the unloaded radius of the tyre [m].
+        speed: V, the speed of the vehicle [m/s].
+        points: the number of points on the lower half of the disc, odd so that its lowest one is among them.
+
+    Raises:
+        ValueError: if `radius` or `speed` is not positive, if the road was made for another speed, or if `points` is
+            not odd or below 3.
+
     >>> import jax.numpy as jnp
     >>> from jaxdamp.roads import step
     >>> disc = rolling_disc(step(0.05, start=1.0, ramp=1e-4), radius=0.3, speed=10.0)
@@ -125,16 +135,6 @@ def rolling_disc(
     >>> z = disc.height(1.0 + jnp.array([-before - 0.01, -0.5 * before, 0.0]) / 10.0)
     >>> z[:, 0].round(2)  # exactly 0, 0.0383, 0.05
     Array([0.  , 0.04, 0.05], dtype=float64)
-
-    Args:
-        road: Any road, with one or several tracks.
-        radius: R, the unloaded radius of the tyre [m].
-        speed: V, the speed of the vehicle [m/s].
-        points: The number of points on the lower half of the disc, odd so that its lowest one is among them.
-
-    Raises:
-        ValueError: If `radius` or `speed` is not positive, if the road was made for another speed, or if `points` is
-            not odd or below 3.
     """
     _checks.positive("radius", radius)
     speed = agreed_speed(road, speed, "radius")

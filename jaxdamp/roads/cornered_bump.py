@@ -55,21 +55,21 @@ def half_sine_bump(
     touches in a point. Rounded, height, slope and curvature are continuous everywhere; the bump then begins T
     `rounding` earlier and ends as much later. Differentiable in every argument but `rounding`.
 
+    Arguments:
+        height: H, the height of the crest [m]; negative for a dip.
+        start: t0, the time [s] at which the wheel reaches the sharp bump.
+        duration: T, the time [s] to cross it.
+        length: its length along the road [m], instead of `duration`.
+        speed: the speed of the vehicle [m/s], with `length`.
+        rounding: how far each corner is rounded to either side, as a share of the length, 0 to 0.25.
+
+    Raises:
+        ValueError: as for `cosine_bump`, or if `rounding` is not between 0 and 0.25.
+
     >>> import jax.numpy as jnp
     >>> pipe = half_sine_bump(0.1, start=1.0, length=0.5, speed=5.0)
     >>> pipe.height(jnp.array([1.0, 1.025, 1.05, 1.1]))[:, 0].round(4)
     Array([0.    , 0.0707, 0.1   , 0.    ], dtype=float64)
-
-    Args:
-        height: H, the height of the crest [m]; negative for a dip.
-        start: t0, the time [s] at which the wheel reaches the sharp bump.
-        duration: T, the time [s] to cross it.
-        length: Its length along the road [m], instead of `duration`.
-        speed: The speed of the vehicle [m/s], with `length`.
-        rounding: How far each corner is rounded to either side, as a share of the length, 0 to 0.25.
-
-    Raises:
-        ValueError: As for `cosine_bump`, or if `rounding` is not between 0 and 0.25.
     """
     shape = Partial(half_sine, rounding=_rounding(rounding))
     return place(shape, height, start, duration, length, speed)
@@ -92,22 +92,22 @@ def trapezoid_bump(
     everywhere; the bump then begins T `rounding` earlier and ends as much later. Differentiable in every argument but
     `rounding`.
 
+    Arguments:
+        height: H, the height of the platform [m]; negative for a trench.
+        platform: the share of the length that is level, at least 0 and below 1; each ramp takes half of the rest.
+        start: t0, the time [s] at which the wheel reaches the sharp bump.
+        duration: T, the time [s] to cross it.
+        length: its length along the road [m], ramps included, instead of `duration`.
+        speed: the speed of the vehicle [m/s], with `length`.
+        rounding: how far each corner is rounded to either side, as a share of the length, 0 to 0.25.
+
+    Raises:
+        ValueError: as for `cosine_bump`, or if `rounding` is not between 0 and 0.25 or `platform` not within [0, 1).
+
     >>> import jax.numpy as jnp
     >>> table = trapezoid_bump(0.1, platform=0.5, start=1.0, length=4.0, speed=4.0)
     >>> table.height(jnp.array([1.125, 1.25, 1.5, 1.875, 2.0]))[:, 0].round(4)
     Array([0.05, 0.1 , 0.1 , 0.05, 0.  ], dtype=float64)
-
-    Args:
-        height: H, the height of the platform [m]; negative for a trench.
-        platform: The share of the length that is level, at least 0 and below 1; each ramp takes half of the rest.
-        start: t0, the time [s] at which the wheel reaches the sharp bump.
-        duration: T, the time [s] to cross it.
-        length: Its length along the road [m], ramps included, instead of `duration`.
-        speed: The speed of the vehicle [m/s], with `length`.
-        rounding: How far each corner is rounded to either side, as a share of the length, 0 to 0.25.
-
-    Raises:
-        ValueError: As for `cosine_bump`, or if `rounding` is not between 0 and 0.25 or `platform` not within [0, 1).
     """
     _checks.nonnegative("platform", platform, "Use 0 for a triangle.")
     share = _checks.concrete(platform)
@@ -130,20 +130,20 @@ def triangular_bump(
 
     Rounding lowers the crest by 0.595 `rounding` H (12 % at 0.2), because the corner is cut.
 
-    >>> import jax.numpy as jnp
-    >>> triangular_bump(0.1, start=1.0, length=4.0, speed=4.0).height(jnp.array([1.25, 1.5, 1.75]))[:, 0].round(4)
-    Array([0.05, 0.1 , 0.05], dtype=float64)
-
-    Args:
+    Arguments:
         height: H, the height of the sharp crest [m]; negative for a dip.
         start: t0, the time [s] at which the wheel reaches the sharp bump.
         duration: T, the time [s] to cross it.
-        length: Its length along the road [m], instead of `duration`.
-        speed: The speed of the vehicle [m/s], with `length`.
-        rounding: How far each corner is rounded to either side, as a share of the length, 0 to 0.25.
+        length: its length along the road [m], instead of `duration`.
+        speed: the speed of the vehicle [m/s], with `length`.
+        rounding: how far each corner is rounded to either side, as a share of the length, 0 to 0.25.
 
     Raises:
-        ValueError: As for `cosine_bump`, or if `rounding` is not between 0 and 0.25.
+        ValueError: as for `cosine_bump`, or if `rounding` is not between 0 and 0.25.
+
+    >>> import jax.numpy as jnp
+    >>> triangular_bump(0.1, start=1.0, length=4.0, speed=4.0).height(jnp.array([1.25, 1.5, 1.75]))[:, 0].round(4)
+    Array([0.05, 0.1 , 0.05], dtype=float64)
     """
     return trapezoid_bump(
         height, platform=0.0, start=start, duration=duration, length=length, speed=speed, rounding=rounding

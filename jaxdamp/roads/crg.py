@@ -48,21 +48,21 @@ def read_crg(
 
         left_right = read_crg("belgian_block.crg", speed=10.0, lateral=[0.75, -0.75], start=730.0, stop=740.0)
 
-    Args:
-        path: The file.
+    Arguments:
+        path: the file.
         speed: V, the speed of the vehicle [m/s].
-        lateral: The position v of each track [m], to the left of the reference line positive; for two tracks left, then
+        lateral: the position v of each track [m], to the left of the reference line positive; for two tracks left, then
             right. One column of `height` each.
-        start: Where the vehicle is at time 0, the u of the file [m]; by default where the grid begins. Taken to the
+        start: where the vehicle is at time 0, the u of the file [m]; by default where the grid begins. Taken to the
             next point of the grid.
-        stop: Where the road ends, the u of the file [m]; by default where the grid ends.
-        periodic: Repeat the profile for ever, as for `from_profile`.
-        ramp: The time [s] over which the road fades in, as for `from_profile`.
+        stop: where the road ends, the u of the file [m]; by default where the grid ends.
+        periodic: repeat the profile for ever, as for `from_profile`.
+        ramp: the time [s] over which the road fades in, as for `from_profile`.
 
     Raises:
-        ModuleNotFoundError: If pyopencrg is not installed.
-        FileNotFoundError: If there is no such file.
-        ValueError: If the file is damaged, if `lateral`, `start` or `stop` lies outside the grid, or if a line meets a
+        ModuleNotFoundError: if pyopencrg is not installed.
+        FileNotFoundError: if there is no such file.
+        ValueError: if the file is damaged, if `lateral`, `start` or `stop` lies outside the grid, or if a line meets a
             gap of the scan.
 
     Source: ASAM OpenCRG 1.2.

@@ -42,19 +42,19 @@ def step(
     shorter than a step of the simulation is seen as a jump. The vertical acceleration jumps by pi^2 H/(2 T^2) at both
     ends; with `smooth` the flank is a quintic polynomial instead and the acceleration is continuous.
 
+    Arguments:
+        height: H, the height of the ground behind the step [m]; negative for a drop.
+        start: t0, the time [s] at which the ground begins to rise.
+        ramp: T, the time [s] of the rise: its length along the road divided by the speed of the vehicle.
+        smooth: continuous acceleration.
+
+    Raises:
+        ValueError: if `height` or `start` is not finite, or `ramp` is not positive.
+
     >>> import jax.numpy as jnp
     >>> kerb = step(0.05, start=1.0, ramp=0.02)
     >>> kerb.height(jnp.array([1.0, 1.01, 1.02, 9.0]))[:, 0].round(6)
     Array([0.   , 0.025, 0.05 , 0.05 ], dtype=float64)
-
-    Args:
-        height: H, the height of the ground behind the step [m]; negative for a drop.
-        start: t0, the time [s] at which the ground begins to rise.
-        ramp: T, the time [s] of the rise: its length along the road divided by the speed of the vehicle.
-        smooth: Continuous acceleration.
-
-    Raises:
-        ValueError: If `height` or `start` is not finite, or `ramp` is not positive.
     """
     _checks.finite("height", height)
     _checks.finite("start", start)

@@ -54,27 +54,27 @@ def iso8608_filtered(
     a length L), the road never repeats, and the waviness is 2. Differentiable in `speed`, `cutoff` and a numeric
     `road_class`; the gradient in speed is that of the straight lines.
 
-    >>> road = iso8608_filtered("C", speed=20.0, duration=50.0, seed=1)
-    >>> round(float(road.samples.std()), 4), round(float(filtered_noise_variance(256e-6, 0.011)) ** 0.5, 4)
-    (0.0175, 0.0191)
-
-    Args:
-        road_class: A letter from "A" to "H", or the roughness G_d(n0) itself [m^3], as for `iso8608`.
+    Arguments:
+        road_class: a letter from "A" to "H", or the roughness G_d(n0) itself [m^3], as for `iso8608`.
         speed: V, the speed of the vehicle [m/s].
-        duration: The time [s] the road lasts; not where `speed` is traced by JAX.
-        seed: A whole number, or a JAX random key.
+        duration: the time [s] the road lasts; not where `speed` is traced by JAX.
+        seed: a whole number, or a JAX random key.
         cutoff: n1 [cycle/m].
-        spacing: The distance between samples [m]. A simulation may not take steps longer than spacing/speed.
-        length: The length of the road [m], instead of `duration`.
-        ramp: The time [s] over which the road fades in as a raised cosine at the start; 0 turns it off.
+        spacing: the distance between samples [m]. A simulation may not take steps longer than spacing/speed.
+        length: the length of the road [m], instead of `duration`.
+        ramp: the time [s] over which the road fades in as a raised cosine at the start; 0 turns it off.
 
     Raises:
-        ValueError: If the class is unknown, if `speed`, the roughness, `cutoff`, `spacing`, `duration` or `length` is
+        ValueError: if the class is unknown, if `speed`, the roughness, `cutoff`, `spacing`, `duration` or `length` is
             not positive, if `ramp` is negative, if not exactly one of `duration` and `length` is given, if the road
             is shorter than one spacing, or if `duration` is given while `speed` is traced.
 
     Source: ISO 8608 for the spectrum. The noise of density 1 becomes randn/sqrt(2 dx) on a grid, not randn/sqrt(dx):
     the latter, seen in published code, doubles the spectrum.
+
+    >>> road = iso8608_filtered("C", speed=20.0, duration=50.0, seed=1)
+    >>> round(float(road.samples.std()), 4), round(float(filtered_noise_variance(256e-6, 0.011)) ** 0.5, 4)
+    (0.0175, 0.0191)
     """
     density = roughness(road_class)
     _checks.positive("speed", speed, "Roads are driven forwards; it is in m/s.")

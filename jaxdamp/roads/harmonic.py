@@ -48,22 +48,22 @@ def sine(
     It starts at height zero but with its full slope; give a `ramp` of a few periods where the transient of that
     matters. Differentiable in every argument but `ramp`.
 
+    Arguments:
+        amplitude: A, half the height from trough to crest [m].
+        frequency: f [Hz].
+        wavelength: the distance between two crests [m], instead of `frequency`.
+        speed: the speed of the vehicle [m/s], with `wavelength`.
+        ramp: the time [s] over which the road fades in as a raised cosine; 0 turns it off.
+
+    Raises:
+        ValueError: if not exactly one of `frequency` and `wavelength` is given, if `speed` is missing with
+            `wavelength` or given with `frequency`, if one of the three is not positive, if `amplitude` is not finite,
+            or if `ramp` is negative.
+
     >>> import jax.numpy as jnp
     >>> waves = sine(0.01, wavelength=8.0, speed=16.0)
     >>> waves.height(jnp.array([0.0, 0.125, 0.375]))[:, 0].round(6)
     Array([ 0.  ,  0.01, -0.01], dtype=float64)
-
-    Args:
-        amplitude: A, half the height from trough to crest [m].
-        frequency: f [Hz].
-        wavelength: The distance between two crests [m], instead of `frequency`.
-        speed: The speed of the vehicle [m/s], with `wavelength`.
-        ramp: The time [s] over which the road fades in as a raised cosine; 0 turns it off.
-
-    Raises:
-        ValueError: If not exactly one of `frequency` and `wavelength` is given, if `speed` is missing with
-            `wavelength` or given with `frequency`, if one of the three is not positive, if `amplitude` is not finite,
-            or if `ramp` is negative.
     """
     _checks.finite("amplitude", amplitude)
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
@@ -81,6 +81,17 @@ def wave_course(
     The usual measures of a wave are its height from trough to crest and its length from crest to crest; the amplitude
     is half the height (the source takes the whole height by mistake).
 
+    Arguments:
+        height: h, from trough to crest [m]; 0.1 to 0.2 m in the source.
+        length: a, from crest to crest [m]; 5 to 8 m in the source.
+        speed: V, the speed of the vehicle [m/s].
+        ramp: the time [s] over which the road fades in as a raised cosine; 0 turns it off.
+
+    Raises:
+        ValueError: if `length` or `speed` is not positive, if `height` is not finite, or if `ramp` is negative.
+
+    Source: identification of the shock absorbers of an M113, equation 17: f = V/a, 0.556 Hz for 12 km/h and 6 m.
+
     >>> import jax.numpy as jnp
     >>> course = wave_course(0.15, length=6.0, speed=12 / 3.6)
     >>> round(float(course.frequency), 3)
@@ -88,17 +99,6 @@ def wave_course(
     >>> z = course.height(jnp.linspace(0.0, 3.6, 201))
     >>> round(float(z.max() - z.min()), 6)
     0.15
-
-    Args:
-        height: h, from trough to crest [m]; 0.1 to 0.2 m in the source.
-        length: a, from crest to crest [m]; 5 to 8 m in the source.
-        speed: V, the speed of the vehicle [m/s].
-        ramp: The time [s] over which the road fades in as a raised cosine; 0 turns it off.
-
-    Raises:
-        ValueError: If `length` or `speed` is not positive, if `height` is not finite, or if `ramp` is negative.
-
-    Source: identification of the shock absorbers of an M113, equation 17: f = V/a, 0.556 Hz for 12 km/h and 6 m.
     """
     _checks.finite("height", height)
     _checks.positive("length", length)

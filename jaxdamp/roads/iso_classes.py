@@ -44,18 +44,18 @@ def roughness(road_class: str | ScalarLike) -> ScalarLike:
 def class_limits(road_class: str) -> tuple[float, float]:
     """The least and the greatest G_d(n0) [m^3] of a class, half and twice its mean; 0 and infinity at the ends.
 
+    Arguments:
+        road_class: a letter from "A" to "H".
+
+    Raises:
+        ValueError: if the class is unknown.
+
+    Source: ISO 8608.
+
     >>> class_limits("C")
     (0.000128, 0.000512)
     >>> class_limits("A")
     (0.0, 3.2e-05)
-
-    Args:
-        road_class: A letter from "A" to "H".
-
-    Raises:
-        ValueError: If the class is unknown.
-
-    Source: ISO 8608.
     """
     mean = float(roughness(str(road_class)))
     return 0.0 if road_class == "A" else 0.5 * mean, math.inf if road_class == "H" else 2.0 * mean
@@ -64,14 +64,14 @@ def class_limits(road_class: str) -> tuple[float, float]:
 def road_class(roughness_psd: float) -> str:
     """The letter of the class with a roughness G_d(n0) [m^3], n0 = 0.1 cycle/m; a limit belongs to the rougher class.
 
-    >>> road_class(200e-6), road_class(2e-6), road_class(0.5)
-    ('C', 'A', 'H')
-
-    Args:
+    Arguments:
         roughness_psd: G_d(n0) [m^3].
 
     Raises:
-        ValueError: If it is not positive.
+        ValueError: if it is not positive.
+
+    >>> road_class(200e-6), road_class(2e-6), road_class(0.5)
+    ('C', 'A', 'H')
     """
     _checks.positive("roughness_psd", roughness_psd, "It is G_d(n0) in m^3, for example 64e-6.")
     return next(letter for letter in ROUGHNESS_PSD if roughness_psd < class_limits(letter)[1])

@@ -96,6 +96,29 @@ def iso8608(
     rougher. `two_track` adds the right-hand track, `delayed` the rear axle; `iso8608_filtered` is the road made by a
     shaping filter instead.
 
+    Arguments:
+        road_class: a letter from "A" (very good) to "H" (very poor), standing for the geometric mean of the class, or
+            the roughness G_d(n0) itself [m^3] at n0 = 0.1 cycle/m ("A" is 16e-6, each class four times the one
+            before).
+        speed: V, the speed of the vehicle [m/s].
+        duration: the time [s] the road must last before it repeats; lengthens the road where 1 km is not enough.
+        seed: a whole number, or a JAX random key.
+        waviness: w; 2 in the standard.
+        minimum_spatial_frequency: the lower end of the spectrum [cycle/m]; 0.011 in the standard.
+        maximum_spatial_frequency: the upper end of the spectrum [cycle/m]; 2.83 in the standard. It reaches the
+            frequency 2.83 V: sample the road at more than twice that.
+        length: the distance [m] after which the road repeats; by default the longest of 1000 m, ten of the longest
+            waves, and `speed` times `duration`. The time to compute the road grows with it.
+        ramp: the time [s] over which the road fades in as a raised cosine at the start, so that a vehicle at rest on
+            level ground meets no jump; 0 turns it off.
+
+    Raises:
+        ValueError: if the class is unknown, if `speed`, the roughness or a spatial frequency is not positive, if
+            `waviness` or `ramp` is negative, if the band is empty, if `length` is shorter than the longest wave or
+            than `speed` times `duration`, or if `duration` is given while `speed` is traced (give `length` instead).
+
+    Source: ISO 8608. Not to be confused with the table over rad/m, whose reference is 1 rad/m (1e-6 m^3 for class A).
+
     >>> import jax.numpy as jnp
     >>> road = iso8608("C", speed=20.0, seed=1, ramp=0.0)
     >>> z = road.height(jnp.linspace(0.0, 50.0, 10_000, endpoint=False))[:, 0]
@@ -103,29 +126,6 @@ def iso8608(
     0.015226
     >>> road.duration
     50.0
-
-    Args:
-        road_class: A letter from "A" (very good) to "H" (very poor), standing for the geometric mean of the class, or
-            the roughness G_d(n0) itself [m^3] at n0 = 0.1 cycle/m ("A" is 16e-6, each class four times the one
-            before).
-        speed: V, the speed of the vehicle [m/s].
-        duration: The time [s] the road must last before it repeats; lengthens the road where 1 km is not enough.
-        seed: A whole number, or a JAX random key.
-        waviness: w; 2 in the standard.
-        minimum_spatial_frequency: The lower end of the spectrum [cycle/m]; 0.011 in the standard.
-        maximum_spatial_frequency: The upper end of the spectrum [cycle/m]; 2.83 in the standard. It reaches the
-            frequency 2.83 V: sample the road at more than twice that.
-        length: The distance [m] after which the road repeats; by default the longest of 1000 m, ten of the longest
-            waves, and `speed` times `duration`. The time to compute the road grows with it.
-        ramp: The time [s] over which the road fades in as a raised cosine at the start, so that a vehicle at rest on
-            level ground meets no jump; 0 turns it off.
-
-    Raises:
-        ValueError: If the class is unknown, if `speed`, the roughness or a spatial frequency is not positive, if
-            `waviness` or `ramp` is negative, if the band is empty, if `length` is shorter than the longest wave or
-            than `speed` times `duration`, or if `duration` is given while `speed` is traced (give `length` instead).
-
-    Source: ISO 8608. Not to be confused with the table over rad/m, whose reference is 1 rad/m (1e-6 m^3 for class A).
     """
     band = (float(minimum_spatial_frequency), float(maximum_spatial_frequency))
     _checks.positive("minimum_spatial_frequency", band[0])

@@ -29,24 +29,24 @@ def pothole(
     derivatives; the greatest slope is D/(2 e T). A rigid wheel does not follow a real edge: see `contact_patch` and
     `rolling_disc`. Differentiable in every argument.
 
-    >>> import jax.numpy as jnp
-    >>> hole = pothole(0.08, start=1.0, length=0.6, speed=10.0)
-    >>> hole.height(jnp.array([0.9, 1.0, 1.03, 1.06, 1.2]))[:, 0].round(4)
-    Array([-0.  , -0.04, -0.08, -0.04, -0.  ], dtype=float64)
-
-    Args:
+    Arguments:
         depth: D [m]; negative for a block lying on the road.
         start: t0, the time [s] at which the wheel is half way down the first edge. Leave a few e T before it, as the
             edge has no sharp beginning.
         duration: T, the time [s] from edge to edge.
-        length: The distance from edge to edge [m], instead of `duration`.
-        speed: The speed of the vehicle [m/s], with `length`.
+        length: the distance from edge to edge [m], instead of `duration`.
+        speed: the speed of the vehicle [m/s], with `length`.
         edge: e, the width of the edges as a share of the length, at most 0.25.
 
     Raises:
-        ValueError: If not exactly one of `duration` and `length` is given, if `speed` is missing with `length` or
+        ValueError: if not exactly one of `duration` and `length` is given, if `speed` is missing with `length` or
             given with `duration`, if one of the three or `edge` is not positive, if `edge` is above 0.25, or if
             `depth` or `start` is not finite.
+
+    >>> import jax.numpy as jnp
+    >>> hole = pothole(0.08, start=1.0, length=0.6, speed=10.0)
+    >>> hole.height(jnp.array([0.9, 1.0, 1.03, 1.06, 1.2]))[:, 0].round(4)
+    Array([-0.  , -0.04, -0.08, -0.04, -0.  ], dtype=float64)
     """
     _checks.finite("depth", depth)
     _checks.positive("edge", edge, "A sudden edge has no derivative: give it a few hundredths of the length.")

@@ -31,28 +31,28 @@ def from_profile(
     A road that is not periodic ends with its last sample: asking for later times raises a `ValueError`, and gives NaN
     inside compiled code, where times cannot be inspected.
 
+    Arguments:
+        position: the place of each sample: distance along the road [m] if `speed` is given, otherwise time [s]. It
+            must increase in equal steps.
+        height: the height of each sample [m], up positive: shape [samples], or [samples, wheels] with one column per
+            track.
+        speed: the speed of the vehicle [m/s], for a profile over distance.
+        periodic: repeat the profile for ever. The sample after the last one is then the first one again, so a closed
+            lap must not hold its starting point twice.
+        ramp: the time [s] over which the road fades in as a raised cosine, for profiles that do not start at height
+            zero; 0 turns it off.
+
+    Raises:
+        ValueError: if lengths differ, if there are fewer than two samples, if anything is NaN or infinite, if
+            `position` does not increase or its steps are not equal, if `speed` is not positive, or if `ramp` is
+            negative.
+
     >>> import jax.numpy as jnp
     >>> ramp_up = from_profile(jnp.arange(4.0), jnp.array([0.0, 0.0, 0.1, 0.1]), speed=10.0)
     >>> ramp_up.height(jnp.array([0.1, 0.15, 0.2]))[:, 0].round(6)
     Array([0.  , 0.05, 0.1 ], dtype=float64)
     >>> round(ramp_up.grid, 6), round(ramp_up.duration, 6)
     (0.1, 0.3)
-
-    Args:
-        position: The place of each sample: distance along the road [m] if `speed` is given, otherwise time [s]. It
-            must increase in equal steps.
-        height: The height of each sample [m], up positive: shape [samples], or [samples, wheels] with one column per
-            track.
-        speed: The speed of the vehicle [m/s], for a profile over distance.
-        periodic: Repeat the profile for ever. The sample after the last one is then the first one again, so a closed
-            lap must not hold its starting point twice.
-        ramp: The time [s] over which the road fades in as a raised cosine, for profiles that do not start at height
-            zero; 0 turns it off.
-
-    Raises:
-        ValueError: If lengths differ, if there are fewer than two samples, if anything is NaN or infinite, if
-            `position` does not increase or its steps are not equal, if `speed` is not positive, or if `ramp` is
-            negative.
     """
     spacing = _uniform_spacing(np.asarray(position, float))
     heights = jnp.asarray(height, float)

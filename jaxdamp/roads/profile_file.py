@@ -33,6 +33,22 @@ def read_profile(
     Columns are separated by commas, semicolons, tabs or blanks. Lines that begin with # or %, and empty ones, are left
     out. Names of columns may stand in the first remaining line. Everything else is as for `from_profile`.
 
+    Arguments:
+        path: the file.
+        speed: the speed of the vehicle [m/s] if the positions are distances along the road; left out if they are times.
+        position: the column of positions, by name or by number from 0.
+        height: the column of heights, or one column for each track, by name or by number from 0.
+        position_unit: "m" (which is assumed with a speed), "km", "cm", "mm", "ft" or "in"; without a speed "s" (which
+            is then assumed) or "ms".
+        height_unit: "m", "km", "cm", "mm", "ft" or "in".
+        periodic: repeat the profile for ever, as for `from_profile`.
+        ramp: the time [s] over which the road fades in, as for `from_profile`.
+
+    Raises:
+        ValueError: if the file holds no numbers, if lines differ in length or a field is not a number, if a column or
+            unit is unknown, or if `from_profile` refuses the values.
+        FileNotFoundError: if there is no such file.
+
     >>> import tempfile, pathlib
     >>> file = pathlib.Path(tempfile.mkdtemp()) / "lane.csv"
     >>> _ = file.write_text("distance,left,right\n0.0,0,1\n0.1,5,2\n0.2,0,3\n")
@@ -40,22 +56,6 @@ def read_profile(
     >>> road.height(np.array([0.01, 0.02]))
     Array([[0.005, 0.002],
            [0.   , 0.003]], dtype=float64)
-
-    Args:
-        path: The file.
-        speed: The speed of the vehicle [m/s] if the positions are distances along the road; left out if they are times.
-        position: The column of positions, by name or by number from 0.
-        height: The column of heights, or one column for each track, by name or by number from 0.
-        position_unit: "m" (which is assumed with a speed), "km", "cm", "mm", "ft" or "in"; without a speed "s" (which
-            is then assumed) or "ms".
-        height_unit: "m", "km", "cm", "mm", "ft" or "in".
-        periodic: Repeat the profile for ever, as for `from_profile`.
-        ramp: The time [s] over which the road fades in, as for `from_profile`.
-
-    Raises:
-        ValueError: If the file holds no numbers, if lines differ in length or a field is not a number, if a column or
-            unit is unknown, or if `from_profile` refuses the values.
-        FileNotFoundError: If there is no such file.
     """
     units = _TIMES if speed is None else _LENGTHS
     unit = position_unit or next(iter(units))

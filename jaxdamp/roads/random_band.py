@@ -41,30 +41,30 @@ def band_limited(
 
     `rms` or `peak_to_peak` holds for one full period as sampled, before the fade-in. Differentiable in both.
 
-    >>> road = band_limited(peak_to_peak=0.01, duration=20.0, dt=0.002, seed=0, ramp=0.0)
-    >>> import jax.numpy as jnp
-    >>> z = road.height(jnp.arange(10_000.0) * 0.002)[:, 0]
-    >>> round(float(z.max() - z.min()), 6)
-    0.01
-
-    Args:
-        low: The lowest frequency [Hz].
-        high: The highest frequency [Hz], below half the sampling frequency 1/dt.
-        rms: The root mean square of the height [m].
-        peak_to_peak: The difference between the highest and the lowest sample [m], instead of `rms`.
-        duration: The length of one period [s], a multiple of `dt` and at least 1/low.
-        dt: The spacing of the samples [s].
-        seed: A whole number, or a JAX random key.
-        ramp: The time [s] over which the road fades in as a raised cosine at the start, so that a vehicle at rest on
+    Arguments:
+        low: the lowest frequency [Hz].
+        high: the highest frequency [Hz], below half the sampling frequency 1/dt.
+        rms: the root mean square of the height [m].
+        peak_to_peak: the difference between the highest and the lowest sample [m], instead of `rms`.
+        duration: the length of one period [s], a multiple of `dt` and at least 1/low.
+        dt: the spacing of the samples [s].
+        seed: a whole number, or a JAX random key.
+        ramp: the time [s] over which the road fades in as a raised cosine at the start, so that a vehicle at rest on
             level ground meets no jump; 0 turns it off. Later periods are not faded.
 
     Raises:
-        ValueError: If not exactly one of `rms` and `peak_to_peak` is given, if `low` is not below `high`, if `high`
+        ValueError: if not exactly one of `rms` and `peak_to_peak` is given, if `low` is not below `high`, if `high`
             is not below the Nyquist frequency 1/(2 dt), if `duration` is not a multiple of `dt` or too short, or if a
             size is not positive.
 
     Source: Cui, Kurfess and Messman, quarter-car simulation with a random road from 0.1 to 50 Hz, 0.01 m peak to
     peak. They do not say what the phases and amplitudes are.
+
+    >>> road = band_limited(peak_to_peak=0.01, duration=20.0, dt=0.002, seed=0, ramp=0.0)
+    >>> import jax.numpy as jnp
+    >>> z = road.height(jnp.arange(10_000.0) * 0.002)[:, 0]
+    >>> round(float(z.max() - z.min()), 6)
+    0.01
     """
     size, first, last = _lines(float(low), float(high), float(duration), float(dt))
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")

@@ -67,6 +67,15 @@ def joined(first: AbstractRoad, second: AbstractRoad, *, at: ScalarLike | int | 
     Its `ramp`, if it has one, fades it in there. Several roads join in turn: joined(joined(a, b), c). Differentiable
     in `at` and in whatever the two roads are differentiable in.
 
+    Arguments:
+        first: a road.
+        second: a road with as many tracks.
+        at: t1 [s]; by default the time at which the first road ends or repeats.
+
+    Raises:
+        ValueError: if the roads have different numbers of tracks or tracks of different wheels, if `at` is negative or
+            beyond the end of the first road, or if it is left out where the first road has no end.
+
     >>> import jax.numpy as jnp
     >>> from jaxdamp.roads import from_profile, step
     >>> kerb, field = step(0.1, start=0.5), from_profile(jnp.arange(3.0), jnp.array([1.0, 1.2, 1.0]))
@@ -75,15 +84,6 @@ def joined(first: AbstractRoad, second: AbstractRoad, *, at: ScalarLike | int | 
     Array([0. , 0.1, 0.1, 0.3, 0.1], dtype=float64)
     >>> road.duration
     4.0
-
-    Args:
-        first: A road.
-        second: A road with as many tracks.
-        at: t1 [s]; by default the time at which the first road ends or repeats.
-
-    Raises:
-        ValueError: If the roads have different numbers of tracks or tracks of different wheels, if `at` is negative or
-            beyond the end of the first road, or if it is left out where the first road has no end.
     """
     if first.wheels != second.wheels:
         remedy = "Join single tracks first and use `two_track` and `delayed` on the result."

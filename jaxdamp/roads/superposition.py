@@ -37,17 +37,17 @@ class Superposed(AbstractOnSeveralRoads):
 def superposed(*roads: AbstractRoad) -> Superposed:
     """The sum of roads: a bump on a rough surface, a measured profile on a long swell.
 
+    Arguments:
+        roads: at least one road, all with the same number of tracks.
+
+    Raises:
+        ValueError: if there is no road, or if their numbers of tracks differ or stand for different wheels.
+
     >>> import jax.numpy as jnp
     >>> from jaxdamp.roads import cosine_bump, sine
     >>> road = superposed(sine(0.01, frequency=1.0), cosine_bump(0.1, start=1.0, duration=0.5))
     >>> road.height(jnp.array([0.25, 1.25]))[:, 0].round(6)
     Array([0.01, 0.11], dtype=float64)
-
-    Args:
-        roads: At least one road, all with the same number of tracks.
-
-    Raises:
-        ValueError: If there is no road, or if their numbers of tracks differ or stand for different wheels.
     """
     if not roads:
         _checks.refuse("roads", "hold at least one road", "empty")

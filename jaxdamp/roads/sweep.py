@@ -74,24 +74,24 @@ def sweep_sine(
     it: the rate of height then swings by V, except for the part A'(t) sin, of relative size f'/(2 pi f^2). Before the
     start and after the end the frequency stays at f0 and f1. Differentiable in every number but `ramp`.
 
-    >>> import jax.numpy as jnp
-    >>> rig = sweep_sine(1.0, 20.0, duration=30.0, velocity_amplitude=0.1, sweep="logarithmic")
-    >>> z = rig.height(jnp.arange(0.0, 30.0, 0.001))[:, 0]
-    >>> round(float(z[:1000].max()), 4), round(float(z[-1000:].max()), 5)  # 0.1/(2 pi f)
-    (0.0155, 0.00088)
-
-    Args:
+    Arguments:
         start: f0 [Hz].
         stop: f1 [Hz]; below f0 for a sweep downwards.
         duration: T, the time [s] of the sweep, and of the road.
         amplitude: A, half the height from trough to crest [m].
         velocity_amplitude: V, the amplitude of the rate of height [m/s], instead of `amplitude`.
         sweep: "linear" or "logarithmic".
-        ramp: The time [s] over which the road fades in as a raised cosine; 0 turns it off.
+        ramp: the time [s] over which the road fades in as a raised cosine; 0 turns it off.
 
     Raises:
-        ValueError: If not exactly one of the two amplitudes is given, if it is not finite, if a frequency or
+        ValueError: if not exactly one of the two amplitudes is given, if it is not finite, if a frequency or
             `duration` is not positive, if the frequencies are equal, if `ramp` is negative, or if `sweep` is unknown.
+
+    >>> import jax.numpy as jnp
+    >>> rig = sweep_sine(1.0, 20.0, duration=30.0, velocity_amplitude=0.1, sweep="logarithmic")
+    >>> z = rig.height(jnp.arange(0.0, 30.0, 0.001))[:, 0]
+    >>> round(float(z[:1000].max()), 4), round(float(z[-1000:].max()), 5)  # 0.1/(2 pi f)
+    (0.0155, 0.00088)
     """
     _checks.one_of("sweep", sweep, _SWEEPS)
     _checks.positive("start", start)

@@ -56,6 +56,17 @@ def two_track(
     G_d (1 + gamma)/2 in their mean (heave) and 2 G_d (1 - gamma) in their difference (roll); the coherence over bands
     of many cosines is gamma^2. Differentiable in `track_width` and in what the road is differentiable in.
 
+    Arguments:
+        left: the road under the left wheels, with a single track.
+        right: the road under the right wheels, with a single track; the same object for a symmetric road.
+        track_width: B [m], the distance between the tracks, for a right-hand track made from `left`.
+        seed: a whole number, or a JAX random key, for the right-hand track: with `track_width` only.
+
+    Raises:
+        ValueError: if not exactly one of `right` and `track_width` is given, if a road has several tracks, if
+            `track_width` is not positive or comes without `seed`, or if it is given for a road that is not made by
+            `iso8608`.
+
     >>> import jax.numpy as jnp
     >>> from jaxdamp.roads import delayed, iso8608
     >>> road = two_track(iso8608("C", speed=20.0, seed=1), track_width=1.5, seed=2)
@@ -63,17 +74,6 @@ def two_track(
     (1001, 2)
     >>> delayed(road, positions=[0.0, 2.7], speed=20.0).wheels  # front-left, front-right, rear-left, rear-right
     4
-
-    Args:
-        left: The road under the left wheels, with a single track.
-        right: The road under the right wheels, with a single track; the same object for a symmetric road.
-        track_width: B [m], the distance between the tracks, for a right-hand track made from `left`.
-        seed: A whole number, or a JAX random key, for the right-hand track: with `track_width` only.
-
-    Raises:
-        ValueError: If not exactly one of `right` and `track_width` is given, if a road has several tracks, if
-            `track_width` is not positive or comes without `seed`, or if it is given for a road that is not made by
-            `iso8608`.
     """
     for name, road in (("left", left), ("right", right)):
         if road is not None and road.wheels != 1:
