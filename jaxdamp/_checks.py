@@ -1,4 +1,4 @@
-"""Checks of arguments. Every message names the argument, shows its value and says what to do instead."""
+"""Checks of arguments. Every message contains the argument, its value and the remedy."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,13 +10,14 @@ from jax import Array
 from jax.core import Tracer
 
 
-MOST_SHOWN = 8  # numbers of an array that a message shows
+MOST_SHOWN = 8  # largest number of array elements shown in a message
 
 
 class ArgumentError(ValueError):
     """A value that an argument must not have.
 
-    `str(error)` speaks of Python's arguments. Its parts are kept apart, so that the command line can speak of options.
+    `str(error)` refers to arguments in Python. Its parts are stored separately, so that the command line can refer to
+    options instead.
 
     Attributes:
         argument: name of the argument at fault; empty if a file is at fault.
@@ -31,11 +32,11 @@ class ArgumentError(ValueError):
 
 @dataclass(frozen=True)
 class Setting:
-    """An argument with its value as a message writes it.
+    """An argument with its value, as written in a message.
 
     Attributes:
         argument: name of the argument.
-        value: its value, which may be a mapping; an ellipsis stands for what the user must fill in.
+        value: its value, which may be a mapping; an ellipsis stands for a value that the user must fill in.
 
     >>> str(Setting("sign", "rebound-positive")), str(Setting("columns", {"time": None, "stroke": ...}))
     ('sign="rebound-positive"', 'columns={"time": None, "stroke": ...}')
@@ -60,14 +61,14 @@ def _literal(value: Any) -> str:
 
 
 def refuse(argument: str, must: str, value: Any, remedy: str = "", *settings: Setting) -> NoReturn:
-    """Raise the error that all checks share; settings that the remedy mentions follow it."""
+    """Raise the common error of all checks; `settings` are those that the remedy mentions."""
     remedy = f" {remedy}" if remedy else ""
     message = f"Argument `{argument}` must {must}, but is {summary(value)}.{remedy}"
     raise ArgumentError(message, *settings, argument=argument)
 
 
 def summary(value: Any, wrong: Any = None) -> Any:
-    """A value as a message shows it: of more than a few numbers only how many there are, and one that is wrong.
+    """A value as shown in a message: of many numbers only their count and the first wrong one.
 
     Arguments:
         value: any value.
@@ -97,7 +98,7 @@ def concrete(value: Any) -> np.ndarray | None:
 
 
 def _numbers(argument: str, value: Any) -> np.ndarray | None:
-    """`concrete`, but refusing what is no number."""
+    """`concrete`, but refusing values that are not numbers."""
     array = concrete(value)
     if array is not None and array.dtype.kind not in "biufc":
         refuse(argument, "be a number", described(value))
@@ -145,13 +146,13 @@ def described(value: Any) -> str:
 
 
 def instance(argument: str, value: Any, kinds: type | tuple[type, ...], must: str, remedy: str = "") -> None:
-    """Refuse an object of another kind, such as a road where a vehicle belongs."""
+    """Refuse an object of a wrong type, such as a road instead of a vehicle."""
     if not isinstance(value, kinds):
         refuse(argument, must, described(value), remedy)
 
 
 def one_of(argument: str, value: str, choices: Iterable[str]) -> None:
-    """Refuse a word that is not among the choices; suggest the nearest one."""
+    """Refuse a text that is not among the choices; suggest the nearest one."""
     choices = list(choices)
     if value not in choices:
         near = nearest(value, choices)
@@ -160,5 +161,5 @@ def one_of(argument: str, value: str, choices: Iterable[str]) -> None:
 
 
 def nearest(value: str, choices: Iterable[str]) -> str | None:
-    """The choice that a mistyped word is most like, if any is like it."""
+    """The choice that is most similar to a mistyped word, if any."""
     return next(iter(get_close_matches(value, list(choices), 1)), None)

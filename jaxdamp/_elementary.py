@@ -1,11 +1,11 @@
-"""Elementary functions of float64 that go by vectors in a loop over many cars.
+"""Vectorised elementary functions of float64 for loops over many cars.
 
-On a CPU XLA computes its own logarithm and power number by number, and 1/√x too on processors without AVX-512: 4 to
-15 ns where a square root takes 0.7 ns (`python -m benchmarks.functions`). These are made of operations that go by
-vectors on all processors.
+On a CPU, XLA computes the logarithm and the power without vector instructions, and also 1/√x on processors without
+AVX-512: 4 to 15 ns, while a square root takes 0.7 ns (`python -m benchmarks.functions`). These functions consist of
+operations that are vectorised on all processors.
 
-Each has a derivative of its own, and its value differentiates rightly too: where reverse mode passes through a loop,
-`lax.scan` keeps the value and forgets the custom derivative, so that second derivatives are those of the value's text.
+Each has a custom derivative, and its value is differentiable too: where reverse mode passes through a loop, `lax.scan`
+stores the value and loses the custom derivative, so that second derivatives are those of the code of the value.
 """
 
 import functools

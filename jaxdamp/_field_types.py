@@ -1,4 +1,4 @@
-"""What the fields of a module may hold, by their annotations: one number, numbers in a row, other modules."""
+"""Checks of the fields of a module by their annotations: one number, a vector of numbers, other modules."""
 
 import dataclasses
 import functools
@@ -21,13 +21,13 @@ _WORDS = {  # abstract classes in words, and what to write
 
 
 def check_field_types(module: eqx.Module) -> None:
-    """Refuse a field whose value is not of the kind that its annotation names.
+    """Refuse a field whose value does not have the type of its annotation.
 
-    Checked are fields for one number (`Number`), for numbers in a row (`Vector`), and for modules such as laws, bodies
-    and corners, alone, optional or in a tuple. Other annotations are left alone.
+    Checked are fields for one number (`Number`), for a vector (`Vector`), and for modules such as laws, bodies and
+    corners, also optional or in a tuple. Other annotations are not checked.
 
     Raises:
-        ValueError: a value of another kind; names the class and the field, what came and what belongs there.
+        ValueError: a wrong type; the message names the class, the field, the value and the expected type.
     """
     for name, annotation in _annotations(type(module)).items():
         argument, value = f"{type(module).__name__}.{name}", getattr(module, name)

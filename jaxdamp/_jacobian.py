@@ -11,11 +11,11 @@ from jaxtyping import Array
 
 Mode = Literal["forward", "reverse"]
 Results = dict[str, Array]
-INPUTS_FOR_A_RESULT = 2  # each costs about a run more forward, each result about three reverse
+INPUTS_FOR_A_RESULT = 2  # each input costs about one run in forward mode, each result about three in reverse mode
 
 
 def choose_mode(inputs: int, results: int) -> Mode:
-    """Forward for few inputs, which needs no memory of the steps taken; reverse for more than twice the results."""
+    """Forward mode, which stores no steps, for up to twice as many inputs as results; otherwise reverse mode."""
     return "forward" if inputs <= INPUTS_FOR_A_RESULT * results else "reverse"
 
 
@@ -49,12 +49,12 @@ def value_and_jacobian(
     point = dict(point)
 
     def split(point: dict[str, Array]) -> tuple[Results, Results]:
-        found = function(point)
+        results = function(point)
         chosen = [
-            name for name in found if jnp.issubdtype(found[name].dtype, jnp.floating) and (of is None or name in of)
+            name for name in results if jnp.issubdtype(results[name].dtype, jnp.floating) and (of is None or name in of)
         ]
-        smooth = {name: found[name] for name in chosen}
-        return smooth, {name: value for name, value in found.items() if name not in smooth}
+        smooth = {name: results[name] for name in chosen}
+        return smooth, {name: value for name, value in results.items() if name not in smooth}
 
     smooth, rest, slopes = _forward(split, point) if mode == "forward" else _reverse(split, point)
     return smooth | rest, slopes

@@ -1,9 +1,9 @@
 """Limits and maxima with derivatives that do not depend on how they are compiled.
 
-To differentiate, `jnp.maximum` and `jnp.max` compare their result with their arguments. A compiler may compute an
-argument anew for that, round it otherwise, find none equal, and so lose the derivative. These compare the arguments.
-When differentiated, their value is selected by the same comparison, so that second derivatives do not depend on it
-either (see `jaxdamp._elementary` on loops that forget custom derivatives).
+The derivatives of `jnp.maximum` and `jnp.max` compare the result with the arguments. A compiler may compute an argument
+again for this, with different rounding, so that none is equal and the derivative is lost. The functions here compare
+the arguments. When differentiated, their value is selected by the same comparison, so that second derivatives are right
+too (see `jaxdamp._elementary` on loops that lose custom derivatives).
 """
 
 from typing import Any
@@ -31,7 +31,7 @@ def at_most(numbers: AnyNumbers, most: AnyNumbers) -> Numbers:
 
 
 def within(numbers: AnyNumbers, least: AnyNumbers, most: AnyNumbers) -> Numbers:
-    """Numbers kept between two limits."""
+    """Numbers limited to between two values."""
     return at_most(at_least(numbers, least), most)
 
 
@@ -50,7 +50,7 @@ def _slope_of_most(primals: tuple[Any, Any], tangents: tuple[Any, Any]) -> tuple
 
 
 def _selected(values: tuple[Any, Any], lead: Numbers, changes: tuple[Any, Any]) -> tuple[Numbers, Numbers]:
-    """The value that leads and its change; of equal ones the mean of both."""
+    """The selected value and its change; for equal values the mean of both."""
     one, other = (jnp.asarray(value, lead.dtype) for value in values)
     ans = jnp.where(lead > 0, one, jnp.where(lead < 0, other, 0.5 * one + 0.5 * other))
     share = jnp.where(lead > 0, 1.0, jnp.where(lead < 0, 0.0, 0.5)).astype(ans.dtype)
@@ -60,3 +60,15 @@ def _selected(values: tuple[Any, Any], lead: Numbers, changes: tuple[Any, Any]) 
 
 at_least.defjvp(_slope_of_least, symbolic_zeros=True)
 at_most.defjvp(_slope_of_most, symbolic_zeros=True)
+
+
+def root(power: Numbers, order: int = 2) -> Numbers:
+    """The square root or fourth root of numbers that are not negative, with a derivative of zero at zero.
+
+    Numbers that are slightly negative by rounding count as zero; NaN stays NaN.
+    """
+    zero = power <= 0.0
+    positive = jnp.where(zero, jnp.ones_like(power), power)
+    for _ in range(order // 2):  # order 2 or 4
+        positive = jnp.sqrt(positive)
+    return jnp.where(zero, jnp.zeros_like(power), positive)

@@ -1,4 +1,4 @@
-"""Which of many points a module cannot take, because a value lies outside its domain."""
+"""Points of a sweep at which a parameter of a module is outside its domain."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -16,12 +16,12 @@ Columns = Mapping[str, np.ndarray]
 
 
 def outside_domains(tree: Any, columns: Columns) -> np.ndarray:
-    """Why each of many points cannot be given to a law or a vehicle; an empty text where it can.
+    """The reason why a law or a vehicle refuses each of many points; an empty text for allowed points.
 
     Arguments:
         tree: a law, a vehicle or any module.
         columns: a number for each point by parameter (names as in `jaxdamp.parameters.replace`), all equally long.
-            Parameters that are vectors are not looked at.
+            Vector parameters are not checked.
 
     Returns:
         Texts, one for each point, such as "damper.rate must be positive [N s/m]".

@@ -1,4 +1,4 @@
-"""One line of progress, for work that has taken longer than two seconds and that somebody is watching."""
+"""One line of progress in the terminal or notebook, for work that takes longer than two seconds."""
 
 import sys
 import time
@@ -10,8 +10,8 @@ from typing import Any, final
 class Progress:
     """`with Progress("Fitting") as progress: progress("besinger, 2 of 5")` writes over one line of the terminal.
 
-    Nothing is shown before two seconds have gone by, nor where the output goes to a file. In a notebook the line stands
-    below the cell while the work lasts; the notebook that is saved does not hold it.
+    Nothing is shown during the first two seconds, or if the output is not a terminal. In a notebook the line is below
+    the cell during the work and is not saved.
     """
 
     def __init__(self, label: str, delay: float = 2.0) -> None:

@@ -1,8 +1,8 @@
-"""Random numbers that depend on the seed alone: the same in single and double precision, one by one or in a batch.
+"""Random numbers that depend on the seed only: the same in single and double precision, alone or in a batch.
 
-JAX draws other bits for other floating-point types. Here 64 bits are drawn for every number, by the generator that is
-JAX's default (Threefry-2x32, the same on every device), and converted to the precision in use. In double precision the
-numbers are those of `jax.random`.
+JAX draws different bits for different floating-point types. Here 64 bits are drawn for every number, by the default
+generator of JAX (Threefry-2x32, the same on every device), and converted to the precision in use. In double precision
+the numbers are those of `jax.random`.
 """
 
 import math
@@ -50,7 +50,7 @@ def normal(seed: int | Array, shape: tuple[int, ...]) -> Float[Array, "..."]:
 
 
 def sign(seed: int | Array, shape: tuple[int, ...]) -> Float[Array, "..."]:
-    """1 or −1, alike in probability; arguments as those of `uniform`."""
+    """1 or −1 with equal probability; arguments as those of `uniform`."""
     return jnp.where(_bits(seed, shape)[0] >> 31 == 0, 1.0, -1.0).astype(float)
 
 

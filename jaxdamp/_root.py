@@ -1,4 +1,4 @@
-"""Root of a scalar function that increases, with the derivative of the implicit function theorem."""
+"""Root of an increasing scalar function, with the derivative of the implicit function theorem."""
 
 from collections.abc import Callable
 from typing import Any
@@ -22,26 +22,26 @@ def increasing_root(
 ) -> Scalar:
     """Solve function(w) = 0 by Newton steps kept inside a shrinking bracket.
 
-    Newton lands exactly on piecewise-linear functions and converges quadratically on smooth ones. Steps that are likely
-    to do are taken as they are. Where the last of them moves any lane of a batch too far, safe ones follow, which take
-    the middle of the bracket where Newton would leave it, or has not halved the residual in two steps (as when it
-    cycles about a kink). With the default `close`, a dozen reach rounding for power laws, friction and kinked laws in
-    series with springs of 1e5 to 1.5e7 N/m at 1 ms, from any guess.
-    Derivatives, forward and reverse, come from the implicit function theorem and do not pass through the steps. (Second
-    ones, forward over reverse in a loop, do so where the likely steps were enough, and then are good to `close`.)
+    Newton's method is exact for piecewise-linear functions and converges quadratically for smooth ones. First there are
+    `likely` plain steps. If the last of them is too long for any element of a batch, safe steps follow, which bisect
+    the bracket where Newton would leave it or has not halved the residual in two steps (as in cycles about a kink).
+    With the default `close`, a dozen steps reach rounding errors for power laws, friction and kinked laws in series
+    with springs of 1e5 to 1.5e7 N/m at 1 ms, from any guess. Forward and reverse derivatives come from the implicit
+    function theorem and do not pass through the steps. (Second derivatives, forward over reverse in a loop, do if the
+    plain steps were enough, and are then accurate to `close`.)
 
     Arguments:
         function: increasing on the bracket.
         guess: a first value inside the bracket.
         lower: where the function is not positive.
         upper: where the function is not negative.
-        steps: number of safe steps, at most.
-        likely: number of plain Newton steps that a good guess is likely to need; none to be safe from the first.
-        close: relative length of a step that is the last: what is left is about its square.
+        steps: largest number of safe steps.
+        likely: number of plain Newton steps that are likely to be enough for a good guess; 0 for safe steps only.
+        close: relative length of the last step; the remaining error is about its square.
     """
 
     def tangent_solve(linear: Callable[[Scalar], Scalar], value: Scalar) -> Scalar:
-        return value * (1.0 / linear(jnp.ones_like(value)))  # no quotient for each of many tangents
+        return value * (1.0 / linear(jnp.ones_like(value)))  # a product for each tangent, since quotients are slow
 
     def solve(f: Callable[[Scalar], Scalar], w: Scalar) -> Scalar:
         def newton(w: Scalar) -> tuple[Scalar, Scalar, Scalar]:
@@ -55,7 +55,7 @@ def increasing_root(
             high = jnp.where(value >= 0, w, high)
             stalled = jnp.abs(value) > 0.5 * before_last
             inside = (ahead >= low) & (ahead <= high)
-            # At the root rounding may point out of the bracket; its other end can be far away, and so its middle.
+            # At the root, rounding may lead out of the bracket; a bisection could then be far from the root.
             small = jnp.abs(ahead - w) <= 1e-6 * (high - low)
             good = (slope > 0) & (small | (inside & ~stalled))
             return jnp.where(good, ahead, 0.5 * (low + high)), low, high, jnp.abs(value), last

@@ -1,4 +1,4 @@
-"""Smooth stand-ins for kinks, each with its width, so that every law has a finite slope everywhere."""
+"""Smooth approximations of kinks with a given width, so that every law has a finite slope everywhere."""
 
 import jax
 import jax.numpy as jnp

@@ -4,7 +4,7 @@ import enum
 
 
 class Status(enum.Enum):
-    """How a fit, a training or a tuning ended: compare with `is` in code, read `sentence` as a person."""
+    """How a fit, a training or a tuning ended: compare with `is` in code; `sentence` explains it."""
 
     CONVERGED = "The search converged."
     STEP_LIMIT = "The search stopped after as many steps as `max_steps` allows."
@@ -16,5 +16,5 @@ class Status(enum.Enum):
 
     @property
     def sentence(self) -> str:
-        """What it means, in a sentence."""
+        """Explanation in a sentence."""
         return self.value

@@ -17,7 +17,7 @@ SignalLike = Float[Array, " time"] | Float[np.ndarray, " time"]
 # Any number goes in as a scalar. Fields of modules: the constructor takes numbers and sequences, the converter of the
 # field makes arrays of them, which is what type checkers read from the descriptors.
 if TYPE_CHECKING:
-    ScalarLike: TypeAlias = Any
+    ScalarLike: TypeAlias = float | Array
 
     class Number:
         """A field for one number."""

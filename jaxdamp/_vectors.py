@@ -1,7 +1,7 @@
 """Small vectors in two layouts: one array, or a tuple of scalars.
 
 XLA compiles a loop over a tuple of scalars, or of contiguous lanes where many cars run side by side, into the code that
-one would write by hand; where it is not told to compile small loops as one function, one array is better for one car.
+one would write by hand; without the compiler options of `jaxdamp.configure`, one array is better for one car.
 """
 
 import operator
@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 from jaxdamp._types import Scalar, ScalarLike
 
 
-# One array or a tuple of scalars, rows of them for a matrix; who calls knows which.
+# One array or a tuple of scalars, rows of them for a matrix, as the caller chooses.
 if TYPE_CHECKING:
     Vector: TypeAlias = Any
     Matrix: TypeAlias = Any
@@ -35,7 +35,7 @@ def rows(matrix: Float[Array, "_ _"]) -> tuple[tuple[Scalar, ...], ...]:
 
 
 def times(matrix: Matrix, vector: Vector) -> Vector:
-    """Matrix @ vector as products and sums, which XLA fuses with what is around them; a `dot` stands alone."""
+    """Matrix @ vector as products and sums, which XLA fuses with other operations, unlike a `dot`."""
     if isinstance(matrix, tuple):
         return tuple(_dot(row, vector) for row in matrix)
     return jnp.sum(matrix * jnp.asarray(vector)[None, :], axis=1)
@@ -54,14 +54,14 @@ def minus(one: Vector, other: Vector) -> Vector:
 def once(vector: Vector, unit: Scalar | None) -> Vector:
     """The same, to be computed once.
 
-    XLA writes what goes into several sums anew in each of them, but not a quotient: scalars are divided by one, whose
-    value the compiler must not know. That doubles the rate of many cars side by side; one car does better without.
+    XLA computes a term again for each sum that uses it, but not a quotient: scalars are therefore divided by a one that
+    the compiler does not know. This doubles the speed of many cars side by side; a single car is faster without.
     """
     return tuple(entry / unit for entry in vector) if unit is not None else vector
 
 
 def once_in_derivatives(vector: Vector, unit: Scalar | None) -> Vector:
-    """The same, its tangents and cotangents to be computed once: a quarter to a third less for many cars in reverse."""
+    """The same, with tangents and cotangents computed once: 25 to 33 % less time for many cars in reverse mode."""
     return tuple(_divided_in_derivatives(entry, unit) for entry in vector) if unit is not None else vector
 
 

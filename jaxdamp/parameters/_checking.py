@@ -1,4 +1,4 @@
-"""Checking what a module refuses when it is built: kinds of fields, domains, and conditions between fields."""
+"""Checks of modules: types of fields, domains, and conditions between fields."""
 
 import dataclasses
 from typing import TypeVar
@@ -14,7 +14,7 @@ Tree = TypeVar("Tree")
 
 
 def check_parameters(module: eqx.Module) -> None:
-    """Refuse fields of another kind than their annotation and values outside their domain (traced values pass).
+    """Refuse fields of a wrong type and values outside their domain (traced values are not checked).
 
     Modules call it in `__check_init__`.
     """
@@ -33,14 +33,14 @@ def check_parameters(module: eqx.Module) -> None:
 
 
 def checked(tree: Tree) -> Tree:
-    """The same tree, after all modules in it have checked again what their constructors check.
+    """The same tree, after repeating the checks of the constructors of all modules in it.
 
-    For trees whose values were set without a constructor: fields of another kind, values outside their domains, and
-    conditions between fields or on a law inside are refused (traced values pass). Modules inside are checked before
-    those around them, and base classes before derived ones, so that the error names the cause.
+    For trees whose values were set without a constructor: fields of a wrong type, values outside their domains, and
+    violated conditions between fields or on a law inside are refused (traced values are not checked). Modules inside
+    are checked before those around them, and base classes before derived ones, so that the error names the cause.
 
     Raises:
-        ValueError: what a module refuses.
+        ValueError: as the constructors of the modules.
     """
     for _, module in reversed(list(modules_inside(tree))):
         for kind in reversed(type(module).__mro__):

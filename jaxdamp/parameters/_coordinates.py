@@ -13,9 +13,9 @@ from jaxdamp.parameters._declaration import Parameter
 from jaxdamp.parameters._free import FreeParameters
 
 
-OPEN_END = 1e-6  # distance, in coordinates, that is kept from an end that does not belong to a domain
-TOUCHING = 1e-4  # gap between ordered numbers, relative to the largest, that counts as none
-LEAST_GAP = 1e-6  # gap between ordered numbers that a search keeps, relative to the largest
+OPEN_END = 1e-6  # distance, in coordinates, from an end that does not belong to a domain
+TOUCHING = 1e-4  # gap between ordered numbers, relative to the largest, that counts as zero
+LEAST_GAP = 1e-6  # smallest gap between ordered numbers in a search, relative to the largest
 
 
 Vector = TypeVar("Vector", Float[Array, " free"], Float[np.ndarray, " free"])
@@ -29,12 +29,12 @@ class Bounds(NamedTuple):
 
 
 class Coordinates(eqx.Module):
-    """Free parameters as a search sees them, and back.
+    """The coordinates of free parameters in a search, and the conversion to and from physical values.
 
-    A coordinate is its parameter divided by a unit: the magnitude of its start, or for a fit the width of its range
-    where that is finite (a tuning has bounds of its own, near the start). So the force is linear in it where it is in
-    the parameter, and a search can end on a bound. Or it is the raw number of the domain's smooth map, which has no
-    bounds, but crawls towards the edge of its domain. Which of the two depends on what the search can handle:
+    A coordinate is either the parameter divided by a unit: the magnitude of its start, or for a fit the width of its
+    range if that is finite (a tuning has its own bounds near the start). Linearity of the force is preserved, and a
+    search can end at a bound. Or it is the raw number of the smooth map of the domain, which has no bounds, but
+    approaches an edge of the domain only slowly. The choice depends on the search:
 
     - `smooth="none"`: bounds and linear constraints (tuning). Ordered vectors are kept in order by `order`.
     - `smooth="ordered"`: bounds (fits). Ordered vectors have a smooth map.
@@ -50,7 +50,7 @@ class Coordinates(eqx.Module):
 
     @property
     def units(self) -> list[Any]:
-        """The value of each parameter where its coordinate is one, if that is a quotient."""
+        """The unit of each parameter: its value where a coordinate without a smooth map is one."""
         return [
             np.full(p.value.shape, p.domain.upper - p.domain.lower, p.value.dtype)
             if self.smooth != "none" and _has_range(p)
@@ -59,13 +59,13 @@ class Coordinates(eqx.Module):
         ]
 
     def to_physical(self, y: Vector) -> Vector:
-        """Physical values of coordinates, NumPy's of NumPy's."""
+        """Physical values of coordinates; NumPy arrays for NumPy arrays."""
         parts = zip(self.free.chosen, self.units, self.free.split(y), strict=True)
         maps = ((p.domain.from_raw, p, u, a) for p, u, a in parts)
         return _joined([of(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a * u for of, p, u, a in maps])
 
     def from_physical(self, values: Vector) -> Vector:
-        """Coordinates of physical values, NumPy's of NumPy's."""
+        """Coordinates of physical values; NumPy arrays for NumPy arrays."""
         parts = zip(self.free.chosen, self.units, self.free.split(values), strict=True)
         maps = ((p.domain.to_raw, p, u, a) for p, u, a in parts)
         return _joined([of(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a / u for of, p, u, a in maps])
@@ -76,7 +76,7 @@ class Coordinates(eqx.Module):
         return np.asarray(self.from_physical(np.asarray(self.free.values)))
 
     def bounds(self) -> Bounds:
-        """Limits of the coordinates; a small distance is kept from ends that do not belong to a domain."""
+        """Limits of the coordinates, at a small distance from ends that do not belong to a domain."""
         lower, upper = [], []
         for p, unit in zip(self.free.chosen, self.units, strict=True):
             low, high, margin = -np.inf, np.inf, 0.0
@@ -101,7 +101,7 @@ class Coordinates(eqx.Module):
         return np.concatenate(rows), np.concatenate(gaps)
 
     def at_ends(self, values: Float[np.ndarray, " free"]) -> Float[np.ndarray, " free"]:
-        """−1 where a number lies on the lower end of its range, 1 on the upper, else 0.
+        """−1 for a number at the lower end of its range, 1 at the upper, else 0.
 
         Neighbours of ordered numbers are ends too.
         """
@@ -110,7 +110,8 @@ class Coordinates(eqx.Module):
         low, high = self.bounds()
         sides = np.where(y <= low + OPEN_END, -1.0, np.where(y >= high - OPEN_END, 1.0, 0.0))
         parts = zip(self.free.chosen, pieces, strict=True)
-        return sides + np.concatenate([_met(p, a) if p.domain.ordered else np.zeros(a.size) for p, a in parts])
+        equal = [_at_neighbours(p, a) if p.domain.ordered else np.zeros(a.size) for p, a in parts]
+        return sides + np.concatenate(equal)
 
     @property
     def ordered(self) -> Bool[np.ndarray, " free"]:
@@ -127,9 +128,9 @@ def _has_range(p: Parameter) -> bool:
 
 
 def _magnitude(value: Any) -> Any:
-    """Typical magnitude of each number, never zero; small ones beside large ones count as larger than they are.
+    """Typical magnitude of each number, never zero; numbers much smaller than the largest are increased.
 
-    Of numbers that JAX does not trace it is NumPy's, because each operation of JAX alone is a program to compile.
+    Numbers that JAX does not trace are computed by NumPy, because JAX would compile each operation separately.
     """
     traced = isinstance(value, Tracer)
     xp: Any = jnp if traced else np
@@ -150,8 +151,8 @@ def _joined(pieces: list[Any]) -> Any:
     return xp.concatenate([xp.ravel(piece) for piece in pieces])
 
 
-def _met(p: Parameter, value: Float[np.ndarray, " _"]) -> Float[np.ndarray, " _"]:
-    """−1 where an ordered number has met the one below it, 1 where it has met the one above, else 0."""
+def _at_neighbours(p: Parameter, value: Float[np.ndarray, " _"]) -> Float[np.ndarray, " _"]:
+    """−1 for an ordered number that is equal to the previous one, 1 if equal to the next one, else 0."""
     ends = [a for a in (p.domain.lower, p.domain.upper) if np.isfinite(a)]
     extent = np.ptp(ends) if len(ends) == 2 else np.abs(value).max()
     low = p.domain.lower if np.isfinite(p.domain.lower) else value[0] - extent

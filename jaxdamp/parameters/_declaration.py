@@ -18,7 +18,7 @@ def as_float(value: Any, name: str = "value") -> Array:
     """A JAX array of the default float type; arrays that are floating already keep their type.
 
     Raises:
-        ValueError: something that is no number, under the name of its argument.
+        ValueError: something that is not a number; the message names the argument.
     """
     if isinstance(value, jax.Array) and jnp.issubdtype(value.dtype, jnp.floating):
         return value
@@ -37,20 +37,20 @@ def as_float(value: Any, name: str = "value") -> Array:
 def parameter(
     unit: str, meaning: str, domain: Domain | Callable[[Any], Domain] = real, *, linear: bool = False, **field: Any
 ) -> Any:
-    """Declare a field of an equinox module to be a parameter.
+    """Declare a field of an equinox module as a parameter.
 
     Arguments:
-        unit: SI unit in words that pint reads, `""` for a pure number.
+        unit: SI unit in the notation of pint, `""` for a dimensionless number.
         meaning: one line for tables and labels.
-        domain: the values it may take; a function of the instance where that depends on a setting.
-        linear: the law's force is linear in all its parameters marked so, so that a fit has a closed form.
+        domain: the allowed values; a function of the instance if they depend on a setting.
+        linear: whether the force of the law is linear in all parameters marked so; a fit then has a closed form.
         field: passed on to `equinox.field`, such as `default=0.0`.
     """
     return _number("parameter", {"unit": unit, "meaning": meaning, "domain": domain, "linear": linear}, field)
 
 
 def setting(unit: str, meaning: str, domain: Domain = real, *, command: bool = False, **field: Any) -> Any:
-    """Declare a field that is a number with a unit but never changed by a fit or a tuning, such as a knee width.
+    """Declare a field as a number with a unit that fits and tunings never change, such as a knee width.
 
     A `command` is set from outside, run by run, such as a coil current (`dampers.with_command`).
     """
@@ -58,7 +58,7 @@ def setting(unit: str, meaning: str, domain: Domain = real, *, command: bool = F
 
 
 def _number(kind: str, declared: dict[str, Any], options: dict[str, Any]) -> Any:
-    """A field that makes arrays of numbers, and names itself where it is given something else."""
+    """A field that converts numbers to arrays, with an error that names the field."""
 
     def convert(value: Any) -> Array:
         return as_float(value, field.name)
@@ -71,7 +71,7 @@ if TYPE_CHECKING:
 
     @dataclass_transform(field_specifiers=(parameter, setting, eqx.field))
     class _DeclaringMeta(type(eqx.Module)):
-        """What tells type checkers that `parameter` and `setting` declare fields."""
+        """Tells type checkers that `parameter` and `setting` declare fields."""
 
     class Module(eqx.Module, metaclass=_DeclaringMeta):
         """An equinox module whose fields may be parameters and settings."""

@@ -29,7 +29,7 @@ class Domain:
 
     @property
     def ordered(self) -> bool:
-        """Whether it is of vectors whose numbers must increase."""
+        """Whether it is a domain of increasing vectors."""
         return self.steps is not None
 
 
@@ -59,7 +59,7 @@ def _increasing_to_raw_positive(value: Array, scale: Array) -> Array:
 
 
 real = Domain("real", lambda a: True, lambda raw, scale: scale * raw, lambda value, scale: value / scale)
-# Weights of a network: their magnitude at the start says nothing about how far they should move.
+# Weights of a network: their initial magnitude is not a scale for their changes.
 weight = dataclasses.replace(real, from_raw=lambda raw, scale: raw, to_raw=lambda value, scale: value)
 positive = Domain(
     "positive",
@@ -68,8 +68,8 @@ positive = Domain(
     _positive_to_raw,
     lower=0.0,
 )
-# Its edge belongs to it, so the map is a square: zero is reached at a finite raw value, where softplus would crawl
-# towards it for ever. At exactly zero the square is flat and a search would never leave: it starts a little beside.
+# Zero belongs to this domain, so the map is a square: it reaches zero at a finite raw value, unlike softplus. At
+# exactly zero the square has no slope and a search could not leave it, so a search starts slightly above.
 nonnegative = Domain(
     "not negative",
     lambda a: bool(np.all(a >= 0)),
@@ -92,7 +92,7 @@ increasing_negative = Domain(
     upper=0.0,
     steps=lambda value: jnp.diff(value, append=jnp.zeros(1, value.dtype)),
 )
-# For settings that hold the two ends of a range.
+# For settings that are the two ends of a range.
 ends = dataclasses.replace(
     increasing,
     name="a low and a high end",
@@ -105,55 +105,56 @@ around_zero = dataclasses.replace(
 )
 
 
-def _check_bounds(lower: float, upper: float) -> None:
+def _bounded(
+    name: str,
+    lower: float,
+    upper: float,
+    share_of: Callable[[Array], Array],
+    raw_of: Callable[[Array], Array],
+    steps: Callable[[Array], Array] | None = None,
+) -> Domain:
+    """A domain between two finite numbers, from the map of raw numbers to shares of the range (0 to 1) and back."""
     if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
         raise ValueError(f"Bounds must be two finite numbers in increasing order, but are ({lower}, {upper}).")
+    width = upper - lower
+
+    def contains(a: np.ndarray) -> bool:
+        return bool(np.all((a >= lower) & (a <= upper))) and (steps is None or bool(np.all(np.diff(a) > 0)))
+
+    return Domain(
+        f"{name}between {lower:g} and {upper:g}",
+        contains,
+        lambda raw, scale: lower + width * share_of(raw),
+        lambda value, scale: raw_of((value - lower) / width),
+        lower,
+        upper,
+        steps,
+    )
+
+
+def _logit(share: Array) -> Array:
+    share = jnp.clip(share, 1e-9, 1 - 1e-9)
+    return jnp.log(share / (1 - share))
+
+
+def _ordered_shares(raw: Array) -> Array:
+    return jnp.cumsum(jax.nn.softmax(jnp.concatenate([raw, jnp.zeros(1, raw.dtype)])))[:-1]
+
+
+def _raw_of_ordered_shares(shares: Array) -> Array:
+    zero, one = jnp.zeros(1, shares.dtype), jnp.ones(1, shares.dtype)
+    gaps = jnp.maximum(jnp.diff(shares, prepend=zero, append=one), 1e-12)
+    return jnp.log(gaps[:-1] / gaps[-1])
 
 
 @functools.lru_cache
 def interval(lower: float, upper: float) -> Domain:
-    """The open interval between two finite numbers (scaled logistic map)."""
-    _check_bounds(lower, upper)
-    width = upper - lower
-
-    def to_raw(value: Array, scale: Array) -> Array:
-        del scale
-        share = jnp.clip((value - lower) / width, 1e-9, 1 - 1e-9)
-        return jnp.log(share / (1 - share))
-
-    return Domain(
-        f"between {lower:g} and {upper:g}",
-        lambda a: bool(np.all((a >= lower) & (a <= upper))),
-        lambda raw, scale: lower + width * jax.nn.sigmoid(raw),
-        to_raw,
-        lower,
-        upper,
-    )
+    """Numbers between two finite ones (scaled logistic map)."""
+    return _bounded("", lower, upper, jax.nn.sigmoid, _logit)
 
 
 @functools.lru_cache
 def ordered_interval(lower: float, upper: float) -> Domain:
     """Increasing numbers between two finite ones: their gaps are the shares of a softmax."""
-    _check_bounds(lower, upper)
-    width = upper - lower
-
-    def from_raw(raw: Array, scale: Array) -> Array:
-        del scale
-        gaps = jax.nn.softmax(jnp.concatenate([raw, jnp.zeros(1, raw.dtype)]))
-        return lower + width * jnp.cumsum(gaps)[:-1]
-
-    def to_raw(value: Array, scale: Array) -> Array:
-        del scale
-        ends = jnp.array([lower], value.dtype), jnp.array([upper], value.dtype)
-        gaps = jnp.maximum(jnp.diff(jnp.concatenate([ends[0], value, ends[1]])) / width, 1e-12)
-        return jnp.log(gaps[:-1] / gaps[-1])
-
-    return Domain(
-        f"strictly increasing between {lower:g} and {upper:g}",
-        lambda a: bool(np.all(np.diff(a) > 0) and np.all((a >= lower) & (a <= upper))),
-        from_raw,
-        to_raw,
-        lower,
-        upper,
-        steps=increasing.steps,
-    )
+    shares = _ordered_shares, _raw_of_ordered_shares
+    return _bounded("strictly increasing ", lower, upper, *shares, steps=increasing.steps)

@@ -1,4 +1,4 @@
-"""The parameters that a fit or a tuning may change, as one vector."""
+"""The free parameters of a fit or a tuning as one vector."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,7 +17,7 @@ from jaxdamp.parameters._ties import resolve_ties
 
 
 class FreeParameters(eqx.Module):
-    """The free parameters of a tree as one vector of physical values, and back. Made by `free_parameters`.
+    """The free parameters of a tree as one vector of physical values, from `free_parameters`.
 
     Attributes:
         tree: the law, vehicle or other module, with the values to start from.
@@ -101,15 +101,15 @@ def free_parameters(
     Arguments:
         tree: a law, a vehicle or any module.
         over: paths, last parts of paths or patterns with `*`; all parameters if not given.
-        freeze: the same, to be left as they are.
+        freeze: names of parameters to hold at their values.
         bounds: extra limits `{path: (lower, upper)}` in the parameter's unit.
-        tie: parameters that take the values of others, as `{"front.damper.*": "rear.damper.*"}`; what a `*` stands for
-            must be the same on both sides. A group of tied parameters is one free value: it is free where `over` names
-            one of them, stays as it is where `freeze` does, and the bounds of one hold for all.
+        tie: parameters that take the values of others, as `{"front.damper.*": "rear.damper.*"}`; a `*` stands
+            for the same text on both sides. A group of tied parameters is one free value: it is free if `over` names
+            one of them, frozen if `freeze` names one of them, and the bounds of one apply to all.
 
     Raises:
         ValueError: a name that fits no parameter; nothing left to change; bounds of a parameter that is not free, or of
-            a wrong shape; a start value outside its bounds; a mapping where names belong; ties of parameters that
+            a wrong shape; a start value outside its bounds; a mapping instead of names; ties of parameters that
             differ in unit, shape, domain or start value.
 
     >>> from jaxdamp.vehicles.presets import half_car_002
@@ -142,17 +142,17 @@ def free_parameters(
 def _limits_by_path(
     known: Sequence[str], free: set[str], leaders: Mapping[str, str], bounds: Mapping[str, Any]
 ) -> dict[str, tuple[float, float]]:
-    """Extra limits by path, checked. Of two names for one parameter the later counts."""
+    """Extra limits by path, checked. If two names match a parameter, the later one counts."""
     if not isinstance(bounds, Mapping):
         _checks.refuse("bounds", "be a mapping as {'rate': (1000.0, 5000.0)}", repr(bounds))
     limits = {}
     for name, pair in bounds.items():
         if np.shape(pair) != (2,) or not np.all(np.isfinite(pair)) or not pair[0] < pair[1]:
-            remedy = "A side that should stay open gets a number that is never reached."
+            remedy = "For a side without a limit, give a number that is never reached."
             _checks.refuse(f"bounds[{name!r}]", "be two finite numbers in increasing order", pair, remedy)
         named = [leaders.get(path, path) for path in match_paths(known, [name])]
         if free and not free & set(named):
-            remedy = "Take it out of `freeze`, or leave out its bounds: what stays as it is needs none."
+            remedy = "Remove it from `freeze`, or leave out its bounds: frozen parameters need none."
             _checks.refuse(f"bounds[{name!r}]", "bound a parameter that is free", "one that is not", remedy)
         limits |= dict.fromkeys(named, (float(pair[0]), float(pair[1])))
     return limits

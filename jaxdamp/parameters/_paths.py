@@ -23,7 +23,7 @@ def get(tree: Any, path: str) -> Any:
 
 
 def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
-    """The same tree with other values at exact paths, unchecked: for searches, which keep within bounds themselves.
+    """The same tree with other values at exact paths, unchecked: for searches, which respect bounds themselves.
 
     >>> from jaxdamp.dampers import Linear
     >>> with_values(Linear(1500.0), {"rate": 2000.0}).rate
@@ -36,8 +36,8 @@ def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
 def replace(tree: Tree, values: Mapping[str, Any]) -> Tree:
     """The same tree with other values at the given paths (last parts and patterns as in `free_parameters`).
 
-    Values outside their domain are refused, and so is whatever a module of the tree refuses when it is built: a
-    condition between several of its parameters, or one that a wrapper puts on the law inside (see `checked`).
+    Values outside their domain are refused, and so are all values that a constructor refuses: violated conditions
+    between several parameters, or of a wrapper on the law inside (see `checked`).
 
     >>> from jaxdamp.dampers import Linear
     >>> float(replace(Linear(1500.0), {"rate": 2000.0}).rate)
