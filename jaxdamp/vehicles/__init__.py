@@ -1,9 +1,9 @@
-"""Vehicles in one form: linear masses and springs, laws at ports.
+"""Vehicle models: linear masses and springs, with force laws at ports.
 
 - Ready-made: `QuarterCar`, `HalfCar`, `RollCar`, `FullCar`, `TandemTruck`, `TrackedHull`, built from `Corner`, `Axle`,
   `WalkingBeam` or `IndependentTandem`, `Cab`, `Seat`, `Place`; published sets are in `vehicles.presets`.
 - Your own: a `LumpedVehicle` from a `Frame` of `Body`, `Link` and `Wheel` parts (`docs/vehicles.md`).
-- What they say of themselves: `static_equilibrium`, `modes`, `linearise`, `frequency_response`, `stationary_rms`,
+- Analysis: `static_equilibrium`, `modes`, `linearise`, `frequency_response`, `stationary_rms`,
   `spectral_rms`; in time, `jaxdamp.simulate`.
 
 z is up, pitch positive nose up, roll positive left side up.

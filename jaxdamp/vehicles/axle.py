@@ -10,15 +10,15 @@ from jaxdamp.vehicles.parts import AbstractPart, Body, Link, Parts, prefixed
 
 @final
 class Axle(AbstractPart):
-    """Two corners alike, half a track width left and right of the middle, with an anti-roll bar.
+    """Two equal corners, half a track width left and right of the middle, with an anti-roll bar.
 
-    The bar holds the energy ½ k_R (φ − (z_ul − z_ur)/w)²: it twists by the roll of the body against the line through
-    the wheels, and by nothing else.
+    The energy of the bar is ½ k_R (φ − (z_ul − z_ur)/w)²: its twist is the roll angle of the body relative to the line
+    through the wheels.
 
     Arguments:
-        corner: on each side.
+        corner: wheel, suspension and tyre of each side.
         track_width: w [m].
-        anti_roll_rate: k_R [N m/rad], moment on the body by angle of roll.
+        anti_roll_rate: k_R [N m/rad], moment on the body per roll angle.
     """
 
     corner: Corner
@@ -29,9 +29,9 @@ class Axle(AbstractPart):
         """Left corner, right corner and anti-roll bar under a body that rolls.
 
         Arguments:
-            name: of the parts, may be empty.
-            body: on the axle.
-            ahead: of the centre of gravity [m], on a body that pitches.
+            name: prefix of the names of the parts, may be empty.
+            body: the body above the axle.
+            ahead: distance ahead of the centre of gravity [m], for a body that pitches.
             behind: distance behind the front axle [m].
         """
         half = 0.5 * self.track_width

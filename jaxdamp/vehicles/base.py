@@ -1,5 +1,6 @@
-"""What every vehicle offers, all from its frame of parts."""
+"""The base class of all vehicles: everything follows from the frame of parts."""
 
+import functools
 from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any, final
@@ -20,14 +21,11 @@ from jaxdamp.vehicles.ride_metrics import chosen_metrics
 from jaxdamp.vehicles.system import Layout, System, assemble, layout_of
 
 
-_LAYOUTS: dict[Any, Layout] = {}  # by all of a vehicle but the values of its arrays, which do not change its layout
-
-
 class AbstractVehicle(Module):
     """Masses and springs with damper laws at ports.
 
-    A vehicle names its parameters and has one method, `frame`, which says what it is made of; the `layout` and the
-    assembled `system` follow from it. `docs/vehicles.md` builds one.
+    A vehicle declares its parameters and has one method, `frame`, which returns its parts; the `layout` and the
+    assembled `system` follow from it. `docs/vehicles.md` shows an example.
     """
 
     def __check_init__(self) -> None:
@@ -41,17 +39,15 @@ class AbstractVehicle(Module):
         """The parts, from the geometry."""
 
     def system(self) -> System:
-        """The vehicle assembled: matrices, laws, outputs. Compiled once for all vehicles of one layout."""
+        """The assembled vehicle: matrices, laws, outputs. Compiled once for all vehicles of one layout."""
         return _assembled(without_fitted_ranges(self))  # vehicles with laws fitted to other records share one program
 
     @property
     def layout(self) -> Layout:
-        """Names of coordinates, ports, wheels, channels and metrics: what depends on no number."""
+        """Names of coordinates, ports, wheels, channels and metrics, independent of all parameter values."""
         leaves, structure = jax.tree.flatten(without_fitted_ranges(self))
-        key = structure, tuple(leaf.shape if eqx.is_array(leaf) else leaf for leaf in leaves)
-        if key not in _LAYOUTS:
-            eqx.filter_eval_shape(lambda vehicle: _remember_layout(key, vehicle), self)  # leaves no trace in a program
-        return _LAYOUTS[key]
+        shapes = (jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) if eqx.is_array(leaf) else leaf for leaf in leaves)
+        return _layout_of(structure, tuple(shapes))
 
     def port_form(self) -> PortForm:
         """The matrices, built from geometry."""
@@ -73,19 +69,19 @@ class AbstractVehicle(Module):
 
     @property
     def descriptions(self) -> dict[str, str]:
-        """What each channel is, its positive direction, and of how many dampers or wheels it is."""
+        """Meaning of each channel, its positive direction, and the number of dampers or wheels it stands for."""
         return {channel.name: channel.description for channel in self.layout.channels}
 
     @property
     def ride_metrics(self) -> tuple[Metric, ...]:
-        """The numbers that say how the vehicle rides."""
+        """The predefined ride metrics."""
         return self.layout.metrics
 
     def chosen_metrics(self, wanted: Sequence[str | Metric] | None, argument: str = "metrics") -> list[Metric]:
         """These metrics, by the names of ride metrics or as a `Metric` of any channel; all ride metrics if None.
 
         Raises:
-            ValueError: an unknown name or channel, with the nearest one; `argument` is what the error calls them.
+            ValueError: an unknown name or channel, with the nearest known one; the message names `argument`.
         """
         return chosen_metrics(self.layout.metrics, self.layout.by_name, wanted, argument)
 
@@ -95,12 +91,12 @@ class AbstractVehicle(Module):
 
     @property
     def wheel_names(self) -> tuple[str, ...]:
-        """Names of the wheels, in the order of the columns that motions given wheel by wheel must have."""
+        """Names of the wheels, in the order of the columns of a road with one column for each wheel."""
         return self.layout.wheels
 
     @property
     def axle_positions(self) -> Float[Array, " axles"]:
-        """Distance of each axle behind the front axle [m], by which it meets the road later."""
+        """Distance of each axle behind the front axle [m]."""
         return jnp.stack([wheel.behind for wheel in self.frame().wheels if not wheel.beside])
 
     @property
@@ -110,9 +106,17 @@ class AbstractVehicle(Module):
         return jnp.max(offsets) - jnp.min(offsets)
 
 
-def _remember_layout(key: Any, vehicle: AbstractVehicle) -> None:
-    frame = vehicle.frame()
-    _LAYOUTS[key] = layout_of(frame, channels_of(frame))
+@functools.lru_cache(maxsize=256)
+def _layout_of(structure: Any, leaves: tuple[Any, ...]) -> Layout:
+    """The layout of vehicles of this structure, whose arrays have these shapes: their values do not change it."""
+    layouts = []
+
+    def trace(vehicle: AbstractVehicle) -> None:
+        frame = vehicle.frame()
+        layouts.append(layout_of(frame, channels_of(frame)))
+
+    eqx.filter_eval_shape(trace, jax.tree.unflatten(structure, leaves))  # adds nothing to a program being compiled
+    return layouts[0]
 
 
 @eqx.filter_jit
@@ -122,14 +126,14 @@ def _assembled(vehicle: AbstractVehicle) -> System:
 
 @final
 class LumpedVehicle(AbstractVehicle):
-    """A vehicle that is a list of parts and nothing else, for one of its own kind.
+    """A vehicle given directly by a list of parts.
 
-    Its parameters are those of the parts, such as `parts.links.0.stiffness`. To give parameters names of your own,
-    derive a class from `AbstractVehicle` (`docs/vehicles.md` shows both).
+    Its parameters are those of the parts, such as `parts.links.0.stiffness`. For parameters with your own names, derive
+    a class from `AbstractVehicle` (`docs/vehicles.md` shows both).
 
     Arguments:
         parts: bodies, links, wheels and places.
-        tyre_lifts: whether all wheels can leave the road; a single `Wheel` can say so itself (`lifts`).
+        tyre_lifts: whether all tyres can lift off; for a single wheel, set `lifts` of the `Wheel`.
 
     >>> from jaxdamp.dampers import Linear
     >>> from jaxdamp.vehicles import Body, Element, Link, Wheel

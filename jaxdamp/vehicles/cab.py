@@ -1,4 +1,4 @@
-"""The cab of a truck on mounts of its own."""
+"""The cab of a truck on its own mounts."""
 
 from typing import final
 
@@ -14,21 +14,21 @@ class Cab(AbstractPart):
     """A cab with heave and pitch on two mounts, front and rear.
 
     Arguments:
-        mass: [kg].
-        pitch_inertia: [kg m²].
+        mass: mass of the cab [kg].
+        pitch_inertia: moment of inertia in pitch [kg m²].
         ahead: centre of gravity of the cab ahead of that of the sprung mass [m].
         front_distance: front mount ahead of the centre of gravity of the cab [m].
-        rear_distance: rear mount behind it [m].
+        rear_distance: rear mount behind the centre of gravity of the cab [m].
         front_rate: spring rate of the front mount, both sides together [N/m].
-        rear_rate: of the rear mount [N/m].
+        rear_rate: spring rate of the rear mount, both sides together [N/m].
         front_damper: law at the front mount, both sides together.
         rear_damper: law at the rear mount, both sides together.
-        front_extra_spring: law beside the linear spring of the front mount, both sides together; the rest likewise.
-        rear_extra_spring: of the rear mount.
-        front_bump_stop: of the front mount.
-        rear_bump_stop: of the rear mount.
-        front_friction: of the front mount.
-        rear_friction: of the rear mount.
+        front_extra_spring: law parallel to the spring of the front mount; as all laws, both sides together.
+        rear_extra_spring: law parallel to the spring of the rear mount.
+        front_bump_stop: bump stop of the front mount.
+        rear_bump_stop: bump stop of the rear mount.
+        front_friction: friction of the front mount.
+        rear_friction: friction of the rear mount.
     """
 
     mass: Number = parameter("kg", "mass of the cab", positive)

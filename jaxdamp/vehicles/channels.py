@@ -1,4 +1,4 @@
-"""What a test engineer would measure on a vehicle: channels, each a sum of signals of the motion, forces and road."""
+"""Channels of a vehicle: each is a linear combination of signals of the motion, the forces and the road."""
 
 import enum
 from typing import NamedTuple
@@ -9,12 +9,12 @@ from jaxdamp.vehicles.points import Point
 
 
 class ChannelKind(enum.Enum):
-    """What a channel is of; its unit and its weighting by ISO 2631-1 follow.
+    """The physical quantity of a channel, which determines its unit and its frequency weighting.
 
     Attributes:
-        meaning: in words.
-        unit: SI.
-        weighting: of ISO 2631-1 for a person who feels it, where there is one.
+        meaning: description in words.
+        unit: SI unit.
+        weighting: frequency weighting of ISO 2631-1, for accelerations.
     """
 
     HEIGHT = "height of a body or a place", "m"
@@ -25,8 +25,8 @@ class ChannelKind(enum.Enum):
     DAMPER_VELOCITY = "rate of a deflection", "m/s"
     FORCE = "force of one law", "N"
     ROAD_HEIGHT = "height of the road under a wheel", "m"
-    TYRE_LOAD = "load of a wheel less the static load", "N"
-    RELATIVE_TYRE_LOAD = "load of a wheel less the static load, over the static load", ""
+    TYRE_LOAD = "load of a wheel minus the static load", "N"
+    RELATIVE_TYRE_LOAD = "load of a wheel minus the static load, divided by the static load", ""
 
     def __init__(self, meaning: str, unit: str, weighting: str | None = None) -> None:
         self.meaning, self.unit, self.weighting = meaning, unit, weighting
@@ -36,10 +36,10 @@ class Channel(NamedTuple):
     """A channel of a vehicle.
 
     Arguments:
-        name: of the channel.
-        kind: what it is of.
-        place: name of the body, place, link, wheel or element that it is of.
-        description: what it is, its positive direction, and of how many dampers or wheels it is.
+        name: name of the channel.
+        kind: its physical quantity.
+        place: name of the body, place, link, wheel or element that it belongs to.
+        description: its meaning, its positive direction, and the number of dampers or wheels it stands for.
     """
 
     name: str
@@ -53,12 +53,12 @@ class Channel(NamedTuple):
         return self.kind.unit
 
 
-Measured = tuple[Channel, Point]  # a channel, and what it is the sum of: see `signals`
+Measured = tuple[Channel, Point]  # a channel, and its linear combination of `signals`
 ANGULAR = (ChannelKind.ANGLE, ChannelKind.ANGULAR_ACCELERATION)
 
 
 def signals(frame: Frame) -> list[str]:
-    """Names of all that a channel can be a sum of.
+    """Names of the signals that channels are combined from.
 
     Positions, rates and accelerations of the coordinates, forces of the elements, heights and rates of the road.
     """
@@ -68,17 +68,18 @@ def signals(frame: Frame) -> list[str]:
 
 
 def channels_of(frame: Frame) -> list[Measured]:
-    """All channels of a vehicle; the relative tyre load is still to be divided by the static load of its wheel."""
+    """All channels of a vehicle; the relative tyre load must still be divided by the static load of its wheel."""
     parts: list[Link | Wheel] = [*frame.links, *frame.wheels]
-    found = [channel for body in frame.bodies for channel in _of_body(body)]
+    channels = [channel for body in frame.bodies for channel in _of_body(body)]
     for place in frame.places:
         where, names = f"{place.name} on {place.body}, up", (f"z_{place.name}", place.name)
-        found += _of_point(place.name, frame.place(place), names, (f"height of {where}", f"acceleration of {where}"))
+        words = f"height of {where}", f"acceleration of {where}"
+        channels += _of_point(place.name, frame.place(place), names, words)
     for part in parts:
-        found += _of_elements(part)
+        channels += _of_elements(part)
     for wheel in frame.wheels:
-        found += _of_wheel(wheel)
-    return found
+        channels += _of_wheel(wheel)
+    return channels
 
 
 def _signal(what: str, point: Point) -> Point:
@@ -101,17 +102,17 @@ def _of_point(
 
 
 def _of_body(body: Body) -> list[Measured]:
-    height = f"height of {body.name}, up, from where the linear springs carry the weight on level ground"
+    height = f"height of {body.name}, up, from the equilibrium of the linear springs on level ground"
     words = height, f"acceleration of {body.name}, up"
-    found = _of_point(body.name, body.at(), (f"z_{body.name}", body.name), words)
+    channels = _of_point(body.name, body.at(), (f"z_{body.name}", body.name), words)
     for turn in body.turns:
         angle, of = body.angle(turn.axis), f"of {body.name}, {turn.sense}"
         words, kinds = (f"{turn.axis} angle {of}", f"{turn.axis} acceleration {of}"), ANGULAR
-        found += _of_point(body.name, Point({angle: 1.0}), (angle, angle), words, kinds)
-    return found
+        channels += _of_point(body.name, Point({angle: 1.0}), (angle, angle), words, kinds)
+    return channels
 
 
-def _stretch(part: Link | Wheel, what: str) -> Point:
+def _deflection(part: Link | Wheel, what: str) -> Point:
     """The deflection of a link or a wheel, or its rate."""
     if isinstance(part, Link):
         return _signal(what, part.extension)
@@ -125,39 +126,39 @@ def _of_elements(part: Link | Wheel) -> list[Measured]:
         return []
     stroke, velocity = prefixed(part.name, "stroke"), prefixed(part.name, "damper_velocity")
     what = f"deflection{f' of {part.name}' if part.name else ''}, extension positive"
-    found = [
-        (Channel(stroke, ChannelKind.STROKE, part.name, what), _stretch(part, "position")),
-        (Channel(velocity, ChannelKind.DAMPER_VELOCITY, part.name, f"rate of the {what}"), _stretch(part, "rate")),
+    channels = [
+        (Channel(stroke, ChannelKind.STROKE, part.name, what), _deflection(part, "position")),
+        (Channel(velocity, ChannelKind.DAMPER_VELOCITY, part.name, f"rate of the {what}"), _deflection(part, "rate")),
     ]
     for element in part.elements:
         name = prefixed(part.name, element.name)
         words = f"force of {name}{_share(element, part)}, positive where it resists extension"
-        force = Point({f"force:{name}": 1.0 / element.count})  # several that act together: the force of one
-        found.append((Channel(f"{name}_force", ChannelKind.FORCE, name, words), force))
-    return found
+        force = Point({f"force:{name}": 1.0 / element.count})  # the force of one of several equal laws
+        channels.append((Channel(f"{name}_force", ChannelKind.FORCE, name, words), force))
+    return channels
 
 
 def _of_wheel(wheel: Wheel) -> list[Measured]:
-    """Height of the road under a wheel, and its load beyond the static one: positive with more load."""
+    """Height of the road under a wheel, and its load minus the static load, positive for more load."""
     where, of = (f" under {wheel.name}" if wheel.name else ""), _together(wheel)
-    pull = _stretch(wheel, "position") * wheel.stiffness + _stretch(wheel, "rate") * wheel.damping
+    pull = _deflection(wheel, "position") * wheel.stiffness + _deflection(wheel, "rate") * wheel.damping
     for name in wheel.element_names:
         pull = pull + Point({f"force:{name}": 1.0})
     dynamic, relative = (prefixed(wheel.name, f"{word}_tyre_load") for word in ("dynamic", "relative"))
-    kinds, load = ChannelKind, f"load{where} less the static load"
+    kinds, load = ChannelKind, f"load{where} minus the static load"
     height = Channel(
         f"z_{prefixed(wheel.name, 'road')}", kinds.ROAD_HEIGHT, wheel.name, f"height of the road{where}, up"
     )
     return [
         (height, Point({f"road:{wheel.name}": 1.0})),
         (Channel(dynamic, kinds.TYRE_LOAD, wheel.name, f"{load}{of}, more load positive"), -pull),
-        (Channel(relative, kinds.RELATIVE_TYRE_LOAD, wheel.name, f"{load}, over the static load"), -pull),
+        (Channel(relative, kinds.RELATIVE_TYRE_LOAD, wheel.name, f"{load}, divided by the static load"), -pull),
     ]
 
 
 def _share(element: Element, part: Link | Wheel) -> str:
-    """Of how many laws a force is."""
-    return f", one of {element.count} alike that act together" if element.count > 1 else _together(part)
+    """The number of laws that a force stands for, in words."""
+    return f", of one of {element.count} equal ones" if element.count > 1 else _together(part)
 
 
 def _together(part: Link | Wheel) -> str:

@@ -1,4 +1,4 @@
-"""One wheel with its suspension: what all cars are built from."""
+"""One wheel with its suspension, the building block of all cars."""
 
 from typing import Any, final
 
@@ -13,7 +13,7 @@ from jaxdamp.vehicles.suspension import Suspension
 
 
 class AbstractCorner(Module):
-    """The fields of a wheel with its suspension, which a `Corner` and a `QuarterCar` have in common."""
+    """The common fields of a `Corner` and a `QuarterCar`."""
 
     unsprung_mass: Number = parameter("kg", "mass of wheel and hub", positive)
     spring_rate: Number = parameter("N/m", "suspension spring rate at the wheel", positive)
@@ -39,12 +39,12 @@ class AbstractCorner(Module):
         """The wheel, the suspension and the tyre under a point of the body.
 
         Arguments:
-            name: of the parts and channels, may be empty.
+            name: prefix of the names of parts and channels, may be empty.
             mount: point of the body above the wheel.
             behind: distance behind the front axle [m].
             left: distance to the left of the middle [m].
-            beside: on the axle of the wheel before it.
-            sides: of the vehicle that the corner stands for.
+            beside: whether it is on the same axle as the previous wheel.
+            sides: number of sides of the vehicle that the corner stands for.
         """
         wheel = Body(prefixed(name, "unsprung"), self.unsprung_mass)
         laws = self.damper, self.extra_spring, self.bump_stop, self.friction
@@ -56,22 +56,22 @@ class AbstractCorner(Module):
 
 @final
 class Corner(AbstractCorner, AbstractPart):
-    """Wheel, tyre, spring, damper, and what may stand beside them, all referred to the wheel.
+    """Wheel, tyre, spring, damper and optional further laws, all referred to the wheel.
 
-    Of an axle seen from the side, a corner is one wheel (half a car) or the whole axle, as the vehicle says.
+    In side views, a corner is one wheel (`HalfCar`) or a whole axle (`TandemTruck`).
 
     Arguments:
-        unsprung_mass: wheel and hub [kg].
+        unsprung_mass: mass of wheel and hub [kg].
         spring_rate: linear suspension spring at the wheel [N/m].
-        tyre_stiffness: [N/m].
-        damper: law at the wheel; `dampers.MotionRatio(law, ratio)` for one that moves less or more.
-        tyre_damping: [N s/m].
-        extra_spring: law beside the linear spring, such as `CubicSpring` or `dampers.GasSpring`.
+        tyre_stiffness: vertical tyre stiffness [N/m].
+        damper: law at the wheel; `dampers.MotionRatio(law, ratio)` if the damper has another travel than the wheel.
+        tyre_damping: vertical tyre damping [N s/m].
+        extra_spring: law parallel to the linear spring, such as `CubicSpring` or `dampers.GasSpring`.
         bump_stop: law such as `dampers.BumpStop`.
         friction: law such as `dampers.CoulombFriction`.
-        tyre_lifts: whether the tyre can leave the road.
-        damper_count: how many dampers like `damper` act together, two where the corner is a whole axle with one on
-            each side; the channel of the damper's force and its power are of one.
+        tyre_lifts: whether the tyre can lift off.
+        damper_count: number of equal dampers, two if the corner is a whole axle with one on each side; the channels of
+            force and power are those of one damper.
     """
 
     damper_count: int = eqx.field(static=True, default=1)

@@ -1,4 +1,4 @@
-"""Equivalent spring and dashpot of the elements for a sinusoidal stroke."""
+"""Equivalent spring and dashpot of the laws for a sinusoidal stroke (describing function)."""
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +9,7 @@ from jaxdamp.vehicles.ports import Ports, States
 
 
 POINTS = 256  # in a cycle
-CYCLES = 8  # the last one counts; laws with states settle before
+CYCLES = 8  # the last one is evaluated; laws with states settle before
 
 
 def equivalent_slopes(
@@ -17,13 +17,13 @@ def equivalent_slopes(
 ) -> tuple[Float[Array, " ports"], Float[Array, " ports"]]:
     """First harmonic of each force for x = centre + X sin ωt: F ≈ k (x − centre) + c v.
 
-    k = (2/X) mean(F sin ωt) [N/m], c = (2/(Xω)) mean(F cos ωt) [N s/m] over the last of eight cycles of 256 points; c
-    takes in the energy of the law, k what it holds back in phase with the stroke. Zeros without elements.
+    k = (2/X) mean(F sin ωt) [N/m], c = (2/(Xω)) mean(F cos ωt) [N s/m] over the last of eight cycles of 256 points. c
+    dissipates the same energy as the law, k is its part in phase with the stroke. Zeros without elements.
 
     Arguments:
-        ports: the elements.
-        centre: deflection about which they move [m].
-        amplitude: X [m], one for all or one for each.
+        ports: the laws at the ports.
+        centre: mean deflection [m], shape (ports,).
+        amplitude: X [m], one for all or one for each port.
         frequency: ω/2π [Hz].
     """
     x_max = jnp.broadcast_to(jnp.abs(amplitude), centre.shape)

@@ -26,18 +26,19 @@ STANDARD_GRAVITY = 9.80665  # m/s²
 
 @final
 class Frame(eqx.Module):
-    """Bodies, links between their points, wheels on the road, places of interest: all that a vehicle is.
+    """The parts of a vehicle: bodies, links between their points, wheels on the road, places of interest.
 
-    Coordinates follow the bodies, tracks of the road the wheels, ports the elements of links and then of wheels.
+    Coordinates are in the order of the bodies, road inputs in that of the wheels, ports in that of the elements of
+    links and then of wheels.
 
     Arguments:
         bodies: rigid bodies; names differ.
         links: springs, dashpots and laws between their points.
-        wheels: what stands on the road.
-        places: where else the acceleration is of interest.
+        wheels: points that stand on the road.
+        places: further places where the acceleration is of interest.
 
     Raises:
-        ValueError: two parts of one name, a point of a body that is not there, no wheel.
+        ValueError: two parts of one name, a point of an unknown body, no wheel.
 
     >>> body, wheel = Body("sprung", 300.0), Body("unsprung", 40.0)
     >>> suspension = Link("", body.at() - wheel.at(), stiffness=20e3)
@@ -89,12 +90,12 @@ class Frame(eqx.Module):
 
     @property
     def element_names(self) -> tuple[str, ...]:
-        """Name of the element at each port; those of tyres that can leave the road come last."""
+        """Name of the element at each port; those of tyres that can lift off come last."""
         lifting = [wheel.element_names[-1] for wheel in self.wheels if wheel.lifts]
         return (*[name for name, _, _ in self._elements()], *lifting)
 
     def elements(self, static_loads: Float[Array, " wheels"] | None = None) -> tuple[AbstractDamper, ...]:
-        """The law at each port, for static wheel loads [N] that are known already or found here."""
+        """The law at each port, for given static wheel loads [N]; they are computed if left out."""
         own = tuple(element.together for _, _, element in self._elements())
         if not any(wheel.lifts for wheel in self.wheels):
             return own
@@ -102,13 +103,13 @@ class Frame(eqx.Module):
         return (*own, *[lift_off(wheel, load) for wheel, load in zip(self.wheels, loads, strict=True) if wheel.lifts])
 
     def element(self, name: str) -> Element:
-        """The element of a name, with the law of one where several act together."""
-        known = {known: element for known, _, element in self._elements()}
-        _checks.one_of("name", name, known)
-        return known[name]
+        """The element of a name, with the law of a single one of several equal ones."""
+        elements = {key: element for key, _, element in self._elements()}
+        _checks.one_of("name", name, elements)
+        return elements[name]
 
     def lifting(self, lifts: bool = True) -> "Frame":
-        """The same with wheels that can all leave the road, if `lifts`."""
+        """The same parts; if `lifts`, with tyres that can all lift off."""
         if not lifts:
             return self
         wheels = tuple(dataclasses.replace(wheel, lifts=True) for wheel in self.wheels)
@@ -135,12 +136,12 @@ class Frame(eqx.Module):
     def static_wheel_loads(self, form: PortForm | None = None) -> Float[Array, " wheels"]:
         """Load of each wheel at rest on level ground [N], in the order of the wheels.
 
-        Where the weight can stand on the wheels in one way only, it does. Where there are more wheels than that, it is
-        shared as if all springs were free of load on the same level ground before: K_t q = −weight, with the springs
-        of the laws in the tangent stiffness K_t.
+        If equilibrium determines the loads, these are they. With more wheels (statically indeterminate), the loads
+        follow from springs that were all free of load on level ground: K_t q = −weight, where the tangent stiffness K_t
+        includes the laws.
 
         Arguments:
-            form: the matrices, if they are known already.
+            form: the matrices; computed if left out.
         """
         form = self.port_form() if form is None else form
         own = [element.together for _, _, element in self._elements()]
@@ -148,18 +149,18 @@ class Frame(eqx.Module):
         form = dataclasses.replace(form, ports=form.ports[: len(own)], port_road=standing)  # without lift-off
         heights = np.array([name in {f"z_{body.name}" for body in self.bodies} for name in self.coordinates])
         stiffness = tangent_stiffness(form, own, jnp.zeros(len(self.coordinates)))
-        sunk = jnp.linalg.solve(stiffness, -jnp.diag(form.mass) * (STANDARD_GRAVITY * heights))
+        deflected = jnp.linalg.solve(stiffness, -jnp.diag(form.mass) * (STANDARD_GRAVITY * heights))
         tyres = jnp.stack([wheel.stiffness for wheel in self.wheels])
-        loads = -tyres * (matrix([wheel.point for wheel in self.wheels], self.coordinates) @ sunk)
+        loads = -tyres * (matrix([wheel.point for wheel in self.wheels], self.coordinates) @ deflected)
         direct = [i for i, (_, part, _) in enumerate(self._elements()) if isinstance(part, Wheel)]
         if direct and form.port_road is not None:
             slopes, _ = Ports(own).stiffness_and_damping(jnp.zeros(len(own)))
-            loads = loads - form.port_road[np.array(direct)].T @ (slopes * (form.ports @ sunk))[np.array(direct)]
+            loads = loads - form.port_road[np.array(direct)].T @ (slopes * (form.ports @ deflected))[np.array(direct)]
         return loads
 
     @property
     def axles(self) -> tuple[int, ...]:
-        """Number of the axle that each wheel is on, from 0 in the order of the wheels."""
+        """Number of the axle of each wheel, from 0 in the order of the wheels."""
         return tuple(int(i) for i in np.cumsum([not wheel.beside for wheel in self.wheels]) - 1)
 
     @property
@@ -169,7 +170,7 @@ class Frame(eqx.Module):
 
 
 def lift_off(wheel: Wheel, static_load: Scalar) -> AbstractDamper:
-    """What a wheel that can leave the road has beside its spring, dashpot and laws."""
+    """The law that adds lift-off to a wheel, parallel to its spring, dashpot and laws."""
     linear = LiftOff(wheel.stiffness, wheel.damping, static_load)
     laws = tuple(element.together for element in wheel.elements)
     return LiftOffWithLaws(linear, Sum(laws)) if laws else linear

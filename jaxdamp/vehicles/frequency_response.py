@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import root
 from jaxdamp._types import Scalar
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear
@@ -23,21 +24,21 @@ def frequency_response(
 ) -> dict[str, Complex[Array, "..."]]:
     """Complex gain from road height to every channel, H(ω) = C (iω − A)⁻¹ (B + iω E) + D + iω F.
 
-    The road goes under all wheels: at a `speed` one axle after the other, Σ_w H_w exp(−iω τ_w) with the delay τ_w of
+    All wheels run on the same road: with a `speed` one axle after the other, Σ_w H_w exp(−iω τ_w) with the delay τ_w of
     wheel w behind the front axle, or `in_phase`. Differentiable in every parameter and in the speed.
 
     Arguments:
         vehicle: a vehicle, linearised about rest, or what `linearise` made of it.
-        frequency: [Hz], shape (frequencies,).
+        frequency: frequencies [Hz], shape (frequencies,).
         speed: of the vehicle [m/s]; not needed for a single axle.
         in_phase: the road is under all axles at once, instead of a speed.
-        by_wheel: give the gain from the height under each wheel instead of their sum.
+        by_wheel: return the gain from the height under each wheel instead of their sum.
 
     Returns:
-        By channel, unit of the channel by metre: shape (frequencies,), or (frequencies, wheels) by wheel.
+        For each channel, in its unit per metre: shape (frequencies,), or (frequencies, wheels) by wheel.
 
     Raises:
-        ValueError: frequencies that are not a row of numbers ≥ 0, a speed that is not positive or comes with
+        ValueError: frequencies that are not a vector of numbers ≥ 0, a speed that is not positive or comes with
             `by_wheel` or `in_phase`, several axles with none of the three.
 
     >>> from jaxdamp.vehicles.presets import quarter_car_000
@@ -101,9 +102,9 @@ def spectral_rms(
 ) -> dict[str, Scalar]:
     """RMS of every channel of the linearised vehicle on a random road of any spectrum, √∫ |H(f)|² S(f) df.
 
-    By the trapezoid rule over the given frequencies: they have to resolve the resonances and, with a speed, the ripples
-    of width 1/τ that the axle delay makes. What lies outside them is left out. For a road whose rate is white noise,
-    `stationary_rms` is exact.
+    By the trapezoidal rule over the given frequencies: they must resolve the resonances and, with a speed, the ripples
+    of width 1/τ due to the delay between the axles. Only the given frequency range is included. For a road whose rate
+    is white noise, `stationary_rms` is exact.
 
     Arguments:
         vehicle: a vehicle, linearised about rest, or what `linearise` made of it.
@@ -112,8 +113,8 @@ def spectral_rms(
             G_d(f/V)/V.
         speed: of the vehicle [m/s]; not needed for a single axle.
         in_phase: the road is under all axles at once, instead of a speed.
-        coherence: γ(f) in −1 … 1, cross spectrum of left and right track divided by S; one and the same track if left
-            out. Needs wheels on both sides.
+        coherence: γ(f) in −1 … 1, cross spectrum of left and right track divided by S; if left out, both tracks are
+            equal. Needs wheels on both sides.
 
     Raises:
         ValueError: frequencies that do not increase, a density or coherence of another shape, a coherence for a vehicle
@@ -137,7 +138,7 @@ def spectral_rms(
     if levels.shape != points.shape:
         _checks.refuse("density", f"have the shape {points.shape} of `frequency`", f"of shape {levels.shape}")
     linear = as_linear(vehicle)
-    gains, turned = gains_by_wheel(linear, points), phase_factors(points, linear.delays(speed, in_phase))
+    gains, factors = gains_by_wheel(linear, points), phase_factors(points, linear.delays(speed, in_phase))
     shared = sides = None
     if coherence is not None:
         shared = jnp.asarray(coherence, dtype=float)
@@ -149,18 +150,12 @@ def spectral_rms(
             _checks.refuse("coherence", "be left out where a wheel stands for both sides", "given", remedy)
         sides = (linear.left > 0)[None, None, :]
 
-    moved = gains * turned[:, None]
+    delayed = gains * factors[:, None]
     if sides is None or shared is None:
-        squares = jnp.abs(jnp.sum(moved, axis=2)) ** 2
+        squares = jnp.abs(jnp.sum(delayed, axis=2)) ** 2
     else:
-        left, right = (jnp.sum(jnp.where(side, moved, 0.0), axis=2) for side in (sides, ~sides))
+        left, right = (jnp.sum(jnp.where(side, delayed, 0.0), axis=2) for side in (sides, ~sides))
         squares = jnp.abs(left) ** 2 + jnp.abs(right) ** 2 + 2.0 * shared[:, None] * jnp.real(left * jnp.conj(right))
-    heights = squares * levels[:, None]
-    found = root(jnp.sum(0.5 * (heights[1:] + heights[:-1]) * jnp.diff(points)[:, None], axis=0))
-    return {name: found[i] for i, name in enumerate(linear.channels)}
-
-
-def root(squares: Float[Array, " channels"]) -> Float[Array, " channels"]:
-    """√ of mean squares, with a derivative of zero at zero."""
-    positive = squares > 0
-    return jnp.where(positive, jnp.sqrt(jnp.where(positive, squares, 1.0)), 0.0)
+    spectra = squares * levels[:, None]
+    rms = root(jnp.sum(0.5 * (spectra[1:] + spectra[:-1]) * jnp.diff(points)[:, None], axis=0))
+    return {name: rms[i] for i, name in enumerate(linear.channels)}

@@ -20,7 +20,7 @@ class FullCar(AbstractVehicle):
         m z̈ = −Σ F_i,   J_θ θ̈ = −Σ x_i F_i,   J_φ φ̈ = −Σ y_i F_i − M_f − M_r,   m_ui z̈_ui = F_i − F_ti ± M/w,
 
     with corner i x_i ahead and y_i left of the centre of gravity, at z + x_i θ + y_i φ, and the moments M of the
-    anti-roll bars (`Axle`). Left and right are alike; a `LumpedVehicle` need not be.
+    anti-roll bars (`Axle`). Left and right are equal; for different sides, use a `LumpedVehicle`.
 
     The wheels are front left, front right, rear left, rear right.
 
@@ -29,7 +29,7 @@ class FullCar(AbstractVehicle):
         rear: axle at `rear_distance`.
         places: where on the body accelerations are of interest.
         seats: on the body.
-        tyre_lifts: whether all tyres can leave the road; a single corner can say so itself.
+        tyre_lifts: whether all tyres can lift off; for a single corner, set `tyre_lifts` of the corner.
 
     >>> from jaxdamp.vehicles.presets import full_car_jazar
     >>> full_car_jazar().wheel_names

@@ -20,19 +20,19 @@ class HalfCar(AbstractVehicle):
         m z̈ = −F_f − F_r,   J θ̈ = −l_a F_f + l_b F_r,   m_ui z̈_ui = F_i − F_ti,
         F_i = k_i e_i + laws,  e_f = z + l_a θ − z_uf,  e_r = z − l_b θ − z_ur.
 
-    Paper 002 prints J θ̈ + l_a F_1 + l_b F_2 = 0: the sign of the last term is wrong, it makes the stiffness matrix
-    asymmetric and the vehicle unstable. Here the matrices come from the geometry. With J = m l_a l_b the ends move
+    Paper 002 prints J θ̈ + l_a F_1 + l_b F_2 = 0: the sign of the last term is wrong, which makes the stiffness matrix
+    asymmetric and the vehicle unstable. Here the matrices follow from the geometry. With J = m l_a l_b the ends move
     independently, as two quarter cars of sprung masses m l_b/(l_a + l_b) and m l_a/(l_a + l_b).
 
-    Masses and rates are those of one side of the car. The wheels are front and rear, each for both sides; the rear one
-    meets the road later.
+    Masses and rates are those of one side of the car. The wheels are front and rear, each for both sides of the road;
+    the rear wheel reaches the road later.
 
     Arguments:
         front: corner at l_a.
         rear: corner at l_b.
         places: where on the body accelerations are of interest.
         seats: on the body.
-        tyre_lifts: whether all tyres can leave the road; a single corner can say so itself.
+        tyre_lifts: whether all tyres can lift off; for a single corner, set `tyre_lifts` of the corner.
 
     >>> from jaxdamp.vehicles.presets import half_car_002
     >>> car = half_car_002()

@@ -1,4 +1,4 @@
-"""The vehicle linearised: about rest, or for a chosen amplitude of its elements."""
+"""The linearised vehicle: about the static equilibrium, or for a given amplitude of its laws."""
 
 from typing import Any, final
 
@@ -20,12 +20,14 @@ from jaxdamp.vehicles.ports import Ports
 
 @final
 class LinearVehicle(eqx.Module):
-    """ẋ = A x + B z_r + E ż_r, channels = C x + D z_r + F ż_r, x = (q, q̇, states of the laws) less their rest.
+    """ẋ = A x + B z_r + E ż_r, channels = C x + D z_r + F ż_r, in SI units.
+
+    x = (q, q̇, states of the laws) minus the static equilibrium.
 
     Arguments:
         state_matrix: A.
-        road_input: B, by height [m] of each wheel.
-        road_rate_input: E, by its rate [m/s].
+        road_input: B, for the road height [m] under each wheel.
+        road_rate_input: E, for the rate of this height [m/s].
         output: C.
         road_feed: D.
         feed_through: F.
@@ -33,7 +35,7 @@ class LinearVehicle(eqx.Module):
         left: distance of each wheel to the left of the middle [m].
         coordinates: names of q.
         channels: names of the channels.
-        axles: how many axles the wheels are on.
+        axles: number of axles.
     """
 
     state_matrix: Float[Array, "n n"]
@@ -49,11 +51,11 @@ class LinearVehicle(eqx.Module):
     axles: int = eqx.field(static=True)
 
     def settled(self) -> Float[Array, "n wheels"]:
-        """−A⁻¹ B: where the vehicle comes to rest on unit road heights."""
+        """−A⁻¹ B: static position of the vehicle for a unit road height under each wheel."""
         return -jnp.linalg.solve(self.state_matrix, self.road_input)
 
     def delays(self, speed: ScalarLike | int | None, in_phase: bool = False) -> Float[Array, " wheels"]:
-        """Delay of each wheel [s] behind the front axle at a speed [m/s]; none in phase.
+        """Delay of each wheel [s] behind the front axle at a speed [m/s]; zero if `in_phase`.
 
         Raises:
             ValueError: a speed that is not positive or comes with `in_phase`; several axles and neither of the two.
@@ -72,17 +74,17 @@ class LinearVehicle(eqx.Module):
 def linearise(vehicle: AbstractVehicle, *, amplitude: Any = None, frequency: Any = None) -> LinearVehicle:
     """Linearise the laws of a vehicle at its static equilibrium.
 
-    About rest, which holds for small motion and keeps the states of the laws; or for a sinusoidal stroke of an
-    amplitude and a frequency, where each law becomes the spring and the dashpot of its first harmonic
+    By default for small motion, including the states of the laws. With an amplitude and a frequency, for a sinusoidal
+    stroke: each law is replaced by an equivalent spring and dashpot with the same first harmonic of the force
     (`equivalent_slopes`). Differentiable in every parameter.
 
     Arguments:
         vehicle: any vehicle.
-        amplitude: of the deflection of every element [m], or one for each port; left out, about rest.
-        frequency: of that stroke [Hz]; it matters where a law depends on the velocity.
+        amplitude: amplitude of the deflection at all ports [m], or one for each port; left out for small motion.
+        frequency: frequency of this stroke [Hz].
 
     Raises:
-        ValueError: an amplitude without a frequency or the other way round, one that is not positive; a vehicle without
+        ValueError: an amplitude without a frequency or the reverse; one that is not positive; a vehicle without static
             equilibrium.
 
     >>> from jaxdamp.dampers import PowerLaw
@@ -123,8 +125,8 @@ def _linearise(vehicle: AbstractVehicle, amplitude: Array | None, frequency: Arr
     rest_state = jnp.concatenate([rest, jnp.zeros(n), start])
     size = rest_state.size
 
-    def everything(inputs: Array) -> Array:
-        """Rates of the state, then channels, from state, road heights and road rates."""
+    def rates_and_channels(inputs: Array) -> Array:
+        """Rates of the state, then channels, as a function of state, road heights and road rates."""
         x, road, road_rate = inputs[:size], inputs[size : size + wheels], inputs[size + wheels :]
         deflection, rate = form.at_ports(x[:n], road), form.at_ports(x[n : 2 * n], road_rate)
         inner: list[Array] = []
@@ -137,13 +139,13 @@ def _linearise(vehicle: AbstractVehicle, amplitude: Array | None, frequency: Arr
         at = x[: 2 * n], forces, road, road_rate
         return jnp.concatenate([system.motion(*at), *map(jnp.ravel, inner), system.outputs(*at)])
 
-    slopes = jax.jacfwd(everything)(jnp.concatenate([rest_state, level, level]))
+    slopes = jax.jacfwd(rates_and_channels)(jnp.concatenate([rest_state, level, level]))
     (a, b, e), (c, d, f) = (jnp.split(part, [size, size + wheels], axis=1) for part in jnp.split(slopes, [size]))
     behind, left = (jnp.stack(values) for values in zip(*((w.behind, w.left) for w in frame.wheels), strict=True))
     return LinearVehicle(a, b, e, c, d, f, behind, left, layout.coordinates, tuple(layout.units), max(layout.axles) + 1)
 
 
 def as_linear(vehicle: AbstractVehicle | LinearVehicle) -> LinearVehicle:
-    """The vehicle linearised about rest, if it is not linear yet."""
+    """The vehicle linearised about its static equilibrium, unless it is linear already."""
     check_module("vehicle", vehicle, (AbstractVehicle, LinearVehicle))
     return vehicle if isinstance(vehicle, LinearVehicle) else linearise(vehicle)

@@ -1,28 +1,30 @@
 """Natural modes of a vehicle: frequencies, damping, shapes."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from jaxtyping import Complex, Float
 
+from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear
 
 
 @dataclasses.dataclass(frozen=True)
 class Modes:
-    """Natural modes, slowest first; prints as a table.
+    """Natural modes, lowest frequency first; prints as a table.
 
-    Arguments:
-        coordinates: what the rows of the shapes are.
-        undamped_frequency: of the vehicle with all damping taken off [Hz], shape (q,).
-        shapes: of those modes, a column for each, the largest entry +1; metres and radians are compared as they are.
+    Attributes:
+        coordinates: names of the coordinates, the rows of the shapes.
+        undamped_frequency: natural frequencies of the vehicle without damping [Hz], shape (q,).
+        shapes: shapes of these modes, one column each, the largest entry +1 (metres and radians compared as numbers).
         poles: λ of the damped oscillations [1/s], with positive imaginary part, shape (oscillations,).
         frequency: |λ|/2π [Hz].
         damped_frequency: Im λ/2π [Hz].
         damping_ratio: −Re λ/|λ|.
-        damped_shapes: complex shapes of the oscillations, a column for each, the largest entry 1.
-        decays: real poles [1/s], of overdamped modes and of states of laws; positive ones grow.
+        damped_shapes: complex shapes of the oscillations, one column each, the largest entry 1.
+        decays: real poles [1/s], of overdamped modes and of states of laws; positive ones are unstable.
     """
 
     coordinates: tuple[str, ...]
@@ -47,36 +49,61 @@ class Modes:
         """−Re λ/|λ|."""
         return -np.real(self.poles) / np.abs(self.poles)
 
+    def table(self) -> Table:
+        """A row for each damped oscillation, with the coordinates of largest amplitude."""
+        columns = (
+            Column("frequency", "Hz", ".4f"),
+            Column("damped frequency", "Hz", ".4f"),
+            Column("damping ratio", "", ".4f"),
+            Column("largest amplitudes"),
+        )
+        numbers = np.stack([self.frequency, self.damped_frequency, self.damping_ratio], axis=1)
+        amplitudes = map(self._largest, np.abs(self.damped_shapes.T))
+        return Table(
+            "Modes", columns, tuple((*plain(row), words) for row, words in zip(numbers, amplitudes, strict=True))
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Frequencies, damping ratios and shapes with units, ready for JSON; complex shapes as magnitude and phase."""
+        magnitude, phase = np.abs(self.damped_shapes), np.angle(self.damped_shapes)
+        return {
+            "coordinates": list(self.coordinates),
+            "undamped_frequency": with_unit(self.undamped_frequency, "Hz"),
+            "shapes": plain(self.shapes),
+            "frequency": with_unit(self.frequency, "Hz"),
+            "damped_frequency": with_unit(self.damped_frequency, "Hz"),
+            "damping_ratio": plain(self.damping_ratio),
+            "damped_shapes": {"magnitude": plain(magnitude), "phase": with_unit(phase, "rad")},
+            "decays": with_unit(self.decays, "1/s"),
+        }
+
     def __str__(self) -> str:
         undamped = ", ".join(f"{f:.6g}" for f in self.undamped_frequency)
-        lines = [f"undamped modes [Hz]: {undamped}"]
-        lines.append(f"{'frequency [Hz]':>15}{'damped [Hz]':>13}{'damping ratio':>15}   moves most")
-        rows = zip(self.frequency, self.damped_frequency, self.damping_ratio, self.damped_shapes.T, strict=True)
-        for frequency, damped, ratio, shape in rows:
-            lines.append(f"{frequency:15.4f}{damped:13.4f}{ratio:15.4f}   {self._most(np.abs(shape))}")
+        lines = [self.table().to_text(), f"undamped frequencies [Hz]: {undamped}"]
         if self.decays.size:
-            lines.append("without oscillation [1/s]: " + ", ".join(f"{d:.4g}" for d in self.decays))
+            lines.append("real poles, without oscillation [1/s]: " + ", ".join(f"{d:.4g}" for d in self.decays))
         return "\n".join(lines)
 
-    def _most(self, size: Float[np.ndarray, " q"]) -> str:
-        largest = np.argsort(-size)[:3]
-        return ", ".join(f"{self.coordinates[i]} {size[i]:.2f}" for i in largest if size[i] > 0.05)
+    def _largest(self, amplitude: Float[np.ndarray, " q"]) -> str:
+        largest = np.argsort(-amplitude)[:3]
+        return ", ".join(f"{self.coordinates[i]} {amplitude[i]:.2f}" for i in largest if amplitude[i] > 0.05)
 
 
 def modes(vehicle: AbstractVehicle | LinearVehicle) -> Modes:
-    """Natural modes of a vehicle linearised about its static equilibrium, or of what `linearise` made of it.
+    """Natural modes of a vehicle linearised about its static equilibrium, or of a result of `linearise`.
 
     Undamped modes solve K φ = ω² M φ with the stiffness of the laws at rest in K; damped ones are the eigenvalues of
-    the state matrix. The result holds numbers of NumPy and takes no part in derivatives.
+    the state matrix. The results are NumPy arrays and not differentiable.
 
     >>> from jaxdamp.vehicles.presets import half_car_002
     >>> print(modes(half_car_002()))
-    undamped modes [Hz]: 1.15663, 1.43125, 11.6348, 11.6387
-     frequency [Hz]  damped [Hz]  damping ratio   moves most
-             1.1707       1.1430         0.2161   pitch 1.00, z_sprung 0.94, z_front_unsprung 0.22
-             1.4589       1.4053         0.2685   z_sprung 1.00, pitch 0.49, z_rear_unsprung 0.20
-            11.4182      10.9627         0.2796   z_rear_unsprung 1.00, z_front_unsprung 0.29
-            11.4949      11.0508         0.2753   z_front_unsprung 1.00, z_rear_unsprung 0.29
+    Modes
+    frequency [Hz]  damped frequency [Hz]  damping ratio  largest amplitudes
+            1.1707                 1.1430         0.2161  pitch 1.00, z_sprung 0.94, z_front_unsprung 0.22
+            1.4589                 1.4053         0.2685  z_sprung 1.00, pitch 0.49, z_rear_unsprung 0.20
+           11.4182                10.9627         0.2796  z_rear_unsprung 1.00, z_front_unsprung 0.29
+           11.4949                11.0508         0.2753  z_front_unsprung 1.00, z_rear_unsprung 0.29
+    undamped frequencies [Hz]: 1.15663, 1.43125, 11.6348, 11.6387
     """
     linear = as_linear(vehicle)
     a, n = np.asarray(linear.state_matrix), len(linear.coordinates)

@@ -1,4 +1,4 @@
-"""What a vehicle is made of: rigid bodies, links between their points, wheels on the road."""
+"""The parts of a vehicle: rigid bodies, links between their points, wheels on the road."""
 
 from typing import Any, TypeAlias, final
 
@@ -16,7 +16,7 @@ Parts: TypeAlias = "tuple[tuple[Body, ...], tuple[Link, ...], tuple[Wheel, ...]]
 
 
 def prefixed(name: str, word: str) -> str:
-    """The name of a channel of a part: "front" and "stroke" give "front_stroke"; a part without a name adds nothing."""
+    """The name of a channel of a part: "front" and "stroke" give "front_stroke"; an empty name adds no prefix."""
     return f"{name}_{word}" if name else word
 
 
@@ -25,7 +25,7 @@ def _maybe(value: Any) -> Any:
 
 
 class AbstractPart(Module):
-    """Anything a vehicle is made of that has parameters of its own."""
+    """A part of a vehicle with its own parameters."""
 
     def __check_init__(self) -> None:
         check_parameters(self)
@@ -36,7 +36,7 @@ class AbstractPart(Module):
 
 @final
 class Inertia(AbstractPart):
-    """An angle that a body turns by, pitch (nose up) or roll (left side up), and its moment of inertia."""
+    """A rotation of a body, pitch (nose up) or roll (left side up), and its moment of inertia."""
 
     axis: str = eqx.field(static=True)
     moment: Number = parameter("kg m²", "moment of inertia about the centre of gravity", positive)
@@ -49,14 +49,14 @@ class Inertia(AbstractPart):
 
 @final
 class Body(AbstractPart):
-    """A rigid body that moves up and down and, where it has the moment of inertia for it, pitches and rolls.
+    """A rigid body with heave and, if the moments of inertia are given, pitch and roll.
 
     Its coordinates are the height of the centre of gravity `z_{name}` [m, up] and the angles [rad] `{name}_pitch`
-    (nose up) and `{name}_roll` (left side up); those of the body named "sprung" are `pitch` and `roll` for short.
+    (nose up) and `{name}_roll` (left side up); those of the body named "sprung" are just `pitch` and `roll`.
 
     Arguments:
-        name: of the body; names the coordinates and their channels.
-        mass: [kg].
+        name: name of the body, used in the names of coordinates and channels.
+        mass: mass [kg].
         pitch_inertia: moment of inertia in pitch [kg m²]; left out, the body does not pitch.
         roll_inertia: moment of inertia in roll [kg m²]; left out, the body does not roll.
 
@@ -80,7 +80,7 @@ class Body(AbstractPart):
 
     @property
     def masses(self) -> dict[str, Scalar]:
-        """The coordinates of the body and the mass [kg] or moment of inertia [kg m²] that belongs to each."""
+        """The coordinates of the body, each with its mass [kg] or moment of inertia [kg m²]."""
         return {f"z_{self.name}": self.mass} | {self.angle(turn.axis): turn.moment for turn in self.turns}
 
     def _turn(self, axis: str) -> Point:
@@ -107,15 +107,15 @@ class Body(AbstractPart):
 
 @final
 class Element(AbstractPart):
-    """A law at a port, under a name: `Element("damper", law)` gives the channel `damper_force`.
+    """A law at a port, with a name: `Element("damper", law)` gives the channel `damper_force`.
 
-    Where `count` of them act together, such as the dampers of both sides of a truck seen from the side, the vehicle
-    carries the force of all; the channel and the dissipated power are of one.
+    If there are several equal ones, such as the dampers of both sides in a side view of a truck, the vehicle has the
+    force of all; the channels of force and dissipated power are those of one.
 
     Arguments:
-        name: of the element.
-        law: of one of them.
-        count: how many alike act together.
+        name: name of the element.
+        law: law of one of them.
+        count: number of equal laws.
 
     Raises:
         ValueError: a count below one.
@@ -127,29 +127,29 @@ class Element(AbstractPart):
 
     def __check_init__(self) -> None:
         if self.count < 1:
-            _checks.refuse("count", "be 1 or more", self.count, "It is how many laws alike act together.")
+            _checks.refuse("count", "be 1 or more", self.count, "It is the number of equal laws.")
 
     @property
     def together(self) -> AbstractDamper:
-        """The law of all of them, as the vehicle has it at the port."""
+        """The law of all of them together."""
         return self.law if self.count == 1 else float(self.count) * self.law
 
 
 @final
 class Link(AbstractPart):
-    """A linear spring and dashpot and any laws, side by side, on one extension: upper point less lower point.
+    """A linear spring, a dashpot and any laws in parallel; the extension is the upper point minus the lower point.
 
     A link with laws has the channels `stroke` [m], `damper_velocity` [m/s] (of the extension: with a `MotionRatio` the
     damper's own is ratio times that) and the force [N] of each law, after the name of the link. Across an angle, as in
     an anti-roll bar, the units are N m/rad, N m s/rad, rad and N m.
 
     Arguments:
-        name: of the link, may be empty.
-        extension: upper point less lower point.
-        stiffness: of the linear spring.
-        damping: of the linear dashpot.
-        elements: laws beside them.
-        sides: of the vehicle that it stands for, two where left and right are one; only for descriptions.
+        name: name of the link, may be empty.
+        extension: upper point minus lower point.
+        stiffness: stiffness of the linear spring.
+        damping: coefficient of the linear dashpot.
+        elements: laws parallel to them.
+        sides: number of sides of the vehicle that it stands for; only for descriptions.
     """
 
     name: str = eqx.field(static=True)
@@ -162,22 +162,23 @@ class Link(AbstractPart):
 
 @final
 class Wheel(AbstractPart):
-    """A point that stands on the road: a linear spring and dashpot to the height of its own track, and any laws.
+    """A tyre between a point of the vehicle and the road: a linear spring, a dashpot and any laws.
 
-    Channels, after its name: `z_road` [m], `dynamic_tyre_load` [N] beyond the static one, `relative_tyre_load`; with
-    laws also `stroke`, `damper_velocity` and their forces. Wheels take the tracks of a road in their order.
+    Channels, with its name as prefix: `z_road` [m], `dynamic_tyre_load` [N] (minus the static load),
+    `relative_tyre_load`; with laws also `stroke`, `damper_velocity` and their forces. The columns of a road are in the
+    order of the wheels.
 
     Arguments:
-        name: of the wheel, may be empty.
-        point: of the vehicle that the tyre carries.
-        stiffness: of the tyre.
-        damping: of the tyre.
+        name: name of the wheel, may be empty.
+        point: point of the vehicle above the tyre.
+        stiffness: vertical stiffness of the tyre.
+        damping: vertical damping of the tyre.
         behind: distance behind the front axle [m], for delays.
-        left: distance to the left of the middle [m]; zero where both sides are one.
+        left: distance to the left of the middle [m]; zero if the wheel stands for both sides.
         elements: laws between point and road.
-        lifts: whether the tyre can leave the road (`LiftOff`).
-        beside: whether it is on the axle of the wheel before it.
-        sides: of the vehicle that it stands for, two where left and right are one; only for descriptions.
+        lifts: whether the tyre can lift off (`LiftOff`).
+        beside: whether it is on the same axle as the previous wheel.
+        sides: number of sides of the vehicle that it stands for; only for descriptions.
     """
 
     name: str = eqx.field(static=True)
@@ -203,10 +204,10 @@ class Place(AbstractPart):
     """A place on the body where the acceleration is of interest: channels `z_{name}` and `{name}_acceleration`.
 
     Arguments:
-        name: of the place.
-        ahead: of the centre of gravity [m]; `None` for a body that does not pitch.
-        left: of the centre of gravity [m]; `None` for a body that does not roll.
-        body: that it is on.
+        name: name of the place.
+        ahead: distance ahead of the centre of gravity [m]; `None` for a body that does not pitch.
+        left: distance to the left of the centre of gravity [m]; `None` for a body that does not roll.
+        body: name of the body it is on.
     """
 
     name: str = eqx.field(static=True)

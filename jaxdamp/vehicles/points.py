@@ -19,8 +19,8 @@ def _is_one(coefficient: Any) -> bool:
 class Point(eqx.Module):
     """Σ coefficient · coordinate: the height of a point [m] or an angle [rad], for small angles.
 
-    Points add, subtract and scale, so that the extension of a link reads `body.at(1.2) - wheel.at()`. A body gives
-    points by `Body.at`, angles by `Body.pitch` and `Body.roll`.
+    Points can be added, subtracted and scaled: the extension of a link is `body.at(1.2) - wheel.at()`. `Body.at` gives
+    points, `Body.pitch` and `Body.roll` give angles.
 
     >>> twist = Point({"roll": 1.0}) - (Point({"z_left": 1.0}) - Point({"z_right": 1.0})) * 0.5
     >>> twist.terms
@@ -47,7 +47,7 @@ class Point(eqx.Module):
         return self + -other
 
     def of(self, values: Mapping[str, Any]) -> Any:
-        """Its value for values of the coordinates by name, such as a mode's.
+        """Its value for given values of the coordinates by name, such as a mode shape.
 
         >>> Point({"z_sprung": 1.0, "pitch": -1.0}).of({"z_sprung": 0.5, "pitch": 0.25})
         0.25
@@ -56,7 +56,7 @@ class Point(eqx.Module):
 
 
 def matrix(points: Sequence[Point], coordinates: Sequence[str]) -> Float[Array, "points coordinates"]:
-    """The coefficients of points, a row each, in the order of the coordinates; others are left out."""
+    """The coefficients of points, one row each, in the order of the coordinates; other coordinates are ignored."""
     numbers: list[Any] = [0.0, 1.0]  # each entry is one of these: a gather compiles faster than a stack of rows
     entries = np.zeros((len(points), len(coordinates)), dtype=int)
     column = {name: j for j, name in enumerate(coordinates)}

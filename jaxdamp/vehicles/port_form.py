@@ -1,9 +1,10 @@
-"""The one form of all vehicles: linear masses and springs, and nonlinear elements at ports.
+"""The common form of all vehicles: linear masses and springs, and nonlinear laws at ports.
 
-    M q̈ = −K q − C q̇ + K_r z_r + C_r ż_r − Pᵀ f,    fᵢ = element i (deflection eᵢ = Pᵢ q − Sᵢ z_r, rate ėᵢ, its states)
+    M q̈ = −K q − C q̇ + K_r z_r + C_r ż_r − Pᵀ f,    fᵢ = element i (deflection eᵢ = Pᵢ q − Sᵢ z_r, rate ėᵢ, its
+    states)
 
-The coordinates q [m, rad] are measured from the static equilibrium on the linear springs, z up. Every spring and every
-port is a row R of geometry, so that forces return through the same row, −Rᵀ F, and no sign is written by hand.
+The coordinates q [m, rad] are measured from the static equilibrium of the linear springs, z up. Every spring and every
+port is a row R of the geometry; its force acts through the same row, −Rᵀ F, so no sign is written by hand.
 """
 
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ from jaxdamp._vectors import Matrix, Vector, plus, rows, times
 class PortForm(eqx.Module):
     """The matrices of a vehicle, in SI units; q coordinates, `wheels` road inputs, `ports` nonlinear elements.
 
-    The ground matrices close the energy: the springs hold ½ qᵀK q − qᵀK_r z_r + ½ z_rᵀK_g z_r.
+    The ground matrices are for the energy balance: the springs store ½ qᵀK q − qᵀK_r z_r + ½ z_rᵀK_g z_r.
     """
 
     mass: Float[Array, "q q"]
@@ -32,7 +33,7 @@ class PortForm(eqx.Module):
     ground_stiffness: Float[Array, "wheels wheels"]
     ground_damping: Float[Array, "wheels wheels"]
     ports: Float[Array, "ports q"]
-    port_road: Float[Array, "ports wheels"] | None = None  # S; None where no element stands on the road
+    port_road: Float[Array, "ports wheels"] | None = None  # S; None if no element is at the road
 
     def first_order(self) -> "LinearMap":
         """ẋ = A x + B_f f + B_r z_r + B_d ż_r of the motion x = (q, q̇), by one solution with the mass matrix."""
@@ -62,11 +63,14 @@ class LinearMap(eqx.Module):
     road_rate: Matrix
 
     def __call__(self, motion: Vector, force: Vector, road: Vector, road_rate: Vector | None) -> Vector:
-        """Its value; what the road gives is summed first, as it is the same for all cars. No rate is a rate of zero."""
-        given = times(self.road, road)
+        """Its value. The contribution of the road is summed first, since it is the same for all cars of a batch.
+
+        Without a road rate, the rate is zero.
+        """
+        of_road = times(self.road, road)
         if road_rate is not None:
-            given = plus(given, times(self.road_rate, road_rate))
-        return plus(given, times(self.motion, motion), times(self.force, force))
+            of_road = plus(of_road, times(self.road_rate, road_rate))
+        return plus(of_road, times(self.motion, motion), times(self.force, force))
 
     def of(self, numbers: Sequence[int]) -> "LinearMap":
         """Some of its rows."""
@@ -74,7 +78,7 @@ class LinearMap(eqx.Module):
         return LinearMap(self.motion[chosen], self.force[chosen], self.road[chosen], self.road_rate[chosen])
 
     def scalars(self) -> "LinearMap":
-        """The same, rows of scalars for matrices."""
+        """The same with rows of scalars instead of matrices."""
         return LinearMap(*map(rows, (self.motion, self.force, self.road, self.road_rate)))
 
 
@@ -91,12 +95,12 @@ def sum_springs(
 
     Arguments:
         mass: M.
-        links: R, a row for each spring with the dashpot beside it.
+        links: R, a row for each spring and its parallel dashpot.
         road: S.
         stiffness: k [N/m].
         damping: c [N s/m].
         ports: rows of the elements.
-        port_road: S of the elements; None where none stands on the road.
+        port_road: S of the elements; None if none is at the road.
     """
     springs, dashpots = links.T * stiffness[None, :], links.T * damping[None, :]
     ground_springs, ground_dashpots = road.T * stiffness[None, :], road.T * damping[None, :]

@@ -1,4 +1,4 @@
-"""The elements at the ports of a vehicle, computed together: laws that differ in their numbers only go as one batch."""
+"""The laws at the ports of a vehicle, computed together: equal laws with different parameters are one batch."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias, final
@@ -13,7 +13,7 @@ from jaxdamp._types import Scalar, State
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 
 
-# One array, or a tuple of scalars; who calls knows which.
+# One array, or a tuple of scalars, as the caller chooses.
 if TYPE_CHECKING:
     AtPorts: TypeAlias = Any
 else:
@@ -23,7 +23,7 @@ Earlier = tuple[list[Array | None], list[Array | None]]  # one and two steps bef
 
 
 def _alike(one: AbstractDamper, other: AbstractDamper) -> bool:
-    """Whether two laws differ in nothing but the values of their arrays."""
+    """Whether two laws differ only in the values of their arrays."""
     if jax.tree.structure(one) != jax.tree.structure(other):
         return False
     pairs = list(zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True))
@@ -38,14 +38,14 @@ def _alike(one: AbstractDamper, other: AbstractDamper) -> bool:
 class Ports(eqx.Module):
     """Forces, states and steps of all elements of a vehicle, in the order of its ports.
 
-    The laws of one kind are stacked and computed as one batch: four dampers of a car cost little more than one, and are
-    compiled once. A law alone is called as it is.
+    Laws of the same kind are stacked and computed as one batch: four dampers of a car cost little more than one, and
+    are compiled once. A single law is called directly.
 
-    Deflections, rates and forces are one array; or, of laws kept `apart`, a tuple of scalars.
+    Deflections [m], rates [m/s] and forces [N] are one array of shape (ports,); with `apart`, a tuple of scalars.
 
     Arguments:
         laws: the law at each port.
-        apart: call every law by itself.
+        apart: call every law separately, without stacking.
     """
 
     laws: tuple[AbstractDamper, ...]  # one of each kind, its arrays stacked where there are several
@@ -56,11 +56,11 @@ class Ports(eqx.Module):
         laws = [without_fitted_ranges(law) for law in laws]
         kinds: list[list[int]] = []
         for i, law in enumerate(laws):
-            found = None if apart else next((kind for kind in kinds if _alike(laws[kind[0]], law)), None)
-            if found is None:
+            same = None if apart else next((kind for kind in kinds if _alike(laws[kind[0]], law)), None)
+            if same is None:
                 kinds.append([i])
             else:
-                found.append(i)
+                same.append(i)
         self.members = tuple(tuple(kind) for kind in kinds)
         self.smooth = tuple(laws[kind[0]].traits().extrapolable_states for kind in kinds)
         self.laws = tuple(
@@ -96,18 +96,18 @@ class Ports(eqx.Module):
         return self._each(step, [x0, v0, x1, v1], states)
 
     def first_earlier(self, states: States) -> Earlier:
-        """The states before the beginning: what they are then."""
-        kept = [state if smooth else None for smooth, state in zip(self.smooth, states, strict=True)]
-        return kept, kept
+        """The earlier states at the start of a run: equal to the initial ones."""
+        extrapolated = [state if smooth else None for smooth, state in zip(self.smooth, states, strict=True)]
+        return extrapolated, extrapolated
 
     def next_earlier(self, states: States, earlier: Earlier) -> Earlier:
-        """The states before the next step."""
+        """The earlier states for the next step."""
         return [None if old is None else state for old, state in zip(earlier[0], states, strict=True)], earlier[0]
 
     def predict(
         self, x0: AtPorts, v0: AtPorts, x1: AtPorts, v1: AtPorts, states: States, earlier: Earlier, dt: Scalar
     ) -> States:
-        """What `advance` will give, to third order: smooth states by extrapolation, which costs next to nothing."""
+        """An approximation of `advance`, third order: smooth states are extrapolated, which costs almost nothing."""
 
         def step(law: AbstractDamper, *arguments: Any) -> State:
             x0, v0, x1, v1, state, before, two_before = arguments
@@ -117,10 +117,10 @@ class Ports(eqx.Module):
 
     def by_port(self, states: States) -> list[Float[Array, " _state"]]:
         """The states of each element, in the order of the ports."""
-        found = {}
+        of_port = {}
         for kind, state in zip(self.members, states, strict=True):
-            found |= {port: state if len(kind) == 1 else state[i] for i, port in enumerate(kind)}
-        return [found[port] for port in sorted(found)]
+            of_port |= {port: state if len(kind) == 1 else state[i] for i, port in enumerate(kind)}
+        return [of_port[port] for port in sorted(of_port)]
 
     def stiffness_and_damping(self, x: Float[Array, " ports"]) -> tuple[Array, Array]:
         """Slopes ∂F/∂x [N/m] and ∂F/∂v [N s/m] of the forces at rest at the deflections x."""
@@ -133,18 +133,18 @@ class Ports(eqx.Module):
         self, call: Callable[..., Array], vectors: Sequence[AtPorts], *states: Sequence[Array | None]
     ) -> list[Array]:
         """The call for every law, as one batch for each kind."""
-        found = []
+        results = []
         for i, (law, kind) in enumerate(zip(self.laws, self.members, strict=True)):
             state = [some[i] for some in states]
             if len(kind) == 1:
-                found.append(call(law, *[vector[kind[0]] for vector in vectors], *state))
+                results.append(call(law, *[vector[kind[0]] for vector in vectors], *state))
                 continue
             arrays, rest = eqx.partition(law, eqx.is_array)
             picked = [_pick(vector, kind) for vector in vectors]
-            found.append(
+            results.append(
                 jax.vmap(lambda a, *more, rest=rest: call(eqx.combine(a, rest), *more))(arrays, *picked, *state)
             )
-        return found
+        return results
 
 
 def _stacked(*leaves: Any) -> Any:
@@ -152,6 +152,6 @@ def _stacked(*leaves: Any) -> Any:
 
 
 def _pick(vector: AtPorts, kind: tuple[int, ...]) -> Float[Array, " laws"]:
-    """The entries of some ports, as a slice where they follow one another: a gather would cost more in a loop."""
+    """The entries of some ports, as a slice if they are consecutive: a gather would cost more in a loop."""
     first, last = kind[0], kind[-1]
     return vector[first : last + 1] if len(kind) == last - first + 1 else vector[np.array(kind)]

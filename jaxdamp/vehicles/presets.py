@@ -1,6 +1,6 @@
-"""Published parameter sets; each function names its source and what had to be assumed.
+"""Published parameter sets; each docstring gives the source and the assumptions.
 
-With `tyre_lifts=True` all tyres can leave the road.
+With `tyre_lifts=True` all tyres can lift off.
 """
 
 from jaxdamp.dampers import AbstractDamper, Besinger, Linear
@@ -18,9 +18,9 @@ from jaxdamp.vehicles.tracked_hull import TrackedHull
 def quarter_car_000(
     damper: AbstractDamper | None = None, *, seats: tuple[Seat, ...] = (), tyre_lifts: bool = False
 ) -> QuarterCar:
-    """Mazda CX-7 front corner, paper 000 Table II (1200 kg is heavy for a quarter of this car, but printed so).
+    """Mazda CX-7 front corner, paper 000 Table II (1200 kg, heavy for a quarter of it, is the printed value).
 
-    Its own damper is linear, 2500 N s/m. Undamped modes 0.9951 and 7.5509 Hz.
+    The default damper is linear, 2500 N s/m. Undamped modes 0.9951 and 7.5509 Hz.
     """
     law = Linear(2500.0) if damper is None else damper
     return QuarterCar(1200.0, 125.0, 60e3, 220e3, law, seats=seats, tyre_lifts=tyre_lifts)
@@ -42,11 +42,11 @@ def golden_car(sprung_mass: float = 250.0, *, tyre_lifts: bool = False) -> Quart
 
 
 def half_car_002(damper: AbstractDamper | None = None, *, tyre_lifts: bool = False) -> HalfCar:
-    """Half car of paper 002 Table 1, the sign in its equation 2 put right.
+    """Half car of paper 002 Table 1, with the sign error of its equation 2 corrected.
 
     The paper gives neither the linear damping coefficient nor the delay of the rear axle. Undamped modes
-    1.157, 1.431, 11.635, 11.639 Hz. Assumed: 1560 N s/m at both
-    ends, which with a delay of 0.0986 s comes within 4 % of its linear results.
+    1.157, 1.431, 11.635, 11.639 Hz. Assumed: 1560 N s/m at both ends, which with a delay of 0.0986 s agrees with its
+    linear results within 4 %.
     """
     corner = Corner(40.0, 23.5e3, 190e3, Linear(1560.0) if damper is None else damper)
     return HalfCar(580.0, 1100.0, 1.0, 1.5, corner, corner, tyre_lifts=tyre_lifts)
@@ -71,12 +71,12 @@ def truck_001(
     """Heavy vehicle of paper 001 Table 1, fully laden: 6900 kg on the front axle, 18 000 kg on the tandem.
 
     Published: those loads, leaf springs 252 kN/m in front and 1195 kN/m behind, tyres 1100 kN/m; the damper of the
-    front axle is the paper's Besinger law with its continuous opening velocity. Assumed, as the paper is silent: rates
-    are those of one spring and one tyre, with two springs an axle or tandem, two tyres in front and four on each rear
-    axle, each with 500 N s/m, without which a walking beam never comes to rest; two dampers in front; 700 kg of front
-    axle, 1100 kg of each rear axle; wheelbase 4.5 m to the middle of a tandem of 1.3 m; radius of gyration in pitch
-    2.2 m; 40 kN s/m for the friction of the tandem's leaves; beams whose inertia sits in the axles. Force and power of
-    the damper in front are of one of the two, tyre loads and forces of the tandem of both sides together.
+    front axle is the paper's Besinger law with its continuous opening velocity. Assumed, since the paper does not say:
+    rates are those of one spring and one tyre, with two springs per axle or tandem, two tyres in front and four on each
+    rear axle, each with 500 N s/m, without which a walking beam never comes to rest; two dampers in front; 700 kg of
+    front axle, 1100 kg of each rear axle; wheelbase 4.5 m to the middle of a tandem of 1.3 m; radius of gyration in
+    pitch 2.2 m; 40 kN s/m for the friction of the tandem's leaves; beams whose inertia is in the axles. Force and power
+    of the front damper are those of one of the two, tyre loads and forces of the tandem those of both sides together.
     """
     shock = Besinger(14.4e3, 15.6e3, 3.6e3, 0.125, 0.7) if damper is None else damper
     front = Corner(700.0, 2 * 252e3, 2 * 1100e3, shock, 2 * 500.0, damper_count=2)
@@ -96,7 +96,7 @@ def m113_003(damper: AbstractDamper | None = None, *, tyre_lifts: bool = False) 
     """M113 of paper 003: pitch inertia 24 000 kg m², five wheels a side of 127 kN/m, dampers on wheels 1, 2 and 5.
 
     Assumed: the spacing of the wheels in Chrono's model, 0.667 m, with the centre of gravity over the third, and
-    Chrono's hull mass of 7819 kg; the paper gives neither. Its own damper is the mean of the paper, 16 kN s/m.
+    Chrono's hull mass of 7819 kg; the paper gives neither. The default damper is the mean of the paper, 16 kN s/m.
     """
     positions = [1.334, 0.667, 0.0, -0.667, -1.333]
     law = Linear(16e3) if damper is None else damper
@@ -106,9 +106,9 @@ def m113_003(damper: AbstractDamper | None = None, *, tyre_lifts: bool = False) 
 def m113_chrono(damper: AbstractDamper | None = None, *, tyre_lifts: bool = False) -> TrackedHull:
     """M113 of Project Chrono (data/vehicle/M113, BSD-3): 7819.24 kg, 27 287.61 kg m², dampers on wheels 1, 2 and 5.
 
-    Wheel rate 301.4 kN/m, torsion bar over arm² at the design position; places are the mean of the left and the right
-    side, whose bars lie 85 mm apart. The model's own shock absorber (100 N s/m) is a placeholder. Assumed instead: the
-    mean of paper 003, 16 kN s/m. The damping of the torsion bars is left out.
+    Wheel rate 301.4 kN/m, torsion bar rate divided by arm² at the design position; positions are the mean of the left
+    and the right side, whose bars are 85 mm apart. The shock absorber of the model (100 N s/m) is a placeholder.
+    Assumed instead: the mean of paper 003, 16 kN s/m. The damping of the torsion bars is left out.
     """
     positions = [1.3085, 0.6415, -0.0255, -0.692, -1.3585]
     law = Linear(16e3) if damper is None else damper

@@ -1,4 +1,4 @@
-"""Two masses over one another: body and wheel of one corner."""
+"""The quarter car: body and wheel of one corner."""
 
 from typing import final
 
@@ -21,19 +21,20 @@ class _SprungMass(AbstractVehicle):
 class QuarterCar(AbstractCorner, _SprungMass):  # in this order, the sprung mass is the first argument
     """A quarter of a car: sprung mass, spring and damper, unsprung mass, tyre.
 
-    m_s z̈_s = −k_s (z_s − z_u) − F,  m_u z̈_u = k_s (z_s − z_u) + F − F_t, F_t = k_t (z_u − z_r) + c_t (ż_u − ż_r), with
-    the force F of the damper and of the other laws at stroke z_s − z_u. Heights are measured from static equilibrium,
-    z up. Unless `tyre_lifts`, the tyre stays on the road, and its load may become negative on paper
-    (`Response.notes` says so). For any law, at every instant and with c_t = 0, m_s z̈_s + m_u z̈_u = −k_t (z_u − z_r).
+    m_s z̈_s = −k_s (z_s − z_u) − F,  m_u z̈_u = k_s (z_s − z_u) + F − F_t, F_t = k_t (z_u − z_r) + c_t (ż_u − ż_r),
+    with the force F of the damper and of the other laws at stroke z_s − z_u. Heights are measured from static
+    equilibrium, z up. Unless `tyre_lifts`, the tyre stays on the road and its load may become negative
+    (`Response.notes` reports it). For any law, at every instant and with c_t = 0, m_s z̈_s + m_u z̈_u = −k_t (z_u −
+    z_r).
 
     Arguments:
-        damper: law at the wheel; `dampers.MotionRatio(law, ratio)` for one that moves less or more.
-        extra_spring: law beside the linear spring, such as `CubicSpring` or `dampers.GasSpring`.
+        damper: law at the wheel; `dampers.MotionRatio(law, ratio)` if the damper has another travel than the wheel.
+        extra_spring: law parallel to the linear spring, such as `CubicSpring` or `dampers.GasSpring`.
         bump_stop: law such as `dampers.BumpStop`.
         friction: law such as `dampers.CoulombFriction`.
-        tyre_lifts: whether the tyre can leave the road (see `LiftOff`).
+        tyre_lifts: whether the tyre can lift off (see `LiftOff`).
         seats: on the body.
-        damper_count: how many dampers like `damper` act together; the channel of the force and the power are of one.
+        damper_count: number of equal dampers; the channels of force and power are those of one.
 
     >>> from jaxdamp.dampers import Linear
     >>> car = QuarterCar(1200.0, 125.0, 60e3, 220e3, Linear(2500.0))

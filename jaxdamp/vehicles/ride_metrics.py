@@ -1,4 +1,4 @@
-"""The numbers that say how a vehicle rides."""
+"""The predefined ride metrics of a vehicle, and the choice among them."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,7 +10,7 @@ from jaxdamp.vehicles.parts import Link, Wheel, prefixed
 
 
 def ride_metrics_of(frame: Frame, channels: Sequence[Channel]) -> tuple[Metric, ...]:
-    """What a ride is judged by, in groups: bodies and places, suspensions, tyres."""
+    """The ride metrics, in groups: bodies and places, suspensions, tyres."""
     return (*_of_bodies(frame, channels), *_of_elements(frame), *_of_tyres(frame))
 
 
@@ -39,7 +39,7 @@ def _of_bodies(frame: Frame, channels: Sequence[Channel]) -> list[Metric]:
 
 
 def _of_elements(frame: Frame) -> list[Metric]:
-    """Working space and velocity of every link with laws, and the power that each law takes."""
+    """Working space and velocity of every link with laws, and the power that each law dissipates."""
     metrics: list[Metric] = []
     parts: list[Link | Wheel] = [*frame.links, *frame.wheels]
     for part in parts:
@@ -60,7 +60,7 @@ def _of_elements(frame: Frame) -> list[Metric]:
 
 
 def _of_tyres(frame: Frame) -> list[Metric]:
-    """Variation of the tyre loads, and how often a wheel lifts off."""
+    """Variation of the tyre loads, and the fraction of time in which a wheel is lifted off."""
     metrics: list[Metric] = []
     for wheel in frame.wheels:
         load, relative = prefixed(wheel.name, "dynamic_tyre_load"), prefixed(wheel.name, "relative_tyre_load")
@@ -72,25 +72,28 @@ def _of_tyres(frame: Frame) -> list[Metric]:
 
 
 def is_stationary(metric: Metric, channels: Mapping[str, Channel]) -> bool:
-    """Whether the RMS of its channel on a white road gives a metric; a height wanders with the road and has none."""
-    wanders = metric.from_rest and channels[metric.channel].kind is ChannelKind.HEIGHT
-    return metric.statistic.of_rms is not None and not (wanders or metric.by or metric.window)
+    """Whether a metric follows from the RMS of its channel on a white road.
+
+    Absolute heights have no finite RMS there, since they follow the road.
+    """
+    unbounded = metric.from_rest and channels[metric.channel].kind is ChannelKind.HEIGHT
+    return metric.statistic.of_rms is not None and not (unbounded or metric.by or metric.window)
 
 
 def chosen_metrics(
     metrics: Sequence[Metric], channels: Mapping[str, Channel], wanted: Sequence[str | Metric] | None, argument: str
 ) -> list[Metric]:
-    """The metrics that are wanted, ready to be computed.
+    """The requested metrics, checked and with their weightings.
 
     Arguments:
-        metrics: those that have names of their own, the ride metrics of a vehicle.
-        channels: of the vehicle, by name.
-        wanted: names among the ride metrics, or metrics of any channel; None for all ride metrics.
-        argument: what errors call `wanted`.
+        metrics: the predefined ride metrics of the vehicle.
+        channels: channels of the vehicle, by name.
+        wanted: names of ride metrics, or metrics of any channel; None for all ride metrics.
+        argument: name of this argument in error messages.
 
     Raises:
-        ValueError: none; an unknown name or channel, with the nearest one; a weighting of what no person feels; two
-            metrics of one name.
+        ValueError: an empty list; an unknown name or channel, with the nearest known one; a weighting of a channel that
+            is not an acceleration; two metrics of one name.
     """
     known = {m.name: m for m in metrics}
     if wanted is None:
@@ -112,7 +115,7 @@ def chosen_metrics(
 
 
 def of_channel(metric: Metric, channels: Mapping[str, Channel], argument: str) -> Metric:
-    """A metric whose channels exist, with the weighting of its channel in place of "default"."""
+    """The metric after a check of its channels, with the weighting of its channel instead of "default"."""
     for name in (metric.channel, metric.by) if metric.by else (metric.channel,):
         _checks.one_of(f"channel of {argument}", name, channels)
     own = channels[metric.channel].kind.weighting

@@ -17,8 +17,8 @@ from jaxdamp.vehicles.seat import Seat, seat_parts
 class RollCar(AbstractVehicle):
     """Body with heave z and roll φ (left side up) on one axle with an anti-roll bar.
 
-        m z̈ = −F_l − F_r,   J φ̈ = −(w/2)(F_l − F_r) − M,   m_u z̈_ul = F_l − F_tl + M/w,  m_u z̈_ur = F_r − F_tr − M/w,
-        M = k_R (φ − (z_ul − z_ur)/w).
+        m z̈ = −F_l − F_r,   J φ̈ = −(w/2)(F_l − F_r) − M,   m_u z̈_ul = F_l − F_tl + M/w,  m_u z̈_ur = F_r − F_tr −
+        M/w, M = k_R (φ − (z_ul − z_ur)/w).
 
     The wheels are left and right.
 
@@ -26,7 +26,7 @@ class RollCar(AbstractVehicle):
         axle: the two corners and the bar between them.
         places: where on the body accelerations are of interest.
         seats: on the body.
-        tyre_lifts: whether all tyres can leave the road; a single corner can say so itself.
+        tyre_lifts: whether all tyres can lift off; for a single corner, set `tyre_lifts` of the corner.
 
     >>> from jaxdamp.vehicles.presets import full_car_jazar
     >>> full = full_car_jazar()

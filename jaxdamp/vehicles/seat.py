@@ -16,13 +16,13 @@ from jaxdamp.vehicles.suspension import Suspension
 
 @final
 class SeatMass(AbstractPart):
-    """A mass on a spring and a damper, such as seat and driver on the seat's suspension.
+    """A mass on a spring and a damper, such as seat and driver on the suspension of the seat.
 
     Arguments:
-        mass: on the spring [kg].
-        spring_rate: under the mass [N/m].
+        mass: mass on the spring [kg].
+        spring_rate: rate of the spring under the mass [N/m].
         damper: law under the mass.
-        extra_spring: law beside the linear spring, such as `dampers.GasSpring`.
+        extra_spring: law parallel to the linear spring, such as `dampers.GasSpring`.
         bump_stop: law such as `dampers.BumpStop`.
         friction: law such as `dampers.CoulombFriction`.
     """
@@ -37,16 +37,16 @@ class SeatMass(AbstractPart):
 
 @final
 class Seat(Module):
-    """A seat at a point of the body: one mass, or two over one another (seat frame, driver on the cushion), or more.
+    """A seat at a point of the body: one mass, or several above each other (seat frame, driver on the cushion).
 
     Channels: `z_seat`, `seat_acceleration`, `seat_stroke`, `seat_damper_force` and so on for the first mass; the next
     are called `seat_2`, `seat_3`. Its accelerations are among the ride metrics.
 
     Arguments:
         masses: from below upwards.
-        ahead: of the centre of gravity [m]; left out on a body that does not pitch.
-        left: of the centre of gravity [m]; left out on a body that does not roll.
-        name: of the seat.
+        ahead: distance ahead of the centre of gravity [m]; left out on a body that does not pitch.
+        left: distance to the left of the centre of gravity [m]; left out on a body that does not roll.
+        name: name of the seat.
 
     >>> from jaxdamp.dampers import Linear
     >>> from jaxdamp.vehicles.presets import quarter_car_000

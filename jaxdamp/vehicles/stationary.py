@@ -1,4 +1,4 @@
-"""Stationary response of the linearised vehicle to a road whose rate of height is white noise."""
+"""Stationary response of the linearised vehicle to a road whose rate is white noise."""
 
 import equinox as eqx
 import jax
@@ -7,10 +7,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._limits import at_least
+from jaxdamp._limits import at_least, root
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.vehicles.base import AbstractVehicle
-from jaxdamp.vehicles.frequency_response import root
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear
 
 
@@ -29,26 +28,27 @@ def stationary_rms(
     speed: ScalarLike | int | None = None,
     in_phase: bool = False,
 ) -> dict[str, Scalar]:
-    """RMS of every channel of the linearised vehicle when the road's rate of height is white noise.
+    """RMS of every channel of the linearised vehicle on a road whose rate is white noise.
 
-    One road goes under all wheels: at a `speed` one axle after the other, which correlates what they do, or `in_phase`.
-    A channel is then y(t) = ∫ k(s) u(t − s) ds with the white rate u of the road, and its mean square S ∫ k² ds is
-    summed exactly from axle to axle: over a stretch in which no wheel meets the impulse, k is a row times the matrix
-    exponential of the state, plus a constant. Behind the last axle A X + X Aᵀ + x xᵀ = 0 gives the rest. Differentiable
-    in every parameter and in the speed.
+    All wheels run on the same road: with a `speed` one axle after the other, so that their motions are correlated, or
+    `in_phase`. A channel is y(t) = ∫ k(s) u(t − s) ds with the white rate u of the road, and its mean square S ∫ k² ds
+    is computed exactly, from axle to axle: while no wheel meets the impulse, k is a row times the matrix exponential of
+    the state, plus a constant. The part after the last axle follows from A X + X Aᵀ + x xᵀ = 0. Differentiable in every
+    parameter and in the speed.
 
-    Channels that carry the white noise itself (with tyre damping, the tyre load) have an infinite RMS and are given as
-    `inf`. Absolute heights (`z_…`) grow without bound: those given are above the road under the front axle.
+    Channels that contain the white noise itself (the tyre load, if there is tyre damping) have an infinite RMS,
+    returned as `inf`. Absolute heights (`z_…`) have no finite RMS; the returned ones are relative to the road under the
+    front axle.
 
     Arguments:
         vehicle: a vehicle, linearised about rest, or what `linearise` made of it.
-        velocity_psd: two-sided power spectral density S of the rate of height [(m/s)²/Hz]; of an ISO 8608 road of
-            waviness 2, 2π² G_d(n₀) n₀² V (`roads.white`).
+        velocity_psd: two-sided power spectral density S of the rate of the height [(m/s)²/Hz]; for an ISO 8608 road of
+            waviness 2 it is 2π² G_d(n₀) n₀² V (`roads.white`).
         speed: of the vehicle [m/s]; not needed for a single axle.
         in_phase: the road is under all axles at once, instead of a speed.
 
     Returns:
-        RMS by channel name, in the units of the vehicle's channels.
+        RMS of each channel by name, in the unit of the channel.
 
     Raises:
         ValueError: a density or a speed that is not positive, several axles with neither `speed` nor `in_phase`, or
@@ -65,35 +65,35 @@ def stationary_rms(
     matrix = _checks.concrete(linear.state_matrix)
     if matrix is not None and np.max(np.linalg.eigvals(matrix).real) > -1e-9 * np.abs(matrix).max():
         remedy = (
-            "Friction that holds at rest (Dahl, LuGre, Bouc-Wen) never forgets, for small motion: pass "
+            "Friction models such as Dahl, LuGre and Bouc-Wen have an undamped state for small motion: pass "
             "`linearise(vehicle, amplitude=0.02, frequency=1.2)`."
         )
         _checks.refuse("vehicle", "come to rest when linearised", "one that does not", remedy)
-    found = root(velocity_psd * _mean_squares(linear, linear.delays(speed, in_phase)))
-    return {name: found[i] for i, name in enumerate(linear.channels)}
+    rms = root(velocity_psd * _mean_squares(linear, linear.delays(speed, in_phase)))
+    return {name: rms[i] for i, name in enumerate(linear.channels)}
 
 
 @eqx.filter_jit
 def _mean_squares(linear: LinearVehicle, delays: Float[Array, " wheels"]) -> Float[Array, " channels"]:
-    """∫ k² ds of every channel, `inf` where it holds the white noise."""
+    """∫ k² ds of every channel, `inf` if it contains the white noise."""
     a, c, settled = linear.state_matrix, linear.output, linear.settled()
     # ξ = x − settled z_r obeys ξ̇ = A ξ + (E − settled) ż_r; channels are C ξ + (C settled + D) z_r + F ż_r
     order = jnp.argsort(delays)
     times, pushes = delays[order], (linear.road_rate_input - settled)[:, order]
     static = (c @ settled + linear.road_feed)[:, order]
 
-    def seen(covariance: Float[Array, "n n"]) -> Float[Array, " channels"]:
+    def of_channels(covariance: Float[Array, "n n"]) -> Float[Array, " channels"]:
         return jnp.sum((c @ covariance) * c, axis=1)
 
     state, total = pushes[:, 0], jnp.zeros(c.shape[0])
     for i in range(1, times.size):
         gap = times[i] - times[i - 1]
         after = jax.scipy.linalg.expm(a * gap) @ state
-        # ∫ ξξᵀ over the stretch: the whole tail from its beginning less that from its end
+        # ∫ ξξᵀ over the interval: the integral from its start minus that from its end
         covariance = lyapunov(a, jnp.outer(state, state) - jnp.outer(after, after))
         mean = c @ jnp.linalg.solve(a, after - state)
-        held = -jnp.sum(static[:, i:], axis=1)  # wheels still to come stand on the road that the front axle has left
-        total = total + seen(covariance) + 2.0 * held * mean + held**2 * gap
+        offset = -jnp.sum(static[:, i:], axis=1)  # later wheels are still on the road before the impulse
+        total = total + of_channels(covariance) + 2.0 * offset * mean + offset**2 * gap
         state = after + pushes[:, i]
-    total = at_least(total + seen(lyapunov(a, jnp.outer(state, state))), 0.0)
+    total = at_least(total + of_channels(lyapunov(a, jnp.outer(state, state))), 0.0)
     return jnp.where(jnp.any(linear.feed_through != 0, axis=1), jnp.inf, total)

@@ -1,4 +1,4 @@
-"""What stands between two points of a vehicle: a spring, a damper and what may act beside them."""
+"""A suspension between two points of a vehicle: a spring, a damper and optional further laws."""
 
 from typing import final
 
@@ -13,15 +13,15 @@ from jaxdamp.vehicles.points import Point
 
 @final
 class Suspension(AbstractPart):
-    """A spring, a damper, and what may act beside them, between a wheel and the body, under a cab or a seat.
+    """A spring, a damper and optional parallel laws, between a wheel and the body or under a cab or a seat.
 
     Arguments:
-        spring_rate: of the linear spring [N/m].
-        damper: law; `dampers.MotionRatio(law, ratio)` for one that moves less or more.
-        extra_spring: law beside the linear spring, such as `CubicSpring` or `dampers.GasSpring`.
+        spring_rate: rate of the linear spring [N/m].
+        damper: law; `dampers.MotionRatio(law, ratio)` if the damper has another travel than the suspension.
+        extra_spring: law parallel to the linear spring, such as `CubicSpring` or `dampers.GasSpring`.
         bump_stop: law such as `dampers.BumpStop`.
         friction: law such as `dampers.CoulombFriction`.
-        damper_count: how many dampers like `damper` act together; the channel of the force and the power are of one.
+        damper_count: number of equal dampers; the channels of force and power are those of one.
 
     >>> from jaxdamp.dampers import BumpStop, Linear
     >>> from jaxdamp.vehicles import Body
@@ -46,5 +46,5 @@ class Suspension(AbstractPart):
         return tuple(Element(name, law, count) for name, law, count in named if law is not None)
 
     def link(self, name: str, extension: Point, *, sides: int = 1) -> Link:
-        """It as a link: its extension is the upper point less the lower point, `sides` those that it stands for."""
+        """The suspension as a link; its extension is the upper point minus the lower point."""
         return Link(name, extension, self.spring_rate, elements=self.elements, sides=sides)

@@ -1,4 +1,4 @@
-"""The assembled vehicle: what engines, linear answers and metrics take, matrices and channels written once."""
+"""The assembled vehicle, which solvers, linear analysis and metrics use: matrices, laws and channels."""
 
 import dataclasses
 import functools
@@ -24,16 +24,16 @@ from jaxdamp.vehicles.ride_metrics import ride_metrics_of
 @final
 @dataclasses.dataclass(frozen=True)
 class Layout:
-    """What does not depend on any number of a vehicle.
+    """The part of a vehicle that is independent of its parameter values.
 
     Arguments:
         coordinates: names of q.
-        ports: names of the elements, those of tyres that can leave the road last.
+        ports: names of the elements, those of tyres that can lift off last.
         wheels: names of the wheels.
-        axles: number of the axle that each wheel is on, from 0.
-        lifts: whether each wheel can leave the road.
-        channels: what can be measured.
-        metrics: what a ride is judged by.
+        axles: number of the axle of each wheel, from 0.
+        lifts: whether the tyre of each wheel can lift off.
+        channels: all channels.
+        metrics: the ride metrics.
     """
 
     coordinates: tuple[str, ...]
@@ -46,7 +46,7 @@ class Layout:
 
     @property
     def axle_names(self) -> tuple[str, ...]:
-        """What the names of the wheels of each axle have in common, or its number."""
+        """The common part of the wheel names of each axle, or the number of the axle."""
         words: dict[int, list[str]] = {}
         for axle, wheel in zip(self.axles, self.wheels, strict=True):
             own = wheel.split("_")
@@ -68,7 +68,7 @@ class Layout:
         """The weighting of ISO 2631-1 of a channel.
 
         Raises:
-            ValueError: a channel that no person feels.
+            ValueError: a channel that is not an acceleration.
         """
         weighting = self.by_name[channel].kind.weighting
         if weighting is None:
@@ -77,7 +77,7 @@ class Layout:
 
     @functools.cached_property
     def numbers(self) -> dict[str, int]:
-        """Place of each channel among the outputs."""
+        """Index of each channel in the outputs."""
         return {channel.name: i for i, channel in enumerate(self.channels)}
 
 
@@ -97,14 +97,14 @@ def layout_of(frame: Frame, measured: Sequence[Measured]) -> Layout:
 
 @final
 class System(eqx.Module):
-    """A vehicle assembled: names, matrices, laws and outputs.
+    """An assembled vehicle: names, matrices, laws and outputs.
 
     Arguments:
         layout: names, kinds and places.
-        form: masses, springs and dashpots [SI units], rows of geometry of the ports.
-        laws: at each port.
-        static_loads: of the wheels at rest on level ground [N].
-        motion: ẋ of the motion x = (q, q̇).
+        form: matrices of masses, springs and dashpots, and geometry of the ports, in SI units.
+        laws: the law at each port.
+        static_loads: loads of the wheels at rest on level ground [N].
+        motion: the rate ẋ of the motion x = (q, q̇).
         outputs: the channels of the layout.
     """
 
@@ -131,7 +131,7 @@ def assemble(frame: Frame) -> System:
 def _outputs(
     layout: Layout, motion: LinearMap, sums: Float[Array, "channels signals"], loads: Float[Array, " wheels"]
 ) -> LinearMap:
-    """The channels, from their sums of signals and the accelerations of the coordinates."""
+    """The channels, from their linear combinations of signals and the accelerations of the coordinates."""
     n, ports, wheels = len(layout.coordinates), len(layout.ports), len(layout.wheels)
     relative = [c.kind is ChannelKind.RELATIVE_TYRE_LOAD for c in layout.channels]
     divisor = [1 + layout.wheels.index(c.place) if own else 0 for c, own in zip(layout.channels, relative, strict=True)]

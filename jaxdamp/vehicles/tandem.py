@@ -1,4 +1,4 @@
-"""Two axles close together behind a truck: on a walking beam, or each on its own."""
+"""The tandem axles of a truck: on a walking beam, or each with its own suspension."""
 
 from typing import Any, final
 
@@ -14,24 +14,24 @@ from jaxdamp.vehicles.suspension import Suspension
 
 @final
 class WalkingBeam(AbstractPart):
-    """Two axles on the ends of a beam, a leaf spring on its middle: both wheels carry the same load at rest.
+    """Two axles at the ends of a beam with a leaf spring at its middle: both wheels carry the same load at rest.
 
-    m_b z̈_b = P − F_t1 − F_t2,  J_b ψ̈ = −(s/2)(F_t1 − F_t2), with the force P of the spring and of the damper over the
-    middle. Nothing damps the pitch of the beam but the tyres: with c_t = 0 its mode √(k_t s²/(2 J_b)) rings on, the
-    known weakness of walking beams.
+    m_b z̈_b = P − F_t1 − F_t2,  J_b ψ̈ = −(s/2)(F_t1 − F_t2), with the force P of the spring and of the damper at the
+    middle. Only the tyres damp the pitch of the beam: with c_t = 0 its mode √(k_t s²/(2 J_b)) is undamped, the known
+    weakness of walking beams.
 
     Arguments:
         mass: m_b of beam, axles and wheels together [kg].
-        pitch_inertia: J_b [kg m²]; m_b s²/4 if all of it sits in the axles.
-        spread: s, between the two axles [m].
-        spring_rate: of the leaf spring, both sides together [N/m].
+        pitch_inertia: J_b [kg m²]; m_b s²/4 if the whole mass is in the axles.
+        spread: s, distance between the two axles [m].
+        spring_rate: rate of the leaf spring, both sides together [N/m].
         tyre_stiffness: k_t of each axle [N/m].
-        damper: law over the middle, both sides together.
-        tyre_damping: of each axle [N s/m].
-        tyre_lifts: whether the tyres can leave the road.
-        extra_spring: law beside the leaf spring, both sides together.
-        bump_stop: law over the middle, both sides together.
-        friction: law over the middle, such as that of the leaves, both sides together.
+        damper: law at the middle, both sides together.
+        tyre_damping: vertical damping of the tyres of each axle [N s/m].
+        tyre_lifts: whether the tyres can lift off.
+        extra_spring: law parallel to the leaf spring, both sides together.
+        bump_stop: law at the middle, both sides together.
+        friction: law at the middle, such as that of the leaves, both sides together.
     """
 
     mass: Number = parameter("kg", "mass of beam, axles and wheels", positive)
@@ -68,11 +68,11 @@ class WalkingBeam(AbstractPart):
 
 @final
 class IndependentTandem(AbstractPart):
-    """Two axles alike, each with a spring and a damper of its own.
+    """Two equal axles, each with its own spring and damper.
 
     Arguments:
-        axle: each of the two; masses and rates are those of the whole axle.
-        spread: between the two [m].
+        axle: each of the two axles; masses and rates are those of the whole axle.
+        spread: distance between the two axles [m].
     """
 
     axle: Corner

@@ -21,17 +21,17 @@ class TandemTruck(AbstractVehicle):
 
         m z̈ = −F_f − P,   J θ̈ = −l_f F_f + l_t P,
 
-    l_f ahead of and l_t behind the centre of gravity, P the force of the tandem. Masses and rates are those of both
-    sides together, and so are the laws; with `Corner.damper_count` the law is that of one damper of an axle, and so are
-    its channels. `vehicle.descriptions` says it of each. The wheels are front, first and second axle of the tandem.
+    l_f ahead of and l_t behind the centre of gravity, P the force of the tandem. Masses, rates and laws are those of
+    both sides together; with `Corner.damper_count` the law and its channels are those of one damper of an axle (see
+    `vehicle.descriptions`). The wheels are front, first and second axle of the tandem.
 
     Arguments:
         front: the front axle.
         tandem: a `WalkingBeam` or an `IndependentTandem`.
-        cab: on mounts of its own, if it is wanted.
+        cab: a cab on its own mounts, or None.
         places: where on the body, or on the cab (`body="cab"`), accelerations are of interest.
         seats: on the sprung mass.
-        tyre_lifts: whether all tyres can leave the road; a single corner can say so itself.
+        tyre_lifts: whether all tyres can lift off; for a single corner, set `tyre_lifts` of the corner.
 
     >>> from jaxdamp.vehicles.presets import truck_001
     >>> truck_001().coordinates

@@ -27,32 +27,32 @@ class PitchDecay(NamedTuple):
 
 @final
 class TrackedHull(AbstractVehicle):
-    """Hull with heave z and pitch θ (nose up) on road wheels that follow the ground, shock absorbers on some of them.
+    """Hull with heave z and pitch θ (nose up) on road wheels that follow the ground; some have shock absorbers.
 
         m z̈ = −2 Σ F_i,   J θ̈ = −2 Σ l_i F_i,   F_i = C e_i + damper(e_i, ė_i),  e_i = z + l_i θ − z_ri,
 
     for wheels i on each side, l_i ahead of the centre of gravity; both sides together. The channels
-    `wheel_i_damper_force` and the powers are of one shock absorber, the wheel loads of both sides. The mass of the road
-    wheels is left out, as in paper 003. Each wheel of the list stands for both sides, and meets the road in its turn.
+    `wheel_i_damper_force` and the powers are those of one shock absorber, the wheel loads those of both sides. The mass
+    of the road wheels is neglected, as in paper 003. Each wheel of the list stands for both sides.
 
-    For free pitch without heave, J θ̈ + 2 μ Σ_d l² θ̇ + 2 C Σ l² θ = 0, with one sum over the damped wheels and one over
-    all: θ decays by exp(2πn/√(ω² − n²)) a cycle, n = μ Σ_d l²/J, ω² = 2 C Σ l²/J (paper 003, equations 8 to 13).
+    For free pitch without heave, J θ̈ + 2 μ Σ_d l² θ̇ + 2 C Σ l² θ = 0, with one sum over the damped wheels and one
+    over all: θ decays by exp(2πn/√(ω² − n²)) a cycle, n = μ Σ_d l²/J, ω² = 2 C Σ l²/J (paper 003, equations 8 to 13).
 
     Arguments:
-        wheel_positions: l_i, from the first wheel to the last [m], falling.
+        wheel_positions: l_i, from the first wheel to the last [m], decreasing.
         wheel_rate: C of one wheel [N/m].
         damper: law of one shock absorber, referred to the wheel.
-        damped: numbers of the wheels that have one, counted from 1 at the front.
+        damped: numbers of the wheels with a shock absorber, counted from 1 at the front.
         places: where on the hull accelerations are of interest.
         seats: on the hull.
-        tyre_lifts: whether the road wheels can leave the ground: spring and shock absorber of a wheel, which has no
-            mass, then never pull together (`LiftOff`).
-        extra_spring: law of one road wheel beside its linear spring, on every wheel.
+        tyre_lifts: whether the road wheels can lift off: spring and shock absorber of a wheel, which has no mass, then
+            never pull together (`LiftOff`).
+        extra_spring: law of one road wheel parallel to its linear spring, on every wheel.
         bump_stop: law of one road wheel, on every wheel.
         friction: law of one road wheel, on every wheel.
 
     Raises:
-        ValueError: positions that do not fall, a damped wheel that is not there.
+        ValueError: positions that do not decrease, a damped wheel that does not exist.
 
     >>> from jaxdamp.vehicles.presets import m113_003
     >>> hull = m113_003()
@@ -76,7 +76,7 @@ class TrackedHull(AbstractVehicle):
     def __check_init__(self) -> None:
         positions = _checks.concrete(self.wheel_positions)
         if positions is not None and (positions.ndim != 1 or positions.size < 2 or np.any(np.diff(positions) >= 0)):
-            must = "hold two or more positions from the first wheel to the last, falling [m]"
+            must = "hold two or more decreasing positions, from the first wheel to the last [m]"
             _checks.refuse("TrackedHull.wheel_positions", must, positions)
         count = self.wheel_positions.shape[0]
         if any(not 1 <= number <= count for number in self.damped) or len(set(self.damped)) < len(self.damped):
@@ -151,7 +151,7 @@ class TrackedHull(AbstractVehicle):
         A hull that is free to heave decays a little differently, as its dampers, on wheels 1, 2 and 5, also lift it.
         From 0.02 rad, `simulate(hull, flat_road, start={"pitch": 0.02})` gives for `m113_003` 14.05, 15.09 and 17.14
         a cycle with coefficients of 16:16, 12.5:20.5 and 11.5:23 kN s/m, where this formula has 14.18, 15.66 and
-        18.23: 0.9, 3.8 and 6.4 % more. Take the simulated value where that matters.
+        18.23: 0.9, 3.8 and 6.4 % more. Use the simulation if this difference matters.
 
         >>> from jaxdamp.vehicles.presets import m113_003
         >>> decay = m113_003().pitch_decay(11.5e3, 23e3)  # the paper wants 12 to 15

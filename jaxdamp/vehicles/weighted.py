@@ -1,4 +1,4 @@
-"""What people feel of a linearised vehicle: weightings of ISO 2631-1 joined to its state."""
+"""Frequency weightings of ISO 2631-1 added to the state of a linearised vehicle."""
 
 from collections.abc import Sequence
 
@@ -11,12 +11,12 @@ from jaxdamp.vehicles.linear import LinearVehicle
 
 
 def with_weightings(linear: LinearVehicle, weightings: Sequence[tuple[str, str]]) -> LinearVehicle:
-    """The linearised vehicle with channels `weighted_…` more, exactly: ẇ = A_w w + B_w y, C_w w for a channel y.
+    """The linearised vehicle with added channels `weighted_…`: ẇ = A_w w + B_w y, output C_w w, for a channel y.
 
     `stationary_rms` then gives the weighted RMS of a white road, `frequency_response` the weighted response.
 
     Arguments:
-        linear: what `linearise` made.
+        linear: result of `linearise`.
         weightings: pairs of a channel and a weighting, such as `[("sprung_acceleration", "Wk")]`.
 
     Raises:
@@ -24,8 +24,8 @@ def with_weightings(linear: LinearVehicle, weightings: Sequence[tuple[str, str]]
 
     >>> from jaxdamp.vehicles import linearise, stationary_rms
     >>> from jaxdamp.vehicles.presets import quarter_car_000
-    >>> felt = with_weightings(linearise(quarter_car_000()), [("sprung_acceleration", "Wk")])
-    >>> rms = stationary_rms(felt, 3e-3)
+    >>> weighted = with_weightings(linearise(quarter_car_000()), [("sprung_acceleration", "Wk")])
+    >>> rms = stationary_rms(weighted, 3e-3)
     >>> [round(float(rms[name]), 3) for name in ("sprung_acceleration", "weighted_sprung_acceleration")]
     [1.6, 1.026]
     """
@@ -39,15 +39,15 @@ def with_weightings(linear: LinearVehicle, weightings: Sequence[tuple[str, str]]
     own = jax.scipy.linalg.block_diag(*[f.state_matrix for f in filters])
     above = jnp.concatenate([linear.state_matrix, jnp.zeros((size, inner))], axis=1)
     below = jnp.concatenate([into @ linear.output[picked], own], axis=1)
-    known = jnp.concatenate([linear.output, jnp.zeros((len(linear.channels), inner))], axis=1)
-    felt = jnp.concatenate([jnp.zeros((len(filters), size)), out], axis=1)
+    unweighted = jnp.concatenate([linear.output, jnp.zeros((len(linear.channels), inner))], axis=1)
+    weighted = jnp.concatenate([jnp.zeros((len(filters), size)), out], axis=1)
     wheels = linear.road_input.shape[1]
     nothing = jnp.zeros((len(filters), wheels))
     return LinearVehicle(
         jnp.concatenate([above, below]),
         jnp.concatenate([linear.road_input, into @ linear.road_feed[picked]]),
         jnp.concatenate([linear.road_rate_input, into @ linear.feed_through[picked]]),
-        jnp.concatenate([known, felt]),
+        jnp.concatenate([unweighted, weighted]),
         jnp.concatenate([linear.road_feed, nothing]),
         jnp.concatenate([linear.feed_through, nothing]),
         linear.behind,

@@ -113,7 +113,7 @@ def test_no_equilibrium_is_said():
     falling = CubicSpring(-1e9, 0.0) + dampers.Spring(0.0, -2e5)
     car = full_quarter_car(extra_spring=falling, bump_stop=None, tyre_lifts=False)
     for call in (static_equilibrium, linearise, lambda car: simulate(car, JUMP, duration=0.2)):
-        with pytest.raises(ValueError, match=r"`vehicle` must have an equilibrium"):
+        with pytest.raises(ValueError, match=r"`vehicle` must have a static equilibrium"):
             call(car)
     with pytest.raises(ValueError, match=r"`road` must hold a height for each of 1 wheel"):
         static_equilibrium(full_quarter_car(), [0.0, 0.1])

@@ -1,5 +1,6 @@
 """What the linearised vehicle says: modes, frequency response, stationary response, equivalent elements."""
 
+import json
 from typing import Any
 
 import jax
@@ -40,7 +41,10 @@ def test_modes_of_the_golden_car():
     np.testing.assert_allclose(found.frequency, [1.2363, 10.755], rtol=5e-5)
     np.testing.assert_allclose(found.damping_ratio, [0.333, 0.302], atol=5e-4)
     np.testing.assert_allclose(found.damped_frequency, found.frequency * np.sqrt(1 - found.damping_ratio**2))
-    assert "z_unsprung 1.00" in str(found) and len(str(found).splitlines()) == 4
+    assert "z_unsprung 1.00" in str(found) and len(str(found).splitlines()) == 5
+    assert found.table().records()[0]["frequency"] == found.frequency[0]
+    plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert plain["frequency"] == {"value": list(found.frequency), "unit": "Hz"}
 
 
 def test_undamped_modes_solve_the_eigenproblem_and_overdamped_ones_do_not_oscillate():

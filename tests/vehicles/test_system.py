@@ -107,12 +107,22 @@ def test_a_suspension_of_a_vehicle_of_ones_own():
     np.testing.assert_array_equal(own.system().outputs.motion, ready.system().outputs.motion)
 
 
-def test_asking_for_the_layout_leaves_no_trace_in_a_program(monkeypatch):
-    """A program is the same whether the layout is known already or not."""
-    monkeypatch.setattr(base, "_LAYOUTS", {})
+def test_the_layout_adds_nothing_to_a_program():
+    """A program is the same with and without the layout in the cache."""
+    base._layout_of.cache_clear()
 
     def program() -> str:
         return str(jax.make_jaxpr(lambda mass: mass * len(replace(CAR, {"sprung_mass": mass}).coordinates))(500.0))
 
     assert program() == program()
-    assert base._LAYOUTS
+    layouts = base._layout_of.cache_info()
+    assert layouts.hits == layouts.misses == 1
+
+
+def test_the_cache_of_layouts_is_bounded_and_holds_no_numbers():
+    """Cars that differ in numbers only share one entry, and the cache cannot grow without bound."""
+    base._layout_of.cache_clear()
+    for mass in (300.0, 400.0, 500.0):
+        assert replace(CAR, {"sprung_mass": mass}).layout is CAR.layout
+    layouts = base._layout_of.cache_info()
+    assert layouts.currsize == 1 and layouts.maxsize == 256

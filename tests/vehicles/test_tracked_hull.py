@@ -87,7 +87,10 @@ def test_chrono_set():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"wheel_positions": [1.0, 1.2, -1.0]}, r"`TrackedHull.wheel_positions` must hold two or more .* falling"),
+        (
+            {"wheel_positions": [1.0, 1.2, -1.0]},
+            r"`TrackedHull.wheel_positions` must hold two or more decreasing positions",
+        ),
         ({"damped": (1, 4)}, r"`TrackedHull.damped` must hold numbers of wheels, 1 to 3"),
         ({"wheel_rate": 0.0}, r"`TrackedHull.wheel_rate` must be positive"),
     ],
