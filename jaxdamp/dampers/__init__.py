@@ -6,7 +6,7 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 
 from jaxdamp.dampers._commands import command_paths
 from jaxdamp.dampers._points import drives_motion
-from jaxdamp.dampers._starts import Reach
+from jaxdamp.dampers._starts import Reach, from_samples
 from jaxdamp.dampers.acceleration_surface import AccelerationSurface
 from jaxdamp.dampers.base import (
     AbstractDamper,
@@ -127,6 +127,7 @@ __all__ = [
     "coverage",
     "drives_motion",
     "extrapolated",
+    "from_samples",
     "has_fitted_range",
     "keeps_conditions",
     "laws_inside",

@@ -1,4 +1,4 @@
-"""Where the commands of a law stand."""
+"""The commands of a law and of the laws inside."""
 
 import dataclasses
 from typing import Any

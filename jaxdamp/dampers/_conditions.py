@@ -1,4 +1,4 @@
-"""A condition between several parameters of a law, and the refusal of laws that break one."""
+"""A condition between several parameters of a law, and the refusal of laws that violate one."""
 
 from typing import Any, NamedTuple
 
@@ -14,11 +14,11 @@ class Condition(NamedTuple):
     parameter: str
     least: Any  # in the unit of the parameter
     formula: str  # the limit in words
-    reason: str  # what goes wrong below it, a sentence
+    reason: str  # the consequence of a lower value, a sentence
 
 
 def check_conditions(law: Any) -> None:
-    """Refuse parameters that break a condition between them (traced values pass)."""
+    """Refuse parameters that violate a condition between them (traced values are not checked)."""
     if not law.has_conditions() or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(law)):
         return
     for condition in jax.tree.map(np.asarray, law).conditions():

@@ -1,4 +1,4 @@
-"""First-order lag: the step that laws with lags, filters and washouts share."""
+"""The exact step of a first-order lag."""
 
 import jax.numpy as jnp
 
@@ -6,7 +6,7 @@ from jaxdamp._types import Scalar, ScalarLike
 
 
 def follow(now: ScalarLike, before: ScalarLike, after: ScalarLike, dt: ScalarLike, time: ScalarLike) -> Scalar:
-    """State y of τ ẏ + y = u after a step over which u goes straight from `before` to `after`, exact for any τ > 0."""
+    """State y of τ ẏ + y = u after a step over which u is linear from `before` to `after`, exact for any τ > 0."""
     z = dt / time
     decay = jnp.exp(-z)
     mean = -jnp.expm1(-z) / z

@@ -4,7 +4,7 @@ import numpy as np
 
 
 def binned_curve(velocity: np.ndarray, force: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean velocity and mean force in each bin that holds data; hysteresis averages out over whole cycles."""
+    """Mean velocity and mean force in each bin with data; hysteresis averages out over whole cycles."""
     velocity, force = np.asarray(velocity), np.asarray(force)
     place = np.digitize(velocity, edges)
     filled = [k for k in range(1, len(edges)) if np.any(place == k)]
@@ -22,7 +22,7 @@ def velocity_grid(velocity: np.ndarray, points_a_side: int) -> np.ndarray:
 
 
 def secant_rate(velocity: np.ndarray, force: np.ndarray, side: int, low: float = 0.0, high: float = 1.0) -> float:
-    """Least-squares slope through the origin over |v| between two shares of the peak, on one side (+1 rebound)."""
+    """Least-squares slope through the origin, for |v| between two fractions of the peak, on one side (+1 rebound)."""
     velocity, force = np.asarray(velocity), np.asarray(force)
     v, f = side * velocity, side * force
     peak = max(float(v.max()), 1e-9)
@@ -34,11 +34,11 @@ def secant_rate(velocity: np.ndarray, force: np.ndarray, side: int, low: float =
     return max(float(np.vdot(v[use], f[use]) / np.vdot(v[use], v[use])), 1.0)
 
 
-TYPICAL_GIVE = 5e-4  # m, over which seals and guides give before they slide
+ELASTIC_TRAVEL = 5e-4  # m, elastic deflection of seals and guides before sliding
 
 
 def sliding_fit(velocity: np.ndarray, force: np.ndarray) -> tuple[float, float, float]:
-    """C [N s/m], F_c [N] and f₀ [N] of F ≈ c v + F_c sgn v + f₀ at the higher velocities, where friction slides."""
+    """C [N s/m], F_c [N] and f₀ [N] of F ≈ c v + F_c sgn v + f₀ at higher velocities, in sliding."""
     velocity, force = np.asarray(velocity), np.asarray(force)
     fast = np.abs(velocity) >= 0.5 * np.max(np.abs(velocity))
     velocity, force = velocity[fast], force[fast]

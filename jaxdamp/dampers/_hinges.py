@@ -1,4 +1,4 @@
-"""A continuous piecewise-linear curve as a sum of hinges: no search for the segment, so it is fast inside loops."""
+"""A continuous piecewise-linear curve as a sum of hinges; without a search for the segment, it is fast inside loops."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float

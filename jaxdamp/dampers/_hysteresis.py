@@ -1,4 +1,4 @@
-"""What the laws with hysteresis share: travel with reversals, and its direction."""
+"""Travel with reversals and its direction, for laws with hysteresis."""
 
 import jax.numpy as jnp
 
@@ -17,5 +17,5 @@ def travels(v0: ScalarLike, v1: ScalarLike, dt: ScalarLike) -> tuple[Scalar, Sca
 
 
 def direction(travel: ScalarLike) -> Scalar:
-    """+1 or −1; +1 at zero, where |travel| = direction · travel then has the slope of one side, not none."""
+    """+1 or −1; +1 at zero, so that |travel| = direction · travel has a one-sided slope there."""
     return jnp.where(travel >= 0, 1.0, -1.0)

@@ -1,4 +1,4 @@
-"""Start values for laws that are linear in all but one number on each side: that number is tried out on a grid."""
+"""Start values for laws that are linear in all parameters but one on each side, which is varied on a grid."""
 
 from collections.abc import Callable
 
@@ -19,11 +19,11 @@ def knee_scan(
     Arguments:
         velocity: measured velocity [m/s].
         force: measured force [N].
-        side: +1 rebound, −1 compression; a side without data takes the other's.
-        columns: for |v| and a knee, what each coefficient multiplies in |F|.
-        shares: knees to try, as shares of the peak velocity.
+        side: +1 rebound, −1 compression; a side without data uses that of the other.
+        columns: the factors of the coefficients in |F|, for |v| and a knee.
+        shares: knees to try, as fractions of the peak velocity.
     """
-    from scipy.optimize import nnls  # heavy, and only a start needs it
+    from scipy.optimize import nnls  # a slow import, needed only here
 
     v, f = side * np.asarray(velocity, dtype=float), side * np.asarray(force, dtype=float)
     if not np.any(v > 0):
@@ -31,7 +31,7 @@ def knee_scan(
     if not np.any(v > 0):
         v, f = np.ones(1), np.ones(1)
     peak = float(v.max())
-    # bins of equal width in √v: knees lie at low velocities, where a sine has few samples
+    # bins of equal width in √v, since knees are at low velocities, where a sine has few samples
     edges = peak * np.linspace(0.0, 1.0, 41) ** 2
     edges[-1] *= 1.0 + 1e-9
     v, f = binned_curve(v, f, edges)

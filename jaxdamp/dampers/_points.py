@@ -1,4 +1,4 @@
-"""Force-velocity points: their number, and whether they are those of a damper."""
+"""Force-velocity points: checks of their number and of passivity."""
 
 import numpy as np
 from jaxtyping import Array
@@ -10,22 +10,22 @@ TOLERANCE = 0.05  # of the largest force; measured points near zero velocity sca
 
 
 def check_points(velocity: Array, force: Array) -> None:
-    """Refuse fewer than two points, or another number of forces than of velocities."""
+    """Refuse fewer than two points, or different numbers of forces and velocities."""
     if velocity.ndim != 1 or velocity.size < 2 or force.shape != velocity.shape:
         must = "hold two or more points, one force for each velocity"
-        _checks.refuse("force", must, f"of shape {force.shape} beside {velocity.shape} velocities")
+        _checks.refuse("force", must, f"of shape {force.shape} for velocities of shape {velocity.shape}")
 
 
 def drives_motion(velocity: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """At which points of a curve F(v) the force drives the motion instead of damping it, shape (points,).
+    """Whether the force adds energy to the motion, for each point of a curve F(v), shape (points,).
 
-    A law F(v) takes in energy over every closed cycle if and only if (F(v) − F(0)) v ≥ 0 for all v, where F(0) is a
-    constant force such as that of the gas. Violations below 5 % of the largest force do not count, and velocities that
-    do not hold zero cannot be judged.
+    A law F(v) dissipates energy over every cycle if and only if (F(v) − F(0)) v ≥ 0 for all v, where F(0) is a constant
+    force such as that of the gas. Violations below 5 % of the largest force are ignored, and so are curves that do not
+    include zero velocity.
 
     Arguments:
-        velocity: increasing [m/s], shape (points,).
-        force: [N], shape (points,).
+        velocity: increasing velocities [m/s], shape (points,).
+        force: forces [N], shape (points,).
     """
     if not (np.all(np.isfinite(force)) and velocity[0] <= 0.0 <= velocity[-1]):
         return np.zeros(velocity.shape, dtype=bool)
@@ -34,10 +34,10 @@ def drives_motion(velocity: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 
 def refuse_active(velocity: Array, force: Array) -> None:
-    """Refuse points that drive the motion instead of damping it (`drives_motion`); traced values pass.
+    """Refuse points whose force adds energy to the motion (`drives_motion`); traced values are not checked.
 
     Raises:
-        ValueError: names the points.
+        ValueError: the first of these points.
     """
     v, f = _checks.concrete(velocity), _checks.concrete(force)
     if v is None or f is None:
@@ -49,6 +49,6 @@ def refuse_active(velocity: Array, force: Array) -> None:
         must = "resist the motion, so that it is larger than at zero velocity in rebound and smaller in compression"
         remedy = (
             "Force is positive when it resists extension: in compression a damper's force is negative. "
-            "If an active element is meant, pass `allow_active=True`."
+            "For an active element, pass `allow_active=True`."
         )
         _checks.refuse("force", must, value, remedy)

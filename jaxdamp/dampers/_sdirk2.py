@@ -5,19 +5,18 @@ from collections.abc import Callable
 from typing import TypeVar
 
 
-GAMMA = 1.0 - 1.0 / math.sqrt(2.0)  # share of the step over which each stage is implicit
+GAMMA = 1.0 - 1.0 / math.sqrt(2.0)  # fraction of the step over which each stage is implicit
 
 Y = TypeVar("Y")
 Rate = TypeVar("Rate")
 
 
 def sdirk2(stage: Callable[[float, Y], Rate], moved: Callable[[Rate, Y, float], Y], start: Y) -> Y:
-    """States after a step dt of Y' = f(t, Y), of which each stage solves one implicit equation.
+    """States after a step dt of Y' = f(t, Y); each stage solves one implicit equation.
 
     Arguments:
-        stage: (share, Y) to the rate k that, held over γ dt from Y, ends where it is the rate at that share of the
-            step: k = f(t₀ + share · dt, Y + γ dt k).
-        moved: (k, Y, part) to the states after moving at a rate for that part of the step.
+        stage: (share, Y) to the rate k with k = f(t₀ + share · dt, Y + γ dt k).
+        moved: (k, Y, part) to the states Y + part · dt k.
         start: states at the beginning of the step.
     """
     halfway = moved(stage(GAMMA, start), start, 1.0 - GAMMA)

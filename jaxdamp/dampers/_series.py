@@ -1,4 +1,4 @@
-"""A law in series with massless springs: all carry one force, the spring deflections are states."""
+"""A law in series with massless springs: all have the same force, the spring deflections are states."""
 
 from abc import abstractmethod
 from typing import NamedTuple
@@ -21,8 +21,8 @@ FASTEST = 1e3  # m/s, far above any damper
 Deflections = tuple[Scalar, ...]
 
 
-class _Now(NamedTuple):
-    """Where the parts in series are within a step."""
+class _StageState(NamedTuple):
+    """The state of the parts in series within a step."""
 
     deflections: Deflections  # of the springs [m]
     stroke: ScalarLike  # of the law [m]
@@ -30,15 +30,15 @@ class _Now(NamedTuple):
     guess: Scalar  # velocity of the law expected in the next stage [m/s]
 
 
-class _Rate(NamedTuple):
-    """What a stage finds."""
+class _StageResult(NamedTuple):
+    """The result of a stage."""
 
     velocity: Scalar  # of the law [m/s]
     change: Deflections  # of the springs over the stage [m]
 
 
 class AbstractSeries(AbstractWrapper):
-    """A law in series with springs, whose deflections are the own states; all carry the same force.
+    """A law in series with springs, whose deflections are additional states; all have the same force.
 
     The step is the two-stage SDIRK method: each stage finds the law's velocity w with F_law(w) = F_springs(free −
     duration w), where `free` is the springs' total deflection for a locked law.
@@ -46,19 +46,19 @@ class AbstractSeries(AbstractWrapper):
 
     @abstractmethod
     def spring_force(self, deflections: Deflections) -> Scalar:
-        """Force [N] carried at these deflections [m]; it does not fall when their total grows."""
+        """Force [N] at these deflections [m]; it does not decrease with their total."""
 
     @abstractmethod
     def largest_deflection(self, force: Scalar, begun: Deflections) -> Scalar:
-        """A total deflection [m] at which the springs carry at least this force [N] at the end of any stage."""
+        """A total deflection [m] at which the springs have at least this force [N] at the end of any stage."""
 
     def shared(self, total: Scalar, begun: Deflections, duration: ScalarLike) -> Deflections:
-        """The deflections of a total [m] at the end of an implicit stage that began at others; one spring has it all.
+        """The deflection of each spring at the end of an implicit stage, from their total; by default one spring.
 
         Arguments:
-            total: sum of the deflections [m].
+            total: sum of the deflections at the end [m].
             begun: deflections at the beginning of the stage [m].
-            duration: of the stage [s].
+            duration: duration of the stage [s].
         """
         del begun, duration
         return (total,)
@@ -78,11 +78,11 @@ class AbstractSeries(AbstractWrapper):
 
     @property
     def stroke_limits(self) -> tuple[ScalarLike, ScalarLike]:
-        """None: the springs take a part of the stroke."""
+        """No limits: the springs have a part of the stroke."""
         return -jnp.inf, jnp.inf
 
     def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
-        """The same force; stroke and velocity of the whole, of which the springs take a part, so mostly a bound."""
+        """The same force; stroke and velocity of the assembly, which are usually larger than those of the law."""
         return [(law, motion) for law in self.inner_laws()]
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
@@ -109,23 +109,25 @@ class AbstractSeries(AbstractWrapper):
         total = _total(deflections)
         v0, gained = jnp.asarray(v0, total.dtype), jnp.asarray(v1 - v0, total.dtype)
 
-        def stage(share: float, now: _Now) -> _Rate:
+        def stage(share: float, now: _StageState) -> _StageResult:
             free = _total(now.deflections) + GAMMA * dt * (v0 + share * gained)
             return self._stage(law, free, now, GAMMA * dt, likely=3 if share < 1.0 else 2)
 
-        def moved(rate: _Rate, now: _Now, part: float) -> _Now:
+        def moved(rate: _StageResult, now: _StageState, part: float) -> _StageState:
             w, duration = rate.velocity, part * dt
             pairs = zip(now.deflections, rate.change, strict=True)
             stroke = now.stroke + duration * w
             inner = law.advance(now.stroke, w, stroke, w, now.inner, duration)
             after = tuple(old + (part / GAMMA) * change for old, change in pairs)
-            return _Now(after, stroke, inner, w + (1.0 - GAMMA) * gained)
+            return _StageState(after, stroke, inner, w + (1.0 - GAMMA) * gained)
 
-        after = sdirk2(stage, moved, _Now(deflections, x0 - total, inner, v0))
+        after = sdirk2(stage, moved, _StageState(deflections, x0 - total, inner, v0))
         return jnp.concatenate([jnp.stack(after.deflections), after.inner])
 
-    def _stage(self, law: AbstractDamper, free: Scalar, now: _Now, duration: ScalarLike, likely: int) -> _Rate:
-        """The velocity of the law that, held for the duration, ends where law and springs carry the same force."""
+    def _stage(
+        self, law: AbstractDamper, free: Scalar, now: _StageState, duration: ScalarLike, likely: int
+    ) -> _StageResult:
+        """The constant velocity of the law for which law and springs have the same force at the end of the stage."""
 
         def law_force(w: Scalar) -> Scalar:
             stroke = now.stroke + duration * w
@@ -146,13 +148,13 @@ class AbstractSeries(AbstractWrapper):
             close=1e-4,
         )
         pairs = zip(now.deflections, deflections(velocity), strict=True)
-        return _Rate(velocity, tuple(new - old for old, new in pairs))
+        return _StageResult(velocity, tuple(new - old for old, new in pairs))
 
 
 def require_feed_through(argument: str, law: AbstractDamper, name: str) -> None:
-    """Refuse a law whose force does not answer the velocity at once: no velocity of it matches that of the springs."""
+    """Refuse a law whose force does not depend directly on the velocity: no velocity could balance the springs."""
     if not law.traits().has_feed_through:
-        must = "be a law whose force answers the velocity at once"
+        must = "be a law whose force depends directly on the velocity"
         remedy = f"Put the lag outside, `Lag({name}(law))`, or combine two springs into one."
         _checks.refuse(argument, must, f"a {type(law).__name__}", remedy)
 

@@ -1,23 +1,37 @@
-"""Start values from which a fit may end in another minimum."""
+"""Starting values of fits: from the samples of records, and further ones that may lead to another minimum."""
 
 import dataclasses
+import inspect
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 
 class Reach(NamedTuple):
-    """How far records go."""
+    """The extent of records."""
 
     stroke: float  # half the range [m]
     velocity: float  # largest magnitude [m/s]
 
 
-def starts_of_bends(law: Any, reach: Reach) -> list[dict[str, float]]:
-    """A quarter and four times each positive number of a law at which its force may bend, within the records.
+def from_samples(make: Callable[..., Any], runs: Sequence[Any]) -> Any:
+    """The law that a function makes from the samples of all records one after the other.
 
-    Such are the numbers in m/s, m or s in which the force is not linear; they are kept between a hundredth of the reach
-    of the records and all of it.
+    The function gets velocity and force as its first two arguments, and `stroke` and `time` if it has arguments of
+    these names.
+    """
+    names = inspect.signature(make).parameters
+    channels = ["velocity", "force", *(name for name in ("stroke", "time") if name in names)]
+    velocity, force, *others = (np.concatenate([getattr(run, name) for run in runs]) for name in channels)
+    return make(velocity, force, **dict(zip(channels[2:], others, strict=True)))
+
+
+def starts_of_bends(law: Any, reach: Reach) -> list[dict[str, float]]:
+    """A quarter and four times each positive parameter that may determine where the force curve bends.
+
+    These are the parameters in m/s, m or s in which the force is not linear; the values are limited to between 1 % and
+    100 % of the extent of the records.
     """
     spans = {"m/s": reach.velocity, "m": reach.stroke}
     starts = []

@@ -1,4 +1,4 @@
-"""Surfaces over two axes made of Chebyshev polynomials: their value, where they hold, their least squares."""
+"""Surfaces of Chebyshev polynomials over two axes: value, valid range, least squares."""
 
 import warnings
 from typing import NamedTuple
@@ -12,14 +12,14 @@ from jaxdamp._limits import within
 from jaxdamp._types import Scalar, ScalarLike, Vector
 
 
-CONSENT = 'Fit it to records that reach farther, or accept the values of the nearest edge beyond, `outside="hold"`.'
-MARGIN = 0.01  # of the width of the data, by which a range reaches beyond them: averaging and rounding shift samples
-THIN = 1e-3  # singular value, relative to the largest, below which errors of the data are magnified a thousand times
-RIDGES = np.logspace(-16, 0, 65)  # of the largest singular value squared, among which cross-validation chooses
+CONSENT = 'Fit it to records with a larger range, or accept the values of the nearest edge outside, `outside="hold"`.'
+MARGIN = 0.01  # of the width of the data, added to the range: averaging and rounding shift samples
+THIN = 1e-3  # singular value, relative to the largest, below which errors of the data are amplified a thousand times
+RIDGES = np.logspace(-16, 0, 65)  # relative to the largest singular value squared; cross-validation selects one
 
 
 class Axis(NamedTuple):
-    """A coordinate of a surface: its name and unit for messages, its value and the range that the data covered."""
+    """A coordinate of a surface: its name and unit for messages, its value and the range of the data."""
 
     name: str
     unit: str
@@ -31,7 +31,7 @@ class Axis(NamedTuple):
         return within(self.value, self.reach[0], self.reach[1])
 
     def beyond(self) -> Scalar:
-        """How far the value is beyond the nearest edge; zero inside."""
+        """Distance of the value from the nearest edge; zero inside."""
         return self.value - self.held()
 
     def covers(self) -> Bool[Array, ""]:
@@ -53,7 +53,7 @@ class Axis(NamedTuple):
 
 
 def surface_force(coefficients: Float[Array, "_ _"], first: Axis, second: Axis, outside: str) -> Scalar:
-    """Σ Cᵢⱼ Tᵢ Tⱼ; outside the ranges NaN, or an error where the values are known, unless `outside` is "hold"."""
+    """Σ Cᵢⱼ Tᵢ Tⱼ; outside the ranges NaN, or an error for known values, unless `outside` is "hold"."""
     rows, columns = coefficients.shape
     weights = first.polynomials(rows)[:, None] * second.polynomials(columns)[None, :]
     force = jnp.sum(coefficients * weights)
@@ -66,14 +66,14 @@ def surface_force(coefficients: Float[Array, "_ _"], first: Axis, second: Axis, 
 
 
 def check_surface(coefficients: Array, outside: str) -> None:
-    """Refuse coefficients that are no grid, and unknown words."""
+    """Refuse coefficients that are not a matrix, and unknown values of `outside`."""
     if coefficients.ndim != 2 or coefficients.size == 0:
         _checks.refuse("coefficients", "have a row and a column for each degree", f"of shape {coefficients.shape}")
     _checks.one_of("outside", outside, ["nan", "hold"])
 
 
 def data_range(name: str, values: np.ndarray) -> np.ndarray:
-    """Lowest and highest value, a hundredth of the width farther out."""
+    """Lowest and highest value, extended by 1 % of the width."""
     low, high = float(np.min(values)), float(np.max(values))
     if not low < high:
         _checks.refuse(name, "vary", f"{low:g} throughout")
@@ -81,7 +81,7 @@ def data_range(name: str, values: np.ndarray) -> np.ndarray:
 
 
 def around_zero_range(name: str, values: np.ndarray) -> np.ndarray:
-    """The same, with zero inside."""
+    """The same, including zero."""
     low, high = data_range(name, values)
     return np.array([min(low, 0.0), max(high, 0.0)])
 
@@ -96,8 +96,8 @@ def surface_least_squares(
 ) -> Float[np.ndarray, "rows columns"]:
     """Coefficients of min ‖A c − F‖² + λ ‖c‖², λ = ridge · (largest singular value of A)².
 
-    Without a ridge given, it is the one of smallest generalised cross-validation ‖F − A c‖²/(N − tr H)², H = A (AᵀA +
-    λ)⁻¹ Aᵀ (Golub, Heath and Wahba 1979). A warning says where the data leave combinations of coefficients open.
+    By default the ridge is that of smallest generalised cross-validation ‖F − A c‖²/(N − tr H)², H = A (AᵀA + λ)⁻¹ Aᵀ
+    (Golub, Heath and Wahba 1979). A warning states how many combinations of coefficients the data do not determine.
     """
     if len(degrees) != 2 or min(degrees) < 0:
         _checks.refuse("degrees", "be two whole numbers, 0 or more", degrees)
@@ -114,9 +114,9 @@ def surface_least_squares(
     thin = int(np.count_nonzero(shares < THIN))
     if thin:
         warnings.warn(
-            f"The records leave {thin} of {len(shares)} combinations of the surface's coefficients open (singular"
-            f" values below {THIN:g} of the largest), as the samples of a single sine do, which lie on one ellipse. Add"
-            " records of other amplitudes and frequencies, or lower the degrees.",
+            f"The records do not determine {thin} of {len(shares)} combinations of the coefficients of the surface"
+            f" (singular values below {THIN:g} of the largest). The samples of a single sine, for example, are on one"
+            " ellipse. Add records of other amplitudes and frequencies, or use lower degrees.",
             np.exceptions.RankWarning,
             stacklevel=3,
         )

@@ -1,4 +1,4 @@
-"""The force as a smooth surface over velocity and acceleration, taken from data."""
+"""The force as a smooth surface over velocity and acceleration, fitted to data."""
 
 from typing import final
 
@@ -43,27 +43,28 @@ def washed_acceleration(time: np.ndarray, velocity: np.ndarray, washout_time: fl
 class AccelerationSurface(AbstractDamper):
     """F(v, a) = Σ Cᵢⱼ Tᵢ(v̄) Tⱼ(ā), a = (v − s)/τ, τ ṡ + s = v, v̄ and ā scaled to −1 … 1, Tₖ Chebyshev polynomials.
 
-    The loops of shock absorbers open with frequency, because oil and hoses give way: at one velocity the force
-    differs between speeding up and slowing down. So Duym and Schoukens (1996) lay the surface over velocity and
-    acceleration. A law receives the velocity only; a washout makes the acceleration from it, late by τ. One state, the
-    washed-out velocity s [m/s]; its step is exact for a velocity linear over the step.
+    The loops of shock absorbers widen with frequency, because oil and hoses are compressible: at the same velocity the
+    force differs between acceleration and deceleration. Duym and Schoukens (1996) therefore use a surface over velocity
+    and acceleration. A law gets the velocity only; a washout filter computes the acceleration from it, delayed by τ.
+    One state, the filtered velocity s [m/s]; its step is exact for a velocity linear over the step.
 
-    A force that lags by τ_F has a slope ∂F/∂a ≈ −τ_F ∂F/∂v. Unless τ ≥ τ_F, such a surface drives the motion above
-    1/(2π √(τ (τ_F − τ))), 82 Hz for 4 ms and 1.5 ms, and the mass it is connected to must exceed −∂F/∂a. Nothing makes
-    a surface passive: look at its work before it goes into a vehicle. Outside its data it refuses or holds as
-    `ForceSurface` does. The law starts at rest: a motion that does not begins with an acceleration outside any data.
+    A force with a lag τ_F has a slope ∂F/∂a ≈ −τ_F ∂F/∂v. Unless τ ≥ τ_F, such a surface adds energy to the motion
+    above 1/(2π √(τ (τ_F − τ))), 82 Hz for 4 ms and 1.5 ms, and the mass it is connected to must exceed −∂F/∂a. A
+    surface is not necessarily passive: check the dissipated energy before you use it in a vehicle. Outside its data it
+    behaves as `ForceSurface`. The law starts at rest: a motion that does not start at rest begins with a very large
+    acceleration.
 
     Arguments:
         coefficients: Cᵢⱼ [N], shape (velocity degree + 1, acceleration degree + 1).
         velocity_range: lowest and highest velocity [m/s] covered, around zero.
         acceleration_range: lowest and highest washed-out acceleration [m/s²] covered, around zero.
         outside_rate: slope over the velocity [N s/m] outside its range, for `outside="hold"`.
-        washout_time: τ [s], a millisecond or two: longer makes the acceleration late, shorter lets noise through.
+        washout_time: τ [s], one or two milliseconds: longer delays the acceleration, shorter passes noise.
         outside: `"nan"` or `"hold"`.
 
     Raises:
-        ValueError: coefficients that are no grid, ranges without a width, an unknown word; a known velocity or
-            acceleration outside the ranges.
+        ValueError: coefficients that are not a matrix, ranges without a width, an unknown `outside`; a known velocity
+            or acceleration outside the ranges.
 
     >>> law = AccelerationSurface([[0.0, -10.0], [1000.0, 0.0]], (-0.5, 0.5), (-40.0, 40.0), washout_time=0.002)
     >>> round(float(law.force(0.0, 0.25, jnp.array([0.21]))), 6)  # 1000 · 0.5 − 10 · 20/40
@@ -113,7 +114,7 @@ class AccelerationSurface(AbstractDamper):
     def validity(self) -> str:
         """The ranges in words."""
         velocity, acceleration = self._axes(0.0, 0.0)
-        return f"AccelerationSurface holds for {velocity.words()}, {acceleration.words()}. {CONSENT}"
+        return f"AccelerationSurface is valid for {velocity.words()}, {acceleration.words()}. {CONSENT}"
 
     def _axes(self, v: ScalarLike, a: ScalarLike) -> tuple[Axis, Axis]:
         return Axis("v", "m/s", v, self.velocity_range), Axis("acceleration", "m/s²", a, self.acceleration_range)
@@ -129,12 +130,12 @@ class AccelerationSurface(AbstractDamper):
         washout_time: float | int = WASHOUT_TIME,
         outside: str = "nan",
     ) -> "AccelerationSurface":
-        """The least squares through samples in the order of time, as `ForceSurface.guess` does it.
+        """Least squares fit to samples in the order of time, as `ForceSurface.guess`.
 
         Arguments:
-            velocity: [m/s], shape (samples,).
-            force: [N], shape (samples,).
-            time: [s], shape (samples,); one record after the other, the time of each beginning anew.
+            velocity: velocities [m/s], shape (samples,).
+            force: forces [N], shape (samples,).
+            time: times [s], shape (samples,); one record after the other, each with its own start time.
             degrees: highest degree over velocity and over acceleration.
             ridge: as in `ForceSurface.guess`.
             washout_time: τ [s].

@@ -1,11 +1,12 @@
-"""The damper contract: what every law offers.
+"""The damper contract: the interface of every law.
 
 Stroke x [m] and velocity v [m/s] are positive in extension (rebound), the force [N] is positive when it resists
-extension: a passive law takes in energy, ∮ F v dt ≥ 0. One instance is one damper; batches are made with `jax.vmap`.
+extension: a passive law dissipates energy, ∮ F v dt ≥ 0. One instance is one damper; use `jax.vmap` for batches.
 """
 
 import dataclasses
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
@@ -14,7 +15,7 @@ import jax.numpy as jnp
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, State
 from jaxdamp.dampers._conditions import Condition, check_conditions
-from jaxdamp.dampers._starts import Reach, starts_of_bends
+from jaxdamp.dampers._starts import Reach, from_samples, starts_of_bends
 from jaxdamp.dampers.fitted_range import FittedRange
 from jaxdamp.dampers.motion import Motion
 from jaxdamp.dampers.traits import Traits, combined_traits
@@ -27,18 +28,18 @@ START = "Start from `law.initial_state()`."
 class AbstractDamper(Module):
     """A force law between two points, with a flat array of states (empty for memoryless laws).
 
-    A law whose states are fast compared with a step of about a millisecond derives from this class and brings its own
+    A law whose states are fast compared with a step of about a millisecond derives from this class and defines its own
     `advance`, exact or implicit. Other laws derive from `AbstractStateful`, `AbstractStateless` or
-    `AbstractMemoryless`, which bring it.
+    `AbstractMemoryless`, which define it.
 
-    What engines, fits and other laws must know of a law beside its forces are its `traits()`. Every law can say in
-    `fitted_to` which range its records covered (`with_fitted_range`).
+    `traits()` are the properties of a law that solvers, fits and other laws need to know besides its forces.
+    `fitted_to` is the range of the records that the law was fitted to (`with_fitted_range`).
     """
 
     fitted_to: FittedRange | None = eqx.field(kw_only=True, default=None, repr=False)
 
     def __check_init__(self) -> None:
-        if "fitted_to" not in vars(self):  # as after an `__init__` written by hand; trees need the field to be there
+        if "fitted_to" not in vars(self):  # after a hand-written `__init__`; JAX needs the field
             object.__setattr__(self, "fitted_to", None)
         check_parameters(self)
         check_conditions(self)
@@ -48,7 +49,7 @@ class AbstractDamper(Module):
 
     @abstractmethod
     def initial_state(self) -> State:
-        """The states of a damper at rest that carries no dynamic force."""
+        """The states of a damper at rest without dynamic force."""
 
     @abstractmethod
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
@@ -67,7 +68,7 @@ class AbstractDamper(Module):
     def predict(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
     ) -> State:
-        """What `advance` will give, or something near it that costs less, from which an engine predicts the force."""
+        """An approximation of `advance` that may cost less, with which a solver predicts the force."""
         return self.advance(x0, v0, x1, v1, state, dt)
 
     def inner_laws(self) -> list["AbstractDamper"]:
@@ -77,10 +78,10 @@ class AbstractDamper(Module):
         return [item for item in inside if isinstance(item, AbstractDamper)]
 
     def traits(self) -> Traits:
-        """What engines, fits and other laws must know beside the forces; to be asked of one law, never a stacked one.
+        """Properties that solvers, fits and other laws need to know; not defined for stacked laws.
 
-        By default those of the laws inside together, but for what the law around them decides: neither linearity in the
-        parameters nor states that may be extrapolated.
+        By default the combined traits of the laws inside, but without linearity in the parameters and without states
+        that may be extrapolated, since these depend on the outer law.
         """
         inside = [law.traits() for law in self.inner_laws()]
         if not inside:
@@ -88,58 +89,76 @@ class AbstractDamper(Module):
         return combined_traits(inside)._replace(extrapolable_states=False, linear_in_parameters=False)
 
     def side_by_side(self) -> tuple["AbstractDamper", ...]:
-        """Laws whose forces add to that of this law, as fine as they can be told apart; the law itself if it is one."""
+        """Laws whose forces add up to the force of this law; the law itself if it is no sum."""
         return (self,)
 
     @property
     def stroke_limits(self) -> tuple[ScalarLike, ScalarLike]:
-        """Lowest and highest stroke [m] at which the law holds; infinite without limits."""
+        """Lowest and highest stroke [m] at which the law is valid; infinite without limits."""
         return -jnp.inf, jnp.inf
 
     def validity(self) -> str:
-        """Where the law itself has a force, in words, if it is made from data and has none elsewhere; or empty."""
+        """The valid range in words, for a law from data that has no force outside this range; empty for others."""
         return ""
 
     def motion_inside(self, motion: Motion) -> list[tuple["AbstractDamper", Motion]]:
-        """What each law directly inside goes through while this law goes through a motion, as far as it is known.
+        """The motion of each law directly inside for a motion of this law, as far as it is known.
 
-        By default stroke and velocity are those of the whole, and the force is not known. A wrapper whose inner law
-        moves otherwise says how.
+        By default with the same stroke and velocity and an unknown force. A wrapper whose inner law has another motion
+        overrides this.
         """
         return [(law, motion.with_force(None)) for law in self.inner_laws()]
 
     def conditions(self) -> tuple[Condition, ...]:
-        """What must hold between several parameters of this law, beside the domain of each; of laws inside not.
+        """Conditions between several parameters of this law, without those of laws inside.
 
-        The constructor refuses a law that breaks one, and a fit keeps inside. Written with operators only, so that
-        NumPy's numbers stay NumPy's.
+        The constructor refuses a law that violates one, and fits satisfy them. Write them with operators only, so that
+        they also work on NumPy arrays without JAX.
         """
         return ()
 
     @classmethod
     def has_conditions(cls) -> bool:
-        """Whether there are any, known without computing them."""
+        """Whether the class has any conditions."""
         return cls.conditions is not AbstractDamper.conditions
 
-    def other_starts(self, reach: Reach) -> list[dict[str, float]]:
-        """Values of own parameters from which a fit may end in another minimum than from this law's own values.
+    @classmethod
+    def guess(cls, *samples: Any, **options: Any) -> "AbstractDamper":
+        """A law of this class with starting values for a fit: `guess(velocity, force)`, arrays of all samples.
 
-        A sum of squares has several minima where a parameter says at which velocity, stroke or time the force curve
-        bends. So each positive number in m/s, m or s in which the force is not linear is tried at a quarter and at four
-        times its value, kept between a hundredth of the reach of the records and all of it. A law for which that is
-        not enough brings its own list; one whose sum of squares has one minimum gives an empty one.
+        A law that can estimate its parameters defines it with these two arguments, and `stroke` or `time` if it needs
+        them; further arguments need defaults.
+
+        Raises:
+            ValueError: a class of laws without an estimate.
+        """
+        remedy = f"Pass an instance, `{cls.__name__}(...)`, as the start."
+        _checks.refuse("law", "be a class that defines `guess`", f"the class {cls.__name__}", remedy)
+
+    @classmethod
+    def from_runs(cls, runs: Sequence[Any]) -> "AbstractDamper":
+        """A law of this class with starting values for a fit to bench records; by default `guess` of all samples."""
+        return from_samples(cls.guess, runs)
+
+    def other_starts(self, reach: Reach) -> list[dict[str, float]]:
+        """Further starting values, from which a fit may reach another minimum.
+
+        The sum of squares can have several minima if a parameter determines at which velocity, stroke or time the force
+        curve bends. By default, each positive parameter in m/s, m or s in which the force is not linear is therefore
+        tried at a quarter and at four times its value, limited to between 1 % and 100 % of the reach of the records. A
+        law that needs other starts overrides this; one whose sum of squares has a single minimum returns an empty list.
 
         Arguments:
-            reach: how far the records to be fitted go.
+            reach: largest stroke and velocity in the records to be fitted.
 
         Returns:
-            One mapping of names of fields to values for each start; fields left out keep their values. Laws inside
-            give their own, and the starts of a composition change one law at a time.
+            For each start, values by name of the field; other fields do not change. Laws inside define their own
+            starts, and the starts of a composition change one law at a time.
         """
         return starts_of_bends(self, reach)
 
     def __add__(self, other: "AbstractDamper") -> "AbstractDamper":
-        """Two laws side by side: forces add."""
+        """Two laws in parallel: the forces add."""
         if not isinstance(other, AbstractDamper):
             return NotImplemented
         from jaxdamp.dampers.sum import Sum, terms_of
@@ -158,10 +177,10 @@ class AbstractDamper(Module):
 
 
 class AbstractStateless(AbstractDamper):
-    """A law whose force depends on stroke and velocity at this instant: it has one method, `force_stroke_velocity`."""
+    """A law without states, whose force depends on stroke and velocity: it has one method, `force_stroke_velocity`."""
 
     def traits(self) -> Traits:
-        """No states; linear in the parameters declared so, unless there are laws inside."""
+        """No states; linear in the parameters declared as linear, unless there are laws inside."""
         inside = self.inner_laws()
         feed_through = not inside or any(law.traits().has_feed_through for law in inside)
         return Traits(feed_through, extrapolable_states=True, linear_in_parameters=not inside)
@@ -198,7 +217,7 @@ class AbstractMemoryless(AbstractStateless):
     """A law whose force depends on the velocity alone: it has one method, `force_velocity`."""
 
     def traits(self) -> Traits:
-        """Those of a law without states, and no stroke."""
+        """Those of a law without states, independent of the stroke."""
         return super().traits()._replace(stroke_dependent=False, stroke_dependent_at_rest=False)
 
     @abstractmethod
@@ -212,7 +231,7 @@ class AbstractMemoryless(AbstractStateless):
 
 
 class AbstractStateful(AbstractDamper):
-    """A law with states that change slowly over a step: the step is Heun's, second order and explicit."""
+    """A law with states that change slowly over a step; it uses Heun's method, second order and explicit."""
 
     def traits(self) -> Traits:
         """Those of any law with states, and an explicit step."""
@@ -227,7 +246,7 @@ class AbstractStateful(AbstractDamper):
 
 
 def own_states(law: AbstractDamper, state: State, count: int) -> list[Scalar]:
-    """The states as numbers; another count than that of the law is refused."""
+    """The states as a list of scalars, after a check of their number."""
     if state.size != count:
         must = f"hold {count} number{'s' * (count != 1)} for {type(law).__name__}"
         _checks.refuse("state", must, f"of shape {state.shape}", START)
@@ -246,6 +265,6 @@ def laws_inside(tree: Any, prefix: str = "") -> list[tuple[str, AbstractDamper]]
 
 
 def refuse_states(argument: str, law: AbstractDamper, remedy: str) -> None:
-    """Refuse a law with states where only the force of this instant has a meaning."""
+    """Refuse a law with states where only a law without states can be used."""
     if law.initial_state().size:
         _checks.refuse(argument, "be without states", f"a {type(law).__name__}", remedy)

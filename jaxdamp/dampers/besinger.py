@@ -20,18 +20,18 @@ def transition_rate(
 
     C goes from C_c far in compression to C_e far in rebound. Paper 001 prints c₁ twice; the second is c₂.
     """
-    u = v * (1.0 / transition_velocity) - 1.0  # no quotient of v here and below: they are slow, in tangents too
+    u = v * (1.0 / transition_velocity) - 1.0  # a product, since quotients are slow, also in derivatives
     c1 = 0.5 * (rebound_rate - compression_rate)
     c2 = 0.5 * (rebound_rate + compression_rate)
     return c1 * u * reciprocal_root(1.0 + u * u) + c2
 
 
-LEAST_COMPRESSION = 0.0067  # C_c/C_e below which the force falls with v in compression; exactly 0.00664
-_STEEPEST = 0.5 * (np.sqrt(17.0) - 3.0)  # u at which the slope of C(v) v is most unlike C(v)
+LEAST_COMPRESSION = 0.0067  # C_c/C_e below which the force decreases with v in compression; exactly 0.00664
+_STEEPEST = 0.5 * (np.sqrt(17.0) - 3.0)  # u at which the slope of C(v) v differs most from C(v)
 
 
 def least_rebound(limit_velocity: Any, transition_velocity: Any) -> Any:
-    """C_e/C_c below which the force falls with v between zero and v_lim; zero if α is too far above v_lim for that.
+    """C_e/C_c below which the force decreases with v between zero and v_lim; zero if α is far above v_lim.
 
     d(C v)/dv = c₂ + c₁ g(u), g = u/√(1+u²) + (1+u)/√(1+u²)³, which grows up to u = (√17 − 3)/2, where g = 1.525.
     """
@@ -45,14 +45,14 @@ def least_rebound(limit_velocity: Any, transition_velocity: Any) -> Any:
 class Besinger(AbstractMemoryless):
     """Paper 001: F = C(v) v below the limit velocity, F = C_e v_open + C_b (v − v_open) above, when the valve is open.
 
-    C(v) passes smoothly from C_c to C_e (`transition_rate`). The opening velocity is not a parameter of its own:
+    C(v) changes smoothly from C_c to C_e (`transition_rate`). The opening velocity is not an independent parameter:
     continuity at v_lim gives v_open = v_lim (C(v_lim) − C_b)/(C_e − C_b). With v_open = v_lim, as the paper's text
-    suggests, the force jumps. The slope changes at v_lim. F grows with v everywhere: sets for which it would not are
+    suggests, the force jumps. The slope changes at v_lim. F must increase with v everywhere; other parameter sets are
     refused. C_c must be above 0.0067 C_e and, where v_lim is above α, C_e above up to 0.208 C_c (`least_rebound`).
     C_e must differ from C_b only for `opening_velocity` to exist, not for the force.
 
-    Valid below 10 Hz and 1 m/s (paper 001); above 10 Hz put a `SeriesSpring` or a `Lag` around it. Needs data on both
-    sides of v_lim and of α: a test that stays below leaves C_b, C_e and α undetermined.
+    Valid below 10 Hz and 1 m/s (paper 001); above 10 Hz, use it inside a `SeriesSpring` or a `Lag`. A fit needs data on
+    both sides of v_lim and of α: a test at lower velocities does not determine C_b, C_e and α.
 
     >>> law = Besinger(14_400.0, 15_600.0, 3_600.0, limit_velocity=0.125, transition_velocity=0.7)
     >>> round(float(law.opening_velocity()), 6), round(float(law.force_velocity(0.3)), 4)
@@ -72,8 +72,8 @@ class Besinger(AbstractMemoryless):
         return rate * closed + self.blow_off_rate * at_least(v - self.limit_velocity, 0.0)
 
     def conditions(self) -> tuple[Condition, ...]:
-        """The force grows with the velocity."""
-        falls = "Otherwise the force falls with growing velocity in {}."
+        """The force increases with the velocity."""
+        falls = "Otherwise the force decreases with increasing velocity in {}."
         share = least_rebound(self.limit_velocity, self.transition_velocity)
         return (
             Condition(
@@ -91,7 +91,7 @@ class Besinger(AbstractMemoryless):
         )
 
     def other_starts(self, reach: Reach) -> list[dict[str, float]]:
-        """α far below, within and beyond the records; the valve opening early and late."""
+        """α far below, within and above the velocities of the records; low and high limit velocities."""
         shares = (("transition_velocity", (0.03, 0.3, 1.0, 4.0)), ("limit_velocity", (0.2, 0.6, 0.97)))
         return [{name: share * reach.velocity} for name, parts in shares for share in parts]
 
@@ -106,11 +106,11 @@ class Besinger(AbstractMemoryless):
     def from_printed(
         cls, c_c: float, c_e: float, c_b: float, v_lim: float, alpha: float, v_open: float | None = None
     ) -> "Besinger":
-        """Read a parameter set made for the formula as paper 001 prints it, coefficients in N s/m, velocities in m/s.
+        """The law for a parameter set of the formula as printed in paper 001, coefficients in N s/m, velocities in m/s.
 
-        The printed formula has v_open as a free number (v_lim if it is left out) and then jumps at v_lim. The law made
-        here derives v_open, is continuous, and equals the printed formula below v_lim; above it the force is lower or
-        higher by the jump. A warning states the jump.
+        In the printed formula v_open is a free parameter (v_lim if left out), and the force then jumps at v_lim. This
+        law derives v_open and is continuous. It equals the printed formula below v_lim and differs from it by the jump
+        above. A warning states the jump.
         """
         law = cls(c_c, c_e, c_b, v_lim, alpha)
         v_open = v_lim if v_open is None else v_open
@@ -121,7 +121,7 @@ class Besinger(AbstractMemoryless):
             warnings.warn(
                 f"The printed formula with v_open = {v_open:g} m/s jumps by {jump:+.4g} N ({100 * jump / below:+.2g} %)"
                 f" at v_lim = {v_lim:g} m/s; continuity needs v_open = {float(law.opening_velocity()):.6g} m/s, which"
-                " is used instead. A jump breaks solvers and gradients.",
+                " is used instead, because a jump causes errors in solvers and gradients.",
                 stacklevel=2,
             )
         return law
@@ -146,7 +146,7 @@ class Besinger(AbstractMemoryless):
         transition = 0.3 * knee
         rebound = max(rebound, 1.0)
         compression = max(secant_rate(velocity, force, -1), 0.02 * rebound)
-        # records whose force falls in rebound, as with friction that lets go, still get a law whose force grows
+        # if the force decreases in rebound, as with stick-slip friction, the law must still have an increasing force
         rebound = max(rebound, 1.1 * float(least_rebound(knee, transition)) * compression)
         return cls(
             compression_rate=compression,

@@ -23,7 +23,7 @@ def hysteresis_rate(travel_rate: ScalarLike, z: ScalarLike, shape: ScalarLike, e
 
 
 def _rate_factor(size: ScalarLike, to_the_n: ScalarLike, exponent: ScalarLike) -> Scalar:
-    """(1 − wⁿ)/(1 − w²), and its series next to w = 1, where the quotient of small differences has no right slope."""
+    """(1 − wⁿ)/(1 − w²), and its series near w = 1, where the slope of the quotient would be inaccurate."""
     left = 1.0 - size
     near = left < jnp.finfo(jnp.result_type(size)).eps ** 0.25
     series = 0.5 * exponent * (1.0 - (exponent - 2.0) * left * (0.5 - (2.0 * exponent - 5.0) / 12.0 * left))
@@ -35,11 +35,12 @@ def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, expone
     """The state after a travel in one direction, in yield displacements: second order, bounded for any travel.
 
     With w = z sgn(u̇) the law reads dw/du = 1 + (2γ̂ − 1)|w|ⁿ for w < 0, unloading, and 1 − wⁿ for w > 0, loading. The
-    first is never stiff and takes a midpoint step. The second is carried on by w ← (w + t)/(1 + w t), t = tanh(r u),
-    r = (1 − wⁿ)/(1 − w²) at midway: exact for n = 2, and w tends to 1 without passing it however long the travel. To
-    midway s/√(1 + s²) stands for tanh s, which costs less and has the same first two orders.
+    first is never stiff and is integrated by a midpoint step. The second is integrated by w ← (w + t)/(1 + w t),
+    t = tanh(r u), r = (1 − wⁿ)/(1 − w²) at the midpoint: exact for n = 2, and w approaches 1 without exceeding it for
+    any travel. Up to the midpoint, tanh s is replaced by s/√(1 + s²), which costs less and is equal to second order.
 
-    Powers cost most: midway of what unloads altogether, |w|/2, needs none of its own, so that there are two in all.
+    Powers are the largest cost: for complete unloading the midpoint |w|/2 needs no further power, so there are only
+    two.
     """
     sign = direction(travel)
     u, w, curve = sign * travel, sign * z, 2.0 * shape - 1.0
@@ -47,7 +48,7 @@ def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, expone
     held, loaded = at_least(-w, 0.0), at_least(w, 0.0)
 
     unloading = held - 0.5 * u * (1.0 + curve * begin)
-    stays = unloading > 0.5 * held  # held by a lesser force at the end of the travel; else it loads the other way
+    stays = unloading > 0.5 * held  # still unloading at the end; otherwise it loads in the other direction
     steep = 1.0 + curve * jnp.where(w < 0, begin * power(0.5, exponent), 0.0)
     left = at_least(u - held / steep, 0.0)
     half = 0.5 * left * _rate_factor(loaded, jnp.where(w > 0, begin, 0.0), exponent)
@@ -62,9 +63,9 @@ def hysteresis_step(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, expone
 
 
 def hysteresis_estimate(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, exponent: ScalarLike) -> Scalar:
-    """The state after a travel by Heun's step, held between −1 and 1, to predict the force: half the cost.
+    """The state after a travel by Heun's method, limited to −1 … 1, for predictions of the force: half the cost.
 
-    It is of second order, but of first order at kinks.
+    Second order, but first order at kinks.
     """
 
     def moved(z: ScalarLike) -> Scalar:
@@ -78,13 +79,13 @@ def hysteresis_estimate(travel: ScalarLike, z: ScalarLike, shape: ScalarLike, ex
 
 @final
 class BoucWen(AbstractDamper):
-    """F = c₀ v + k₀ x + f₀ + F_y z (Wen 1976), z from −1 to 1: hysteresis with a yield force, independent of the rate.
+    """F = c₀ v + k₀ x + f₀ + F_y z (Wen 1976), −1 ≤ z ≤ 1: rate-independent hysteresis with a yield force.
 
-    x_y ż = v − γ̂ |v| z|z|ⁿ⁻¹ − (1 − γ̂) v |z|ⁿ. From rest the hysteretic force grows with slope F_y/x_y and saturates at
-    ±F_y; a larger n makes the knee sharper; γ̂ shapes the unloading (½: with slope F_y/x_y until z = 0; 1: steeper at
-    first). The usual A, β, γ, α hold one redundant number and leave the scale of z open; here z is dimensionless, so
-    A = 1/x_y, γ = γ̂/x_y, β = (1 − γ̂)/x_y, α = F_y (`classical`, `from_classical`), and γ ≥ |β| holds by construction:
-    the law always dissipates. A spring relaxed at x₀ is f₀ = −k₀ x₀.
+    x_y ż = v − γ̂ |v| z|z|ⁿ⁻¹ − (1 − γ̂) v |z|ⁿ. From rest the hysteretic force grows with slope F_y/x_y and saturates
+    at ±F_y; a larger n makes the knee sharper; γ̂ shapes the unloading (½: with slope F_y/x_y until z = 0; 1: steeper
+    at first). The usual parameters A, β, γ, α are redundant, since they do not fix the scale of z; here z is
+    dimensionless, so A = 1/x_y, γ = γ̂/x_y, β = (1 − γ̂)/x_y, α = F_y (`classical`, `from_classical`), and γ ≥ |β|
+    holds by construction: the law always dissipates energy. For a spring that is relaxed at x₀, f₀ = −k₀ x₀.
 
     State: z. The step is second order, bounded and stable for any x_y and any step. In a `SeriesSpring` it needs c₀
     above zero.
@@ -96,7 +97,7 @@ class BoucWen(AbstractDamper):
     """
 
     viscous_rate: Number = parameter("N s/m", "c₀, viscous damping coefficient", nonnegative)
-    stiffness: Number = parameter("N/m", "k₀, stiffness beside the hysteresis", nonnegative)
+    stiffness: Number = parameter("N/m", "k₀, parallel stiffness", nonnegative)
     yield_force: Number = parameter("N", "F_y, hysteretic force when saturated", positive)
     yield_displacement: Number = parameter("m", "x_y, travel from rest to F_y at the first slope", positive)
     shape: Number = parameter("", "γ̂ = γ/(β + γ), shape of the unloading", interval(0.5, 1.0), default=0.75)
@@ -128,7 +129,7 @@ class BoucWen(AbstractDamper):
     def predict(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
     ) -> State:
-        """What `advance` will give, by `hysteresis_estimate`."""
+        """An approximation of `advance`, by `hysteresis_estimate`."""
         del x0, x1
         return self._moved(hysteresis_estimate, v0, v1, state, dt)
 
@@ -140,7 +141,7 @@ class BoucWen(AbstractDamper):
         return step(travel, z, self.shape, self.exponent)[None]
 
     def classical(self) -> dict[str, float]:
-        """A, β, γ [1/m], n and α [N] of ż = A v − γ|v|z|z|ⁿ⁻¹ − β v|z|ⁿ, F = … + α z, for the z in use here."""
+        """A, β, γ [1/m], n and α [N] of ż = A v − γ|v|z|z|ⁿ⁻¹ − β v|z|ⁿ, F = … + α z, for the dimensionless z."""
         first = 1.0 / float(self.yield_displacement)
         shape = float(self.shape)
         parts = {"A": first, "beta": (1.0 - shape) * first, "gamma": shape * first}
@@ -158,9 +159,9 @@ class BoucWen(AbstractDamper):
         n: float,
         x0: float = 0.0,
     ) -> "BoucWen":
-        """Read a set made for F = c₀ v + k₀ (x − x₀) + α z, whatever the scale of its z (in SI units).
+        """The law for a parameter set of F = c₀ v + k₀ (x − x₀) + α z with any scale of z (in SI units).
 
-        Only sets with γ ≥ β ≥ 0 can be read.
+        Only for sets with γ ≥ β ≥ 0.
         """
         largest = (A / (beta + gamma)) ** (1.0 / n)
         return cls(c0, k0, alpha * largest, largest / A, gamma / (beta + gamma), n, -k0 * x0)

@@ -25,18 +25,18 @@ def penetration(travel: ScalarLike, width: ScalarLike) -> tuple[Scalar, Scalar]:
 class BumpStop(AbstractStateless):
     """F = ∓(k₁ d + k₃ d³ + c ḋ) with the penetration d of the stop at one end of the stroke, or at both.
 
-    In compression the stop is touched at x = −clearance and pushes the rod out (F < 0); in rebound it is touched at
-    x = +clearance and pulls it in (F > 0). Between, the force is exactly zero. The onset of d is rounded over
-    `engagement_width` (`penetration`), so the elastic force has a continuous slope; the damping follows ḋ = g v, which
-    comes in with the penetration, without a jump. A stop can only push: where its damping would hold the rod back on
-    the way out, the force is zero. The law is passive. Two ends with different stops are the sum of two laws.
+    The compression stop is in contact at x < −clearance and pushes the rod out (F < 0); the rebound stop is in contact
+    at x > clearance and pulls it in (F > 0). In between, the force is exactly zero. The onset of d is rounded over
+    `engagement_width` (`penetration`), so the elastic force has a continuous slope; the damping uses ḋ = g v, which
+    increases with the penetration without a jump. A stop can only push: where its damping would pull, the force is
+    zero. The law is passive. For different stops at both ends, add two laws.
 
     Arguments:
         clearance: stroke from x = 0 to first contact [m].
         stiffness: k₁ [N/m].
         cubic_stiffness: k₃ [N/m³], makes the stop progressive.
         damping: c [N s/m].
-        engagement_width: penetration over which the stop comes in [m].
+        engagement_width: penetration over which the contact begins [m].
         end: `"compression"`, `"rebound"` or `"both"`.
 
     >>> law = BumpStop(clearance=0.04, stiffness=50e3, cubic_stiffness=2e8, end="both")
@@ -48,7 +48,7 @@ class BumpStop(AbstractStateless):
     stiffness: Number = parameter("N/m", "k₁, stiffness of the stop", nonnegative)
     cubic_stiffness: Number = parameter("N/m³", "k₃, cubic stiffness of the stop", nonnegative, default=0.0)
     damping: Number = parameter("N s/m", "c, damping coefficient in contact", nonnegative, default=0.0)
-    engagement_width: Number = setting("m", "penetration over which the stop comes in", positive, default=1e-3)
+    engagement_width: Number = setting("m", "penetration over which the contact begins", positive, default=1e-3)
     end: str = eqx.field(static=True, default="compression")
 
     def __check_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""A law in series with its oil column and with a rubber bushing that damps by itself."""
+"""A law in series with its oil column and with a rubber bushing that has its own damping."""
 
 from typing import final
 
@@ -13,19 +13,19 @@ from jaxdamp.parameters import parameter, positive
 
 @final
 class Bushing(AbstractSeries):
-    """F = F_law(v_d) = k_o x_o = k_b x_b + c_b ẋ_b, x = x_d + x_o + x_b: oil column and bushing carry the law's force.
+    """F = F_law(v_d) = k_o x_o = k_b x_b + c_b ẋ_b, x = x_d + x_o + x_b: law, oil column and bushing in series.
 
     Rubber loses energy when it is deflected; a spring in series (`SeriesSpring`) does not. A linear law of coefficient
     c gives the complex stiffness F/x = 1/(1/(iωc) + 1/k_o + 1/(k_b + iωc_b)) at the angular frequency ω. A bushing
-    without damping is a spring: `SeriesSpring` with 1/(1/k_o + 1/k_b). The law must resist more the faster it moves;
-    the whole is passive if the law is.
+    without damping is a spring: `SeriesSpring` with 1/(1/k_o + 1/k_b). The force of the law must increase with its
+    velocity; the assembly is passive if the law is.
 
     States: the deflections x_o and x_b [m], then the law's own; ẋ_b = (F − k_b x_b)/c_b, ẋ_o = v − v_d − ẋ_b. The step
     is that of `SeriesSpring`, one monotone scalar equation a stage, stable for any stiffness and step.
 
     Arguments:
-        law: a law whose force answers the velocity at once.
-        oil_stiffness: k_o [N/m]; of a column of oil A² B (1/V₁ + 1/V₂), with piston area A [m²], bulk modulus B [Pa]
+        law: a law whose force depends directly on the velocity.
+        oil_stiffness: k_o [N/m]; for a column of oil A² B (1/V₁ + 1/V₂), with piston area A [m²], bulk modulus B [Pa]
             and volumes V₁, V₂ [m³] above and below the piston.
         stiffness: k_b [N/m].
         damping: c_b [N s/m]; k_b tan δ/ω for a loss angle δ at ω.
@@ -52,15 +52,15 @@ class Bushing(AbstractSeries):
         return 2
 
     def traits(self) -> Traits:
-        """The rate of the bushing's deflection has a kink where the velocity has one."""
+        """The rate of the bushing deflection has a kink where the velocity has one."""
         return super().traits()._replace(extrapolable_states=False)
 
     def spring_force(self, deflections: Deflections) -> Scalar:
-        """Force [N] of the oil column, which the bushing carries too."""
+        """Force [N] of the oil column, equal to that of the bushing."""
         return self.oil_stiffness * deflections[0]
 
     def largest_deflection(self, force: Scalar, begun: Deflections) -> Scalar:
-        """That [m] of both springs, beside what the bushing has not yet given back."""
+        """Deflection [m] of both springs, plus the remaining deflection of the bushing."""
         return jnp.abs(begun[1]) + force / self.oil_stiffness + force / self.stiffness
 
     def shared(self, total: Scalar, begun: Deflections, duration: ScalarLike) -> Deflections:
@@ -70,6 +70,6 @@ class Bushing(AbstractSeries):
         return oil, total - oil
 
     def shared_rate(self, total_rate: Scalar, deflections: Deflections) -> Deflections:
-        """Of the bushing ẋ_b = (F − k_b x_b)/c_b, and the rest of the oil column [m/s]."""
+        """ẋ_b = (F − k_b x_b)/c_b of the bushing, and the remaining rate of the oil column [m/s]."""
         rubber = (self.spring_force(deflections) - self.stiffness * deflections[1]) / self.damping
         return total_rate - rubber, rubber

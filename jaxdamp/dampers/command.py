@@ -11,20 +11,20 @@ from jaxdamp.parameters import as_float, checked, with_values
 
 
 def takes_command(law: AbstractDamper) -> bool:
-    """Whether there is a command in the law or in a law inside."""
+    """Whether the law or a law inside has a command."""
     return bool(command_paths(law))
 
 
 def with_command(law: AbstractDamper, command: ScalarLike) -> AbstractDamper:
-    """The same law at another command, wherever it or a law inside takes one.
+    """The same law at another command, in the law itself and in all laws inside.
 
     >>> from jaxdamp.dampers import Lag, ModifiedBoucWen
     >>> law = with_command(Lag(ModifiedBoucWen.prototype(), 0.002), 1.5)
     >>> float(law.law.voltage)
     1.5
 
-    A command beyond those of the records that the law was fitted to gives an `OutsideFittedRangeWarning`; one beyond
-    the levels of a `Scheduled` law is refused (inside compiled code it is held at the nearest level).
+    A command outside the range of the fitted records gives an `OutsideFittedRangeWarning`; one outside the levels of a
+    `Scheduled` law is refused (inside compiled code the nearest level is used).
 
     Raises:
         ValueError: a law without a command; a command outside its domain.

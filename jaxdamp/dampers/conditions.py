@@ -1,4 +1,4 @@
-"""The conditions between parameters of all laws inside a tree, for searches that must keep them."""
+"""The conditions between parameters of all laws in a tree, for searches that must satisfy them."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from jaxdamp.dampers.base import laws_inside
 
 
 def margins(tree: Any) -> Float[Array, " conditions"]:
-    """By how much each condition of each law in a law, a vehicle or another module is kept; negative where broken.
+    """The margin of each condition of all laws in a law, a vehicle or another module; negative if violated.
 
     Every margin is in the unit of the parameter that the condition limits.
     """
@@ -20,6 +20,6 @@ def margins(tree: Any) -> Float[Array, " conditions"]:
 
 
 def keeps_conditions(tree: Any) -> bool:
-    """Whether all laws in a law, a vehicle or another module keep their conditions; computed without compiling."""
+    """Whether all laws in a law, a vehicle or another module satisfy their conditions; nothing is compiled."""
     plain = [jax.tree.map(np.asarray, law) for _, law in laws_inside(tree) if law.has_conditions()]
     return all(np.all(getattr(law, c.parameter) > c.least) for law in plain for c in law.conditions())

@@ -1,4 +1,4 @@
-"""Dry friction of seals and guides, made smooth."""
+"""Dry friction of seals and guides, smoothed."""
 
 from typing import final
 

@@ -1,4 +1,4 @@
-"""Laws made from data have a force where the data are: where that is, in words, and the refusal of other forces."""
+"""The valid range of laws from data, in words, and the refusal of forces outside it."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from jaxdamp.dampers.base import AbstractDamper
 
 
 def coverage(law: AbstractDamper) -> str:
-    """Where a law and the laws inside it hold, in words; empty if they hold everywhere."""
+    """The valid range of a law and of the laws inside, in words; empty without limits."""
     return " ".join(filter(None, [law.validity(), *map(coverage, law.inner_laws())]))
 
 

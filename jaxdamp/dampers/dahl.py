@@ -1,4 +1,4 @@
-"""Friction that begins as a spring: the law of Dahl."""
+"""The friction law of Dahl: elastic before sliding."""
 
 from typing import final
 
@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers._guesses import TYPICAL_GIVE, sliding_fit
+from jaxdamp.dampers._guesses import ELASTIC_TRAVEL, sliding_fit
 from jaxdamp.dampers._hysteresis import direction, travels
 from jaxdamp.dampers.base import AbstractDamper, own_states
 from jaxdamp.dampers.traits import Traits
@@ -22,15 +22,15 @@ def dahl_step(travel: ScalarLike, force: ScalarLike, stiffness: ScalarLike, fric
 
 @final
 class Dahl(AbstractDamper):
-    """Ḟ = σ₀ (v − |v| F/F_c) (Dahl 1968, exponent 1): dry friction of seals and guides whose contact gives a little.
+    """Ḟ = σ₀ (v − |v| F/F_c) (Dahl 1968, exponent 1): dry friction of seals and guides with an elastic contact.
 
     For small travel it is a spring of stiffness σ₀, for large it saturates at ±F_c; the force depends on the travel and
-    its reversals, not on the rate. Over a full cycle it dissipates. Unlike `CoulombFriction` it holds at rest. It
-    stands beside a viscous law, `Linear(...) + Dahl(...)`.
+    its reversals, not on the rate. It dissipates energy over a full cycle. Unlike `CoulombFriction` it holds a load at
+    rest. Use it parallel to a viscous law, `Linear(...) + Dahl(...)`.
 
     State: the force [N]. The step is exact for a velocity linear over the step, a reversal included, so that
-    F_c/σ₀ may be far below the travel of a step. Inside a `SeriesSpring` a law with viscous damping must stand beside
-    it.
+    F_c/σ₀ may be much smaller than the travel of a step. Inside a `SeriesSpring` it needs a parallel law with viscous
+    damping.
 
     >>> law = Dahl(stiffness=4e5, friction_force=40.0)
     >>> state = law.advance(0.0, 0.1, 1e-4, 0.1, law.initial_state(), 1e-3)
@@ -72,6 +72,6 @@ class Dahl(AbstractDamper):
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "Dahl":
-        """Start values from measured data: friction of fast sliding, a contact that gives half a millimetre."""
+        """Start values from measured data: friction at high velocities, elastic contact over 0.5 mm."""
         level = sliding_fit(velocity, force)[1]
-        return cls(level / TYPICAL_GIVE, level)
+        return cls(level / ELASTIC_TRAVEL, level)

@@ -1,4 +1,4 @@
-"""A slope that falls with velocity, as vehicle simulators describe truck dampers."""
+"""A slope that decreases with velocity, as vehicle simulators describe truck dampers."""
 
 from typing import final
 
@@ -20,8 +20,8 @@ def degressive(v: ScalarLike, rate: ScalarLike, degressivity: ScalarLike) -> Sca
 class Degressive(AbstractMemoryless):
     """F = c v/(1 + d|v|), with a slope c and a degressivity d for each direction.
 
-    It is the degressive damper of Chrono (`DegressiveDamperForce`), used there for trucks, buses and cars; d = 0 is
-    the linear law. At |v| = 1/d the force is half of its limit c/d. F grows with v everywhere, so the law is passive.
+    It is the degressive damper of Chrono (`DegressiveDamperForce`), used there for trucks, buses and cars; d = 0 is the
+    linear law. At |v| = 1/d the force is half of its limit c/d. F increases with v everywhere, so the law is passive.
     F(0) = 0 and the slope is finite everywhere; it is continuous at v = 0 (C¹) only if both slopes c are equal.
 
     Data below 1/d determine c but not the limit c/d.

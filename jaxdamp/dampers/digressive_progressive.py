@@ -1,4 +1,4 @@
-"""Bleed, blow-off and port: steep, then soft, then rising again."""
+"""Bleed, blow-off valve and ports: a steep, then a flat, then a progressive curve."""
 
 from typing import final
 
@@ -30,13 +30,14 @@ def digressive_progressive(
 
 @final
 class DigressiveProgressive(AbstractMemoryless):
-    """F = c₀ v up to the blow-off velocity v_b, slope c₂ beyond it, and c₃ v|v| on top; own numbers each direction.
+    """F = c₀ v up to the blow-off velocity v_b, slope c₂ above it, plus c₃ v|v|; separate parameters per direction.
 
-    The bleed gives c₀, the opened valve c₂ (digressive if c₂ < c₀), the flow through the ports c₃ (progressive).
-    Without c₃ it is the digressive law. F(0) = 0 and the force is continuous; it grows with v everywhere, so the law
-    is passive. The slope changes at ±v_b, unless `knee_width` rounds these knees, and at v = 0 if the two c₀ differ.
+    c₀ is due to the bleed, c₂ to the open valve (digressive if c₂ < c₀), c₃ to the flow through the ports
+    (progressive). Without c₃ it is the digressive law. F(0) = 0 and the force is continuous; it increases with v
+    everywhere, so the law is passive. The slope changes at ±v_b, unless `knee_width` rounds these knees, and at v = 0
+    if the two c₀ differ.
 
-    Data must reach well beyond v_b on each side: just above it c₂ and c₃ cannot be told apart.
+    Data must extend far above v_b on each side: just above v_b, c₂ and c₃ cannot be distinguished.
 
     >>> law = DigressiveProgressive(
     ...     rebound_bleed_rate=8000.0, rebound_blow_off_velocity=0.1, rebound_blow_off_rate=900.0,

@@ -1,4 +1,4 @@
-"""The range of the records that a law was fitted to, which travels with the law."""
+"""The range of the records that a law was fitted to, stored in the law."""
 
 from typing import Any, NamedTuple, TypeVar, final
 
@@ -16,7 +16,7 @@ Tree = TypeVar("Tree")
 
 
 class OutsideFittedRangeWarning(UserWarning):
-    """A law is used beyond the range of the records that it was fitted to: what it gives there is extrapolated."""
+    """A law is used outside the range of the records that it was fitted to: its force is extrapolated."""
 
 
 class Quantity(NamedTuple):
@@ -31,15 +31,15 @@ class Quantity(NamedTuple):
 class FittedRange(eqx.Module):
     """Lowest and highest value of each quantity in the records that a law was fitted to.
 
-    A law beyond them is an extrapolation: it may be right, but no record says so. A quantity that the records do not
-    hold is `None`. The numbers are data of the law, not parameters: no fit, tuning or gradient changes them.
+    Outside these limits the law is an extrapolation, which no record confirms. A quantity that the records do not
+    contain is `None`. The limits are data of the law, not parameters: fits, tunings and gradients do not change them.
 
     Arguments:
-        velocity: [m/s], positive in extension.
-        stroke: [m], positive in extension, from the zero of the records.
+        velocity: velocity [m/s], positive in extension.
+        stroke: stroke [m], positive in extension, measured from the zero of the records.
         frequency: dominant frequency of the records [Hz].
-        force: [N], positive when it resists extension.
-        temperature: [K].
+        force: force [N], positive when it resists extension.
+        temperature: oil temperature [K].
         command: coil current, voltage, clicks, in the unit of the law's command.
 
     Raises:
@@ -50,8 +50,8 @@ class FittedRange(eqx.Module):
     FittedRange(velocity=(-0.5, 0.9), command=(0.0, 2.0))
     """
 
-    # One array, with infinite limits for what is not known: laws that differ in their range alone have one structure,
-    # so that no compiled program is made twice. NumPy keeps double precision whatever the precision of JAX.
+    # One array, with infinite limits for unknown quantities: laws that differ only in their range have the same
+    # structure and share compiled programs. A NumPy array is in double precision, whatever the precision of JAX.
     limits: Float[np.ndarray, "6 2"] | Float[Array, "6 2"]
 
     def __init__(
@@ -104,18 +104,18 @@ class FittedRange(eqx.Module):
         return self._of("command")
 
     def known(self) -> list[Quantity]:
-        """The quantities that the records hold (none while JAX traces the law)."""
-        found = ((name, self._of(name), unit) for name, unit in UNITS.items())
-        return [Quantity(name, limits, unit) for name, limits, unit in found if limits is not None]
+        """The quantities that the records contain (none while JAX traces the law)."""
+        quantities = ((name, self._of(name), unit) for name, unit in UNITS.items())
+        return [Quantity(name, limits, unit) for name, limits, unit in quantities if limits is not None]
 
     def without(self, *names: str) -> "FittedRange":
-        """The same range with some quantities unknown."""
+        """The same range without some quantities."""
         return FittedRange(
             **{quantity.name: quantity.limits for quantity in self.known() if quantity.name not in names}
         )
 
     def words(self) -> str:
-        """The range as a line: "velocity −0.5 to 0.9 m/s, stroke −20 to 20 mm"."""
+        """The range in words: "velocity −0.5 to 0.9 m/s, stroke −20 to 20 mm"."""
         return ", ".join(f"{q.name} {span(q.name, q.limits)}" for q in self.known())
 
     def __repr__(self) -> str:
@@ -129,13 +129,13 @@ def span(name: str, limits: Limits) -> str:
 
 
 def shown(name: str, value: float | int) -> str:
-    """A value as it is read by people, three figures (whole numbers for thousands)."""
+    """A value for display, with three figures (whole numbers for thousands)."""
     value = 1e3 * value if name == "stroke" else value - 273.15 if name == "temperature" else value
     return (f"{value:.0f}" if abs(value) >= 1e3 else f"{value:.3g}").replace("-", "−")
 
 
 def shown_unit(name: str) -> str:
-    """The unit that goes with `shown`."""
+    """The unit for `shown`."""
     return {"stroke": "mm", "temperature": "°C"}.get(name, UNITS[name])
 
 
@@ -153,13 +153,13 @@ def _checked(name: str, limits: Limits | None) -> tuple[float, float]:
 def without_fitted_ranges(tree: Tree) -> Tree:
     """A law, a vehicle or any tree without the ranges of its laws.
 
-    Compiled code takes laws without: laws fitted to other records then share one program.
+    Compiled code uses laws without them, so that laws fitted to different records share one program.
     """
     return jax.tree.map(lambda leaf: None if isinstance(leaf, FittedRange) else leaf, tree, is_leaf=_is_range)
 
 
 def has_fitted_range(tree: Any) -> bool:
-    """Whether any law in a tree says what it was fitted to."""
+    """Whether any law in a tree has a fitted range."""
     return any(map(_is_range, jax.tree.leaves(tree, is_leaf=_is_range)))
 
 

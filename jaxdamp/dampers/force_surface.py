@@ -1,4 +1,4 @@
-"""The force as a smooth surface over stroke and velocity, taken from data."""
+"""The force as a smooth surface over stroke and velocity, fitted to data."""
 
 from typing import final
 
@@ -23,14 +23,15 @@ from jaxdamp.parameters import around_zero, ends, nonnegative, parameter, settin
 class ForceSurface(AbstractStateless):
     """F(x, v) = Σ Cᵢⱼ Tᵢ(x̄) Tⱼ(v̄), x̄ and v̄ the stroke and velocity scaled to −1 … 1, Tₖ Chebyshev polynomials.
 
-    The restoring-force surface of Masri and Caughey (1979), for shock absorbers by Surace, Worden and Tomlinson
-    (1992). It holds what depends on stroke and velocity at this instant: gas, springs, stroke-dependent valves. Loops
-    that open with frequency are no function of these; `AccelerationSurface` follows them. Nothing makes a surface
-    passive: look at its work before it goes into a vehicle.
+    The restoring-force surface of Masri and Caughey (1979), for shock absorbers by Surace, Worden and Tomlinson (1992).
+    It describes forces that depend on the present stroke and velocity: gas, springs, stroke-dependent valves. It cannot
+    describe hysteresis loops that widen with frequency; use `AccelerationSurface` for these. A surface is not
+    necessarily passive: check the dissipated energy before you use it in a vehicle.
 
-    Polynomials say nothing outside their data, so the law **refuses** to: outside the ranges the force is NaN, which
-    `respond`, `simulate` and `fit` refuse in words; called with plain numbers, it raises at once. `outside="hold"`
-    consents to the values of the nearest edge there, plus `outside_rate` times the velocity beyond it.
+    Polynomials are not valid outside their data. Outside the ranges the force is therefore NaN, which `respond`,
+    `simulate` and `fit` refuse with a message; called with plain numbers, the law raises an error. With
+    `outside="hold"` the law uses the values of the nearest edge there, plus `outside_rate` times the velocity beyond
+    it.
 
     Arguments:
         coefficients: Cᵢⱼ [N], shape (stroke degree + 1, velocity degree + 1).
@@ -40,8 +41,8 @@ class ForceSurface(AbstractStateless):
         outside: `"nan"` or `"hold"`.
 
     Raises:
-        ValueError: coefficients that are no grid, ranges without a width, an unknown word; a known stroke or velocity
-            outside the ranges.
+        ValueError: coefficients that are not a matrix, ranges without a width, an unknown `outside`; a known stroke or
+            velocity outside the ranges.
 
     >>> law = ForceSurface([[0.0, 1000.0], [0.0, 200.0]], stroke_range=(-0.05, 0.05), velocity_range=(-0.5, 0.5))
     >>> round(float(law.force_stroke_velocity(0.025, 0.25)), 6)  # 1000 · 0.5 + 200 · 0.5 · 0.5
@@ -65,7 +66,7 @@ class ForceSurface(AbstractStateless):
     def validity(self) -> str:
         """The ranges in words."""
         stroke, velocity = self._axes(0.0, 0.0)
-        return f"ForceSurface holds for {stroke.words()}, {velocity.words()}. {CONSENT}"
+        return f"ForceSurface is valid for {stroke.words()}, {velocity.words()}. {CONSENT}"
 
     def _axes(self, x: ScalarLike, v: ScalarLike) -> tuple[Axis, Axis]:
         return Axis("x", "m", x, self.stroke_range), Axis("v", "m/s", v, self.velocity_range)
@@ -80,19 +81,19 @@ class ForceSurface(AbstractStateless):
         ridge: float | int | None = None,
         outside: str = "nan",
     ) -> "ForceSurface":
-        """The least squares through scattered samples, over the ranges of the data and a hundredth more.
+        """Least squares fit to samples, over the ranges of the data extended by 1 %.
+
+        A `RankWarning` states how many combinations of coefficients the samples do not determine: the samples of a
+        single sine are on one ellipse, which determines 2 (m + n) of the (m + 1)(n + 1) combinations (m, n ≥ 1).
 
         Arguments:
-            velocity: [m/s], shape (samples,).
-            force: [N], shape (samples,).
-            stroke: [m], shape (samples,).
+            velocity: velocities [m/s], shape (samples,).
+            force: forces [N], shape (samples,).
+            stroke: strokes [m], shape (samples,).
             degrees: highest degree over stroke and over velocity.
-            ridge: λ of the ridge λ ‖C‖², relative to the largest singular value squared; by default the one of
-                smallest generalised cross-validation. `fit` takes none.
+            ridge: λ of the ridge term λ ‖C‖², relative to the largest singular value squared; by default that of
+                smallest generalised cross-validation. `fit` has no ridge term.
             outside: as for the law; `outside_rate` is Σ F v / Σ v² of the data.
-
-        A `RankWarning` says how much the samples leave open: those of a single sine lie on one ellipse, which
-        determines 2 (m + n) of the (m + 1)(n + 1) combinations of coefficients (m, n ≥ 1).
         """
         velocity, force, stroke = (np.asarray(a, dtype=float) for a in (velocity, force, stroke))
         reaches = data_range("stroke", stroke), around_zero_range("velocity", velocity)

@@ -1,4 +1,4 @@
-"""A damper that is softer in fast oscillation than in slow motion."""
+"""A damper that is softer at high frequency than in slow motion."""
 
 from typing import final
 
@@ -14,24 +14,24 @@ from jaxdamp.parameters import parameter, positive
 
 @final
 class FrequencySelective(AbstractDamper):
-    """τ_r Ḟ + F = F_high(v) + F_low(w), w = clip(s, 0, max(v, 0)), τ_f ṡ + s = v: a second valve closes only slowly.
+    """τ_r Ḟ + F = F_high(v) + F_low(w), w = clip(s, 0, max(v, 0)), τ_f ṡ + s = v: a second valve reacts slowly.
 
-    In slow rebound the filtered velocity s reaches v and both laws act; in fast oscillation s stays near the mean
-    velocity, zero, and `high` acts alone, as it always does in compression. Passive before the response lag if both
+    In slow rebound the filtered velocity s reaches v and both laws act; in fast oscillation s is near the mean
+    velocity, zero, and only `high` acts, as always in compression. Without the response lag, the law is passive if both
     laws are.
 
     The frequency-selective damper of the FEDA truck in Project Chrono (FEDA_DoubleWishbone.cpp, 7689fbc0) has
     w = min(v, s) in rebound. The two are equal for s ≥ 0. For s < 0, just after compression, Chrono's F_low(s) jumps
-    at v = 0 and pushes along with the rebound; here the second valve then adds nothing.
+    at v = 0 and acts in the direction of the rebound; here the force of the second valve is then zero.
 
-    States: the filtered velocity s [m/s], the force [N]. Both steps are exact for inputs linear over the step, so any
-    time is stable.
+    States: the filtered velocity s [m/s], the force [N]. Both steps are exact for inputs linear over the step, so all
+    time constants are stable.
 
     Arguments:
         high: law without states that acts at all frequencies.
         low: law without states that is added in slow rebound.
-        filter_time: τ_f [s] of the velocity. FEDA: 0.04 s. In sines of 1/(2π τ_f), 4 Hz, a linear second law does
-            half the work that it does in slow ones.
+        filter_time: τ_f [s] of the velocity. FEDA: 0.04 s. At 1/(2π τ_f) = 4 Hz, a linear second law dissipates half
+            as much as in slow motion.
         response_time: τ_r [s] of the force. FEDA: 0.001 s.
 
     Raises:
@@ -57,10 +57,10 @@ class FrequencySelective(AbstractDamper):
 
     def __check_init__(self) -> None:
         for name in ("high", "low"):
-            refuse_states(name, getattr(self, name), "Put its states outside, or give a law of the velocity.")
+            refuse_states(name, getattr(self, name), "Use a law without states here, and put the states outside.")
 
     def settled_force(self, x: ScalarLike, v: ScalarLike, filtered_velocity: ScalarLike) -> Scalar:
-        """Force [N] that the response lag heads for."""
+        """Force [N] that the response lag approaches."""
         slow = within(filtered_velocity, 0.0, at_least(v, 0.0))
         high, low = self.high, self.low
         return high.force(x, v, high.initial_state()) + low.force(x, slow, low.initial_state())
@@ -77,8 +77,8 @@ class FrequencySelective(AbstractDamper):
     def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
         """Rates of the filtered velocity [m/s²] and of the force [N/s]."""
         slow, force = own_states(self, state, 2)
-        heading = self.settled_force(x, v, slow)
-        return jnp.stack([(v - slow) / self.filter_time, (heading - force) / self.response_time])
+        target = self.settled_force(x, v, slow)
+        return jnp.stack([(v - slow) / self.filter_time, (target - force) / self.response_time])
 
     def advance(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike

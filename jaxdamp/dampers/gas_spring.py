@@ -17,7 +17,7 @@ LEAST_SHARE = 0.05
 def gas_pressure(x: ScalarLike, pressure: ScalarLike, volume: ScalarLike, area: ScalarLike, n: ScalarLike) -> Scalar:
     """p_g = p₀ (V₀/(V₀ + A x))ⁿ [Pa, absolute] at stroke x [m], with volume V₀ [m³] at x = 0 and rod area A [m²].
 
-    Below 5 % of V₀ (`LEAST_SHARE`), where oil would fill the gas chamber, the pressure goes on along its tangent
+    Below 5 % of V₀ (`LEAST_SHARE`), where oil would fill the gas chamber, the pressure continues along its tangent
     instead of to the pole at V₀ + A x = 0: value and slope are finite and continuous at every stroke.
     """
     share = 1.0 + area * x / volume
@@ -29,18 +29,18 @@ def gas_pressure(x: ScalarLike, pressure: ScalarLike, volume: ScalarLike, area: 
 class GasSpring(AbstractStateless):
     """F = −(p_g − p_atm) A with p_g = p₀ (V₀/(V₀ + A x))ⁿ: the gas acts on the cross-section A of the rod.
 
-    It pushes the rod out, so its force is negative (it drives extension), most in compression. At x = 0 it is
-    −(p₀ − p_atm) A, a static force: unlike other laws this one is not zero at rest. Its stiffness there is
-    n p₀ A²/V₀. It is a spring: no energy is lost over a cycle.
+    It pushes the rod out, so its force is negative (in the direction of extension), most in compression. At x = 0 it is
+    the static force −(p₀ − p_atm) A: unlike other laws, this one is not zero at rest. Its stiffness there is n p₀
+    A²/V₀. It is a spring: no energy is lost over a cycle.
 
-    Vehicles measure heights from static equilibrium. In a vehicle whose springs were found with the dampers taken off,
-    the static force lifts the body until the springs balance it; where the equilibrium already holds it, set
-    `relative`, which leaves out the force at x = 0. n = 1 for slow motion (isothermal), 1.4 for fast motion of nitrogen
+    In a vehicle, heights are measured from the equilibrium of the linear springs. If the spring data do not include the
+    dampers, the static gas force raises the body until the springs balance it. If they do include it, set `relative`,
+    which subtracts the force at x = 0. n = 1 for slow motion (isothermal), 1.4 for fast motion of nitrogen
     (adiabatic). The gas warms with the damper: p₀ is the pressure at the temperature of the test, in proportion to it
     [K]. Valid while V₀ + A x > 0.05 V₀ (see `gas_pressure`).
 
-    Tests at one place of the stroke give p₀ A only; V₀ and n come from a slow test over the whole stroke, as n/V₀
-    where A x is small beside V₀.
+    Tests at one stroke position determine p₀ A only; V₀ and n follow from a slow test over the whole stroke, and only
+    as n/V₀ if A x is small compared with V₀.
 
     >>> law = GasSpring(pressure=2e6, volume=6e-5, rod_area=1e-4, exponent=1.3)
     >>> [round(float(law.force(x, 0.0, law.initial_state())), 2) for x in (0.0, 0.05, -0.05)]
@@ -55,11 +55,11 @@ class GasSpring(AbstractStateless):
     relative: bool = eqx.field(static=True, default=False)
 
     def traits(self) -> Traits:
-        """The velocity does not matter."""
+        """Independent of the velocity."""
         return super().traits()._replace(has_feed_through=False)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
-        """Force [N] at stroke x [m]; the velocity does not matter."""
+        """Force [N] at stroke x [m], independent of the velocity."""
         del v
         outside = self.pressure if self.relative else self.atmospheric_pressure
         return (outside - gas_pressure(x, self.pressure, self.volume, self.rod_area, self.exponent)) * self.rod_area

@@ -16,15 +16,15 @@ from jaxdamp.parameters import replace
 
 @final
 class Hybrid(AbstractDamper):
-    """F = F_pwl(v) + F_nn(v, z): a piecewise-linear backbone and a neural hysteresis beside it (paper 002).
+    """F = F_pwl(v) + F_nn(v, z): a piecewise-linear backbone and a parallel neural hysteresis (paper 002).
 
-    The backbone says what the force is on average at a velocity, the network what the loop around it is. Paper 002
-    leaves its network open; here it is a `NeuralHysteresis`, and the backbone must be monotone, so that the whole is
-    **passive by construction**, whatever the numbers: F_pwl v ≥ 0, and the network gives back only what it stored.
+    The backbone is the mean force at a velocity, the network describes the loop around it. Paper 002 does not specify
+    its network; here it is a `NeuralHysteresis`, and the backbone must be monotone, so the law is **passive by
+    construction** for any parameters: F_pwl v ≥ 0, and the network returns only energy that it stored.
 
-    `Hybrid.guess(velocity, force, key=...)` is a start; train it with `identify.train` and add a `Spring` where the
-    records hold an offset or a stiffness. States: those of the network. Valid in the range of velocities, forces and
-    frequencies of its records; outside it is passive, but a guess.
+    `Hybrid.guess(velocity, force, key=...)` gives a start; train it with `identify.train` and add a `Spring` if the
+    records contain an offset or a stiffness. States: those of the network. Valid in the range of velocities, forces and
+    frequencies of its records; outside, it is still passive but not accurate.
 
     >>> v = np.linspace(-0.5, 0.5, 200)
     >>> law = Hybrid.guess(v, 1500.0 * np.tanh(4.0 * v), key=jax.random.key(1))
@@ -68,7 +68,7 @@ class Hybrid(AbstractDamper):
         elements: int = 2,
         width: int = 6,
     ) -> "Hybrid":
-        """A start for training: half the force in the backbone, the weights drawn by the key (0 if left out)."""
+        """A start for training: half the force in the backbone, random weights from the key (0 if left out)."""
         velocity, force = np.asarray(velocity), np.asarray(force)
         backbone = PiecewiseLinear.guess(velocity, force)
         hysteresis = NeuralHysteresis.random(

@@ -14,7 +14,7 @@ from jaxdamp.parameters import nonnegative, parameter, positive, real, setting
 def two_branches(
     x: ScalarLike, v: ScalarLike, steepness: ScalarLike, branch_offset: ScalarLike, stroke_width: ScalarLike
 ) -> Scalar:
-    """tanh(β v + δ tanh(x/w)), from −1 to 1: a step over the velocity that each half of the stroke shifts its own way.
+    """tanh(β v + δ tanh(x/w)), from −1 to 1: a step over v, shifted in opposite directions for x > 0 and x < 0.
 
     β [s/m], δ without unit, w [m].
     """
@@ -25,11 +25,11 @@ def two_branches(
 class HyperbolicTangent(AbstractStateless):
     """F = c v + k x + α tanh(β v + δ sgn x) + f₀ (Kwok et al. 2006; formula quoted from memory).
 
-    Made for magnetorheological dampers: c and k are viscous damping and stiffness, α the yield force, β how steeply it
-    is passed, δ how far apart the two branches of the loop lie, f₀ a static force. The printed sgn x jumps at mid
-    stroke; here it is tanh(x/w) with a stated width w. F grows with v and F(x, 0) depends on the stroke alone, so no
-    closed motion takes energy out. There is no state: the loop has the same shape at every frequency, and x = 0 must be
-    the middle of the motion.
+    For magnetorheological dampers: c and k are viscous damping and stiffness, α the yield force, β the steepness of the
+    yield transition, δ the distance between the two branches of the loop, f₀ a static force. The printed sgn x jumps at
+    mid-stroke; here it is tanh(x/w) with a given width w. F increases with v, and F(x, 0) depends on the stroke only,
+    so no cycle yields energy. There is no state: the loop has the same shape at every frequency, and x = 0 must be the
+    middle of the motion.
 
     >>> law = HyperbolicTangent(900.0, 500.0, 400.0, 30.0, 0.6)
     >>> round(float(law.force_stroke_velocity(0.01, 0.0)), 4)

@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike
-from jaxdamp.dampers._guesses import TYPICAL_GIVE, sliding_fit
+from jaxdamp.dampers._guesses import ELASTIC_TRAVEL, sliding_fit
 from jaxdamp.dampers._series import AbstractSeries, Deflections
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.bilinear import Bilinear
@@ -25,9 +25,9 @@ class KaradayiMasada(AbstractSeries):
     """F = k dz(x_k, δ) = c v_d + F_c tanh(v_d/v_f), x = x_d + x_k, c = c_r for v_d > 0 and c_c for v_d < 0.
 
     The elements of Karadayi and Masada (1989), for low frequencies: a bilinear dashpot and Coulomb friction, in series
-    with a spring that has a clearance of ±δ. After a reversal the force stays zero over a travel of 2 δ and then rises
-    with the spring. That paper's equations were not at hand; these are made from its list of elements, with the
-    friction smooth as in `CoulombFriction`. Passive whatever the parameters. Without clearance it is
+    with a spring that has a clearance of ±δ. After a reversal the force is zero over a travel of 2 δ and then increases
+    with the spring. The equations of that paper were not available; these follow from its list of elements, with
+    smoothed friction as in `CoulombFriction`. Passive for any parameters. Without clearance it is
     `SeriesSpring(Bilinear(c_r, c_c) + CoulombFriction(F_c, v_f), k)`.
 
     State: the deflection x_k [m] of spring and clearance. The step is that of `SeriesSpring`, stable for any k.
@@ -41,7 +41,7 @@ class KaradayiMasada(AbstractSeries):
     rebound_rate: Number = parameter("N s/m", "c_r, slope of the dashpot for v > 0", positive)
     compression_rate: Number = parameter("N s/m", "c_c, slope of the dashpot for v < 0", positive)
     friction_force: Number = parameter("N", "F_c, friction force", positive)
-    friction_velocity: Number = parameter("m/s", "v_f, velocity over which the friction's jump is spread", positive)
+    friction_velocity: Number = parameter("m/s", "v_f, velocity over which the friction jump is smoothed", positive)
     stiffness: Number = parameter("N/m", "k, series stiffness", positive)
     clearance: Number = parameter("m", "δ, half the free travel", nonnegative)
 
@@ -65,7 +65,7 @@ class KaradayiMasada(AbstractSeries):
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "KaradayiMasada":
-        """Start values from measured data: c and friction of fast sliding; spring and clearance give a millimetre."""
+        """Start values from measured data: c and friction from high velocities; spring and clearance deflect 1 mm."""
         rate, level, _ = sliding_fit(velocity, force)
         slow = max(0.1 * float(np.max(np.abs(velocity))), 1e-6)
-        return cls(rate, rate, level, slow, level / TYPICAL_GIVE, 0.5 * TYPICAL_GIVE)
+        return cls(rate, rate, level, slow, level / ELASTIC_TRAVEL, 0.5 * ELASTIC_TRAVEL)

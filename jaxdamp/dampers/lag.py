@@ -1,4 +1,4 @@
-"""A law whose force follows with a first-order lag."""
+"""A law with a first-order lag of the force."""
 
 from typing import final
 
@@ -14,9 +14,9 @@ from jaxdamp.parameters import parameter, positive
 
 @final
 class Lag(AbstractWrapper):
-    """τ Ḟ + F = F_law: the force of any law behind a first-order lag. One state, the force.
+    """τ Ḟ + F = F_law: the force of any law with a first-order lag. One state, the force.
 
-    Oil and hose compressibility make the force trail the velocity. For a linear law the loop of a sine is that of a
+    Compressibility of oil and hoses delays the force. For a linear law the loop of a sine is that of a
     spring c/τ in series; |F(v = 0)|/F_peak = ωτ/√(1 + (ωτ)²). The step is exact for a law force that is linear over
     the step, so any τ is stable and τ ≪ dt gives the law itself.
 
@@ -37,7 +37,7 @@ class Lag(AbstractWrapper):
         return 1
 
     def traits(self) -> Traits:
-        """The force is a state, which follows a kink of the velocity smoothly."""
+        """The force is a state, which is smooth where the velocity has a kink."""
         return super().traits()._replace(has_feed_through=False, stroke_dependent_at_rest=False)
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:

@@ -12,9 +12,9 @@ from jaxdamp.parameters import parameter, positive
 
 @final
 class Linear(AbstractMemoryless):
-    """F = c v, the law of the textbooks (paper 000, eq. 3).
+    """F = c v, the viscous damper (paper 000, eq. 3).
 
-    Valid where the flow through the valves is laminar; real dampers are stiffer at low velocity and softer in
+    Valid for laminar flow through the valves; real dampers have a steeper slope at low velocity and are softer in
     compression.
 
     >>> round(float(Linear(2500.0).force_velocity(0.2)), 6)
@@ -26,7 +26,7 @@ class Linear(AbstractMemoryless):
     def __check_init__(self) -> None:
         rate = _checks.concrete(self.rate)
         if rate is not None and np.any(rate == 0.0):
-            remedy = "For a vehicle without damping write `Linear(1e-6)`, whose force no ride metric shows."
+            remedy = "For a vehicle without damping write `Linear(1e-6)`, whose force is negligible."
             _checks.refuse("Linear.rate", "be positive [N s/m]", rate, remedy)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:

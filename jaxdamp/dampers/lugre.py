@@ -1,4 +1,4 @@
-"""Friction with breakaway: the law of Lund and Grenoble."""
+"""Friction with breakaway: the LuGre law (Lund and Grenoble)."""
 
 from typing import final
 
@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers._guesses import TYPICAL_GIVE, sliding_fit
+from jaxdamp.dampers._guesses import ELASTIC_TRAVEL, sliding_fit
 from jaxdamp.dampers._hysteresis import direction, travels
 from jaxdamp.dampers.base import AbstractDamper, own_states
 from jaxdamp.dampers.stribeck_friction import stribeck_force
@@ -19,13 +19,13 @@ class LuGre(AbstractDamper):
     """F = σ₀ z + σ₁(v) ż + σ₂ v, ż = v − σ₀ |v| z/g(v) (Canudas de Wit et al. 1995): stick, breakaway and sliding.
 
     z [m] is the mean deflection of bristles of stiffness σ₀; in steady sliding F = g(v) sgn v + σ₂ v with the Stribeck
-    curve g(v) = F_c + (F_s − F_c) exp(−(v/v_s)²). A constant σ₁ can give energy out; the law takes none if σ₁(v) ≤
-    4 g/|v|, so here σ₁(v) = σ₁/√(1 + (σ₁ v/4g)²): the damping σ₁ at rest, fading as the contact slides, and a
-    passive law whatever the parameters. With σ₁ = 0 and F_s = F_c it is `Dahl` beside a viscous law.
+    curve g(v) = F_c + (F_s − F_c) exp(−(v/v_s)²). With a constant σ₁ the law may not be passive; it is passive if σ₁(v)
+    ≤ 4 g/|v|. Here σ₁(v) = σ₁/√(1 + (σ₁ v/4g)²): the damping is σ₁ at rest and decreases with sliding, and the law is
+    passive for any parameters. With σ₁ = 0 and F_s = F_c it is `Dahl` parallel to a viscous law.
 
-    State: z. The step is exact at constant velocity, second order, and stable however stiff the contact; a reversal
-    inside the step is followed. Below about σ₀ = 1e7 N/m a car may take steps of 1 ms. Inside a `SeriesSpring` it needs
-    σ₁ or σ₂ above zero.
+    State: z. The step is exact at constant velocity, second order, and stable for any stiffness; it includes a reversal
+    within the step. Up to about σ₀ = 1e7 N/m, steps of 1 ms are possible in a car. Inside a `SeriesSpring` it needs σ₁
+    or σ₂ above zero.
 
     >>> law = LuGre(4e5, 300.0, 0.0, friction_force=40.0, breakaway_force=60.0, stribeck_velocity=0.01)
     >>> state = law.advance(0.0, 0.1, 0.01, 0.1, law.initial_state(), 0.1)
@@ -36,9 +36,9 @@ class LuGre(AbstractDamper):
     stiffness: Number = parameter("N/m", "σ₀, stiffness of the bristles", positive)
     contact_damping: Number = parameter("N s/m", "σ₁, damping of the bristles at rest", nonnegative)
     viscous_rate: Number = parameter("N s/m", "σ₂, viscous damping coefficient", nonnegative)
-    friction_force: Number = parameter("N", "F_c, friction of fast sliding", positive)
-    breakaway_force: Number = parameter("N", "F_s, friction of slow sliding", positive)
-    stribeck_velocity: Number = parameter("m/s", "v_s, velocity over which F_s falls to F_c", positive)
+    friction_force: Number = parameter("N", "F_c, friction at high sliding velocity", positive)
+    breakaway_force: Number = parameter("N", "F_s, friction at low sliding velocity", positive)
+    stribeck_velocity: Number = parameter("m/s", "v_s, velocity over which F_s decreases to F_c", positive)
 
     def traits(self) -> Traits:
         """No force at rest."""
@@ -49,7 +49,7 @@ class LuGre(AbstractDamper):
         return stribeck_force(v, self.friction_force, self.breakaway_force, self.stribeck_velocity)
 
     def initial_state(self) -> State:
-        """Bristles unbent."""
+        """No deflection of the bristles."""
         return jnp.zeros(1)
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
@@ -68,7 +68,7 @@ class LuGre(AbstractDamper):
     def advance(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
     ) -> State:
-        """Exact for a friction of sliding that is linear in the travel, before and after a reversal."""
+        """Exact for a sliding friction that is linear in the travel, before and after a reversal."""
         del x0, x1
         (z,) = own_states(self, state, 1)
         before, after = travels(v0, v1, dt)
@@ -87,7 +87,7 @@ class LuGre(AbstractDamper):
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "LuGre":
-        """Start values from measured data: c and friction of fast sliding; the bristles give over half a millimetre."""
+        """Start values from measured data: c and friction at high velocities; elastic deflection over 0.5 mm."""
         rate, level, _ = sliding_fit(velocity, force)
         slow = max(0.2 * float(np.max(np.abs(velocity))), 1e-6)
-        return cls(level / TYPICAL_GIVE, 0.1 * level / slow, rate, level, level, slow)
+        return cls(level / ELASTIC_TRAVEL, 0.1 * level / slow, rate, level, level, slow)

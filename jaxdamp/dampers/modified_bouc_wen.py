@@ -20,24 +20,24 @@ from jaxdamp.parameters import interval, nonnegative, parameter, positive, real,
 class ModifiedBoucWen(AbstractDamper):
     """F = c₁ ẏ + k₁ x + f₀, c₁ ẏ = c₀ ṙ + k₀ r + F_y z, r = x − y (Spencer et al. 1997; formula quoted from memory).
 
-    A `BoucWen` law over the inner stroke r, in series with the dashpot c₁, which makes the force fall off at small
-    velocities; beside both the accumulator, a spring k₁. Hysteresis as in `BoucWen`: z from −1 to 1, with yield
+    A `BoucWen` law over the inner stroke r, in series with the dashpot c₁, which reduces the force at low velocities;
+    parallel to both the accumulator, a spring k₁. Hysteresis as in `BoucWen`: z from −1 to 1, with yield
     displacement x_y, shape γ̂ and exponent n. At a constant voltage U the law has c₀ + c₀ᵤ U, c₁ + c₁ᵤ U, F_y + F_yᵤ U;
-    the first-order filter between the voltage commanded and U is not part of it. The accumulator relaxed at x₀ is
-    f₀ = −k₁ x₀; it is zero here unless given, so that the damper carries no force at rest. Passive at constant voltage.
+    the first-order filter between the commanded voltage and U is not included. If the accumulator is relaxed at x₀,
+    f₀ = −k₁ x₀; the default is zero, so that the damper has no force at rest. Passive at constant voltage.
 
-    States: r [m] and z. At a long constant velocity F tends to c₁ v with the time constant (c₀ + c₁)/k₀. The step is
-    the two-stage SDIRK method (second order, L-stable) with one monotone scalar equation for ṙ a stage: stable at any
-    step, as it must be, for the published set saturates within 0.02 mm.
+    States: r [m] and z. At constant velocity F tends to c₁ v with the time constant (c₀ + c₁)/k₀. The step is the
+    two-stage SDIRK method (second order, L-stable) with one monotone scalar equation for ṙ per stage. It is stable at
+    any step, which is necessary since the published set saturates within 0.02 mm.
 
     >>> law = ModifiedBoucWen.prototype(voltage=1.5)
     >>> round(float(law.yield_force + 1.5 * law.yield_force_per_volt), 1)
     761.4
     """
 
-    viscous_rate: Number = parameter("N s/m", "c₀, viscous damping beside the hysteresis", nonnegative)
+    viscous_rate: Number = parameter("N s/m", "c₀, viscous damping parallel to the hysteresis", nonnegative)
     series_rate: Number = parameter("N s/m", "c₁, dashpot in series", positive)
-    stiffness: Number = parameter("N/m", "k₀, stiffness beside the hysteresis", nonnegative)
+    stiffness: Number = parameter("N/m", "k₀, stiffness parallel to the hysteresis", nonnegative)
     yield_force: Number = parameter("N", "F_y, hysteretic force when saturated", positive)
     yield_displacement: Number = parameter("m", "x_y, inner travel from rest to F_y at the first slope", positive)
     shape: Number = parameter("", "γ̂ = γ/(β + γ), shape of the unloading", interval(0.5, 1.0), default=0.75)
@@ -56,7 +56,7 @@ class ModifiedBoucWen(AbstractDamper):
         return viscous, series, self.yield_force + self.yield_force_per_volt * self.voltage
 
     def inner_velocity(self, v: ScalarLike, stroke: Scalar, z: Scalar) -> Scalar:
-        """ṙ [m/s], at which dashpot and hysteresis carry the same force."""
+        """ṙ [m/s] for which dashpot and hysteresis have the same force."""
         viscous, series, level = self.at_voltage()
         return (series * v - self.stiffness * stroke - level * z) / (viscous + series)
 
@@ -79,7 +79,7 @@ class ModifiedBoucWen(AbstractDamper):
         return jnp.stack([w, hysteresis_rate(w / self.yield_displacement, z, self.shape, self.exponent)])
 
     def _stage(self, v: ScalarLike, stroke: Scalar, z: Scalar, duration: ScalarLike) -> Scalar:
-        """The inner velocity ṙ [m/s] that, held for the duration, ends where the forces balance."""
+        """The constant inner velocity ṙ [m/s] for which the forces balance at the end of the stage."""
         viscous, series, level = self.at_voltage()
 
         def surplus(w: Scalar) -> Scalar:
@@ -114,8 +114,8 @@ class ModifiedBoucWen(AbstractDamper):
     def prototype(cls, voltage: float = 0.0) -> "ModifiedBoucWen":
         """The prototype damper of Spencer et al. (1997), 0 to 2.25 V.
 
-        The numbers are quoted from memory and not verified: α = 14 000 + 69 500 U N/m, A = 301, β = γ = 3.63e6 m⁻²,
-        n = 2 and so on. The accumulator's offset x₀ = 0.143 m is left out; `static_force=-71.5` would be it.
+        The parameters are quoted from memory and not verified: α = 14 000 + 69 500 U N/m, A = 301, β = γ = 3.63e6 m⁻²,
+        n = 2 and so on. The accumulator offset x₀ = 0.143 m is not included; it corresponds to `static_force=-71.5`.
         """
         slope, size = 301.0, 3.63e6 + 3.63e6
         largest = math.sqrt(slope / size)
@@ -136,7 +136,7 @@ class ModifiedBoucWen(AbstractDamper):
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "ModifiedBoucWen":
-        """Start values from measured data: as for `BoucWen`, with a dashpot in series that hardly moves."""
+        """Start values from measured data: as for `BoucWen`, with a very stiff series dashpot."""
         rate, level, offset = sliding_fit(velocity, force)
         series = max(20.0 * rate, 5.0 * level / max(float(np.max(np.abs(velocity))), 1e-6))
         return cls(rate, series, rate, level, 1e-3, accumulator_stiffness=0.1 * rate, static_force=offset)

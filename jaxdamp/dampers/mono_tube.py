@@ -1,4 +1,4 @@
-"""The mono-tube damper: oil on both sides of a piston, gas behind the oil."""
+"""The mono-tube damper: oil on both sides of a piston, gas at the end of the tube."""
 
 from typing import final
 
@@ -19,14 +19,14 @@ from jaxdamp.parameters import parameter, positive, setting
 
 
 def oil_stiffness(x: ScalarLike, bulk_modulus: ScalarLike, area: ScalarLike, volume: ScalarLike) -> Scalar:
-    """B A/(V_r − A x) [Pa/m], rise of the oil's pressure with its deflection; V_r − A x is 5 % of V_r or more."""
+    """B A/(V_r − A x) [Pa/m], increase of the oil pressure with its deflection; V_r − A x is 5 % of V_r or more."""
     return bulk_modulus * area / at_least(volume - area * x, LEAST_SHARE * volume)
 
 
 def stroke_within(
     share: float, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, dt: ScalarLike
-) -> Scalar:
-    """Stroke [m] at a share of a step over which the velocity goes straight from v₀ to v₁."""
+) -> ScalarLike:
+    """Stroke [m] at a fraction of a step over which the velocity is linear from v₀ to v₁."""
     return x0 + share * (x1 - x0) - 0.5 * share * dt * (1.0 - share) * (v1 - v0)
 
 
@@ -34,38 +34,38 @@ def stroke_within(
 class MonoTube(AbstractDamper):
     """F = A (p_r − p_c) − (p_c − p_atm) A_r + F_c tanh(v/v_f), p_r and p_c the pressures above and below the piston.
 
-    Three laws in one housing: the `piston` of annular area A with bleed, leak and valves, the `gas` behind the oil on
-    the rod's area A_r, the `friction` of the seal; and oil of bulk modulus B between them:
+    It combines three laws: the `piston` of annular area A with bleed, leak and valves, the `gas`, which acts on the rod
+    area A_r, and the `friction` of the seal; with oil of bulk modulus B between them:
 
         ė = v − Q(p_r − p_c)/A                                       deflection e [m], the only state
         p_r = max(p₀ + B A e/(V_r − A x), p_v)                       oil above the piston, or a cavity
         p_c = p₀ (V_g/(V_g + A_r x + A e))ⁿ                          gas, and the oil below the piston
 
-    e is the part of the stroke that the oil above the piston has taken up by compression, x − e the part that has
-    flowed. Both pressures are balances of volume, so no oil is ever lost. (The usual equations for p_r and p_c, with
-    one volume flow out of one chamber and into the other, lose oil at the rate of the dissipated power over B: with
-    `reference()` at 12 Hz and 10 mm 1.3 cm³/s of the 60 cm³ of gas.) A cavity opens where p_r would fall below p_v, as
-    in fast compression, and closes when the oil has come back. The oil below the piston is taken as stiff: beside the
-    gas its compliance is below 1 % and could not be seen.
+    e is the part of the stroke due to compression of the oil above the piston, x − e the part due to flow. Both
+    pressures follow from balances of volume, so no oil is lost. (The usual equations for p_r and p_c, with one volume
+    flow out of one chamber and into the other, lose oil at the rate of the dissipated power over B: with `reference()`
+    at 12 Hz and 10 mm 1.3 cm³/s of the 60 cm³ of gas.) A cavity opens where p_r would fall below p_v, as in fast
+    compression, and closes when the oil has returned. The oil below the piston is assumed to be stiff: its compliance
+    is below 1 % of that of the gas.
 
-    At rest the gas pushes the rod out, as in `GasSpring` (`relative` of the gas leaves that force out). Slow strokes
-    find the stiffness n p₀ A_r²/V_g and no hysteresis but friction; hysteresis grows with frequency, as that of a
-    `SeriesSpring` of B A²/(V_r − A x) that stiffens with the stroke.
+    At rest the gas pushes the rod out, as in `GasSpring` (`relative` of the gas subtracts this force). In slow motion
+    the law has the stiffness n p₀ A_r²/V_g and only the hysteresis of the friction; hysteresis increases with
+    frequency, as with a `SeriesSpring` of stiffness B A²/(V_r − A x).
 
-    The step is the two-stage SDIRK method (second order, L-stable) with one monotone scalar equation a stage: stable
-    at any step. Steps of 1 ms are good to 0.3 % of the peak force (RMS, `reference()`, 12.5 Hz, 10 mm): the front of
-    the force after a reversal takes about 1 ms. Where a cavity closes within a step they are good to 3 % only (20 mm),
-    steps of 0.25 ms to 0.03 %: take `substeps=4` on the rig, or `dt=2.5e-4` in a vehicle. A vehicle divides
-    longer steps, and warns where the error shows.
+    The step is the two-stage SDIRK method (second order, L-stable) with one monotone scalar equation per stage: stable
+    at any step. With steps of 1 ms the error is 0.3 % of the peak force (RMS, `reference()`, 12.5 Hz, 10 mm): the front
+    of the force after a reversal takes about 1 ms. If a cavity closes within a step the error is 3 % (20 mm), with
+    steps of 0.25 ms 0.03 %: use `substeps=4` in `respond`, or `dt=2.5e-4` in a vehicle. Simulations of vehicles divide
+    longer steps, and warn if the error is significant.
 
-    Valid within `stroke_limits`, which `respond` insists on; beyond, the chamber above the piston keeps 5 % of its
-    volume and the gas its tangent, so that forces stay finite. Stops are other laws: add a `BumpStop`.
+    Valid within `stroke_limits`, which `respond` enforces; outside, the chamber above the piston has 5 % of its volume
+    and the gas pressure follows its tangent, so that forces are finite. For stops, add a `BumpStop`.
 
-    A fit cannot tell B from V_r, nor n from p₀ and V_g without slow tests over the whole stroke: geometry is fixed, and
-    `freeze=["gas.*"]` keeps the charge. B shows in the hysteresis at the highest frequencies only. Fit
+    A fit cannot distinguish B from V_r, nor n from p₀ and V_g without slow tests over the whole stroke: geometry is not
+    fitted, and `freeze=["gas.*"]` holds the gas charge. B affects the hysteresis at the highest frequencies only. Fit
     `incompressible()` to slow records first: it is the same `piston`, `gas` and `friction`.
 
-    Equations after Talbott and Starkey (SAE 2002-01-3337), quoted at second hand.
+    Equations after Talbott and Starkey (SAE 2002-01-3337), from a secondary source.
 
     >>> law = MonoTube.reference()
     >>> round(float(law.force(0.0, 0.0, law.initial_state())), 2)
@@ -82,7 +82,7 @@ class MonoTube(AbstractDamper):
     cavitation_pressure: Number = setting("Pa", "p_v, absolute pressure of a cavity", positive, default=1e5)
 
     def traits(self) -> Traits:
-        """The pressures are states; the seal's friction alone cannot match the force of a spring."""
+        """The pressures are states; the friction of the seal alone cannot balance the force of a spring."""
         return super().traits()._replace(has_feed_through=False)
 
     def __check_init__(self) -> None:
@@ -105,7 +105,7 @@ class MonoTube(AbstractDamper):
         return at_least(gas.pressure + rise, self.cavitation_pressure), below
 
     def _gas_stroke(self, x: ScalarLike, deflection: ScalarLike) -> Scalar:
-        """Stroke [m] at which the rod alone would leave the gas the volume that it has."""
+        """Stroke [m] at which the rod alone would give the present gas volume."""
         return x + self.piston.area * deflection / self.gas.rod_area
 
     def _drop(self, x: ScalarLike, deflection: ScalarLike) -> Scalar:
@@ -114,7 +114,7 @@ class MonoTube(AbstractDamper):
         return above - below
 
     def initial_state(self) -> State:
-        """All oil at the pressure of the charge."""
+        """All oil at the pressure of the gas charge."""
         return jnp.zeros(1)
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
@@ -130,12 +130,12 @@ class MonoTube(AbstractDamper):
         return (v - self.piston.flow_velocity(self.piston.root(drop), self.piston.valve(drop >= 0)))[None]
 
     def _flow(self, x: ScalarLike, free: Scalar, duration: ScalarLike) -> Scalar:
-        """Q/A [m/s] that, held for the duration, ends where it is driven by the pressures.
+        """Q/A [m/s] of an implicit step: the flow that the pressures at its end cause.
 
         Arguments:
             x: stroke at the end [m].
-            free: deflection at the end if nothing flowed [m].
-            duration: [s].
+            free: deflection at the end without flow [m].
+            duration: duration of the step [s].
         """
         above, below = self.pressures(x, free)
         valve = self.piston.valve(above >= below)
@@ -144,7 +144,7 @@ class MonoTube(AbstractDamper):
             ahead = free - duration * self.piston.flow_velocity(root, valve)
             return self.piston.drop(root) - self._drop(x, ahead)
 
-        # The flow lowers the drop that drives it: S lies between zero and that of a piston without openings.
+        # The flow reduces the pressure drop that causes it: S is between zero and the value without flow.
         most = self.piston.root(above - below)
         zero = jnp.zeros_like(most)
         lower, upper = at_most(most, zero), at_least(most, zero)
@@ -172,7 +172,7 @@ class MonoTube(AbstractDamper):
 
     @classmethod
     def reference(cls) -> "MonoTube":
-        """A passenger car's damper of 46/11 mm, a typical set of numbers that is quoted but was not measured.
+        """A passenger car damper of 46/11 mm: typical numbers from literature, not measured.
 
         C_d A_b with C_d = 0.7 and A_b = 1.6 mm², valves from 1.2 MPa (rebound) and 0.5 MPa (compression), 2 MPa of gas.
         """

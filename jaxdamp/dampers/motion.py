@@ -1,4 +1,4 @@
-"""What a law goes through in use: the channels that are compared with the range it was fitted to."""
+"""The motion of a law in use: channels that are compared with its fitted range."""
 
 import dataclasses
 from typing import Any, final
@@ -13,7 +13,7 @@ Samples = Float[np.ndarray, " samples"]
 @final
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """Stroke, velocity and force of a law at uniformly spaced instants; `None` for what is not known.
+    """Stroke, velocity and force of a law at uniformly spaced times; `None` for unknown channels.
 
     Arguments:
         stroke: [m], positive in extension, shape (samples,).
@@ -33,7 +33,7 @@ class Motion:
         return dataclasses.replace(self, stroke=stroke, velocity=velocity)
 
     def divided(self, factor: Any) -> "Motion":
-        """The force divided by a factor (not known where the factor is zero)."""
+        """The force divided by a factor (unknown if the factor is zero)."""
         return self.with_force(None if self.force is None or float(factor) == 0.0 else self.force / float(factor))
 
     def with_force(self, force: Samples | None) -> "Motion":

@@ -1,4 +1,4 @@
-"""A damper that moves less, or more, than the point it is referred to."""
+"""A damper with a motion ratio to the wheel."""
 
 from typing import final
 
@@ -30,7 +30,7 @@ class MotionRatio(AbstractWrapper):
 
     @property
     def stroke_limits(self) -> tuple[ScalarLike, ScalarLike]:
-        """Strokes [m] at the wheel within which the damper holds."""
+        """Strokes [m] at the wheel within which the damper law is valid."""
         low, high = self.law.stroke_limits
         return low / self.ratio, high / self.ratio
 

@@ -1,4 +1,4 @@
-"""Hysteresis learnt by a small network, passive whatever its weights are."""
+"""Hysteresis learnt by a small neural network, passive for any weights."""
 
 from typing import final
 
@@ -32,21 +32,21 @@ def rounded_speed(v: ScalarLike, width: ScalarLike) -> Scalar:
 
 @final
 class NeuralHysteresis(AbstractDamper):
-    """F = Σ zᵢ, żᵢ = kᵢ v − ρᵢ(v, z) zᵢ: springs that let go at rates ρᵢ ≥ 0 which a network has learnt.
+    """F = Σ zᵢ, żᵢ = kᵢ v − ρᵢ(v, z) zᵢ: springs that relax at rates ρᵢ ≥ 0 given by a neural network.
 
-    Each of n elements is a spring kᵢ in series with something that yields. It yields with travel, as friction does,
-    and with time, as a dashpot does, and the network says how fast:
+    Each of the n elements is a spring kᵢ in series with an element that yields: with travel, like friction, and with
+    time, like a dashpot. The network gives the rates:
 
         ρᵢ = (kᵢ/F₀) (αᵢ |v| + βᵢ v₀),   (α, β) = softplus(W₂ tanh(W₁ [v/v₀, z/F₀] + b₁) + b₂).
 
-    A constant β is a Maxwell element, a constant α is Dahl's friction, both depending on v and z give the loops in
-    between. **Passive by construction**: the springs store E = Σ zᵢ²/2kᵢ and Ė = F v − Σ ρᵢ zᵢ²/kᵢ, so the law can
-    give back only what was put in, for any weights, also far outside the data. v₀ and F₀ are the velocity and the
-    force to which the network is scaled. |v| is rounded within 0.01 v₀.
+    A constant β is a Maxwell element, a constant α is Dahl friction; functions of v and z give other loops. **Passive
+    by construction**: the springs store E = Σ zᵢ²/2kᵢ and Ė = F v − Σ ρᵢ zᵢ²/kᵢ, so the law can return only stored
+    energy, for any weights and also far outside the data. v₀ and F₀ scale the inputs of the network. |v| is rounded
+    within 0.01 v₀.
 
     States: zᵢ [N]. The step is exact for constant rates and of second order otherwise; as ρᵢ ≥ 0 it is bounded and
     stable for any step. Fit it with `identify.train` (gradient descent with early stopping) or, while it has up to
-    about a hundred numbers, with `identify.fit`. The weights have no physical meaning: their errors tell nothing.
+    about a hundred parameters, with `identify.fit`. The weights and their standard errors have no physical meaning.
 
     >>> law = NeuralHysteresis.random(jax.random.key(0), elements=2, width=4, velocity_scale=0.3, force_scale=900.0)
     >>> law.initial_state().shape, law.hidden_weights.shape
@@ -58,8 +58,8 @@ class NeuralHysteresis(AbstractDamper):
     hidden_biases: Vector = parameter("", "b₁, of the hidden layer", weight)
     output_weights: Float[Array, "outputs width"] = parameter("", "W₂, from the hidden layer to α and β", weight)
     output_biases: Vector = parameter("", "b₂, of α and β", weight)
-    velocity_scale: Number = setting("m/s", "v₀, velocity that the network sees as one", positive)
-    force_scale: Number = setting("N", "F₀, force that the network sees as one", positive)
+    velocity_scale: Number = setting("m/s", "v₀, velocity scale of the network", positive)
+    force_scale: Number = setting("N", "F₀, force scale of the network", positive)
 
     def __check_init__(self) -> None:
         n, width = self.stiffness.size, self.hidden_biases.size
@@ -76,9 +76,9 @@ class NeuralHysteresis(AbstractDamper):
         return Traits(has_feed_through=False, stroke_dependent_at_rest=False)
 
     def relaxation(self, v: ScalarLike, forces: State) -> State:
-        """ρᵢ [1/s], the rates at which the elements let go, never negative."""
-        seen = jnp.concatenate([jnp.asarray(v / self.velocity_scale)[None], forces / self.force_scale])
-        hidden = jnp.tanh(self.hidden_weights @ seen + self.hidden_biases)
+        """ρᵢ [1/s], the relaxation rates of the elements, never negative."""
+        inputs = jnp.concatenate([jnp.asarray(v / self.velocity_scale)[None], forces / self.force_scale])
+        hidden = jnp.tanh(self.hidden_weights @ inputs + self.hidden_biases)
         with_travel, with_time = jnp.split(jax.nn.softplus(self.output_weights @ hidden + self.output_biases), 2)
         speed = rounded_speed(v, _ROUNDING * self.velocity_scale)
         return self.stiffness / self.force_scale * (with_travel * speed + with_time * self.velocity_scale)
@@ -101,7 +101,7 @@ class NeuralHysteresis(AbstractDamper):
     def advance(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
     ) -> State:
-        """Two exponential steps: to the middle with the rates of the start, then all the way with those found there."""
+        """Two exponential steps: to the midpoint with the initial rates, then the whole with those of the midpoint."""
         del x0, x1
         forces = jnp.stack(own_states(self, state, self.stiffness.size))
         mean = 0.5 * (v0 + v1)
@@ -119,15 +119,15 @@ class NeuralHysteresis(AbstractDamper):
         force_scale: ScalarLike,
         stiffness: ScalarLike | None = None,
     ) -> "NeuralHysteresis":
-        """A start for training, its weights drawn by the key (`jax.random.key(0)`).
+        """A start for training with random weights from a key, such as `jax.random.key(0)`.
 
         Arguments:
             key: the same key gives the same weights.
-            elements: n, springs side by side.
-            width: hidden units.
+            elements: n, number of parallel springs.
+            width: number of hidden units.
             velocity_scale: v₀ [m/s], about the RMS velocity of the records.
             force_scale: F₀ [N], about their RMS force.
-            stiffness: kᵢ [N/m], the first; F₀ over 3 ms at v₀ if it is left out. Each further one is a third.
+            stiffness: k₁ [N/m]; if left out, F₀/(3 ms v₀). Each further stiffness is a third of the previous one.
         """
         for name, count in (("elements", elements), ("width", width)):
             if count < 1:

@@ -1,4 +1,4 @@
-"""Several slopes between knots."""
+"""A piecewise-linear force-velocity curve."""
 
 from typing import final
 
@@ -40,8 +40,8 @@ class PiecewiseLinear(AbstractMemoryless):
 
     def __check_init__(self) -> None:
         if self.knots.ndim != 1 or self.slopes.shape != (self.knots.size + 1,):
-            must = "hold one slope more than there are knots"
-            _checks.refuse("slopes", must, f"of shape {self.slopes.shape} beside knots of shape {self.knots.shape}")
+            must = "have one entry more than `knots`"
+            _checks.refuse("slopes", must, f"of shape {self.slopes.shape} for knots of shape {self.knots.shape}")
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
@@ -52,7 +52,7 @@ class PiecewiseLinear(AbstractMemoryless):
         """Start values from measured data: knots closer together towards zero, slopes by least squares."""
         velocity, force = np.asarray(velocity), np.asarray(force)
         knots = velocity_grid(velocity, knots_a_side + 1)[1:-1]
-        knots = np.delete(knots, knots_a_side)  # the kink at zero is left to the two innermost knots
+        knots = np.delete(knots, knots_a_side)  # no knot at zero: the two innermost knots describe the kink there
         columns = [velocity] + [np.maximum(velocity - k, 0.0) - max(-k, 0.0) for k in knots]
         jumps = np.linalg.lstsq(np.stack(columns, axis=1), force, rcond=None)[0]
         slopes = np.cumsum(jumps)

@@ -1,4 +1,4 @@
-"""Oil through a damper's piston: bleed, leak and a spring-loaded valve for each direction."""
+"""Oil flow through a damper piston: bleed, leak and a spring-loaded valve for each direction."""
 
 from typing import NamedTuple, final
 
@@ -38,16 +38,16 @@ class Valve(NamedTuple):
 
 @final
 class PistonFlow(AbstractMemoryless):
-    """F = A Δp, the pressure drop Δp that drives the flow Q(Δp) = A v through the piston; no gas, no compressibility.
+    """F = A Δp with the pressure drop Δp of the flow Q(Δp) = A v through the piston; no gas, no compressibility.
 
-    Q = C_d √(2/ρ) (A_b + A_v) S + k_l Δp with S = Δp/(Δp² + ε²)^¼, a square root whose slope is finite at zero: below
-    ε the orifices are laminar. The valve area is A_v = A_max tanh((|Δp| − p_o)/(k A_max)), and zero below the opening
+    Q = C_d √(2/ρ) (A_b + A_v) S + k_l Δp with S = Δp/(Δp² + ε²)^¼, a square root with a finite slope at zero: below ε
+    the orifice flow is laminar. The valve area is A_v = A_max tanh((|Δp| − p_o)/(k A_max)), and zero below the opening
     pressure p_o; one valve opens for Δp > 0 (rebound), another for Δp < 0 (compression). The force is continuous, with
-    kinks where a valve opens, and grows with v: passive. After Talbott and Starkey (SAE 2002-01-3337), quoted at second
-    hand.
+    kinks where a valve opens, and increases with v, so the law is passive. After Talbott and Starkey (SAE
+    2002-01-3337), from a secondary source.
 
-    Only C_d √(2/ρ) times an area shows in a test, so C_d and ρ are settings and the areas are fitted. A valve shows
-    in records whose forces exceed A p_o, its largest area only where it is nearly open.
+    A test determines only the product of C_d √(2/ρ) and an area, so C_d and ρ are settings and the areas are fitted. A
+    valve is determined only by records with forces above A p_o, its largest area only if it is nearly fully open.
 
     The unknown of the equation is S, in which the flow through the bleed is linear; derivatives come from the implicit
     function theorem.
@@ -70,7 +70,7 @@ class PistonFlow(AbstractMemoryless):
     leak: Number = parameter("m³/s/Pa", "k_l, laminar leak past the piston", nonnegative, default=0.0)
     density: Number = setting("kg/m³", "ρ, of the oil", positive, default=850.0)
     discharge: Number = setting("", "C_d, discharge coefficient", positive, default=0.7)
-    transition_pressure: Number = setting("Pa", "ε, below which orifices are laminar", positive, default=1e3)
+    transition_pressure: Number = setting("Pa", "ε, drop below which orifice flow is laminar", positive, default=1e3)
 
     def valve(self, rebound: Bool[Array, ""]) -> Valve:
         """The valve that opens in a direction."""
@@ -103,7 +103,7 @@ class PistonFlow(AbstractMemoryless):
         v = jnp.asarray(v)
         speed, valve = jnp.abs(v), self.valve(v >= 0)
         most = speed / self._per_root(self.bleed_area)  # through the bleed alone
-        # A guess that is right in the leading digit: all through the valve, part open or open, or through the leak.
+        # A first estimate, correct in the leading digit: all flow through the valve, partly or fully open, or the leak.
         cube = speed * valve.stiffness / self._per_root(1.0)
         guess = jnp.sqrt(valve.opening + at_most(cube / jnp.sqrt(valve.opening), jnp.cbrt(cube) ** 2))
         guess = at_least(guess, speed / self._per_root(self.bleed_area + valve.largest))

@@ -14,22 +14,22 @@ from jaxdamp.parameters import around_zero, as_float, parameter, setting
 
 @final
 class Polynomial(AbstractMemoryless):
-    """F = Σⱼ aⱼ vʲ, j = 1 … n, inside a stated range of velocities; beyond it along the tangent at its end.
+    """F = Σⱼ aⱼ vʲ, j = 1 … n, inside a given range of velocities; outside along the tangents at its ends.
 
-    A polynomial says nothing outside the data it was fitted to: the range keeps it finite there. It is passive only
-    where its coefficients make it so.
+    A polynomial is not valid outside the data it was fitted to; the tangents prevent extreme values there. Whether it
+    is passive depends on its coefficients.
 
     Arguments:
-        coefficients: a₁ … aₙ, each the share of the force [N] at 1 m/s, shape (n,).
-        velocity_range: lowest and highest velocity [m/s] where the polynomial holds.
+        coefficients: a₁ … aₙ, contributions to the force [N] at 1 m/s, shape (n,).
+        velocity_range: lowest and highest velocity [m/s] where the polynomial is valid.
 
     >>> law = Polynomial(coefficients=[1500.0, 200.0, -300.0], velocity_range=(-1.0, 1.0))
     >>> round(float(law.force_velocity(0.5)), 6), round(float(law.force_velocity(2.0)), 6)
     (762.5, 2400.0)
     """
 
-    coefficients: Vector = parameter("N", "shares of the force at 1 m/s, by power", linear=True)
-    velocity_range: Vector = setting("m/s", "range where the polynomial holds", around_zero)
+    coefficients: Vector = parameter("N", "contributions to the force at 1 m/s, by power", linear=True)
+    velocity_range: Vector = setting("m/s", "range where the polynomial is valid", around_zero)
 
     def __init__(
         self,

@@ -34,7 +34,7 @@ def saturating_force(
     v: ScalarLike, level: ScalarLike, rate: ScalarLike, high_rate: ScalarLike, shape: str = "tanh"
 ) -> Scalar:
     """F_s g(c₀ v/F_s) + c_∞ v [N] with the level F_s [N], the slopes c₀ and c_∞ [N s/m], and g by its name."""
-    return level * SHAPES[shape](rate * v / level) + high_rate * v
+    return level * SHAPES[shape](jnp.asarray(rate * v / level)) + high_rate * v
 
 
 @final

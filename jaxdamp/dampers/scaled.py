@@ -19,8 +19,8 @@ class Scaled(AbstractWrapper):
 
     Arguments:
         law: the law.
-        factor: not negative: it would turn a damper into a drive, F v ≤ 0.
-        allow_active: accept a negative factor, as in studies of stability: `Scaled(law, -2.0, allow_active=True)`.
+        factor: factor on the force, not negative: a negative one would add energy to the motion, F v ≤ 0.
+        allow_active: accept a negative factor, for example for stability studies.
     """
 
     law: AbstractDamper
@@ -30,7 +30,7 @@ class Scaled(AbstractWrapper):
     def __check_init__(self) -> None:
         factor = _checks.concrete(self.factor)
         if factor is not None and np.any(factor < 0) and not self.allow_active:
-            remedy = "It makes the law drive the motion. If that is meant: `Scaled(law, factor, allow_active=True)`."
+            remedy = "The law would add energy. If this is intended: `Scaled(law, factor, allow_active=True)`."
             _checks.refuse("factor", "not be negative", factor, remedy)
 
     def is_linear_in_law(self) -> bool:
@@ -38,7 +38,7 @@ class Scaled(AbstractWrapper):
         return True
 
     def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
-        """The same motion at a force that is smaller by the factor."""
+        """The same motion with the force divided by the factor."""
         return [(self.law, motion.divided(self.factor))]
 
     def outer_force(self, force: Scalar) -> Scalar:

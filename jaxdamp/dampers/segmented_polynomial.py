@@ -25,12 +25,12 @@ class SegmentedPolynomial(AbstractMemoryless):
 
     The paper's 21 coefficients belong to the segments v ≤ v₁ (5), v₁ < v ≤ v₂ (3), v₂ < v ≤ 0 (5), 0 < v ≤ v₄ (3) and
     v > v₄ (5). Fitted freely they jump at v₁, v₂, 0 and v₄. Here the four conditions of continuity and F(0) = 0 hold
-    by construction: each segment starts at the value where its inner neighbour ends, which leaves 16 coefficients
-    (`coefficients()` gives the paper's 21). Each coefficient is the share of its power in the force [N] one segment
-    length away from the segment's start, so all are of one magnitude. The paper says "4th and 3rd order" but prints
-    4th and 2nd; the printed formulas are used.
+    by construction: each segment starts at the end value of its inner neighbour, which leaves 16 coefficients
+    (`coefficients()` gives the 21 of the paper). Each coefficient is the contribution of its power to the force [N] one
+    segment length away from the start of the segment, so all have similar magnitude. The paper says "4th and 3rd order"
+    but prints 4th and 2nd; the printed formulas are used.
 
-    Valid in `velocity_range`; beyond it the law goes on along its tangent, because quartics run away.
+    Valid in `velocity_range`; outside it the law follows its tangent, because quartics grow fast there.
 
     Arguments:
         compression_knots: v₁ < v₂ < 0 [m/s].
@@ -40,7 +40,7 @@ class SegmentedPolynomial(AbstractMemoryless):
         shares_high_compression: powers 1-4 of (v − v₁)/|v₁| on v ≤ v₁ [N].
         shares_low_rebound: powers 1-2 of v/v₄ on 0 < v ≤ v₄ [N].
         shares_high_rebound: powers 1-4 of (v − v₄)/v₄ on v > v₄ [N].
-        velocity_range: lowest and highest velocity [m/s] where the law holds.
+        velocity_range: lowest and highest velocity [m/s] where the law is valid.
     """
 
     compression_knots: Vector = parameter("m/s", "velocities v₁ < v₂ < 0", increasing_negative)
@@ -50,7 +50,7 @@ class SegmentedPolynomial(AbstractMemoryless):
     shares_high_compression: Vector = parameter("N", "shares by power on v ≤ v₁", linear=True)
     shares_low_rebound: Vector = parameter("N", "shares by power on 0 < v ≤ v₄", linear=True)
     shares_high_rebound: Vector = parameter("N", "shares by power on v > v₄", linear=True)
-    velocity_range: Vector = setting("m/s", "range where the law holds", around_zero, default=(-2.0, 2.0))
+    velocity_range: Vector = setting("m/s", "range where the law is valid", around_zero, default=(-2.0, 2.0))
 
     def __check_init__(self) -> None:
         sizes = {"compression_knots": 2, "shares_low_compression": 4, "shares_mid_compression": 2}
@@ -62,7 +62,7 @@ class SegmentedPolynomial(AbstractMemoryless):
         arrays = (self.compression_knots, self.rebound_knot, self.velocity_range)
         v1, v4, reach = (_checks.concrete(a) for a in arrays)
         if v1 is not None and v4 is not None and reach is not None and not (reach[0] <= v1[0] and v4 <= reach[1]):
-            _checks.refuse("velocity_range", f"hold the knots {v1} and {v4} m/s", reach, "Widen it to the data's.")
+            _checks.refuse("velocity_range", f"hold the knots {v1} and {v4} m/s", reach, "Widen it to the data.")
 
     def _segments(self, v: ScalarLike) -> Scalar:
         v1, v2, v4 = self.compression_knots[0], self.compression_knots[1], self.rebound_knot
@@ -106,7 +106,7 @@ class SegmentedPolynomial(AbstractMemoryless):
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "SegmentedPolynomial":
         """Knots at a third and a tenth of the peak velocities, coefficients by least squares on the data."""
         velocity, force = np.asarray(velocity), np.asarray(force)
-        least = 1e-3 * float(np.abs(velocity).max())  # a side without data still has its segments
+        least = 1e-3 * float(np.abs(velocity).max())  # segments are needed even on a side without data
         low, high = min(float(velocity.min()), -least), max(float(velocity.max()), least)
         v1, v2, v4 = 0.4 * low, 0.1 * low, 0.15 * high
 

@@ -12,12 +12,12 @@ from jaxdamp.parameters import nonnegative, parameter, positive
 class SeriesSpring(AbstractSeries):
     """F = k₁ x_s + k₂ x_s³ = F_law(v_d), x = x_d + x_s: the spring and the law carry the same force (paper 001).
 
-    State: the spring's deflection x_s [m] (then the law's own states), ẋ_s = v − v_d. The law must resist more the
-    faster it moves. The step is the two-stage SDIRK method (second order, L-stable): each stage solves one monotone
-    scalar equation for v_d, so a spring of any stiffness is stable at any step, and derivatives come from the implicit
-    function theorem. A linear law with coefficient c is the Maxwell element of time constant c/k₁.
+    State: the deflection x_s [m] of the spring (then the states of the law), ẋ_s = v − v_d. The force of the law must
+    increase with its velocity. The step is the two-stage SDIRK method (second order, L-stable): each stage solves one
+    monotone scalar equation for v_d, so a spring of any stiffness is stable at any step, and derivatives come from the
+    implicit function theorem. A linear law with coefficient c is the Maxwell element of time constant c/k₁.
 
-    Paper 001 publishes k₁ = 150 N/mm, which puts the corner of the damper at 1.6 Hz; ten times that is plausible.
+    Paper 001 gives k₁ = 150 N/mm, with which the corner frequency of the damper is 1.6 Hz; ten times k₁ is plausible.
 
     >>> import jax.numpy as jnp
     >>> from jaxdamp.dampers import Linear
@@ -39,6 +39,6 @@ class SeriesSpring(AbstractSeries):
         return (self.stiffness + self.cubic_stiffness * deflection * deflection) * deflection
 
     def largest_deflection(self, force: Scalar, begun: Deflections) -> Scalar:
-        """That [m] of the linear part alone."""
+        """Deflection [m] of the linear part alone."""
         del begun
         return force / self.stiffness

@@ -1,4 +1,4 @@
-"""A linear spring with a preload, the elastic part that a bench finds beside the damping."""
+"""A linear spring with a preload, for the elastic part of the force in bench records."""
 
 from typing import final
 
@@ -12,21 +12,21 @@ from jaxdamp.parameters import nonnegative, parameter
 
 @final
 class Spring(AbstractStateless):
-    """F = k x + f₀: a stiffness beside the damper and the force at stroke zero.
+    """F = k x + f₀: a stiffness parallel to the damper and the force at stroke zero.
 
-    A gas pocket over small strokes, an accumulator, seals that give, or the offset of a load cell. It takes in no
-    energy over a cycle. f₀ < 0 pushes the rod out. `GasSpring` follows the pressure over the whole stroke.
+    For a gas volume over small strokes, an accumulator, elastic seals, or the offset of a load cell. It dissipates no
+    energy. f₀ < 0 pushes the rod out. For the gas pressure over the whole stroke use `GasSpring`.
 
     >>> law = Spring(stiffness=2000.0, preload=-150.0)
     >>> float(law.force(0.01, 0.0, law.initial_state()))
     -130.0
     """
 
-    stiffness: Number = parameter("N/m", "k, stiffness beside the damper", nonnegative, linear=True)
+    stiffness: Number = parameter("N/m", "k, stiffness parallel to the damper", nonnegative, linear=True)
     preload: Number = parameter("N", "f₀, force at rest at stroke zero", linear=True, default=0.0)
 
     def traits(self) -> Traits:
-        """The velocity does not matter."""
+        """Independent of the velocity."""
         return super().traits()._replace(has_feed_through=False)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
@@ -36,7 +36,7 @@ class Spring(AbstractStateless):
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray, stroke: np.ndarray) -> "Spring":
-        """Start values from measured data: what of the force goes with the stroke, beside what goes with v."""
+        """Start values from measured data: the part of the force proportional to the stroke, by least squares."""
         velocity, force, stroke = np.asarray(velocity), np.asarray(force), np.asarray(stroke)
         columns = np.stack([stroke, np.ones_like(stroke), velocity, np.sign(velocity)], axis=1)
         stiffness, preload = np.linalg.lstsq(columns, force, rcond=None)[0][:2]

@@ -1,4 +1,4 @@
-"""A damper that changes along its stroke: hydraulic stops, grooves in the tube, tables over stroke and velocity."""
+"""A damper that depends on its stroke: hydraulic stops, grooves in the tube, tables over stroke and velocity."""
 
 from collections.abc import Sequence
 from typing import final
@@ -23,7 +23,7 @@ Grid = Float[Array, "strokes velocities"] | Float[np.ndarray, "strokes velocitie
 
 
 def _forces(laws: tuple[AbstractDamper, ...], x: ScalarLike, v: ScalarLike) -> Float[Array, " laws"]:
-    """Forces [N] of the laws; those that differ in their numbers only, as in a table, are computed as one batch."""
+    """Forces [N] of the laws; laws that differ only in their parameters are computed as one batch."""
     laws = without_fitted_ranges(laws)
     kinds = {(jax.tree.structure(law), tuple(jnp.shape(a) for a in jax.tree.leaves(law))) for law in laws}
     if len(kinds) > 1:
@@ -34,18 +34,18 @@ def _forces(laws: tuple[AbstractDamper, ...], x: ScalarLike, v: ScalarLike) -> F
 
 @final
 class StrokeDependent(AbstractStateless):
-    """F(x, v) between laws Fₖ(v) that hold at strokes xₖ: straight lines in x from each to the next.
+    """F(x, v): linear interpolation over the stroke x between laws Fₖ(v) given at strokes xₖ.
 
-    Below the first stroke and above the last the law there goes on unchanged. The force is continuous in x, its slope
-    changes at each xₖ. Laws with F v ≥ 0 make a whole with F v ≥ 0.
+    Below the first stroke and above the last, the law there is used unchanged. The force is continuous in x, its slope
+    changes at each xₖ. If all laws have F v ≥ 0, so has the interpolated one.
 
     - A factor along the stroke, such as a hydraulic stop: `StrokeDependent((3.0 * law, law), [-0.06, -0.04])`.
     - A table over stroke and velocity: `StrokeDependent.from_grid(stroke, velocity, force)`.
-    - Another law in each zone: the two laws at strokes close together, on either side of the border.
+    - Another law in each zone: give the two laws at strokes close together, on both sides of the border.
 
     Arguments:
         laws: k ≥ 1 laws without states.
-        stroke: strictly increasing strokes xₖ [m], shape (k,). Fixed: a fit changes the laws.
+        stroke: strictly increasing strokes xₖ [m], shape (k,); a fit does not change them.
 
     >>> from jaxdamp.dampers import Linear
     >>> law = StrokeDependent((3.0 * Linear(1000.0), Linear(1000.0)), stroke=[-0.06, -0.04])
@@ -54,17 +54,17 @@ class StrokeDependent(AbstractStateless):
     """
 
     laws: tuple[AbstractDamper, ...]
-    stroke: Vector = setting("m", "strokes where the laws hold", increasing)
+    stroke: Vector = setting("m", "strokes of the laws", increasing)
 
     def traits(self) -> Traits:
-        """Linear where the laws are, and stroke-dependent though they may not be."""
+        """Linear if the laws are, and stroke-dependent."""
         linear = all(law.traits().linear_in_parameters for law in self.laws)
         return super().traits()._replace(linear_in_parameters=linear)
 
     def __check_init__(self) -> None:
         check_field_types(self)
         if self.stroke.ndim != 1 or self.stroke.size != len(self.laws) or not self.laws:
-            must = "hold one stroke or more, one for each law"
+            must = "contain one stroke for each law"
             _checks.refuse("stroke", must, f"of shape {self.stroke.shape} for {len(self.laws)} laws")
         for k, law in enumerate(self.laws):
             refuse_states(f"laws[{k}]", law, f"Put it outside: `{type(law).__name__}(StrokeDependent(...), ...)`.")
@@ -81,8 +81,8 @@ class StrokeDependent(AbstractStateless):
     ) -> "StrokeDependent":
         """Bilinear interpolation of forces [N], shape (strokes, velocities), on a grid, uniform or not.
 
-        Beyond the first and last velocity the slopes there go on, beyond the first and last stroke nothing changes.
-        Rows whose force drives the motion are refused, unless `allow_active` (see `Table`).
+        Outside the velocities the end slopes continue, outside the strokes the end values are used. Rows whose force
+        adds energy to the motion are refused, unless `allow_active` (see `Table`).
 
         >>> force = [[-400.0, 0.0, 900.0], [-600.0, 0.0, 1300.0]]
         >>> law = StrokeDependent.from_grid([0.0, 0.1], [-1.0, 0.0, 1.0], force)

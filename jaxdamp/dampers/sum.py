@@ -1,4 +1,4 @@
-"""Laws side by side."""
+"""Laws in parallel."""
 
 from typing import final
 
@@ -14,7 +14,7 @@ from jaxdamp.dampers.with_range import with_fitted_range
 
 @final
 class Sum(AbstractDamper):
-    """Laws side by side, F = Σ Fᵢ; made by `law + law`. States are concatenated in order."""
+    """Laws in parallel, F = Σ Fᵢ; created by `law + law`. States are concatenated in order."""
 
     terms: tuple[AbstractDamper, ...]
 
@@ -23,7 +23,7 @@ class Sum(AbstractDamper):
             _checks.refuse("terms", "hold at least one law", self.terms)
 
     def traits(self) -> Traits:
-        """What all terms allow, and what any of them has."""
+        """The combined traits of all terms."""
         return combined_traits(term.traits() for term in self.terms)
 
     def side_by_side(self) -> tuple[AbstractDamper, ...]:
@@ -32,7 +32,7 @@ class Sum(AbstractDamper):
 
     @property
     def stroke_limits(self) -> tuple[ScalarLike, ScalarLike]:
-        """Strokes [m] within which all terms hold."""
+        """Strokes [m] within which all terms are valid."""
         lows, highs = zip(*(term.stroke_limits for term in self.terms), strict=True)
         return jnp.max(jnp.stack([*map(jnp.asarray, lows)])), jnp.min(jnp.stack([*map(jnp.asarray, highs)]))
 
@@ -60,7 +60,7 @@ class Sum(AbstractDamper):
     def predict(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
     ) -> State:
-        """What every term predicts."""
+        """The predictions of all terms."""
         pairs = zip(self.terms, self._split(state), strict=True)
         return jnp.concatenate([term.predict(x0, v0, x1, v1, s, dt) for term, s in pairs])
 
@@ -75,7 +75,7 @@ class Sum(AbstractDamper):
 
 
 def terms_of(law: AbstractDamper) -> tuple[AbstractDamper, ...]:
-    """The terms of a sum, or the law itself. What a sum was fitted to holds for its terms, but for the force."""
+    """The terms of a sum, or the law itself. The fitted range of a sum applies to its terms, except the force."""
     if not isinstance(law, Sum):
         return (law,)
     if law.fitted_to is None:

@@ -15,16 +15,16 @@ from jaxdamp.parameters import as_float, increasing, parameter, setting
 
 @final
 class Table(AbstractMemoryless):
-    """Straight lines between the points (vₖ, Fₖ); beyond the first and last point the end slopes go on.
+    """Straight lines between the points (vₖ, Fₖ); outside, the end slopes continue.
 
     Arguments:
-        velocity: strictly increasing velocities [m/s], shape (k,), k ≥ 2. Fixed: a fit changes the forces.
+        velocity: strictly increasing velocities [m/s], shape (k,), k ≥ 2; a fit does not change them.
         force: forces [N] at these velocities, shape (k,).
-        allow_active: accept points whose force drives the motion instead of resisting it.
+        allow_active: accept points whose force adds energy to the motion.
 
     Raises:
-        ValueError: fewer than two points, shapes that differ, velocities that do not increase; points that drive the
-            motion, unless `allow_active`. What a fit makes of the forces is not refused, but its result says so.
+        ValueError: fewer than two points, shapes that differ, velocities that do not increase; points that add
+            energy, unless `allow_active`. A fit may produce such points; its result then has a warning.
 
     >>> law = Table(velocity=[-1.0, 0.0, 0.2, 1.0], force=[-900.0, 0.0, 700.0, 1900.0])
     >>> [round(float(law.force_velocity(v)), 6) for v in (0.1, 0.6, 1.2)]

@@ -12,15 +12,16 @@ from jaxdamp.parameters import parameter, positive, setting
 
 @final
 class TemperatureScaled(AbstractWrapper):
-    """F(T) = F_law (1 − κ (T − T₀)): warm oil is thinner and lighter, the force falls in proportion.
+    """F(T) = F_law (1 − κ (T − T₀)): the force decreases linearly with the oil temperature.
 
-    κ is 0.001 to 0.004 1/K: turbulent flow follows the density of the oil, laminar flow its viscosity, which falls
-    faster and not in proportion. A straight line is good for some 40 K around T₀. The factor must be positive
-    (κ (T − T₀) < 1), otherwise the law would drive the motion; that is refused when the law is made.
+    κ is 0.001 to 0.004 1/K: in turbulent flow the force follows the density of the oil, in laminar flow its viscosity,
+    which decreases faster and nonlinearly. The linear approximation is valid for about 40 K around T₀. The factor must
+    be positive (κ (T − T₀) < 1), otherwise the law would add energy to the motion; the constructor refuses this.
 
-    Scale the oil only: gas pressure rises with temperature, and springs do not feel it, so write
-    `SeriesSpring(TemperatureScaled(law, ...), ...)` and `TemperatureScaled(law, ...) + GasSpring(...)`. κ comes from
-    tests at two temperatures or more; in a test at one temperature it cannot be told from the law's own numbers.
+    Scale only the oil forces: gas pressure increases with temperature, and springs do not depend on it, so write
+    `SeriesSpring(TemperatureScaled(law, ...), ...)` and `TemperatureScaled(law, ...) + GasSpring(...)`. κ is
+    determined by tests at two or more temperatures; at one temperature it cannot be distinguished from the law's own
+    parameters.
 
     Arguments:
         law: the law at T₀.
@@ -36,21 +37,21 @@ class TemperatureScaled(AbstractWrapper):
 
     law: AbstractDamper
     temperature: Number = setting("K", "oil temperature", positive)
-    reference_temperature: Number = setting("K", "temperature of the law's own numbers", positive, default=293.15)
-    sensitivity: Number = parameter("1/K", "κ, loss of force for each kelvin", default=0.002)
+    reference_temperature: Number = setting("K", "temperature at which the law was measured", positive, default=293.15)
+    sensitivity: Number = parameter("1/K", "κ, relative loss of force per kelvin", default=0.002)
 
     def is_linear_in_law(self) -> bool:
         """A factor is linear."""
         return True
 
     def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
-        """The same motion at the oil temperature, at the force of the law's own temperature."""
+        """The same motion at the oil temperature, with the force at the reference temperature."""
         return [(self.law, motion.divided(self.factor()).at_temperature(self.temperature))]
 
     def __check_init__(self) -> None:
         factor = _checks.concrete(self.factor())
         if factor is not None and not factor > 0:
-            must = "leave a positive factor 1 − κ (T − T₀) on the force"
+            must = "give a positive factor 1 − κ (T − T₀) on the force"
             _checks.refuse("sensitivity", must, f"{self.sensitivity}, factor {factor}", "Use a reference nearby.")
 
     def factor(self) -> Scalar:

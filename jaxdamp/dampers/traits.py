@@ -1,26 +1,26 @@
-"""What engines, fits and other laws must know of a law beside its forces."""
+"""Properties of a law that solvers, fits and other laws need to know."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
 
 
 class Traits(NamedTuple):
-    """Properties of a law that follow from its kind, not from its numbers: they are fixed when code is compiled.
+    """Properties of a law that do not depend on its parameter values: they are fixed when code is compiled.
 
-    `law.traits()` gives them. They are asked of one law, never of several whose arrays are stacked. The defaults here
-    are those of a law with states that declares nothing: safe, but not always the fastest.
+    `law.traits()` returns them for a single law, not for several laws whose arrays are stacked. The defaults here are
+    safe for any law with states, but not always the fastest.
 
     Attributes:
-        has_feed_through: the force answers the velocity at the same instant, not only through the states. Without it
-            no velocity matches the force of a spring: the law cannot stand in a `SeriesSpring` or a `Bushing`.
-        extrapolable_states: no state has a kink where the velocity has one, so an engine may extrapolate the states
-            instead of taking the law's own step for its prediction. True without states.
+        has_feed_through: the force depends directly on the velocity, not only through the states. Otherwise no velocity
+            could balance the force of a spring: the law cannot be used in a `SeriesSpring` or a `Bushing`.
+        extrapolable_states: no state has a kink where the velocity has one, so a solver may extrapolate the states for
+            its prediction instead of computing the step of the law. True without states.
         linear_in_parameters: the force is linear in the parameters declared `linear=True`, all others fixed, so that a
             fit of these has a closed form.
-        stroke_dependent: the stroke matters, at an instant or since the last reversal.
-        stroke_dependent_at_rest: the force at zero velocity, with the states of rest, depends on the stroke, so that
-            the law has a say in the static equilibrium of a vehicle.
-        has_explicit_step: some states take an explicit step, which must be shorter than their time constants.
+        stroke_dependent: the force depends on the stroke, directly or since the last reversal.
+        stroke_dependent_at_rest: the force at zero velocity and initial states depends on the stroke, so that the law
+            affects the static equilibrium of a vehicle.
+        has_explicit_step: some states have an explicit step, which must be shorter than their time constants.
     """
 
     has_feed_through: bool = True
@@ -32,6 +32,6 @@ class Traits(NamedTuple):
 
 
 def combined_traits(traits: Iterable[Traits]) -> Traits:
-    """The traits of laws whose forces add: what all of them allow, and what any of them has."""
+    """The traits of a sum of laws."""
     feed_through, extrapolable, linear, stroke, at_rest, explicit = zip(*traits, strict=True)
     return Traits(any(feed_through), all(extrapolable), all(linear), any(stroke), any(at_rest), any(explicit))

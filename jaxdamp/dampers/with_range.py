@@ -11,10 +11,10 @@ L = TypeVar("L")
 
 
 def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Limits) -> L:
-    """The same law with the range of the records that it was fitted to, in place of any range it had.
+    """The same law with the range of the records that it was fitted to, instead of any previous range.
 
-    `identify.fit` and `train` do this; state it yourself for a law whose numbers come from elsewhere. Laws inside keep
-    ranges of their own. Everything that uses the law then says by how much it leaves the range.
+    `identify.fit` and `train` do this; state the range yourself for a law with parameters from another source. Laws
+    inside have their own ranges. Simulations with the law then report by how much it is used outside the range.
 
     Arguments:
         law: any law.
@@ -22,7 +22,7 @@ def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Li
         limits: as `FittedRange` takes them, such as `velocity=(-0.5, 0.5)`.
 
     Raises:
-        ValueError: something that is not a law; neither a range nor limits, or both; a quantity that no range has;
+        ValueError: something that is not a law; neither a range nor limits, or both; an unknown quantity;
             limits out of order.
 
     >>> from jaxdamp.dampers import Linear
@@ -30,7 +30,7 @@ def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Li
     'velocity −0.5 to 0.9 m/s'
     """
     if not isinstance(law, AbstractDamper):
-        _checks.refuse("law", "be a damper law", f"a {type(law).__name__}", "Of a vehicle, give it to its dampers.")
+        _checks.refuse("law", "be a damper law", f"a {type(law).__name__}", "For a vehicle, set it for its dampers.")
     for name in limits:
         _checks.one_of("limits", name, UNITS)
     if (fitted_to is None) == (not limits):

@@ -1,4 +1,4 @@
-"""A law around one law."""
+"""The base class of laws around one inner law."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -11,15 +11,15 @@ from jaxdamp.dampers.traits import Traits
 
 
 class AbstractWrapper(AbstractDamper):
-    """A law around one law, to which everything is passed on unless the wrapper says otherwise.
+    """A law around one inner law, to which all calls are passed on unless the wrapper overrides them.
 
-    A wrapper that changes stroke, velocity or force has one or both of `inner_motion` and `outer_force`; a wrapper with
-    states of its own, which come before those of the law inside, says how many in `own_state_count` and brings `force`,
-    `state_rate` and `advance`.
+    A wrapper that changes stroke, velocity or force overrides `inner_motion`, `outer_force` or both. A wrapper with its
+    own states, which come before those of the inner law, declares their number in `own_state_count` and defines
+    `force`, `state_rate` and `advance`.
     """
 
     def inner_law(self) -> AbstractDamper:
-        """The law inside; by default that of the only field that holds one."""
+        """The law inside; by default the only field that is a law."""
         (law,) = self.inner_laws()
         return law
 
@@ -28,7 +28,7 @@ class AbstractWrapper(AbstractDamper):
         return x, v
 
     def outer_force(self, force: Scalar) -> Scalar:
-        """Force [N] of the whole at a force [N] of the law inside."""
+        """Force [N] of the wrapper for a force [N] of the law inside."""
         return force
 
     def own_state_count(self) -> int:
@@ -44,9 +44,9 @@ class AbstractWrapper(AbstractDamper):
         return tuple(state[i] for i in range(count)), state[count:]
 
     def is_linear_in_law(self) -> bool:
-        """Whether the force is linear in that of the law inside.
+        """Whether the force is linear in the force of the law inside.
 
-        Then the wrapper around a sum is the sum of wrappers around its terms, and linear parameters stay linear.
+        The wrapper around a sum is then the sum of the wrappers around its terms, and linear parameters stay linear.
         """
         return False
 
@@ -56,7 +56,7 @@ class AbstractWrapper(AbstractDamper):
         return inner._replace(linear_in_parameters=inner.linear_in_parameters and self.is_linear_in_law())
 
     def side_by_side(self) -> tuple[AbstractDamper, ...]:
-        """The wrapper around each term of a sum inside, where the force is linear in that of the law inside."""
+        """The wrapper around each term of a sum inside, if the force is linear in the force of the law inside."""
         if not self.is_linear_in_law():
             return (self,)
         return tuple(
@@ -65,7 +65,7 @@ class AbstractWrapper(AbstractDamper):
 
     @property
     def stroke_limits(self) -> tuple[ScalarLike, ScalarLike]:
-        """Strokes [m] within which the law inside holds."""
+        """Strokes [m] within which the law inside is valid."""
         return self.inner_law().stroke_limits
 
     def initial_state(self) -> State:
@@ -91,7 +91,7 @@ class AbstractWrapper(AbstractDamper):
     def predict(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
     ) -> State:
-        """What the law inside predicts; with own states, the step itself."""
+        """The prediction of the law inside; for a wrapper with own states, the step itself."""
         if self.own_state_count():
             return self.advance(x0, v0, x1, v1, state, dt)
         return self.inner_law().predict(*self.inner_motion(x0, v0), *self.inner_motion(x1, v1), state, dt)

@@ -1,4 +1,4 @@
-"""Checks that a damper law of your own works wherever the laws of the library do.
+"""Checks that your own damper law works everywhere the laws of the library do.
 
     from jaxdamp.testing import check_law
     check_law(MyLaw(1500.0))

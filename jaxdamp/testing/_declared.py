@@ -1,4 +1,4 @@
-"""Checks of what a law says about itself: shapes, refusals, parameters, text, file, traits."""
+"""Checks of the declarations of a law: shapes, refusals, parameters, text, file, traits."""
 
 import equinox as eqx
 import jax
@@ -84,7 +84,7 @@ def check_text(law: AbstractDamper) -> None:
 
 
 def check_file(law: AbstractDamper) -> None:
-    """Written as JSON and read again, the law is the same bit for bit."""
+    """Written as JSON and read again, the law is exactly the same."""
     text = to_json(law)
     again = from_json(text)
     same = jax.tree.structure(again) == jax.tree.structure(law)

@@ -1,4 +1,4 @@
-"""Checks of a law's forces, states and derivatives, alone and on the rig."""
+"""Checks of the forces, states and derivatives of a law, alone and under a prescribed motion."""
 
 import jax
 import jax.numpy as jnp
@@ -36,12 +36,12 @@ def check_finite(law: AbstractDamper) -> None:
 
 
 def check_rest(law: AbstractDamper) -> None:
-    """No force at rest, and rest lasts."""
+    """No force at rest, and the law stays at rest."""
     free = free_parameters(law)
     found = points(free, 0.0, 0.0)[0]
     require(np.all(np.abs(found) <= 1e-9), f"Forces and rates at rest must be zero, but are {found}.")
     force, _ = responses(free, free.values, 1e-3, np.zeros(SAMPLES), np.zeros(SAMPLES))
-    require(np.all(np.abs(force) <= 1e-9), f"Rest must last, but the force becomes {force[0, -1]} N.")
+    require(np.all(np.abs(force) <= 1e-9), f"The law must stay at rest, but the force becomes {force[0, -1]} N.")
 
 
 def check_continuous(law: AbstractDamper) -> None:
@@ -74,21 +74,21 @@ def check_continuous(law: AbstractDamper) -> None:
 
 
 def check_passive(law: AbstractDamper) -> None:
-    """Neither a steady sine nor a random motion from rest to rest takes energy out of the law."""
+    """Neither a steady sine nor a random motion from rest to rest gains energy from the law."""
     free = free_parameters(law)
     dt, x, v, amplitude = sines()
     force, _ = responses(free, free.values, dt, x, v)
     last = slice(-(SAMPLES - 1) // 4, None)
     work = np.sum((force * v)[:, last], axis=1) * dt
     least = -1e-9 * np.max(np.abs(force), axis=1) * amplitude
-    require(np.all(work >= least), f"Sines take energy out: work per cycle {work} J.")
+    require(np.all(work >= least), f"Sines gain energy from the law: work per cycle {work} J.")
     dt, x, v = random_motions()
     force, _ = responses(free, free.values, dt, x, v)
     power = force * v
     # where a law only stores, the sum over instants is zero to the order of the step
     allowed = 2e-3 * np.sum(np.abs(power), axis=1) * dt
     work = np.sum(power, axis=1) * dt
-    message = f"Random motions take energy out: work {work} J, of which {allowed} J may be the error of the step."
+    message = f"Random motions gain energy from the law: work {work} J, of which {allowed} J may be errors of the step."
     require(np.all(work >= -allowed), message)
 
 
@@ -156,10 +156,10 @@ def check_step(law: AbstractDamper) -> None:
     places = zip(x[0, :65], v[0, :65], exact.y.T, strict=True)
     expected = np.array([law.force(jnp.asarray(a), jnp.asarray(b), jnp.asarray(s)) for a, b, s in places])
     errors = [np.max(np.abs(c - expected)) / np.max(np.abs(common[2])) for c in common]
-    said = f"has errors {errors} of the peak force in steps of 0.5, 0.25 and 0.125 ms of `state_rate`"
+    errors_text = f"has errors {errors} of the peak force in steps of 0.5, 0.25 and 0.125 ms of `state_rate`"
     remedy = "States faster than the step need an exact or implicit `advance`."
-    require(errors[0] < 0.02, f"`advance` {said}. {remedy}")
-    require(errors[2] < max(errors[0] / 8, 1e-7), f"`advance` {said}, which fall too slowly. {remedy}")
+    require(errors[0] < 0.02, f"`advance` {errors_text}. {remedy}")
+    require(errors[2] < max(errors[0] / 8, 1e-7), f"`advance` {errors_text}, which decrease too slowly. {remedy}")
 
 
 def check_prediction(law: AbstractDamper) -> None:

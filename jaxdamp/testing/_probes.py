@@ -1,6 +1,6 @@
-"""What the checks of a law compute. The compiled functions take the law's numbers as arguments.
+"""The computations of the checks. The compiled functions take the parameters of the law as arguments.
 
-Laws of one structure are thus compiled once; points and motions come in groups of one size.
+Laws of equal structure are thus compiled once; points and motions are in groups of equal size.
 """
 
 import equinox as eqx

@@ -1,4 +1,4 @@
-"""The contract of damper laws: each check takes a law and raises an `AssertionError` if it breaks its part."""
+"""The contract of damper laws: each check takes a law and raises an `AssertionError` if it is violated."""
 
 from collections.abc import Callable, Collection
 
@@ -36,25 +36,26 @@ CHECKS: dict[str, Callable[[AbstractDamper], None]] = {
 
 
 def check_law(law: AbstractDamper, *, leave_out: Collection[str] = ()) -> None:
-    """Check that a law keeps the contract of damper laws, so that it works wherever the laws of the library do.
+    """Check that a law satisfies the contract of damper laws, so that it works everywhere the laws of the library do.
 
-    The checks, by name, take ten to thirty seconds, most of it for compiling:
+    The checks take ten to thirty seconds, mainly for compiling. Their names are:
 
     - `"shapes"`, `"refusals"`: one force and as many rates as states; states of another length are refused by name.
     - `"parameters"`, `"text"`, `"file"`: every parameter has a unit, a meaning and a domain that is enforced; the law
-      prints, and is written as JSON and read again, bit for bit.
-    - `"traits"`: what the law declares of itself agrees with its forces.
+      prints, and is the same after writing and reading as JSON.
+    - `"traits"`: the declared traits agree with the forces.
     - `"finite"`, `"continuous"`: value, slope and derivatives are finite everywhere, and the force has no jump.
-    - `"rest"`, `"passive"`: no force at rest; neither sines nor random motions on the rig take energy out.
+    - `"rest"`, `"passive"`: no force at rest; neither sines nor random motions gain energy from the law.
     - `"compiled"`, `"batched"`, `"single precision"`: the same numbers compiled, in a batch, and in single precision.
     - `"derivatives"`: forward mode, reverse mode and differences agree in every parameter.
-    - `"step"`, `"prediction"`: the law's own step converges with second order to its rates, integrated independently.
-    - `"inside wrappers"`, `"alike ports"`: it works in every wrapper, and twice, with different numbers, in a half car.
+    - `"step"`, `"prediction"`: the step converges with second order to an independent integration of the rates.
+    - `"inside wrappers"`, `"alike ports"`: it works in every wrapper, and twice in a half car with different
+      parameters.
 
     Arguments:
-        law: the law, with numbers as they are in use; knees between 0.01 and 1 m/s, strokes of some 10 mm.
-        leave_out: names of checks that the law breaks by its nature: `["rest"]` for a gas spring, `["passive"]` for an
-            active law.
+        law: the law with realistic parameters: knees between 0.01 and 1 m/s, strokes of about 10 mm.
+        leave_out: names of checks that the law cannot satisfy by its nature: `["rest"]` for a gas spring, `["passive"]`
+            for an active law.
 
     Raises:
         AssertionError: what is wrong, in a sentence that begins with the class and the name of the check.

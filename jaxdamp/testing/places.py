@@ -1,4 +1,4 @@
-"""Checks of laws where they are put: inside every wrapper, and twice in a half car."""
+"""Checks of laws in use: inside every wrapper, and twice in a half car."""
 
 from collections.abc import Callable
 from typing import Any
@@ -49,7 +49,7 @@ WITHOUT_STATES: dict[str, Wrap] = {
     "StrokeDependent((law, law), ...)": lambda law: StrokeDependent((law, law), [-0.01, 0.01]),
     "FrequencySelective(law, ...)": lambda law: FrequencySelective(law, Linear(500.0), 0.03, 0.003),
 }
-SLOTS = ("damper", "extra_spring", "bump_stop", "friction")  # of a corner: so many laws share a car
+SLOTS = ("damper", "extra_spring", "bump_stop", "friction")  # of a corner: four laws can share a car
 METRICS = ("rms_sprung_acceleration", "rms_front_dynamic_tyre_load", "rms_rear_dynamic_tyre_load")
 
 
@@ -124,8 +124,8 @@ def _ride(front: Laws, rear: Laws, heights: np.ndarray) -> np.ndarray:
 def check_alike_ports(*laws: AbstractDamper, rtol: float = 1e-9) -> None:
     """Two of each law with different numbers at the ends of a half car, stacked and computed as one batch.
 
-    With both ends of the car and the road exchanged the ride must be the same but for the ends: no end has the numbers
-    of the other.
+    If front and rear of car and road are exchanged, the results must be exchanged too: no end may use the parameters of
+    the other.
 
     Arguments:
         laws: up to four laws, which share the car.

@@ -108,7 +108,7 @@ def test_the_guess_is_near_the_fit(lagging, moving):
     velocity, force, time = (
         np.concatenate([getattr(run, name) for run in runs]) for name in ("velocity", "force", "time")
     )
-    with pytest.warns(np.exceptions.RankWarning, match="leave 1 of 32"):
+    with pytest.warns(np.exceptions.RankWarning, match="do not determine 1 of 32"):
         law = AccelerationSurface.guess(velocity, force, time)
     fitted = moving.law
     assert np.array_equal(law.acceleration_range, fitted.acceleration_range)
@@ -153,7 +153,7 @@ def test_outside_is_refused_or_held():
     assert float(held.force(0.0, 0.2, state)) == pytest.approx(numpy_surface(0.2, 60.0), rel=1e-12)
     assert float(held.force(0.0, 0.9, jnp.array([0.9]))) == pytest.approx(numpy_surface(0.8, 0.0) + 50.0, rel=1e-12)
     t = np.arange(500) / 500
-    covered = r"AccelerationSurface holds for v from -0\.8 to 0\.8 m/s, acceleration from -60 to 60 m/s²"
+    covered = r"AccelerationSurface is valid for v from -0\.8 to 0\.8 m/s, acceleration from -60 to 60 m/s²"
     with pytest.raises(ValueError, match="`law` must give a finite force over the whole motion.*" + covered):
         respond(law, t, 0.02 * np.sin(9 * t), 0.18 * np.cos(9 * t))
     assert np.all(np.isfinite(respond(law, t, 0.02 * (1 - np.cos(9 * t)), 0.18 * np.sin(9 * t))))

@@ -66,7 +66,7 @@ def is_accepted(compression, rebound, limit, transition):
     try:
         Besinger(compression, rebound, 3_600.0, limit, transition)
     except ValueError as error:
-        assert "Otherwise the force falls with growing velocity" in str(error)
+        assert "Otherwise the force decreases with increasing velocity" in str(error)
         return False
     return True
 

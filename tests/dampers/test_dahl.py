@@ -65,7 +65,7 @@ def test_slope_at_rest():
 
 
 def test_alone_behind_a_spring_it_is_refused():
-    with pytest.raises(ValueError, match=r"answers the velocity at once, but is a Dahl"):
+    with pytest.raises(ValueError, match=r"depends directly on the velocity, but is a Dahl"):
         SeriesSpring(Dahl(STIFFNESS, LEVEL), 1e6)
     SeriesSpring(Linear(1500.0) + Dahl(STIFFNESS, LEVEL), 1e6)
 

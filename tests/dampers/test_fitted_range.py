@@ -135,7 +135,7 @@ def test_what_a_sum_was_fitted_to_holds_for_its_terms_but_for_the_force():
 
 
 def test_only_laws_take_a_range():
-    with pytest.raises(ValueError, match=r"`law` must be a damper law, but is a QuarterCar\. Of a vehicle, give it to"):
+    with pytest.raises(ValueError, match=r"`law` must be a damper law, but is a QuarterCar\. For a vehicle, set it"):
         with_fitted_range(presets.quarter_car_000(), SLOW)
 
 

@@ -23,7 +23,7 @@ from .single_precision import single_precision_error
 
 
 STROKE, VELOCITY = (-0.03, 0.05), (-0.8, 0.6)
-COVERED = r"ForceSurface holds for x from -0\.03 to 0\.05 m, v from -0\.8 to 0\.6 m/s.*`?outside=\"hold\"`?"
+COVERED = r"ForceSurface is valid for x from -0\.03 to 0\.05 m, v from -0\.8 to 0\.6 m/s.*`?outside=\"hold\"`?"
 
 
 def surface(outside="nan", **settings):
@@ -83,7 +83,9 @@ def test_noise_is_averaged():
 def test_single_sine_is_rank_deficient():
     x, v = single_sine()
     clean, noise = analytic(x, v), 5.0 * np.random.default_rng(6).standard_normal(x.size)
-    with pytest.warns(np.exceptions.RankWarning, match="leave 8 of 24 combinations .* lie on one ellipse. Add records"):
+    with pytest.warns(
+        np.exceptions.RankWarning, match="do not determine 8 of 24 combinations .* are on one ellipse. Add records"
+    ):
         law = ForceSurface.guess(v, clean + noise, x, degrees=(3, 5))
     assert np.sqrt(np.mean((forces(law, x, v) - clean) ** 2)) < 1.0
     assert np.max(np.abs(law.coefficients)) < np.max(np.abs(clean))
@@ -150,7 +152,7 @@ def test_everything_that_runs_it_refuses_in_words():
     assert re.search("No force at 1 of 2 velocities, at 0.7 m/s: .* no finite force. " + COVERED, curve.note)
     with pytest.raises(ValueError, match="`vehicle` must have a finite response.*" + COVERED):
         simulate(quarter_car_000(0.1 * law + Linear(100.0)), cosine_bump(0.3, start=0.02, duration=0.1), duration=0.5)
-    with pytest.raises(ValueError, match="`vehicle` must have an equilibrium.*" + COVERED):
+    with pytest.raises(ValueError, match="`vehicle` must have a static equilibrium.*" + COVERED):
         simulate(quarter_car_000(5.0 * law), cosine_bump(0.3, start=0.02, duration=0.1), duration=0.5)
     with pytest.raises(ValueError, match="`law` must give a finite force over the whole programme.*" + COVERED):
         VirtualDyno(law).run(SineTest(amplitude=0.06, frequency=2.0))

@@ -66,7 +66,7 @@ def test_stable_at_a_step_far_too_long():
 
 def test_two_springs_in_series_are_refused():
     law = KaradayiMasada(2600.0, 1200.0, 40.0, 0.01, 1e6, 3e-4)
-    with pytest.raises(ValueError, match=r"answers the velocity at once, but is a KaradayiMasada"):
+    with pytest.raises(ValueError, match=r"depends directly on the velocity, but is a KaradayiMasada"):
         SeriesSpring(law, 1e6)
 
 

@@ -216,7 +216,7 @@ def test_a_charge_below_the_cavity_is_refused():
 
 
 def test_a_spring_cannot_be_put_in_series():
-    with pytest.raises(ValueError, match="force answers the velocity at once"):
+    with pytest.raises(ValueError, match="force depends directly on the velocity"):
         SeriesSpring(LAW, 1e6)
 
 

@@ -48,7 +48,7 @@ def test_guess_fits_a_curve_with_knees():
     ("knots", "slopes", "message"),
     [
         ([0.1, -0.1], [1.0, 2.0, 3.0], r"`PiecewiseLinear\.knots` must be strictly increasing"),
-        ([0.1], [1.0, 2.0, 3.0], r"`slopes` must hold one slope more than there are knots, but is of shape \(3,\)"),
+        ([0.1], [1.0, 2.0, 3.0], r"`slopes` must have one entry more than `knots`, but is of shape \(3,\)"),
         ([0.1], [1.0, -2.0], r"`PiecewiseLinear\.slopes` must be positive \[N s/m\], but is \[ 1\. -2\.\]"),
         ([0.1], [1.0, np.nan], r"`PiecewiseLinear\.slopes` must be finite, but is \[ 1\. nan\]"),
     ],

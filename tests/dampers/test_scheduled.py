@@ -71,9 +71,9 @@ def test_refusals():
         Scheduled((Linear(1.0), Linear(2.0)), [0.0, 1.0], 1.5)
     with pytest.raises(ValueError, match="between the levels 0 and 1"):
         with_command(Lag(Scheduled((Linear(1.0), Linear(2.0)), [0.0, 1.0], 0.0), 0.01), -0.1)
-    with pytest.raises(ValueError, match="`laws` must be of one structure"):
+    with pytest.raises(ValueError, match="`laws` must be of equal structure"):
         Scheduled((Linear(1.0), Bilinear(2.0, 1.0)), [0.0, 1.0], 0.0)
-    with pytest.raises(ValueError, match="`laws` must hold two laws or more"):
+    with pytest.raises(ValueError, match="`laws` must contain two or more laws"):
         Scheduled((Linear(1.0), Linear(2.0)), [0.0, 0.5, 1.0], 0.0)
     with pytest.raises(ValueError, match="`law` must take a command"):
         with_command(Linear(1.0), 0.5)

@@ -112,5 +112,7 @@ def test_rounding_at_the_root_does_not_throw_the_solve_back():
     ],
 )
 def test_a_law_that_does_not_answer_at_once_is_refused(law):
-    with pytest.raises(ValueError, match=r"`law` must be a law whose force answers the velocity at once.*Lag\(Series"):
+    with pytest.raises(
+        ValueError, match=r"`law` must be a law whose force depends directly on the velocity.*Lag\(Series"
+    ):
         SeriesSpring(law, 1e6)

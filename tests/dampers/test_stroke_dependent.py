@@ -115,8 +115,8 @@ def test_single_precision():
 @pytest.mark.parametrize(
     ("laws", "stroke", "message"),
     [
-        ((Linear(1.0), Linear(2.0)), [0.0], r"`stroke` must hold one stroke or more, one for each law"),
-        ((), [], r"`stroke` must hold one stroke or more"),
+        ((Linear(1.0), Linear(2.0)), [0.0], r"`stroke` must contain one stroke for each law"),
+        ((), [], r"`stroke` must contain one stroke for each law"),
         ((Linear(1.0), Linear(2.0)), [0.1, 0.0], r"`StrokeDependent\.stroke` must be strictly increasing"),
         (
             (Linear(1.0), Lag(Linear(2.0), 0.01)),
