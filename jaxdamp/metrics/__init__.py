@@ -1,9 +1,9 @@
-"""Metrics: what a signal says about ride, tyre load, damper and road, as one number or one spectrum.
+"""Metrics of ride, tyre load, damper and road from signals, as one number or one spectrum.
 
 Every function takes plain arrays of uniformly sampled signals, simulated or measured, NumPy or JAX, in SI units. A
 signal has one axis, time; use `jax.vmap` for many. All are pure JAX functions and can be compiled, batched and
-differentiated; where a derivative is zero or undefined, the docstring says so and names a smooth stand-in. NaN in a
-signal gives NaN. Only what answers in words (`evaluation_method`, `comfort_reaction`) does not compile.
+differentiated; where a derivative is zero or undefined, the docstring says so and names a smooth alternative. NaN in a
+signal gives NaN. Only functions that return texts (`evaluation_method`, `comfort_reaction`) cannot be compiled.
 
 - Size of a signal: `rms`, `peak`, `smooth_peak`, `crest_factor`, `running_rms`.
 - Spectrum: `power_spectral_density`, `transmissibility`, `coherence`.
@@ -20,8 +20,8 @@ signal gives NaN. Only what answers in words (`evaluation_method`, `comfort_reac
   `dissipation_histogram`, `temperature_rise`, `damper_temperature`.
 - Fatigue: `spectral_moments`, `spectral_damage`.
 - Road: `international_roughness_index`, `international_roughness_by_segment`.
-- Of a vehicle's channel, also gathered while a simulation runs: `Metric`, with one of `STATISTICS`, `percentile` or a
-  `Statistic` of your own; values by name: `MetricValues`.
+- Metrics of a vehicle channel, also computed during a simulation: `Metric`, with one of `STATISTICS`, `percentile` or
+  your own `Statistic`; values by name: `MetricValues`.
 
 >>> import jax
 >>> import jax.numpy as jnp
@@ -145,7 +145,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """A function by the name that it had before."""
+    """A renamed function by its old name."""
     if name in RENAMED:
         return globals()[current_name(name, RENAMED.values())]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -5,7 +5,7 @@ from jax.typing import ArrayLike
 from jaxtyping import Array
 
 from jaxdamp import _checks
-from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
+from jaxdamp._types import ScalarLike, Signal, SignalLike
 
 
 def as_signal(argument: str, signal: SignalLike, *, least: int = 1) -> Signal:
@@ -38,15 +38,3 @@ def same_length(first: str, one: Signal, second: str, other: Signal) -> None:
 def check_interval(dt: ScalarLike | int) -> None:
     """Refuse a sampling interval that is not positive and finite."""
     _checks.positive("dt", dt, "It is the sampling interval in s.")
-
-
-def root(power: Scalar | Signal, order: int = 2) -> Scalar | Signal:
-    """The root of numbers that are not negative; at zero, where it has no slope, the slope is taken as zero.
-
-    What rounding has made a little negative counts as zero; NaN stays NaN.
-    """
-    zero = power <= 0.0
-    positive = jnp.where(zero, jnp.ones_like(power), power)
-    for _ in range(order // 2):  # 2 and 4 are what is needed
-        positive = jnp.sqrt(positive)
-    return jnp.where(zero, jnp.zeros_like(power), positive)

@@ -5,9 +5,9 @@ from jax.scipy.special import ndtri
 from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp import _checks
-from jaxdamp._limits import at_least
+from jaxdamp._limits import at_least, root
 from jaxdamp._types import Scalar, ScalarLike, SignalLike, VectorLike
-from jaxdamp.metrics._signals import as_numbers, as_signal, check_interval, root
+from jaxdamp.metrics._signals import as_numbers, as_signal, check_interval
 
 
 def aggregate_force(

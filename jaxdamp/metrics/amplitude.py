@@ -1,12 +1,12 @@
-"""The size of a signal."""
+"""Amplitude measures of a signal."""
 
 import jax
 import jax.numpy as jnp
 
 from jaxdamp import _checks
-from jaxdamp._limits import largest
+from jaxdamp._limits import largest, root
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
-from jaxdamp.metrics._signals import as_signal, root
+from jaxdamp.metrics._signals import as_signal
 
 
 def rms(signal: SignalLike) -> Scalar:
@@ -47,9 +47,9 @@ def peak(signal: SignalLike) -> Scalar:
 
 
 def smooth_peak(signal: SignalLike, order: ScalarLike | int = 16) -> Scalar:
-    """A smooth stand-in for `peak`: the power mean (mean |x|^p)^(1/p), in the unit of the signal.
+    """A smooth approximation of `peak`: the power mean (mean |x|^p)^(1/p), in the unit of the signal.
 
-    It lies between max |x| / n^(1/p) and max |x| and rises to it with the order p; as a mean over time it does not
+    It is between max |x| / n^(1/p) and max |x| and approaches max |x| with the order p; as a mean over time it does not
     depend on the sampling rate. All large samples have a gradient. A sine gives 0.90 of its peak with p = 16; a
     Gaussian record gives 2.48 standard deviations, its peak some 4. It is computed relative to the largest sample, so
     nothing overflows. The gradient for a signal that is zero throughout is zero.
@@ -83,8 +83,8 @@ def smooth_peak(signal: SignalLike, order: ScalarLike | int = 16) -> Scalar:
 def crest_factor(signal: SignalLike) -> Scalar:
     """Peak over root mean square, max |x| / sqrt(mean(x^2)) [-]: sqrt(2) for a sine, about 4 for a Gaussian record.
 
-    ISO 2631-1 asks for more than the weighted RMS when that of the weighted acceleration exceeds 9. The gradient is
-    that of `peak` and `rms`. A signal that is zero throughout has no crest factor: the result is NaN.
+    ISO 2631-1 requires more than the weighted RMS if the crest factor of the weighted acceleration exceeds 9. The
+    gradient is that of `peak` and `rms`. A signal that is zero throughout has no crest factor: the result is NaN.
 
     Arguments:
         signal: uniformly sampled values, shape [time], any unit.

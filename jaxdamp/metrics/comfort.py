@@ -1,4 +1,4 @@
-"""Vibration at several places and axes as one number, and what people call it."""
+"""Vibration total value of several places and axes, and comfort reactions."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -6,8 +6,9 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxdamp import _checks
+from jaxdamp._limits import root
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
-from jaxdamp.metrics._signals import as_numbers, root
+from jaxdamp.metrics._signals import as_numbers
 from jaxdamp.metrics.weighted import weighted_rms
 
 
@@ -90,7 +91,7 @@ def vibration_total_value(values: Mapping[str, ScalarLike], purpose: str = "comf
 def total_vibration(
     accelerations: Mapping[str, SignalLike], dt: ScalarLike | int, purpose: str = "comfort", *, method: str = "spectrum"
 ) -> Scalar:
-    """Vibration total value of records: each weighted as its axis asks, then added as `vibration_total_value` [m/s^2].
+    """Vibration total value of records: each weighted by its axis, then added as `vibration_total_value` [m/s^2].
 
     Arguments:
         accelerations: records by axis, shape [time] each [m/s^2] ([rad/s^2] for rotations); axes see
@@ -137,7 +138,7 @@ def comfort_reaction(total_value: ScalarLike) -> tuple[str, ...]:
     """
     known = _checks.concrete(total_value)
     if known is None:
-        _checks.refuse("total_value", "be known: words do not compile", "traced", "Ask outside of compiled code.")
+        _checks.refuse("total_value", "be known: texts cannot be compiled", "traced", "Call it outside compiled code.")
     _checks.nonnegative("total_value", total_value, "It is a weighted RMS acceleration in m/s^2.")
     value = float(known)
     return tuple(word for word, low, high in _REACTIONS if low <= value < high)

@@ -1,4 +1,4 @@
-"""How fast a motion dies away."""
+"""Decay of a free motion."""
 
 import math
 
@@ -6,8 +6,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxdamp import _checks
+from jaxdamp._limits import root
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
-from jaxdamp.metrics._signals import as_numbers, as_signal, check_interval, root
+from jaxdamp.metrics._signals import as_numbers, as_signal, check_interval
 
 
 def _check_band(band: ScalarLike | float) -> None:
@@ -21,7 +22,7 @@ def settling_time(
 ) -> Scalar:
     """The time after which |x - final| stays within `band` times its largest value [s].
 
-    Counted from the first sample to the last crossing of the band, which is found by linear interpolation. `inf` if
+    Counted from the first sample to the last crossing of the band, located by linear interpolation. `inf` if
     the record ends outside the band, 0 if it is at rest throughout. The gradient is that of the last crossing alone;
     the value jumps where a half-wave slips in or out of the band. Tune on `smooth_settling_time` instead.
 
@@ -65,7 +66,7 @@ def _last_crossing(size: Signal, band: Scalar) -> Scalar:
 def smooth_settling_time(
     signal: SignalLike, dt: ScalarLike | int, band: ScalarLike = 0.05, *, final: ScalarLike | int = 0.0
 ) -> Scalar:
-    """A smooth stand-in for `settling_time`: ln(1/band) sqrt(2 int t^2 y^2 dt / int y^2 dt) [s], y = x - final.
+    """A smooth approximation of `settling_time`: ln(1/band) sqrt(2 int t^2 y^2 dt / int y^2 dt) [s], y = x - final.
 
     It is the settling time of the exponential envelope that has the same energy-weighted RMS time: exact for a decay
     exp(-s t), and for an oscillation with that envelope up to a term of the order of (damping ratio)^2. The record

@@ -1,4 +1,4 @@
-"""What a damper takes out of the motion."""
+"""Energy dissipated by a damper."""
 
 import jax.numpy as jnp
 import numpy as np

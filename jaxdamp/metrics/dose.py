@@ -1,11 +1,11 @@
-"""Doses: what vibration adds up to over time."""
+"""Vibration doses."""
 
 import jax.numpy as jnp
 
 from jaxdamp import _checks
-from jaxdamp._limits import at_most
+from jaxdamp._limits import at_most, root
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
-from jaxdamp.metrics._signals import as_numbers, root
+from jaxdamp.metrics._signals import as_numbers
 from jaxdamp.metrics.weighted import as_weighted
 
 

@@ -1,4 +1,4 @@
-"""Which evaluation ISO 2631-1 asks for: is the weighted RMS enough?"""
+"""The evaluation method required by ISO 2631-1: is the weighted RMS sufficient?"""
 
 import math
 from typing import NamedTuple
@@ -6,20 +6,20 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxdamp import _checks
+from jaxdamp._limits import root
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
-from jaxdamp.metrics._signals import root
 from jaxdamp.metrics.amplitude import crest_factor, rms
 from jaxdamp.metrics.dose import vibration_dose_value
 from jaxdamp.metrics.running import max_transient_value
 from jaxdamp.metrics.weighted import as_weighted
 
 
-# Above these the weighted RMS underestimates what people feel.
+# Above these limits the weighted RMS underestimates the effect of the vibration.
 CREST_FACTOR_LIMIT, TRANSIENT_LIMIT, DOSE_LIMIT = 9.0, 1.5, 1.75
 
 
 class ShockRatios(NamedTuple):
-    """How much a record is made of shocks [-]."""
+    """Three ratios that measure shocks in a record [-]."""
 
     crest_factor: Scalar
     transient_ratio: Scalar
@@ -27,7 +27,7 @@ class ShockRatios(NamedTuple):
 
 
 class Evaluation(NamedTuple):
-    """The evaluation that ISO 2631-1 asks for, in words, and the three ratios that say so [-]."""
+    """The evaluation method required by ISO 2631-1, in words, and the three ratios it follows from [-]."""
 
     method: str
     crest_factor: float
@@ -36,7 +36,7 @@ class Evaluation(NamedTuple):
 
 
 def shock_ratios(acceleration: SignalLike, dt: ScalarLike | int, weighting: str | None) -> ShockRatios:
-    """The three ratios by which ISO 2631-1 judges shocks, all of the weighted acceleration [-].
+    """The three ratios of ISO 2631-1 for shocks, all of the weighted acceleration [-].
 
     Crest factor max |a_w(t)|/a_w, MTVV/a_w with linear averaging over 1 s, and VDV/(a_w T^(1/4)). A steady sine has
     1.414, 1 and 1.107; Gaussian vibration about 4, little above 1 and 1.316. The gradient is that of `peak` and
@@ -66,7 +66,7 @@ def shock_ratios(acceleration: SignalLike, dt: ScalarLike | int, weighting: str 
 
 
 def evaluation_method(acceleration: SignalLike, dt: ScalarLike | int, weighting: str | None) -> Evaluation:
-    """Which evaluation ISO 2631-1 asks for, in words.
+    """The evaluation method required by ISO 2631-1, in words.
 
     The weighted RMS is enough unless the crest factor exceeds 9, MTVV/a_w exceeds 1.5 or VDV/(a_w T^(1/4)) exceeds
     1.75; then MTVV or VDV is to be given as well. Words have no gradient and do not compile: use `shock_ratios` there.

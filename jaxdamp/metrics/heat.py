@@ -1,4 +1,4 @@
-"""How hot a damper gets: one mass that is warmed by dissipation and cooled by the air."""
+"""Temperature of a damper: one mass that is heated by dissipation and cooled by air."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float

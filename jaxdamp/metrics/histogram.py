@@ -1,4 +1,4 @@
-"""At which velocities a damper works, and where it turns motion into heat."""
+"""Histograms of damper velocity and of the dissipated energy."""
 
 import jax
 import jax.numpy as jnp

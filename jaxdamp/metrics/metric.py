@@ -1,4 +1,4 @@
-"""`Metric`: a statistic of a channel, the number by which a ride is judged."""
+"""`Metric`: a statistic of a channel."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -18,13 +18,13 @@ class Metric:
         channel: name of the channel, one of `vehicle.units`.
         statistic: a name out of `STATISTICS` ("rms", "peak", "maximum", "vibration_dose_value", ...), `percentile(95)`,
             or a `Statistic` of your own.
-        weighting: of ISO 2631-1, "Wd" for instance, through which an acceleration goes first; "default" is the one of
-            the channel's direction, Wk for heights and We for angles. None for the channel as it is.
-        by: a second channel, which the first is multiplied with.
-        from_rest: whether the channel counts from its value in the static equilibrium on the road's first heights.
-        window: part of the run that counts, from and to [s], both instants included; all of it if left out. Weightings
-            start with the run.
-        name: what the metric is called; made of the parts if left out.
+        weighting: frequency weighting of ISO 2631-1 for an acceleration, such as "Wd"; "default" is the one for the
+            direction of the channel, Wk for heights and We for angles. None for no weighting.
+        by: a second channel, by which the first is multiplied.
+        from_rest: whether the channel is measured from its value in static equilibrium on the first road heights.
+        window: part of the run that is evaluated, start and end [s], both included; the whole run if left out. The
+            weighting filter starts with the run.
+        name: name of the metric; composed of the other arguments if left out.
 
     Raises:
         ValueError: an unknown statistic or weighting; a window that ends before it begins.
@@ -60,8 +60,8 @@ class Metric:
         if weighting not in (None, "default"):
             check_weighting(weighting)
         if weighting is not None and from_rest:
-            remedy = "A weighting takes constants away by itself: leave `from_rest` out."
-            _checks.refuse("from_rest", "not stand beside a weighting", from_rest, remedy)
+            remedy = "A weighting removes constants by itself: leave `from_rest` out."
+            _checks.refuse("from_rest", "not be used with a weighting", from_rest, remedy)
         if window is not None:
             window = (float(window[0]), float(window[1]))
             if not 0.0 <= window[0] < window[1]:

@@ -1,24 +1,26 @@
-"""Names of metrics: the ones that were renamed, the choice among those that there are, and values by name."""
+"""Names of metrics: renamed ones, the check of given names, and values by name."""
 
 import inspect
 import warnings
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, final
 
 import jax
 
 from jaxdamp import _checks
+from jaxdamp._tables import Compared, Table, comparison_table, with_unit
 
 
-# Old name: new name, of the functions here and of ride metrics, alone or after the name of a corner ("front_…"). An
-# entry stays for one release.
+# Old name: new name, of the functions here and of ride metrics, alone or after the name of a corner ("front_…"). Remove
+# an entry after one release.
 RENAMED = {"working_space_peak": "working_space_peak_to_peak"}
 
-_INSIDE = ("jaxdamp", "jaxtyping", "equinox", "jax")  # packages that a warning's place is not looked for in
+_INSIDE = ("jaxdamp", "jaxtyping", "equinox", "jax")  # packages that are skipped in search of the line to warn at
 
 
 def current_name(name: str, known: Collection[str]) -> str:
-    """The name that a metric has now: of a renamed one the new name, with a `FutureWarning`; else the name itself."""
+    """The current name of a metric: for a renamed one the new name, with a `FutureWarning`."""
     new = _new_name(name, known)
     if new is None:
         return name
@@ -27,7 +29,7 @@ def current_name(name: str, known: Collection[str]) -> str:
 
 
 def _warn(text: str) -> None:
-    """Warn at the line of the code that uses this package."""
+    """Warn at the line of user code that called this package."""
     level, frame = 1, inspect.currentframe()
     while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] in _INSIDE:
         level, frame = level + 1, frame.f_back
@@ -44,25 +46,28 @@ def _new_name(name: Any, known: Collection[str]) -> str | None:
 
 
 def current_names(argument: str, names: Sequence[str], known: Collection[str]) -> list[str]:
-    """These metrics by the names that they have now.
+    """The current names of these metrics.
 
     Raises:
-        ValueError: one that is not known, with the nearest that is; one word in place of a list of them.
+        ValueError: an unknown name, with the nearest known one; a single text instead of a list.
     """
     if isinstance(names, str):
         _checks.refuse(argument, "be a list of names", repr(names), f"Write `{argument}=[{names!r}]`.")
-    found = [current_name(name, known) for name in names]
-    for name in found:
+    current = [current_name(name, known) for name in names]
+    for name in current:
         _checks.one_of(argument, name, known)
-    return found
+    return current
 
 
 @final
 @jax.tree_util.register_pytree_with_keys_class
 class MetricValues(dict):
-    """Values of metrics by name: a `dict` that knows names which were changed and suggests the nearest to a wrong one.
+    """Values of metrics by name: a `dict` that accepts renamed metrics and suggests the nearest name to a wrong one.
 
-    To JAX it is a tree of its values, in the order of their names, as a `dict` is.
+    For JAX it is a pytree of its values, sorted by name, like a `dict`.
+
+    Attributes:
+        units: the unit of each metric, where it is known.
 
     >>> values = MetricValues(rms_sprung_acceleration=1.2)
     >>> values["rms_sprung_accel"]
@@ -70,6 +75,24 @@ class MetricValues(dict):
         ...
     KeyError: "no metric 'rms_sprung_accel'; did you mean 'rms_sprung_acceleration'?"
     """
+
+    units: Mapping[str, str] = MappingProxyType({})
+
+    @classmethod
+    def with_units(cls, values: Mapping[str, Any], units: Mapping[str, str]) -> "MetricValues":
+        """These values and their units."""
+        result = cls(values)
+        result.units = {name: units[name] for name in result if name in units}
+        return result
+
+    def table(self) -> Table:
+        """Each metric with its unit and its value, for the values of one vehicle on one road."""
+        rows = [Compared(name, self.units.get(name, ""), (float(value),), None) for name, value in self.items()]
+        return comparison_table("Ride metrics", "metric", ("value",), rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The values with units, ready for JSON; numbers that are not finite are None."""
+        return {name: with_unit(value, self.units.get(name, "")) for name, value in self.items()}
 
     def __missing__(self, name: Any) -> Any:
         new = current_name(name, self.keys())
@@ -84,15 +107,18 @@ class MetricValues(dict):
         return super().__contains__(name) or _new_name(name, self.keys()) is not None
 
     def get(self, name: Any, default: Any = None) -> Any:
-        """The value of a metric, or the default where there is none of this name."""
+        """The value of a metric, or the default if there is no metric of this name."""
         return self[name] if name in self else default
 
-    def tree_flatten_with_keys(self) -> tuple[list[tuple[Any, Any]], tuple[str, ...]]:
-        """Values with their names, and the names."""
+    def tree_flatten_with_keys(self) -> tuple[list[tuple[Any, Any]], tuple[tuple[str, str | None], ...]]:
+        """Values with their names, and the names with their units."""
         names = sorted(self)
-        return [(jax.tree_util.DictKey(name), self[name]) for name in names], tuple(names)
+        return [(jax.tree_util.DictKey(name), self[name]) for name in names], tuple(
+            (name, self.units.get(name)) for name in names
+        )
 
     @classmethod
-    def tree_unflatten(cls, names: tuple[str, ...], values: Sequence[Any]) -> "MetricValues":
-        """Of names and values."""
-        return cls(zip(names, values, strict=True))
+    def tree_unflatten(cls, names: tuple[tuple[str, str | None], ...], values: Sequence[Any]) -> "MetricValues":
+        """The values with these names and units."""
+        units = {name: unit for name, unit in names if unit is not None}
+        return cls.with_units(dict(zip((name for name, _ in names), values, strict=True)), units)

@@ -1,4 +1,4 @@
-"""The international roughness index of a road profile, in all and by segment."""
+"""The international roughness index of a road profile, for the whole profile and by segment."""
 
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._tables import Column, Table
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.metrics._signals import as_signal
 
@@ -86,10 +87,10 @@ class RoughnessBySegment(NamedTuple):
     """The international roughness index of a profile and of its segments; from `international_roughness_by_segment`.
 
     Attributes:
-        whole: The index of the whole profile [m/m].
-        segments: Those of the segments [m/m].
-        starts: Where each segment begins, from the first sample [m].
-        lengths: How long each segment is [m]; the last one may be shorter than the others.
+        whole: index of the whole profile [m/m].
+        segments: index of each segment [m/m].
+        starts: distance of the start of each segment from the first sample [m].
+        lengths: length of each segment [m]; the last one may be shorter than the others.
     """
 
     whole: Scalar
@@ -102,22 +103,25 @@ class RoughnessBySegment(NamedTuple):
         """Whether the last segment is shorter than the others."""
         return bool(self.lengths[-1] < self.lengths[0] - 1e-6)
 
-    def table(self) -> list[dict[str, Any]]:
-        """A row for each segment and one for the whole profile, in m and m/km."""
-        rows = [
-            {"from [m]": float(start), "to [m]": float(start + length), "IRI [m/km]": 1e3 * float(value), "note": ""}
-            for start, length, value in zip(self.starts, self.lengths, self.segments, strict=True)
-        ]
+    def table(self) -> Table:
+        """A row for each segment and one for the whole profile."""
+        ends, notes = self.starts + self.lengths, [""] * len(self.lengths)
         if self.is_partial:
-            rows[-1]["note"] = f"the last {self.lengths[-1]:.6g} m only"
-        end = float(self.starts[-1] + self.lengths[-1])
-        return [*rows, {"from [m]": 0.0, "to [m]": end, "IRI [m/km]": 1e3 * float(self.whole), "note": "in all"}]
+            notes[-1] = f"the last {self.lengths[-1]:.6g} m only"
+        cells = [
+            *zip(self.starts, ends, self.segments, notes, strict=True),
+            (0.0, ends[-1], self.whole, "whole profile"),
+        ]
+        columns = Column("from", "m", ".6g"), Column("to", "m", ".6g"), Column("IRI", "m/km", ".3f"), Column("note")
+        rows = tuple((float(start), float(end), 1e3 * float(value), note) for start, end, value, note in cells)
+        return Table("International roughness index", columns, rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The rows of the table with units, ready for JSON."""
+        return self.table().to_dict()
 
     def __str__(self) -> str:
-        head = f"{'from [m]':>10}{'to [m]':>10}{'IRI [m/km]':>12}"
-        cells = [tuple(row.values()) for row in self.table()]
-        rows = [f"{a:10.6g}{b:10.6g}{value:12.3f}  {note}".rstrip() for a, b, value, note in cells]
-        return "\n".join([head, *rows])
+        return self.table().to_text()
 
     def plot(self) -> "matplotlib.figure.Figure":
         """The index over the distance (`plots.roughness_by_segment`)."""
@@ -133,19 +137,20 @@ def international_roughness_by_segment(
     segment: float | int = 100.0,
     moving_average: float | int = 0.25,
 ) -> RoughnessBySegment:
-    """The international roughness index of every 100 m of one run, and in all.
+    """The international roughness index of each segment of a profile, such as every 100 m, and of the whole profile.
 
-    The golden car drives over the whole profile once, so that only the first segment feels its start: see
-    `international_roughness_index`. The mean of the segments, weighted by their lengths, is the index in all.
+    The golden car drives over the whole profile once, so its initial state only affects the first segment: see
+    `international_roughness_index`. The index of the whole profile is the mean of the segments, weighted by length.
 
     >>> x = jnp.arange(0.0, 250.0, 0.1)
     >>> rough = jnp.where(x < 100.0, 0.001, 0.004) * jnp.sin(2.0 * jnp.pi * x / 5.0)
     >>> print(international_roughness_by_segment(rough, 0.1))
-      from [m]    to [m]  IRI [m/km]
-             0       100       0.928
-           100       200       3.716
-           200     249.7       3.706  the last 49.7 m only
-             0     249.7       2.597  in all
+    International roughness index
+    from [m]  to [m]  IRI [m/km]  note
+           0     100       0.928
+         100     200       3.716
+         200   249.7       3.706  the last 49.7 m only
+           0   249.7       2.597  whole profile
 
     Arguments:
         profile: height of one wheel track [m], shape [samples], longer than 11.25 m.

@@ -7,10 +7,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from jaxdamp import _checks
-from jaxdamp._limits import largest
+from jaxdamp._limits import largest, root
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.metrics._linear_system import quotient, respond_as_lag
-from jaxdamp.metrics._signals import as_signal, check_interval, root
+from jaxdamp.metrics._signals import as_signal, check_interval
 from jaxdamp.metrics.weighted import as_weighted
 
 

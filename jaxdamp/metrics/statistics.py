@@ -1,7 +1,7 @@
-"""Statistics: numbers of a record, taken of all samples at once or gathered sample by sample while a simulation runs.
+"""Statistics of a record, computed from all samples at once or sample by sample during a simulation.
 
-A statistic is written once, as sums and extremes of functions of a sample and what follows from these. Both ways give
-the same number up to rounding; gathered, it needs no memory for the record.
+A statistic is defined once, as a function of sums, maxima and minima over the samples. Both ways give the same number
+up to rounding; sample by sample, it needs no memory for the record.
 """
 
 import dataclasses
@@ -14,9 +14,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._limits import at_least, at_most, largest
+from jaxdamp._limits import at_least, at_most, largest, root
 from jaxdamp._types import Scalar, ScalarLike, Signal
-from jaxdamp.metrics._signals import root
 from jaxdamp.metrics.running import max_transient_value
 
 
@@ -25,7 +24,7 @@ Samples: TypeAlias = Float[Array, "..."]  # one sample, or all of a record at on
 
 
 class Reduction(enum.Enum):
-    """What a term takes of its values over the samples."""
+    """How a term combines its values over the samples."""
 
     SUM = "sum"
     LARGEST = "largest"
@@ -34,7 +33,7 @@ class Reduction(enum.Enum):
     LAST = "last"
 
     def join(self, before: Scalar, value: Scalar) -> Scalar:
-        """With one value more."""
+        """The combination with one more value."""
         match self:
             case Reduction.SUM:
                 return before + value
@@ -48,7 +47,7 @@ class Reduction(enum.Enum):
                 return value
 
     def of(self, values: Signal) -> Scalar:
-        """Of all values at once."""
+        """The combination of all values."""
         match self:
             case Reduction.SUM:
                 return jnp.sum(values)
@@ -63,10 +62,10 @@ class Reduction(enum.Enum):
 
 
 class Term(NamedTuple):
-    """A function of a sample y and of the first sample, and what is taken of its values.
+    """A function of a sample y and of the first sample, and the reduction of its values.
 
-    The first sample is known to all terms of a statistic whose first term is `Term(Reduction.FIRST)`; to those of
-    others it is None, because a run does not save it for them.
+    The first sample is available if the first term of the statistic is `Term(Reduction.FIRST)`; otherwise it is None,
+    because a run does not save it.
     """
 
     reduction: Reduction
@@ -188,7 +187,7 @@ def _dimensionless(_: str) -> str:
     return ""
 
 
-# Sums about the first sample keep their digits where the mean is large.
+# Sums about the first sample avoid loss of digits if the mean is large.
 _SPREAD = (
     Term(Reduction.FIRST),
     Term(Reduction.SUM, lambda y, first: y - first),

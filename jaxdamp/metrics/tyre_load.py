@@ -1,4 +1,4 @@
-"""How evenly a tyre presses on the road."""
+"""Variation of the tyre load."""
 
 import jax.numpy as jnp
 

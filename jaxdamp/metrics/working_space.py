@@ -1,4 +1,4 @@
-"""How much suspension travel is used."""
+"""Use of the suspension travel."""
 
 import math
 

@@ -1,6 +1,6 @@
 """Roads: the height under each wheel as a function of time.
 
-A road answers one question, `height(time)`: the height [m], up positive, under every wheel at the times asked for, as
+The method `height(time)` of a road gives the height [m], up positive, under every wheel at the given times, as
 an array of shape [time, wheels]. A road with a single track has one column.
 
 - Single events: `cosine_bump`, `half_sine_bump`, `trapezoid_bump`, `triangular_bump`, `pothole`, `step`.

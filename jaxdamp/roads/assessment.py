@@ -1,12 +1,14 @@
-"""How rough is a road? Its spectrum, fitted by that of ISO 8608, and its class."""
+"""Roughness of a measured road: its spectrum, fitted by that of ISO 8608, and its class."""
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
+from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.roads.iso_classes import (
     HIGHEST_SPATIAL_FREQUENCY,
     LOWEST_SPATIAL_FREQUENCY,
@@ -16,17 +18,17 @@ from jaxdamp.roads.iso_classes import (
 )
 
 
-# Lines in a band that count as independent: a Hann window makes neighbours alike (1 + 2 (4/9 + 1/36) = 1.94).
-_ALIKE = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)
-# The first lines of a windowed record hold what leaks from the longest waves, and a band needs some lines.
+# A Hann window correlates neighbouring lines: so many lines count as one independent line (1.94).
+_CORRELATED_LINES = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0)
+# The first lines of a windowed record contain leakage from the longest waves; a band needs at least two lines.
 _FIRST_LINE, _LEAST_LINES = 3, 2
-# A spectrum whose bands depart from the straight line by more than this, in ln G_d (a factor of two), is not one.
+# Larger deviations of the bands from the fitted line, in ln G_d (a factor of two), are reported.
 _STRAIGHT = 0.7
 
 
 @dataclass(frozen=True, eq=False)
 class RoughnessAssessment:
-    """The roughness of a profile; made by `assess_roughness`. Its `str` is a table with a verdict in words.
+    """The roughness of a profile, from `assess_roughness`; prints as a table with a summary in words.
 
     Attributes:
         spatial_frequency: centres n of the bands [cycle/m].
@@ -59,7 +61,7 @@ class RoughnessAssessment:
 
     @property
     def verdict(self) -> str:
-        """What the numbers mean, in a few sentences."""
+        """Summary in a few sentences."""
         low, high = class_limits(self.road_class)
         limits = f"{1e6 * low:.0f} to {1e6 * high:.0f}" if 0.0 < low and high < 1.0 else f"up to {1e6 * high:.0f}"
         limits = f"from {1e6 * low:.0f}" if math.isinf(high) else limits
@@ -70,29 +72,52 @@ class RoughnessAssessment:
         ]
         first, last = self.spatial_frequency[[0, -1]]
         if first > 1.5 * LOWEST_SPATIAL_FREQUENCY:
-            words.append(f"Waves longer than {1.0 / first:.3g} m were not seen: the record is too short for them.")
+            words.append(f"Waves longer than {1.0 / first:.3g} m are not included: the record is too short.")
         if last < HIGHEST_SPATIAL_FREQUENCY / 1.5:
-            words.append(f"Waves shorter than {1.0 / last:.3g} m were not seen: the samples are too far apart.")
+            words.append(f"Waves shorter than {1.0 / last:.3g} m are not included: the samples are too far apart.")
         if first > REFERENCE_SPATIAL_FREQUENCY:
             words.append("The value at n0 = 0.1 cycle/m is extrapolated.")
         if self.deviation > _STRAIGHT:
             factor = math.exp(self.deviation)
-            words.append(f"The spectrum is no straight line, it departs by a factor of {factor:.2g}: judge the bands.")
+            words.append(
+                f"The spectrum deviates from a straight line by a factor of {factor:.2g}: use the classes of the bands."
+            )
         elif abs(self.waviness - 2.0) > 0.3:
-            kind = "long waves stand out" if self.waviness > 2.0 else "short waves stand out"
-            words.append(f"The waviness is not that of the standard, 2: {kind}.")
+            kind = "long waves are stronger" if self.waviness > 2.0 else "short waves are stronger"
+            words.append(f"The waviness differs from the value of the standard, 2: {kind}.")
         least, most = min(self.band_classes), max(self.band_classes)
         if least != most:
             worst = int(np.argmax(self.displacement_psd * self.spatial_frequency**2))
             wave = 1.0 / self.spatial_frequency[worst]
-            words.append(f"Band by band it is of class {least} to {most}, the roughest at waves of {wave:.2g} m.")
+            words.append(f"The bands are of class {least} to {most}; the roughest has a wavelength of {wave:.2g} m.")
         return " ".join(words)
 
+    def table(self) -> Table:
+        """A row for each band."""
+        columns = (
+            Column("n", "cycle/m"),
+            Column("wavelength", "m"),
+            Column("G_d", "m^3", ".3e"),
+            Column("lines", spec="d"),
+            Column("class"),
+        )
+        numbers = self.spatial_frequency, 1.0 / self.spatial_frequency, self.displacement_psd, self.lines
+        return Table("Road roughness", columns, tuple(zip(*map(plain, numbers), self.band_classes, strict=True)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Class, fitted spectrum, bands and verdict with units, ready for JSON."""
+        return {
+            "road_class": self.road_class,
+            "roughness_psd": with_unit(self.roughness_psd, "m^3"),
+            "waviness": self.waviness,
+            "deviation": self.deviation,
+            "rms": with_unit(self.rms, "m"),
+            "bands": self.table().to_dict(),
+            "verdict": self.verdict,
+        }
+
     def __str__(self) -> str:
-        rows = zip(self.spatial_frequency, self.displacement_psd, self.lines, self.band_classes, strict=True)
-        table = [f"{'n [cycle/m]':>12}{'wave [m]':>10}{'G_d [m^3]':>12}{'lines':>7}  class"]
-        table += [f"{n:12.4g}{1.0 / n:10.4g}{psd:12.3e}{count:7d}  {letter}" for n, psd, count, letter in rows]
-        return "\n".join([*table, self.verdict])
+        return f"{self.table().to_text()}\n{self.verdict}"
 
 
 def assess_roughness(
@@ -143,7 +168,7 @@ def assess_roughness(
     centre, psd, lines = _bands(values, float(spacing), int(bands_per_octave))
     from scipy.special import digamma
 
-    independent = np.maximum(lines / _ALIKE, 1.0)
+    independent = np.maximum(lines / _CORRELATED_LINES, 1.0)
     logarithm = np.log(psd) - (digamma(independent) - np.log(independent))
     octave = np.log(centre / REFERENCE_SPATIAL_FREQUENCY)
     slope, level = np.polyfit(octave, logarithm, 1)

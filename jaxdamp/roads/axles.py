@@ -16,7 +16,7 @@ from jaxdamp.roads.base import AbstractRoad, Columns
 
 @final
 class Delayed(AbstractOnOneRoad):
-    """The same road under several axles, later under each; made by `delayed`."""
+    """The same road under several axles, later under each; created by `delayed`."""
 
     road: AbstractRoad
     delay: Float[Array, " axles"]
@@ -51,7 +51,7 @@ class Delayed(AbstractOnOneRoad):
 
 @final
 class InPhase(AbstractOnOneRoad):
-    """A road that reaches all axles at the same time; made by `in_phase`."""
+    """A road that reaches all axles at the same time; created by `in_phase`."""
 
     road: AbstractRoad
 

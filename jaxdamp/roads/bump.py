@@ -17,7 +17,7 @@ from jaxdamp.roads.base import AbstractRoad
 
 @final
 class Bump(AbstractRoad):
-    """z(t) = H f((t - t0)/T); made by `cosine_bump`, `half_sine_bump`, `trapezoid_bump`, `pothole` and others.
+    """z(t) = H f((t - t0)/T); created by `cosine_bump`, `half_sine_bump`, `trapezoid_bump`, `pothole` and others.
 
     Attributes:
         shape: f, a function of the fraction of the event that the wheel has passed.

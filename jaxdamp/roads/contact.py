@@ -1,4 +1,4 @@
-"""What a tyre feels of a road: it touches over a patch, and bridges what is shorter than itself."""
+"""Tyre contact: the average over a contact patch, and the path of a rolling disc."""
 
 from typing import final
 
@@ -27,7 +27,7 @@ def heights_around(
 
 @final
 class ContactPatch(AbstractOnOneRoad):
-    """A road averaged over the contact patch; made by `contact_patch`."""
+    """A road averaged over the contact patch; created by `contact_patch`."""
 
     road: AbstractRoad
     passing_time: Scalar  # contact length over speed [s]
@@ -48,7 +48,7 @@ class ContactPatch(AbstractOnOneRoad):
 
 @final
 class RollingDisc(AbstractOnOneRoad):
-    """The path of the lowest point of a rigid disc; made by `rolling_disc`."""
+    """The path of the lowest point of a rigid disc; created by `rolling_disc`."""
 
     road: AbstractRoad
     radius: Scalar

@@ -14,7 +14,7 @@ from jaxdamp.roads.base import AbstractRoad
 
 @final
 class Step(AbstractRoad):
-    """A rounded step in time; made by `step`."""
+    """A rounded step in time; created by `step`."""
 
     rise: Scalar
     start: Scalar

@@ -15,7 +15,7 @@ from jaxdamp.roads.base import AbstractRoad
 
 @final
 class Sine(AbstractRoad):
-    """A sine in time; made by `sine`."""
+    """A sine in time; created by `sine`."""
 
     amplitude: Scalar
     frequency: Scalar

@@ -23,7 +23,7 @@ from jaxdamp.roads.iso_classes import (
 
 @final
 class Iso8608(AbstractRoad):
-    """A sum of cosines with the spectrum of ISO 8608; made by `iso8608`."""
+    """A sum of cosines with the spectrum of ISO 8608; created by `iso8608`."""
 
     roughness_psd: Scalar
     waviness: Scalar

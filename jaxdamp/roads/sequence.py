@@ -15,7 +15,7 @@ from jaxdamp.roads.base import AbstractRoad, Columns
 
 @final
 class Joined(AbstractRoad):
-    """A road that goes over into another one; made by `joined`."""
+    """A road that goes over into another one; created by `joined`."""
 
     first: AbstractRoad
     second: AbstractRoad

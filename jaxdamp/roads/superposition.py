@@ -1,4 +1,4 @@
-"""Roads on top of each other."""
+"""Sums of roads."""
 
 from typing import final
 
@@ -12,7 +12,7 @@ from jaxdamp.roads.base import AbstractRoad, Columns
 
 @final
 class Superposed(AbstractOnSeveralRoads):
-    """The sum of several roads; made by `superposed`."""
+    """The sum of several roads; created by `superposed`."""
 
     roads: tuple[AbstractRoad, ...]
 

@@ -30,7 +30,7 @@ _SWEEPS = {"linear": linear_sweep, "logarithmic": logarithmic_sweep}
 
 @final
 class SweepSine(AbstractRoad):
-    """A sine of changing frequency; made by `sweep_sine`."""
+    """A sine of changing frequency; created by `sweep_sine`."""
 
     size: Scalar  # amplitude of the height [m] or of its rate [m/s]
     start: Scalar

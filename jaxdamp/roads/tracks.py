@@ -1,4 +1,4 @@
-"""Two tracks beside each other."""
+"""Roads with a left and a right track."""
 
 from typing import final
 
@@ -17,7 +17,7 @@ from jaxdamp.roads.iso_roughness import Iso8608
 
 @final
 class TwoTrack(AbstractOnSeveralRoads):
-    """A left-hand and a right-hand track; made by `two_track`."""
+    """A left-hand and a right-hand track; created by `two_track`."""
 
     roads: tuple[AbstractRoad, AbstractRoad]
 
@@ -94,6 +94,7 @@ def two_track(
     if not isinstance(left, Iso8608):
         remedy = "Give the second track as `right`."
         _checks.refuse("left", "be a road made by `iso8608` with `track_width`", f"a {type(left).__name__}", remedy)
+    assert track_width is not None  # since `right` is None
     _checks.positive("track_width", track_width, "It is in m.")
     if seed is None:
         _checks.refuse("seed", "be given with `track_width`", seed, "Any whole number: another one, another road.")

@@ -13,7 +13,7 @@ from jaxdamp.roads.iso_classes import REFERENCE_SPATIAL_FREQUENCY, roughness
 
 @final
 class WhiteRoad(eqx.Module):
-    """A road known by its spectrum alone, for the stationary response of linear vehicles; made by `white`.
+    """A road known by its spectrum alone, for the stationary response of linear vehicles; created by `white`.
 
     Attributes:
         velocity_psd: two-sided power spectral density of the rate of height [(m/s)²/Hz].
@@ -27,7 +27,7 @@ class WhiteRoad(eqx.Module):
 def white(road_class: str | ScalarLike, speed: ScalarLike) -> WhiteRoad:
     """The road of an ISO 8608 class at a speed as white noise in the rate of height, S = 2π² G_d(n₀) n₀² V.
 
-    It cannot be driven over in time: it goes to stationary calculations, in which heights stay relative.
+    It cannot be used in simulations over time, only for stationary responses, in which heights are relative.
 
     Arguments:
         road_class: a letter A to H, or G_d(n₀) [m³].

@@ -147,7 +147,8 @@ class Response(eqx.Module):
         and counts, which have none.
         """
         chosen, dt = self.vehicle.chosen_metrics(names, "names"), self._dt()
-        return MetricValues(self._metrics([(m, self._samples_of(m, dt)) for m in chosen], dt))
+        values = self._metrics([(m, self._samples_of(m, dt)) for m in chosen], dt)
+        return MetricValues.with_units(values, {m.name: m.unit(self.units) for m in chosen})
 
     def _samples_of(self, metric: Metric, dt: ScalarLike) -> tuple[int, int]:
         """Numbers of the first and the last instant that count."""

@@ -169,7 +169,7 @@ class Ride(eqx.Module):
         for name, value in point.items():
             if np.shape(value) != ():
                 self._check_shape(name, np.shape(value))
-        return MetricValues(_drive(self, point))
+        return MetricValues.with_units(_drive(self, point), self.units)
 
     def _check_shape(self, name: str, shape: tuple[int, ...]) -> None:
         """Refuse several numbers for one, which would be several cars."""

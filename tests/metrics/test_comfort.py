@@ -67,5 +67,5 @@ def test_errors():
     for value in (-0.1, np.nan):
         with pytest.raises(ValueError, match=r"`total_value` must be finite and not negative"):
             comfort_reaction(value)
-    with pytest.raises(ValueError, match=r"`total_value` must be known: words do not compile, but is traced"):
+    with pytest.raises(ValueError, match=r"`total_value` must be known: texts cannot be compiled, but is traced"):
         jax.jit(lambda x: len(comfort_reaction(x)))(0.5)

@@ -27,7 +27,7 @@ def test_units_follow_from_those_of_the_channels():
         ({"statistic": "rsm"}, "`statistic` must be one of .* Did you mean 'rms'"),
         ({"weighting": "wk"}, "`weighting` must be one of .* Did you mean 'Wk'"),
         ({"window": (2.0, 1.0)}, "`window` must begin at 0 s or later and end after that"),
-        ({"weighting": "Wk", "from_rest": True}, "`from_rest` must not stand beside a weighting"),
+        ({"weighting": "Wk", "from_rest": True}, "`from_rest` must not be used with a weighting"),
     ],
 )
 def test_what_makes_no_metric_is_refused(more, words):

@@ -60,3 +60,14 @@ def test_a_choice_of_names():
         current_names("metrics", ["rms_sprung_accel"], KNOWN)
     with pytest.raises(ValueError, match=r"`metrics` must be a list of names.*Write `metrics=\['working_space_rms'\]`"):
         current_names("metrics", "working_space_rms", KNOWN)
+
+
+def test_values_with_units_as_a_table_and_as_plain_data():
+    values = MetricValues.with_units(
+        VALUES, {"working_space_rms": "m", "rms_sprung_acceleration": "m/s^2", "other": "N"}
+    )
+    assert values.table().records()[0] == {"metric": "working_space_rms", "unit": "m", "value": 1.0}
+    assert values.to_dict()["rms_sprung_acceleration"] == {"value": 3.0, "unit": "m/s^2"}
+    assert values.to_dict()["front_working_space_peak_to_peak"] == {"value": 2.0, "unit": ""}
+    doubled = jax.jit(lambda values: jax.tree.map(lambda v: 2.0 * v, values))(values)
+    assert doubled.units == values.units and dict(doubled) == {name: 2.0 * value for name, value in VALUES.items()}

@@ -114,8 +114,9 @@ def test_segments_are_of_one_run_and_their_mean_is_the_whole(road):
     np.testing.assert_allclose(found.lengths, [40.0, 40.0, 40.0, 30.0])
     assert float(found.whole) == pytest.approx(np.average(found.segments, weights=found.lengths), rel=1e-12)
     assert float(found.whole) == pytest.approx(float(international_roughness_index(road, 0.25)), rel=1e-12)
-    assert found.is_partial and [row["note"] for row in found.table()] == ["", "", "", "the last 30 m only", "in all"]
-    assert found.table()[1]["IRI [m/km]"] == pytest.approx(1e3 * rates[160:320].mean())
+    rows = found.table().records()
+    assert found.is_partial and [row["note"] for row in rows] == ["", "", "", "the last 30 m only", "whole profile"]
+    assert rows[1]["IRI"] == pytest.approx(1e3 * rates[160:320].mean())
     assert "the last 30 m only" in str(found)
     even = international_roughness_by_segment(road, 0.25, segment=50.0)
     assert not even.is_partial and even.segments.shape == (3,)

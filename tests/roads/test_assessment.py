@@ -1,3 +1,5 @@
+import json
+
 import numpy as np
 import pytest
 
@@ -36,8 +38,8 @@ def test_other_waviness_is_found_and_told(waviness):
     found = assess_roughness(profile(waviness=waviness, seed=2), 0.1, bands_per_octave=3)
     assert found.spatial_frequency.size == 24
     assert abs(found.waviness - waviness) < 0.2
-    told = "long waves stand out" if waviness > 2 else "short waves stand out"
-    assert f"not that of the standard, 2: {told}" in found.verdict
+    stronger = "long waves are stronger" if waviness > 2 else "short waves are stronger"
+    assert f"differs from the value of the standard, 2: {stronger}" in found.verdict
 
 
 def test_a_single_wave_has_its_variance_and_is_no_straight_line():
@@ -48,7 +50,7 @@ def test_a_single_wave_has_its_variance_and_is_no_straight_line():
         0.03**2 / 2, rel=0.02
     )  # the bands' lines, one by one
     assert found.rms == pytest.approx(0.03 / np.sqrt(2), rel=1e-3)
-    assert "no straight line" in found.verdict and "roughest at waves of 4 m" in found.verdict
+    assert "deviates from a straight line" in found.verdict and "roughest has a wavelength of 4 m" in found.verdict
 
 
 def test_slope_and_offset_do_not_count():
@@ -69,10 +71,13 @@ def test_what_the_record_cannot_show_is_told():
 
 def test_table_is_readable():
     lines = str(assess_roughness(profile(seed=6), 0.1)).splitlines()
-    assert lines[0].split() == ["n", "[cycle/m]", "wave", "[m]", "G_d", "[m^3]", "lines", "class"]
-    assert len(lines) == 1 + 8 + 1
-    assert len({len(line) for line in lines[1:9]}) == 1
-    assert lines[1].split()[-1] in "BCD"
+    assert lines[1].split() == ["n", "[cycle/m]", "wavelength", "[m]", "G_d", "[m^3]", "lines", "class"]
+    assert len(lines) == 2 + 8 + 1
+    assert len({len(line) for line in lines[2:10]}) == 1
+    assert lines[2].split()[-1] in "BCD"
+    found = assess_roughness(profile(seed=6), 0.1)
+    plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert plain["road_class"] == found.road_class and plain["bands"]["rows"][0][2] == found.displacement_psd[0]
 
 
 ROUGH = np.sin(np.arange(1000.0))
