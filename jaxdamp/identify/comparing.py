@@ -45,15 +45,15 @@ class Comparison:
         """The comparison of the outcomes of `fit_each`.
 
         Raises:
-            ValueError: not one law was fitted.
+            ValueError: no law could be fitted.
         """
         outcomes = tuple(outcomes)
         rungs = tuple(outcome for outcome in outcomes if isinstance(outcome, Rung))
         failed = tuple(outcome for outcome in outcomes if isinstance(outcome, Failure))
         if not rungs:
             reasons = list(dict.fromkeys(failure.reason for failure in failed))
-            said = reasons if len(reasons) == 1 else [f"{failure.name}: {failure.reason}" for failure in failed]
-            raise ValueError(f"None of {len(failed)} laws could be fitted. {' '.join(said)}")
+            texts = reasons if len(reasons) == 1 else [f"{failure.name}: {failure.reason}" for failure in failed]
+            raise ValueError(f"None of {len(failed)} laws could be fitted. {' '.join(texts)}")
         return cls(rungs, tuple(held_out), failed)
 
     @property
@@ -63,7 +63,7 @@ class Comparison:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What all fits warn of, such as records that contradict each other: it concerns the records, not a law."""
+        """The warnings of all fits, which concern the records and not a law, such as contradicting records."""
         first, *others = (rung.result.warnings for rung in self.rungs)
         return tuple(warning for warning in first if all(warning in warnings for warnings in others))
 
@@ -77,11 +77,11 @@ class Comparison:
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """How good the best law is, and what the errors are made of (shape, hysteresis, noise), a sentence each."""
+        """Sentences on the error of the best law and on the shares of the errors (shape, hysteresis, noise)."""
         return verdict(self.rungs, self.held_out)
 
     def table(self) -> Table:
-        """Each law with its number of free parameters, its errors, what these are made of, and what is doubtful."""
+        """Each law with its number of free parameters, its errors, their shares, and remarks."""
         return ladder_table(self.rungs, self.failed)
 
     def to_dict(self) -> dict[str, Any]:
@@ -133,8 +133,7 @@ def compare(
 ) -> Comparison:
     """Fit several laws to the same records and score them on others.
 
-    A law that cannot be fitted to these records, or scored on those, costs itself alone: it is listed in `failed` with
-    the reason, and the others go on.
+    A law that cannot be fitted or scored does not stop the comparison: it is listed in `failed` with the reason.
 
     Arguments:
         laws: starts by name, such as `default_ladder(runs)`.
@@ -144,7 +143,7 @@ def compare(
         options: passed on to `fit`.
 
     Raises:
-        ValueError: no laws, or not one that could be fitted.
+        ValueError: no laws, or none that could be fitted.
 
     >>> from jaxdamp import bench, dampers
     >>> runs = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=5.0).run(
@@ -175,9 +174,9 @@ def fit_each(
     progress: Callable[[str], None] = lambda name: None,
     **options: Any,
 ) -> Iterator[Rung | Failure]:
-    """The laws of a comparison in their order, each as soon as it and those before it are fitted or have failed.
+    """Fit the laws of a comparison; yields each result or failure in their order, as soon as it is available.
 
-    Most of the time goes into compiling, so several laws are fitted side by side, each in a thread of its own.
+    Most of the time is needed for compiling, so several laws are fitted at the same time, each in its own thread.
 
     Arguments:
         laws: starts by name.

@@ -1,4 +1,4 @@
-"""What the records of a fit covered, to go with the law that was fitted to them."""
+"""The range of the records of a fit, to be stored in the fitted law."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from jaxdamp.dampers import FittedRange
 
 
 def covered_range(runs: Sequence[BenchRun]) -> FittedRange:
-    """Lowest and highest value of each channel over all records; of temperature and command where records state them.
+    """Lowest and highest value of each channel over all records, and of temperature and command if stated.
 
     Arguments:
         runs: the records that were fitted, one or more.

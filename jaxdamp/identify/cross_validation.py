@@ -8,10 +8,12 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import fit
 from jaxdamp.identify.result import AbstractFitted, score
 from jaxdamp.identify.starting import Start, check_starts
+from jaxdamp.parameters import parameters
 
 
 if TYPE_CHECKING:
@@ -59,10 +61,10 @@ class CrossValidation:
         return max(self.laws, key=self.fit_percent)
 
     def _of(self, law: str, group: Hashable) -> list[Fold]:
-        found = [f for f in self.folds if f.law == law and (group is None or f.group == group)]
-        if not found:
+        folds = [f for f in self.folds if f.law == law and (group is None or f.group == group)]
+        if not folds:
             raise KeyError(f"No folds of {law!r} in {group!r}; laws: {self.laws}, groups: {self.groups}.")
-        return found
+        return folds
 
     def __add__(self, other: "CrossValidation") -> "CrossValidation":
         return CrossValidation(self.folds + other.folds)
@@ -73,25 +75,33 @@ class CrossValidation:
 
         return cross_validation(self, **options)
 
-    def table(self) -> list[dict[str, Any]]:
-        """One row for each law: mean held-out fit percent by group and in all, RMSE [N]."""
-        rows = []
-        for law in self.laws:
-            groups = self.groups if len(self.groups) > 1 else ()
-            by_group = {f"{group}": self.fit_percent(law, group) for group in groups}
-            rows.append({"law": law} | by_group | {"all": self.fit_percent(law), "rmse": self.rmse(law)})
-        return rows
+    def table(self) -> Table:
+        """One row for each law: mean fit of the held-out records by group and over all records, and RMSE."""
+        groups = self.groups if len(self.groups) > 1 else ()
+        columns = [Column(f"{group}", "%", ".1f") for group in groups] + [Column("all", "%", ".1f")]
+        rows = tuple(
+            (law, *(self.fit_percent(law, group) for group in groups), self.fit_percent(law), self.rmse(law))
+            for law in self.laws
+        )
+        return Table("Fit of the held-out records", (Column("law"), *columns, Column("RMSE", "N", ".1f")), rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The errors of each law on each held-out record with units, ready for JSON."""
+        folds = [
+            {
+                "law": fold.law,
+                "group": None if fold.group is None else str(fold.group),
+                "held_out": fold.held_out,
+                "fit": with_unit(fold.fit_percent, "%"),
+                "rmse": with_unit(fold.rmse, "N"),
+                "parameters": plain({p.path: p.value for p in parameters(fold.result.law)}),
+            }
+            for fold in self.folds
+        ]
+        return {"best": self.best, "folds": folds}
 
     def __repr__(self) -> str:
-        rows = self.table()
-        columns = [name for name in rows[0] if name not in ("law", "rmse")]
-        width = max(4, *(len(law) for law in self.laws))
-        head = f"{'held-out fit %':<{width}}" + "".join(f"{name:>9}" for name in columns) + f"{'RMSE N':>9}"
-        lines = [
-            f"{row['law']:<{width}}" + "".join(f"{row[name]:>9.1f}" for name in columns) + f"{row['rmse']:>9.1f}"
-            for row in rows
-        ]
-        return "\n".join([head, *lines, f"best: {self.best}"])
+        return f"{self.table().to_text()}\nbest: {self.best}"
 
 
 def cross_validate(
@@ -105,12 +115,12 @@ def cross_validate(
     """Hold out each record in turn, fit every law to the others, and score it on the record held out.
 
     Arguments:
-        laws: starts by name, as `fit` takes them; those that are classes or functions are started anew from the
-            records of each fit, so that nothing of the held-out record leaks into them.
+        laws: starts by name, as for `fit`; classes and functions are called again for each fit with its records only,
+            so that the held-out record has no influence on the start.
         runs: two records or more.
-        by: a group for each record, such as `lambda run: run.command`: the laws are fitted to each group on its own.
+        by: the group of a record, such as `lambda run: run.command`: the laws are fitted to each group separately.
         method: called as `method(start, runs, weighting=..., **options)`, with an infinite weighting for the record
-            held out; gives back something with a `law`. `fit`, or for networks a function that calls `train`.
+            held out; the result has a `law`. `fit`, or for networks a function that calls `train`.
         options: passed on to the method.
 
     Raises:
@@ -139,6 +149,6 @@ def cross_validate(
                     shown(f"{name} without {run.name}, {len(folds) + 1} of {total}")
                     weighting = [np.inf if i == out else 1.0 for i in range(len(members))]
                     result = method(start, members, weighting=weighting, **options)
-                    found = score(result.law, members)[2][out]
-                    folds.append(Fold(name, group, run.name, found.fit_percent, found.rmse, result))
+                    held_out = score(result.law, members)[2][out]
+                    folds.append(Fold(name, group, run.name, held_out.fit_percent, held_out.rmse, result))
     return CrossValidation(tuple(folds))

@@ -1,4 +1,4 @@
-"""Which fitted numbers lie on an end of their range."""
+"""Fitted numbers at an end of their range."""
 
 import jax
 import numpy as np
@@ -8,11 +8,11 @@ from jaxdamp.dampers import laws_inside
 from jaxdamp.parameters import Coordinates
 
 
-AT_LIMIT = 1e-4  # distance from a limit that other parameters give, relative to the start, that counts as none
+AT_LIMIT = 1e-4  # distance from a limit given by other parameters, relative to the start, that counts as zero
 
 
 def at_ends(coordinates: Coordinates, values: Float[np.ndarray, " free"]) -> Float[np.ndarray, " free"]:
-    """−1 where a number lies on the lower end of its range, 1 on the upper, else 0.
+    """−1 for a number at the lower end of its range, 1 at the upper, else 0.
 
     Neighbours of ordered numbers are ends too, and so are limits that depend on other parameters of a law.
     """
@@ -22,7 +22,7 @@ def at_ends(coordinates: Coordinates, values: Float[np.ndarray, " free"]) -> Flo
 
 
 def _at_conditions(coordinates: Coordinates, values: Float[np.ndarray, " free"]) -> set[str]:
-    """Parameters that lie on a limit that other parameters give."""
+    """Parameters at a limit given by other parameters."""
     free = coordinates.free
     scales = {p.path: float(np.max(np.abs(np.asarray(p.value)))) or 1.0 for p in free.chosen}
     found = set()

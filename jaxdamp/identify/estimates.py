@@ -1,4 +1,4 @@
-"""Fitted numbers with their uncertainty, and how they are written."""
+"""Fitted parameters with their uncertainty, and their display."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,14 +10,14 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import free_parameters
 
 
-PLACES = 3  # behind the point, of a value too large or too small to be written out
+PLACES = 3  # decimal places of values in exponential form
 
 
 class Estimate(NamedTuple):
     """One fitted number.
 
-    The standard error counts every other free number as unknown, also those that ended on an edge of their range, and
-    is what it would be without any edge.
+    The standard error takes all other free numbers as unknown, also those that ended at an edge of their range, and is
+    computed without any edges.
     """
 
     name: str
@@ -31,14 +31,14 @@ class Estimate(NamedTuple):
 
     @property
     def remark(self) -> str:
-        """The note, and the numbers tied to this one, in words."""
+        """The note, and the names of the numbers tied to this one."""
         return with_tied(self.note, self.tied)
 
 
 def rounded(value: float, error: float) -> tuple[str, str]:
-    """A value and its standard error as text, with the digits that mean something.
+    """A value and its standard error as text, with the significant digits.
 
-    The error gets two digits, the value those down to the second digit of the error, but one at least.
+    The error has two digits, the value the digits down to the second digit of the error, but at least one.
 
     >>> rounded(14361.27, 61.8), rounded(0.9035, 0.2912), rounded(3.2, float("inf"))
     (('14361', '62'), ('0.90', '0.29'), ('3.2', 'inf'))
@@ -54,12 +54,12 @@ def rounded(value: float, error: float) -> tuple[str, str]:
 
 
 def parameter_table(title: str, estimates: Sequence[Estimate], truth: AbstractDamper | None = None) -> Table:
-    """Fitted values with standard errors, beside the true ones where these are known.
+    """Fitted values with standard errors, and the true values if they are known.
 
     Arguments:
-        title: of the table.
-        estimates: of a fit.
-        truth: a law of which the numbers of the same names are the true ones, as on a virtual bench.
+        title: title of the table.
+        estimates: estimates of a fit.
+        truth: the true law, as on a virtual bench; parameters are compared by name.
     """
     columns = [Column("parameter"), Column("unit"), Column("value", spec=".5g"), Column("standard error", spec=".2g")]
     columns += [Column("true", spec=".5g"), Column("(value − true)/se", spec="+.1f")] * (truth is not None)

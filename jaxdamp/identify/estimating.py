@@ -1,4 +1,4 @@
-"""What a user should know before trusting fitted numbers."""
+"""Standard errors, intervals and warnings for fitted parameters."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -19,13 +19,13 @@ from jaxdamp.parameters import FreeParameters
 
 
 WEAK = 0.5  # standard error, relative to the value or to the force, above which a parameter is not identifiable
-BOUND_Z_SCORE = 3.0  # standard errors beyond an edge from which the data truly press against it
-NEARLY = 9.0  # chi-square above the best up to which another minimum is nearly as good: three standard errors
-APART = 3.0  # standard errors from which a parameter of another minimum is another value
+BOUND_Z_SCORE = 3.0  # standard errors beyond an edge from which a parameter counts as limited by it
+NEARLY = 9.0  # largest increase in chi-square of another minimum that is reported: three standard errors
+APART = 3.0  # standard errors beyond which a parameter of another minimum counts as different
 
 
 class Estimates(NamedTuple):
-    """How far fitted numbers can be trusted."""
+    """The uncertainty of fitted parameters."""
 
     estimates: tuple[Estimate, ...]
     covariance: Float[np.ndarray, "free free"]
@@ -34,30 +34,29 @@ class Estimates(NamedTuple):
 
 
 def estimate(problem: Problem, solution: Solution, noise: Float[np.ndarray, " samples"]) -> Estimates:
-    """Standard errors, 95 % intervals by Student's t within the domain, and what is wrong with them.
+    """Standard errors, 95 % intervals by Student's t within the domain, and remarks.
 
-    A parameter is "not identifiable" where no error is finite, or where its standard error is more than half of it. A
-    number that may have either sign is measured by its force instead: its standard error must not change the force by
-    more than half its RMS. One that ended at zero, where its domain ends, is "not identifiable" too if the data cannot
-    tell it from zero, and "at a bound" if they press beyond. Where one is not identifiable or
-    lies beyond the records, or another minimum is nearly as good, the others are moved away to see whether their errors
-    hold (`profile`).
+    A parameter is "not identifiable" if its standard error is not finite or more than half of its value. A number that
+    may have either sign is compared by its force instead: its standard error must not change the force by more than
+    half its RMS. A parameter that ended at zero, the end of its domain, is "not identifiable" if it does not differ
+    significantly from zero, and "at a bound" if the minimum is beyond. If a parameter is not identifiable or outside
+    the records, or if another minimum is nearly as good, the errors of the other parameters are checked by `profile`.
 
     Arguments:
-        problem: what was minimised.
-        solution: where the searches ended.
+        problem: the problem that was minimised.
+        solution: the ends of the searches.
         noise: standard deviation of each weighted residual.
     """
     free, found, used = problem.free, solution.best, problem.used
     uncertain, variance = uncertainty(found.jacobian, found.residual, noise), float(np.mean(noise[used] ** 2))
-    yardstick = yardsticks(free, found.values, np.linalg.norm(found.jacobian, axis=0) / problem.level)
+    large = large_changes(free, found.values, np.linalg.norm(found.jacobian, axis=0) / problem.level)
     sides, minima = at_ends(problem.coordinates, found.values), minima_of(solution, free.names, variance)
     errors = np.sqrt(np.diag(uncertain.covariance))
     numbers = ~problem.coordinates.ordered
-    firm = numbers & (errors <= WEAK * yardstick) & (sides == 0)
+    firm = numbers & (errors <= WEAK * large) & (sides == 0)
     spans = _spans(free, problem.reach)
     doubt = np.any((np.abs(found.values) > spans) | (numbers & ~firm)) or any(m.chi_square < NEARLY for m in minima[1:])
-    far = WEAK * yardstick
+    far = WEAK * large
     moved = Profile(errors, np.zeros(errors.shape, bool))
     if not solution.closed_form and doubt and found.converged and not problem.is_rounding(found.squares):
         moved = profile(problem, found, errors, far, firm, variance)
@@ -67,7 +66,7 @@ def estimate(problem: Problem, solution: Solution, noise: Float[np.ndarray, " sa
     undetermined = ~(moved.errors <= far) | moved.open_ended
     weak = np.where(sides != 0, at_zero | ~np.isfinite(errors), undetermined)
     estimates = _estimates(problem, found, moved.errors, weak, sides != 0, int(np.count_nonzero(used)))
-    notes = on_estimates(estimates, weak_directions(found.jacobian, float(np.sqrt(variance)), yardstick, WEAK))
+    notes = on_estimates(estimates, weak_directions(found.jacobian, float(np.sqrt(variance)), large, WEAK))
     notes += on_minima(minima, estimates) + on_reach(estimates, spans)
     return Estimates(estimates, uncertain.covariance, minima, tuple(notes))
 
@@ -95,15 +94,15 @@ def _estimates(
     return tuple(rows)
 
 
-def yardsticks(
+def large_changes(
     free: FreeParameters, values: Float[np.ndarray, " free"], sensitivity: Float[np.ndarray, " free"]
 ) -> Float[np.ndarray, " free"]:
-    """A large change of each parameter: its value; for one that may have either sign, what moves the force by its RMS.
+    """A large change of each parameter: its value, or for parameters of either sign the change that moves F by its RMS.
 
     Arguments:
         free: the free parameters.
         values: their values.
-        sensitivity: RMS force that one unit of each makes, relative to the RMS of the measured force.
+        sensitivity: RMS of the change of force per unit of each, relative to the RMS of the measured force.
     """
     lower, upper = free.limits()
     tiny = np.finfo(float).tiny
@@ -113,12 +112,12 @@ def yardsticks(
 
 
 def on_estimates(estimates: Sequence[Estimate], directions: Sequence[np.ndarray]) -> list[str]:
-    """Sentences on parameters at bounds, on those that are not identifiable, and on groups that are so together."""
+    """Sentences on parameters at bounds, and on parameters and groups that are not identifiable."""
     notes = []
     for e in estimates:
         unit = f" {e.unit}" if e.unit else ""
         if e.note == "at a bound":
-            notes.append(f"{e.name} = {e.value:.4g}{unit} is at a bound: the data press beyond it.")
+            notes.append(f"{e.name} = {e.value:.4g}{unit} is at a bound: the best value is beyond it.")
         elif e.note == "not identifiable":
             notes.append(
                 f"{e.name} is not identifiable from these records ({e.value:.3g} ± {e.standard_error:.2g}{unit}):"
@@ -128,7 +127,7 @@ def on_estimates(estimates: Sequence[Estimate], directions: Sequence[np.ndarray]
 
 
 def _together(estimates: Sequence[Estimate], directions: Sequence[np.ndarray]) -> list[str]:
-    """Sentences on groups of parameters of which the records tell only some combination."""
+    """Sentences on groups of parameters of which the records determine only a combination."""
     weak = np.array([e.note == "not identifiable" for e in estimates])
     groups: list[tuple[set[int], str]] = []
     for direction in directions:
@@ -142,7 +141,7 @@ def _together(estimates: Sequence[Estimate], directions: Sequence[np.ndarray]) -
         groups = [group for group in groups if not group[0] & members]
         groups.append((members.union(*(group[0] for group in joined)), "" if joined else how))
     return [
-        f"These records cannot tell {_listed([estimates[i].name for i in sorted(members)])} apart"
+        f"These records cannot distinguish {_listed([estimates[i].name for i in sorted(members)])}"
         + f": {how} hardly changes the force" * bool(how)
         + ". Freeze all but one of them, or add records."
         for members, how in groups
@@ -154,17 +153,17 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _spans(free: FreeParameters, reach: Reach) -> Float[np.ndarray, " free"]:
-    """How far the records go in the unit of each number; infinite for units other than m/s and m."""
+    """Extent of the records in the unit of each number; infinite for units other than m/s and m."""
     spans = {"m/s": reach.velocity, "m": 2.0 * reach.stroke}
     return np.array([spans.get(p.unit, np.inf) for p in free.owners])
 
 
 def on_reach(estimates: Sequence[Estimate], spans: Float[np.ndarray, " free"]) -> list[str]:
-    """Sentences on velocities and strokes in the law that the records do not reach."""
+    """Sentences on velocities and strokes of the law that are outside the records."""
     names = {"m/s": "velocity", "m": "range of the stroke"}
     return [
-        f"{e.name} = {e.value:.4g} {e.unit} lies beyond the records, whose largest {names[e.unit]} is {span:.3g}"
-        f" {e.unit}: what the law does there was not measured. Add records that go beyond it, or freeze it."
+        f"{e.name} = {e.value:.4g} {e.unit} is outside the records, whose largest {names[e.unit]} is {span:.3g}"
+        f" {e.unit}: the force there was not measured. Add records beyond it, or freeze it."
         for e, span in zip(estimates, spans, strict=True)
         if abs(e.value) > span
     ]
@@ -190,7 +189,7 @@ def on_minima(minima: Sequence[Minimum], estimates: Sequence[Estimate]) -> list[
 
 
 def on_correlation(inflation: float) -> list[str]:
-    """A sentence on a residual that is no independent noise."""
+    """A sentence on a residual with correlated noise."""
     if inflation == 1.0:
         return []
     return [

@@ -22,7 +22,7 @@ from jaxdamp.identify.starting import Start
 from jaxdamp.parameters import FreeParameters
 
 
-# What a law that does not suit the records raises. A wrong call (`TypeError` and the like) is no matter of one law.
+# Errors due to a law that does not suit the records, as opposed to a wrong call (`TypeError` and so on).
 NUMERICAL = (ValueError, ArithmeticError, eqx.EquinoxRuntimeError, jax.errors.JaxRuntimeError)
 
 
@@ -46,43 +46,43 @@ def fit(
     of the parameters, and Jacobians by forward-mode differentiation through the law and its states. Where the law is
     linear in everything free, the minimum is computed directly (bounded linear least squares).
 
-    A sum of squares may have several minima. The search goes from several starts, the best end is kept, and `minima`
-    tells of the others; nothing is random, the same records give the same result.
+    A sum of squares can have several minima. The search uses several starts; the best end is the result, and `minima`
+    describes the others. Nothing is random: the same records give the same result.
 
-    Standard errors count every other free number as unknown. Where the residual is correlated from sample to sample,
-    because the law misses something, they count as many samples as are independent (`inflation`).
+    Standard errors take all other free parameters as unknown. If the residual is correlated from sample to sample,
+    because the law does not describe everything, only the number of independent samples counts (`inflation`).
 
-    A law with states is led into every record by a copy of its first cycle, and the record's first half cycle is not
-    compared; blocks of samples of slow records are averaged down to `samples_per_cycle`.
+    States of a law are initialised by running the first cycle of each record once before the record; the first half
+    cycle of the record is not compared. Slow records are averaged in blocks down to `samples_per_cycle`.
 
     Arguments:
-        law: a law to start from; or a law class, or a function that makes a law: of the records, if its argument is
-            called `runs`, or of all their samples, as `(velocity, force)`. If it has arguments `stroke` or `time`, it
-            is given those too, one record after the other.
-        runs: one record or many.
-        freeze: parameters to leave alone, by path, last part of a path, or pattern.
+        law: the start: a law; a law class, which estimates its starting values; or a function that returns a law,
+            either from the records, if its argument is called `runs`, or from all samples `(velocity, force)`, with
+            `stroke` and `time` if it has arguments of these names.
+        runs: one or more records.
+        freeze: parameters to hold at their start, by path, last part of a path, or pattern.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
         tie: parameters that take the values of others, such as `{"terms.1.*": "terms.0.*"}`: one free value for each
             group (see `jaxdamp.parameters.free_parameters`).
-        per_record: parameters that have a value for each record, such as a friction force that the machine changes from
-            record to record; names as in `freeze`. All others are common to the records.
-        weighting: `"samples"`, every sample counts the same; `"runs"`, every record counts the same, relative to its
-            RMS force; or one standard deviation [N] for each record, of which only the ratios matter. `inf` leaves a
-            record out of the fit; it is scored all the same.
-        force_noise: standard deviation [N] of the measured force where it is known, as independent noise. Otherwise
-            the residual gives it, with its correlation.
+        per_record: parameters with one value for each record, such as a friction that depends on the temperature; names
+            as in `freeze`. All other parameters are common to the records.
+        weighting: `"samples"`, equal weight of every sample; `"runs"`, equal weight of every record relative to its RMS
+            force; or one standard deviation [N] for each record, of which only the ratios matter. `inf` leaves a record
+            out of the fit; it is still scored.
+        force_noise: standard deviation [N] of the measured force if it is known, as independent noise. Otherwise it is
+            estimated from the residual, including its correlation.
         samples_per_cycle: see above; `None` uses every sample.
-        starts: search from at most so many starts: `law` first, then those that it and the laws inside it propose
-            (`other_starts`), all of them if left out. 1 searches from `law` alone.
-        max_steps: of each search.
+        starts: largest number of starts: `law` first, then those that its laws propose (`other_starts`); all of them if
+            left out. With 1, the search starts from `law` only.
+        max_steps: largest number of steps of each search.
 
     Returns:
         The law with the range of the fitted records (`law.fitted_to`), its parameters with standard errors, scores and
-        warnings; a search that fails says so in `status` and in `warnings`.
+        warnings; `status` and `warnings` report a search that failed.
 
     Raises:
         ValueError: no records; names that fit no parameter; a start outside its bounds or without finite forces; a
-            force that never varies.
+            constant force.
 
     >>> from jaxdamp import bench, dampers
     >>> dyno = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=5.0, seed=1)
@@ -111,9 +111,9 @@ def solve(problem: Problem, *, starts: int | None = None, max_steps: int = 200) 
     """The second step of `fit`: minimise the sum of squares of a problem.
 
     Arguments:
-        problem: of `prepare`.
-        starts: search from at most so many starts, all that the laws propose if left out.
-        max_steps: of each search.
+        problem: result of `prepare`.
+        starts: largest number of starts; all that the laws propose if left out.
+        max_steps: largest number of steps of each search.
 
     Raises:
         ValueError: counts below one.
@@ -127,7 +127,7 @@ def solve(problem: Problem, *, starts: int | None = None, max_steps: int = 200) 
 
 
 def is_linear(law: AbstractDamper, free: FreeParameters) -> bool:
-    """Whether the force is linear in all that is free, so that the least squares have a closed form."""
+    """Whether the force is linear in all free parameters, so that the least squares have a closed form."""
     return law.traits().linear_in_parameters and all(p.linear and not p.domain.ordered for p in free.chosen)
 
 

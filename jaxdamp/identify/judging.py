@@ -24,12 +24,12 @@ _REMEDY = "Try another start, bounds, or fewer free parameters."
 
 @one_thread()
 def judge(problem: Problem, solution: Solution, *, force_noise: float | None = None) -> FitResult:
-    """The third step of `fit`: what the minimum says, and how far it can be trusted.
+    """The third step of `fit`: the result at the minimum, with standard errors and warnings.
 
     Arguments:
-        problem: of `prepare`.
-        solution: of `solve`.
-        force_noise: standard deviation [N] of the measured force where it is known, as in `fit`.
+        problem: result of `prepare`.
+        solution: result of `solve`.
+        force_noise: standard deviation [N] of the measured force if it is known, as in `fit`.
 
     Raises:
         ValueError: forces or derivatives that are not finite at the minimum.
@@ -65,7 +65,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
 
 
 def _fitted(problem: Problem, values: np.ndarray) -> tuple[AbstractDamper | list[AbstractDamper], AbstractDamper]:
-    """The fitted law, of each record where they differ, and the one with the mean of what differs."""
+    """The fitted law with mean values, and the law of each record if they differ."""
     covered, built = covered_range(problem.fitted_to), problem.free.started_at(values).tree
     if not problem.per_record:
         law = with_fitted_range(built, covered)
@@ -79,12 +79,12 @@ def _fitted(problem: Problem, values: np.ndarray) -> tuple[AbstractDamper | list
 
 
 def notes_on(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
-    """Sentences on records that contradict each other and on a fitted curve that drives the motion."""
+    """Sentences on records that contradict each other and on a fitted curve that adds energy."""
     return _contradicting(law, runs) + _driving(law, runs)
 
 
 def _contradicting(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
-    """A sentence on records with the same motion, and the same command if the law follows it, but other forces."""
+    """A sentence on records with the same motion, and the same command if the law has one, but different forces."""
     follows = takes_command(law) and all(run.command is not None for run in runs)
     groups: dict[float | None, list[BenchRun]] = {}
     for run in runs:
@@ -93,7 +93,7 @@ def _contradicting(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
 
 
 def _driving(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
-    """A sentence on a fitted curve that drives the motion at some of the velocities of the records."""
+    """A sentence on a fitted curve that adds energy at some of the velocities of the records."""
     if not is_memoryless(law):
         return []
     velocity = np.concatenate([run.velocity for run in runs])
@@ -103,6 +103,6 @@ def _driving(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
     if not at.size:
         return []
     return [
-        f"The fitted curve drives the motion instead of damping it at velocities from {at[0]:.3g} to {at[-1]:.3g} m/s. "
+        f"The fitted curve adds energy to the motion at velocities from {at[0]:.3g} to {at[-1]:.3g} m/s. "
         "Check the sign of the force, or take a law that cannot, such as `Bilinear` or `PiecewiseLinear`."
     ]

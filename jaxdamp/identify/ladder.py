@@ -1,4 +1,4 @@
-"""The ladder: laws from plain to rich, each with a start taken from the records."""
+"""The ladder: laws from simple to complex, each with a start from the records."""
 
 import functools
 from collections.abc import Iterable, Sequence
@@ -31,7 +31,7 @@ from jaxdamp.identify.starting import Start, started
 
 
 def lag_time(runs: Sequence[BenchRun]) -> float:
-    """Time [s] by which the force trails the velocity, from the phase of their fundamentals: tan(φ)/ω, the median."""
+    """Delay [s] of the force behind the velocity, from the phase of their fundamentals: median of tan(φ)/ω."""
     times = []
     for run in runs:
         omega = 2 * np.pi * run.frequency
@@ -69,9 +69,9 @@ LAWS = tuple(NAMED_LAWS)
 
 
 def ladder_starts(names: Sequence[str] = LAWS) -> dict[str, Start]:
-    """Laws of the ladder as functions of the records: each fit starts them anew from its own records.
+    """Laws of the ladder as functions of the records, which compute the start of each fit from its own records.
 
-    For `cross_validate`, where nothing of the record held out may leak into a start.
+    For `cross_validate`, where the held-out record must not influence the start.
 
     Raises:
         ValueError: an unknown name.
@@ -86,15 +86,16 @@ def ladder_starts(names: Sequence[str] = LAWS) -> dict[str, Start]:
 
 
 def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dict[str, Start]:
-    """Laws from plain to rich by name, each started from the records, ready for `compare` or `fit`.
+    """Laws from simple to complex by name, each with a start from the records, for `compare` or `fit`.
 
     Memoryless: `linear`, `bilinear`, `power_law`, `polynomial` (degree 5), `segmented_polynomial` (paper 000),
     `piecewise_linear`, `table`, `besinger` (paper 001), `linear_friction` (with smooth Coulomb friction). With
-    hysteresis: `besinger_lag`, `besinger_series_spring` (paper 001), `linear_friction_lag`, and for friction that gives
-    before it slides, as in magnetorheological dampers, `bouc_wen` and `lugre_spring` (with a spring beside it).
+    hysteresis: `besinger_lag`, `besinger_series_spring` (paper 001), `linear_friction_lag`, and for friction with
+    elastic deformation before sliding, as in magnetorheological dampers, `bouc_wen` and `lugre_spring` (with a parallel
+    spring).
 
-    A law that cannot be started from these records is a function in its place, which raises the reason when a fit calls
-    it; `compare` goes on with the others.
+    If a start cannot be computed from these records, the entry is a function that raises the reason when a fit calls
+    it; `compare` continues with the other laws.
 
     Raises:
         ValueError: an unknown name.
@@ -110,9 +111,9 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dic
 
 
 def _no_start(error: Exception, runs: Sequence[BenchRun]) -> AbstractDamper:
-    """The place of a start that could not be made."""
+    """Replaces a start that could not be computed."""
     del runs
-    raise ValueError(f"No start can be made from these records: {error}") from error
+    raise ValueError(f"No start can be computed from these records: {error}") from error
 
 
 def _start(name: str, runs: Sequence[BenchRun]) -> AbstractDamper:

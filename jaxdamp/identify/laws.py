@@ -1,4 +1,4 @@
-"""The laws that can be fitted by name: what each name stands for."""
+"""The laws that can be fitted by name."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ from jaxdamp._tables import Column, Table
 
 
 class NamedLaw(NamedTuple):
-    """What the name of a law stands for."""
+    """A law that can be fitted by name."""
 
     hysteresis: bool
     meaning: str
@@ -31,7 +31,7 @@ NAMED_LAWS = {
 
 
 def laws_table() -> Table:
-    """The laws of `default_ladder`, from plain to rich: name, whether they have hysteresis, what they are."""
+    """The laws of `default_ladder`, from simple to complex: name, hysteresis, description."""
     columns = (Column("law"), Column("hysteresis"), Column("what it is"))
     rows = ((name, "yes" if law.hysteresis else "no", law.meaning) for name, law in NAMED_LAWS.items())
     return Table("Laws", columns, tuple(rows))

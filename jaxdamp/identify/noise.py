@@ -1,4 +1,4 @@
-"""The noise of the measured force, as the residual of a fit shows it: its size, and how long it is alike."""
+"""The noise of the measured force, estimated from the residual of a fit: its size and correlation."""
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -7,22 +7,22 @@ from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 
 
-CORRELATED = 3.0  # samples that count as one, above which the residual is no independent noise
+CORRELATED = 3.0  # samples per independent sample above which the residual counts as correlated
 
 
 def noise_of(
     problem: Problem, found: SearchEnd, force_noise: float | None
 ) -> tuple[Float[np.ndarray, " samples"], float]:
-    """Standard deviation of each weighted residual, and how far correlation has inflated it.
+    """Standard deviation of each weighted residual, and the factor on it due to correlation.
 
-    Samples whose noise is alike tell less than as many independent ones. Where one in `CORRELATED` or fewer is
-    independent, the standard deviation is multiplied by the root of how many count as one, which is what that does to
-    the standard errors.
+    Correlated samples contain less information than independent ones. If more than `CORRELATED` samples correspond to
+    one independent sample, the standard deviation is multiplied by the root of this number, which increases the
+    standard errors accordingly.
 
     Arguments:
-        problem: what was minimised.
+        problem: the problem that was minimised.
         found: the minimum.
-        force_noise: of the measured force [N], if it is known; it counts as independent then.
+        force_noise: standard deviation of the measured force [N], if it is known, as independent noise.
     """
     owner, used, sigma = problem.owner, problem.used, problem.sigma
     if force_noise is not None:
@@ -42,7 +42,7 @@ def _from_residual(
     dof: int,
     each: bool,
 ) -> Float[np.ndarray, " samples"]:
-    """Standard deviation of each weighted residual, of all together, or (`each`) of its own record."""
+    """Standard deviation of each weighted residual, common to all records or (`each`) separate for each."""
     count = np.bincount(owner, used, minlength=runs)
     squares = np.bincount(owner, residual**2, minlength=runs) * (count.sum() / dof)
     if not each:
@@ -51,9 +51,9 @@ def _from_residual(
 
 
 def correlation_time(residuals: list[Float[np.ndarray, " _"]]) -> float:
-    """Samples that count as one, because the residual is alike from one to the next: 1 + 2 Σ ρ(k), 1 for white noise.
+    """Number of samples per independent sample, 1 + 2 Σ ρ(k), 1 for white noise.
 
-    ρ is the autocorrelation over all records together, summed up to where it first is zero or negative.
+    ρ is the autocorrelation over all records, summed up to its first zero or negative value.
     """
     length = max(map(len, residuals))
     total = np.zeros(length)

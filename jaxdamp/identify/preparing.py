@@ -31,7 +31,7 @@ def prepare(
         The residuals of the records, and the free parameters with their start.
 
     Raises:
-        ValueError: no records; names that fit no parameter; a start outside its bounds; a force that never varies.
+        ValueError: no records; names that fit no parameter; a start outside its bounds; a constant force.
 
     >>> from jaxdamp import bench, dampers
     >>> from jaxdamp.identify import judge, solve
@@ -68,8 +68,8 @@ def _per_record(law: AbstractDamper, names: Sequence[str], sigma: Sequence[float
             remedy = "Only single numbers can differ from record to record."
             _checks.refuse("per_record", "name parameters that are one number", f"{path}, a vector", remedy)
     if paths and not np.all(np.isfinite(sigma)):
-        remedy = "A record that is left out says nothing of its own value: leave it out of `runs`."
-        _checks.refuse("weighting", "be finite beside `per_record`", "infinite for some records", remedy)
+        remedy = "The value of a record that is not fitted is undetermined: leave this record out of `runs`."
+        _checks.refuse("weighting", "be finite with `per_record`", "infinite for some records", remedy)
     return tuple(paths)
 
 
@@ -80,7 +80,7 @@ def _spread(law: AbstractDamper, paths: Sequence[str], records: int) -> Abstract
 
 
 def weights(weighting: str | Sequence[float], runs: Sequence[BenchRun]) -> list[float]:
-    """Standard deviation [N] by which each record's residuals are divided; infinite for a record to be left out."""
+    """Standard deviation [N] that the residuals of each record are divided by; infinite for a record to be left out."""
     if isinstance(weighting, str):
         _checks.one_of("weighting", weighting, ["samples", "runs"])
         if weighting == "samples":

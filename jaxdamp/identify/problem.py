@@ -1,4 +1,4 @@
-"""What a fit minimises: residuals as functions of a model with free parameters."""
+"""A fit as a least-squares problem: residuals as functions of a model with free parameters."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -23,11 +23,11 @@ class AbstractResiduals(eqx.Module):
 
     @abstractmethod
     def __call__(self, model: Any) -> Float[Array, " samples"]:
-        """Weighted difference of the model from what was measured; zero for samples that do not count."""
+        """Weighted difference between model and measurement; zero for samples that are not used."""
 
     @abstractmethod
     def used(self) -> Bool[np.ndarray, " samples"]:
-        """Which samples count; the others are padding, or lie before the model has settled."""
+        """Which samples are used; the others are padding, or before the model has settled."""
 
     @abstractmethod
     def total_weight(self) -> Float[Array, ""]:
@@ -44,10 +44,10 @@ class Problem(NamedTuple):
         runs: the records given.
         sigma: standard deviation [N] by which the residuals of each record are divided, infinite for one left out.
         owner: the number of the record that each sample of the residuals belongs to.
-        reach: how far the fitted records go.
-        law: the model to start from with one value for each parameter.
-        per_record: paths of the parameters that have a value for each record.
-        each: whether every record has noise of its own.
+        reach: extent of the fitted records.
+        law: the model to start from, with one value for each parameter.
+        per_record: paths of the parameters with a value for each record.
+        each: whether every record has its own noise level.
     """
 
     free: FreeParameters
@@ -63,7 +63,7 @@ class Problem(NamedTuple):
 
     @property
     def coordinates(self) -> Coordinates:
-        """Those of a search within bounds."""
+        """The coordinates of a search within bounds."""
         return Coordinates(self.free, smooth="ordered")
 
     @property
@@ -81,7 +81,7 @@ class Problem(NamedTuple):
         return self._replace(free=self.free.started_at(values))
 
     def is_rounding(self, squares: float) -> bool:
-        """Whether a sum of squares is so small that it is made of rounding, not of noise."""
+        """Whether a sum of squares is so small that it consists of rounding errors, not of noise."""
         return squares <= (ROUNDING * self.level) ** 2
 
 

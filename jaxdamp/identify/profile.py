@@ -1,8 +1,8 @@
-"""Standard errors tested by moving a parameter: a linear estimate fails where the sum of squares is no parabola.
+"""Standard errors checked by moving a parameter, since linear estimates are wrong if the sum of squares is no parabola.
 
-A slope above a knee that the records do not show looks certain as long as the knee stays where it is; let the knee
-move, and any slope fits. So where something about a fit is doubtful, each number that looks certain is moved away, in
-growing steps, while all others are fitted again at each.
+Example: the slope above a knee that the records do not reach seems certain as long as the knee is fixed; if the knee
+may move, any slope fits. If a fit is doubtful, each parameter that seems certain is therefore moved away in growing
+steps, and all others are fitted again at each step.
 """
 
 from typing import NamedTuple
@@ -15,15 +15,15 @@ from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, search
 
 
-STEPS = 15  # of each search; one cut short makes an error smaller, never larger
-TOLERANCE = 0.1  # standard errors that the last step of a search moves: 0.01 of chi-square
-MOST_STEPS = 250  # of all searches together, after which the linear errors stand for the numbers left
+STEPS = 15  # of each search; an incomplete search makes an error smaller, never larger
+TOLERANCE = 0.1  # last step of a search, in standard errors: 0.01 in chi-square
+MOST_STEPS = 250  # of all searches together; parameters after that have their linear errors
 CHI_SQUARE = 9.0  # increase up to which a moved parameter still fits: three standard errors
 GROWTH = 4.0  # of the distance, from one step to the next
 
 
 class Profile(NamedTuple):
-    """What moving numbers away from a minimum tells of them."""
+    """Errors of parameters from moving them away from a minimum."""
 
     errors: Float[np.ndarray, " free"]  # at least the linear standard errors
     open_ended: Bool[np.ndarray, " free"]  # numbers that fit nearly as well at the largest distance tried
@@ -37,19 +37,19 @@ def profile(
     chosen: Bool[np.ndarray, " free"],
     variance: float,
 ) -> Profile:
-    """Standard errors that also hold away from the minimum.
+    """Standard errors that are also valid away from the minimum.
 
-    A number that is d away from its value should raise the chi-square by (d/error)². Where all others can make up for
-    it so that it rises by less than `CHI_SQUARE`, the error is at least d over the root of the rise, or d if it hardly
-    rises.
+    A parameter at a distance d from its value should increase chi-square by (d/error)². If the other parameters can
+    compensate so that the increase is less than `CHI_SQUARE`, the error is at least d over the root of the increase, or
+    d if there is hardly any increase.
 
     Arguments:
-        problem: what was minimised.
+        problem: the problem that was minimised.
         found: the minimum.
         errors: standard errors from the Jacobian.
-        far: the largest distance to try of each number, or three standard errors if those are more.
-        chosen: which numbers to move.
-        variance: of the noise of a weighted sample.
+        far: largest distance to try for each parameter, or three standard errors if these are more.
+        chosen: the parameters to move.
+        variance: variance of the noise of a weighted sample.
     """
     wide, open_ended, left = errors.copy(), np.zeros(errors.shape, bool), MOST_STEPS
     sides = [(int(i), side) for i in np.flatnonzero(chosen & (errors > 0)) for side in (-1.0, 1.0)]
@@ -72,7 +72,7 @@ def profile(
 
 
 def _moved(problem: Problem, end: SearchEnd, index: int, value: float) -> Problem | None:
-    """The problem started where another search ended, with one value changed; `None` if the law forbids that."""
+    """The problem from the end of another search, with one value changed; `None` if the law refuses this value."""
     lower, upper = problem.free.limits()
     values = end.values.copy()
     values[index] = value

@@ -1,4 +1,4 @@
-"""What the error of a law is made of: shape, hysteresis, noise."""
+"""Shares of the error of a law: shape, hysteresis, noise."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -12,22 +12,22 @@ from jaxdamp.identify.traces import predict_by_record, used_samples
 
 
 class ErrorShares(NamedTuple):
-    """Parts of the mean squared error; together 1."""
+    """Shares of the mean squared error; their sum is 1."""
 
     shape: float  # another curve of force over velocity would remove it
-    hysteresis: float  # the force differs between the two ways through the same velocity
-    rest: float  # noise, and what changes from cycle to cycle
+    hysteresis: float  # the force differs between the two passes through the same velocity
+    rest: float  # noise, and changes from cycle to cycle
 
 
 def error_shares(law: AbstractDamper | Sequence[AbstractDamper], runs: BenchRun | Iterable[BenchRun]) -> ErrorShares:
     """Split the squared force error of a law over records, record by record, by an analysis of variance.
 
-    The samples of a record are sorted by velocity into bins, and each bin by the half of the stroke they were taken
-    in: a cycle passes every velocity twice, once above and once below mid-stroke. The mean of a bin is what another
-    curve over velocity could remove (*shape*), the distance of the two halves from it is *hysteresis* (or a force that
-    depends on the stroke), the scatter about them is the *rest*. What the means owe to the scatter is taken off.
+    The samples of a record are sorted by velocity into bins, and each bin is divided by the half of the stroke: a cycle
+    passes every velocity twice, once above and once below mid-stroke. The mean of a bin is the error that another curve
+    over velocity could remove (*shape*), the difference of the two halves from it is *hysteresis* (or a dependence on
+    the stroke), and the scatter about them is the *rest*. The contribution of the scatter to the means is subtracted.
 
-    `FitResult.error_shares` is this of a fit over its own records.
+    `FitResult.error_shares` gives the shares of a fit over its own records.
 
     Arguments:
         law: a law, fitted or not; or one for each record.

@@ -1,4 +1,4 @@
-"""What a fit found, how well it is determined and how good it is."""
+"""Results of fits: the law, its parameters with uncertainty, and its errors."""
 
 import dataclasses
 import functools
@@ -26,22 +26,31 @@ class Minimum(NamedTuple):
 
     values: dict[str, float]  # of the free numbers, in their units
     chi_square: float  # sum of squares over the variance of the noise, above that of the best minimum
-    starts: int  # so many of the starts ended here
+    starts: int  # number of starts that ended here
 
 
 class Score(NamedTuple):
-    """How far a law's force is from a record's, after settling."""
+    """Errors of the force of a law on one record, after settling."""
 
     name: str
     rmse: float  # N
     fit_percent: float
     largest_error: float  # N
 
+    def to_dict(self) -> dict[str, Any]:
+        """The errors with units, ready for JSON."""
+        return {
+            "record": self.name,
+            "fit": with_unit(self.fit_percent, "%"),
+            "rmse": with_unit(self.rmse, "N"),
+            "largest_error": with_unit(self.largest_error, "N"),
+        }
+
 
 def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray]) -> float:
     """100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all samples: 100 is perfect, 0 no better than a constant.
 
-    −∞ for a measured force that is constant and missed.
+    −∞ for a constant measured force that is not matched exactly.
     """
     y, p = np.concatenate(list(measured)), np.concatenate(list(predicted))
     missed, spread = (float(np.sqrt(np.sum(a * a))) for a in (y - p, y - y.mean()))
@@ -57,9 +66,9 @@ def score(
 ) -> tuple[float, float, tuple[Score, ...]]:
     """Fit percent and RMSE [N] of a law, or of one for each record, over the records that count, and for each."""
     laws, forces = predict_by_record(law, runs)
-    kept = [used_samples(own, run) for own, run in zip(laws, runs, strict=True)]
-    measured = [run.force[k] for run, k in zip(runs, kept, strict=True)]
-    predicted = [force[k] for force, k in zip(forces, kept, strict=True)]
+    used = [used_samples(own, run) for own, run in zip(laws, runs, strict=True)]
+    measured = [run.force[k] for run, k in zip(runs, used, strict=True)]
+    predicted = [force[k] for force, k in zip(forces, used, strict=True)]
     rows = []
     for run, y, p in zip(runs, measured, predicted, strict=True):
         error = p - y
@@ -73,7 +82,7 @@ def score(
 
 
 def describe(minima: Sequence[Minimum], starts: int) -> str:
-    """Where several starts ended, in words."""
+    """The ends of several starts, in words."""
     best, *others = minima
     parts = [f"{best.starts} ended here"]
     parts += [f"{m.starts} in another minimum, chi-square {m.chi_square:.3g} higher" for m in others]
@@ -91,7 +100,7 @@ class AbstractFitted:
         fit_percent: 100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all records fitted.
         rmse: root of the mean squared error over all records fitted [N].
         scores: the same for each record given.
-        warnings: what a user should know before trusting the numbers, in words.
+        warnings: doubts about the result, in words.
         status: how the search ended.
     """
 
@@ -116,6 +125,21 @@ class AbstractFitted:
         """Fit percent, RMSE [N] and the scores by record, on other records."""
         return score(self.law, as_runs(runs))
 
+    def to_dict(self) -> dict[str, Any]:
+        """The result as numbers with units and words, ready for JSON; numbers that are not finite are None.
+
+        The law itself is written by `export.to_json`.
+        """
+        return {
+            "law": repr(self.law),
+            "fit": with_unit(self.fit_percent, "%"),
+            "rmse": with_unit(self.rmse, "N"),
+            "scores": [score.to_dict() for score in self.scores],
+            "status": self.status.name.lower(),
+            "converged": self.converged,
+            "warnings": list(self.warnings),
+        }
+
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class FitResult(AbstractFitted):
@@ -125,11 +149,11 @@ class FitResult(AbstractFitted):
         parameters: an estimate for each free number, with unit, standard error and 95 % interval.
         covariance: of the free numbers, in their units, in the order of `parameters`.
         steps: steps of the search that gave the law, 0 for a closed form.
-        starts: how many starts were tried, 1 for a closed form.
-        minima: where they ended, the best first, which is this result. Starts that were given up are in none.
-        inflation: the standard errors are so many times those for independent noise, because the residual is
-            correlated from sample to sample; 1 where it is not, or where the noise was stated.
-        record_laws: the law of each record, where parameters have a value for each; then `law` has their means.
+        starts: number of starts, 1 for a closed form.
+        minima: the minima that were reached, the best first, which is this result.
+        inflation: factor on the standard errors because the residual is correlated from sample to sample; 1 if it is
+            not, or if the noise was given.
+        record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
     """
 
     parameters: tuple[Estimate, ...]
@@ -149,38 +173,19 @@ class FitResult(AbstractFitted):
 
     @functools.cached_property
     def error_shares(self) -> ErrorShares:
-        """What the squared error over the records is made of: shape, hysteresis, rest (`identify.error_shares`)."""
+        """Shares of the squared error over the records: shape, hysteresis, rest (`identify.error_shares`)."""
         return error_shares(self.record_laws or self.law, self.runs)
 
     def table(self, truth: AbstractDamper | None = None, *, title: str = "") -> Table:
-        """The parameters with units, standard errors and meanings, beside those of a true law where it is known."""
+        """The parameters with units, standard errors and meanings, compared with a true law if one is given."""
         return parameter_table(title or f"Parameters of {type(self.law).__name__}", self.parameters, truth)
 
     def to_dict(self) -> dict[str, Any]:
-        """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None.
-
-        The law itself is written by `export.to_json`.
-        """
-        scores = [
-            {
-                "record": s.name,
-                "fit": with_unit(s.fit_percent, "%"),
-                "rmse": with_unit(s.rmse, "N"),
-                "largest_error": with_unit(s.largest_error, "N"),
-            }
-            for s in self.scores
-        ]
-        return {
-            "law": repr(self.law),
-            "fit": with_unit(self.fit_percent, "%"),
-            "rmse": with_unit(self.rmse, "N"),
+        """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
+        return super().to_dict() | {
             "error_shares": plain(self.error_shares._asdict()),
             "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
             "covariance": plain(self.covariance),
-            "scores": scores,
-            "status": self.status.name.lower(),
-            "converged": self.converged,
-            "warnings": list(self.warnings),
         }
 
     def plot(self, runs: Iterable[BenchRun] | None = None, **options: Any) -> "Figure":

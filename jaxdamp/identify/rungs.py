@@ -1,4 +1,4 @@
-"""The laws of a comparison: each fit with its errors, side by side."""
+"""The laws of a comparison: each fit with its errors."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -38,7 +38,7 @@ def best_of(rungs: Iterable[Rung]) -> Rung:
 
 
 def ladder_table(rungs: Sequence[Rung], failed: Sequence[Failure] = ()) -> Table:
-    """Each law with its errors, and what these are made of; then the laws that failed."""
+    """Each law with its errors and their shares; then the laws that failed."""
     held = any(rung.held_out_rmse is not None for rung in rungs)
     columns = [Column("law"), Column("free", spec="d"), Column("fit", "%", ".1f"), Column("RMSE", "N", ".1f")]
     columns += [Column("held-out fit", "%", ".1f"), Column("held-out RMSE", "N", ".1f")] * held

@@ -1,4 +1,4 @@
-"""The search for the least squares: Levenberg-Marquardt within bounds.
+"""The least squares search: Levenberg-Marquardt within bounds.
 
 Only the forces of the law and their derivatives are compiled. The algebra of a step is small and runs in NumPy, which
 takes less than a millisecond; compiled too, it took four times as long to compile as the forces.
@@ -61,16 +61,16 @@ def search(problem: Problem, max_steps: int, held: int | None = None, tolerance:
     """Minimise the sum of squares.
 
     Nielsen's rule for the damping 1/step_size, by the ratio of actual to predicted decrease. A step whose predicted
-    decrease means less than `tolerance` standard errors, or drowns in rounding, is accepted and ends the search:
-    refused, it would only shrink for ever. A step of less than `SHORT` ends it too, because the kinks of a law are
-    kinks of its sum of squares, near which the predicted decrease fails. A step that breaks a condition between
-    parameters is refused.
+    decrease is less than `tolerance` standard errors, or below rounding errors, is accepted and ends the search; if
+    refused, it would only become shorter and shorter. A step shorter than `SHORT` also ends the search: kinks of a law
+    are kinks of the sum of squares, near which the predicted decrease is wrong. A step that violates a condition
+    between parameters is refused.
 
     Arguments:
-        problem: with the start.
-        max_steps: points that are tried at most, the start among them.
-        held: the number of a parameter that keeps its start.
-        tolerance: standard errors that a last step moves.
+        problem: the problem with its start.
+        max_steps: largest number of points tried, including the start.
+        held: index of a parameter that is held at its start.
+        tolerance: length of the last step in standard errors.
     """
     coordinates = problem.coordinates
     lower, upper = (np.array(side, np.float64) for side in coordinates.bounds())
@@ -160,9 +160,9 @@ class _Model(NamedTuple):
     """The linearised problem min ‖R d + q‖² at a point, the scales of its damping and the limits of d and of C d.
 
     The scales D are the largest norms of the Jacobian's columns so far (as in MINPACK). The tall Jacobian is reduced to
-    a triangle once for each accepted step, so that another damping costs nothing. A step goes at most
-    `MOST_OF_THE_WAY` towards an edge that is not near, lest it strand where the law degenerates. Conditions between
-    parameters are edges too, linearised at each accepted point.
+    a triangle once for each accepted step, so that another damping costs little. Towards an edge that is not near, a
+    step goes at most the fraction `MOST_OF_THE_WAY`, since laws degenerate at the edges. Conditions between parameters
+    are edges too, linearised at each accepted point.
     """
 
     r: Float[np.ndarray, "free free"]

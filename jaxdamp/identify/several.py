@@ -1,8 +1,8 @@
-"""Several starts of a search: the best end is kept, the others say which other minima there are.
+"""Several starts of a search: the best end is the result, the others show further minima.
 
-Compiling a search takes some fifty times as long as running it, so all starts go one after another through the one
-program that is compiled for the first. A start other than the first is followed for a few steps; only the most
-promising are followed to their end.
+Compiling a search takes about fifty times as long as running it, so all starts use the same compiled program, one
+after the other. Starts other than the first are searched for a few steps; only the most promising ones are continued
+to their end.
 """
 
 from collections.abc import Sequence
@@ -18,13 +18,13 @@ from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.parameters import FreeParameters
 
 
-FIRST_LOOK = 10  # steps after which a start is judged
-FOLLOWED = 2  # starts that are followed to their end, beside the first
+FIRST_LOOK = 10  # steps after which starts are compared
+FOLLOWED = 2  # starts that are continued to their end, besides the first
 FOLLOWED_STEPS = 80  # of each of them at most
-PROMISING = 1.5  # sum of squares, relative to the best, up to which a start is followed
-INSIDE = 0.02  # of a range, by which a start stays off its ends
-ROUNDS = 3  # of proposals, each from the best end of the round before
-SAME = 1.0  # chi-square by which two ends of one minimum differ at most
+PROMISING = 1.5  # sum of squares, relative to the best, up to which a start is continued
+INSIDE = 0.02  # distance of a start from the ends of a range, relative to its width
+ROUNDS = 3  # rounds of proposals, each from the best end of the previous round
+SAME = 1.0  # largest difference in chi-square of two ends of the same minimum
 WORTH_A_ROUND = 1e-3  # relative decrease of the sum of squares after which there is another round
 BETTER = 1e-9  # relative decrease of the sum of squares that counts as one
 
@@ -39,10 +39,10 @@ class Solution(NamedTuple):
 
 
 def other_starts(free: FreeParameters, reach: Reach) -> list[Float[np.ndarray, " free"]]:
-    """Values of the free parameters to start from beside the law's own: what it and the laws inside it propose.
+    """Further starting values of the free parameters, as proposed by the law and the laws inside.
 
-    Proposals for frozen parameters are left out, those outside the limits are moved inside, and those that break a
-    condition between parameters are left out too.
+    Proposals for frozen parameters and those that violate a condition between parameters are left out; those outside
+    the limits are moved inside.
     """
     own, (lower, upper) = np.asarray(free.values), free.limits()
     width = np.where(np.isfinite(upper - lower), upper - lower, 0.0)
@@ -62,15 +62,15 @@ def other_starts(free: FreeParameters, reach: Reach) -> list[Float[np.ndarray, "
 
 
 def search_from(problem: Problem, *, starts: int | None, max_steps: int) -> Solution:
-    """Search from the start of the problem, and from what its law and the laws inside propose beside it.
+    """Search from the start of the problem and from the further starts that its laws propose.
 
-    Where another start leads to a better end, the proposals are made anew from there, so that two parameters can be
+    If another start leads to a better end, new proposals are made from there, so that more than one parameter can be
     wrong at the start.
 
     Arguments:
-        problem: with the start.
-        starts: at most so many; all that are proposed if `None`.
-        max_steps: of each search.
+        problem: the problem with its start.
+        starts: largest number of starts; all proposed ones if `None`.
+        max_steps: largest number of steps of each search.
     """
     best = search(problem, max_steps)
     ends, tried = [best], [np.asarray(problem.free.values)]
@@ -111,13 +111,13 @@ def _follow(problem: Problem, others: Sequence[np.ndarray], best: SearchEnd, max
 def minima_of(solution: Solution, names: Sequence[str], variance: float) -> tuple[Minimum, ...]:
     """The minima in which the searches ended, the best first.
 
-    Two ends are one minimum if their sums of squares differ by less than noise does and the best one's Jacobian says
-    that their parameters hardly differ in force.
+    Two ends are the same minimum if their sums of squares differ by less than the noise, and if by the Jacobian of the
+    better one their parameters give almost the same force.
 
     Arguments:
-        solution: the ends.
-        names: of the free numbers.
-        variance: of the noise of a weighted sample.
+        solution: the ends of the searches.
+        names: names of the free numbers.
+        variance: variance of the noise of a weighted sample.
     """
     best = solution.best
     groups: list[tuple[SearchEnd, int]] = []

@@ -1,4 +1,4 @@
-"""What a fit can start from: a law, a class of laws, or a function that makes a law from records."""
+"""Starts of a fit: a law, a class of laws, or a function that makes a law from records."""
 
 import inspect
 import warnings
@@ -10,41 +10,31 @@ import numpy as np
 
 from jaxdamp import _checks, dampers
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper, from_samples, without_fitted_ranges
 
 
 Start = AbstractDamper | type[AbstractDamper] | Callable[..., AbstractDamper]
-CHANNELS = ("velocity", "force", "stroke", "time")
 
 
 def started(law: Start, runs: Sequence[BenchRun]) -> AbstractDamper:
     """An instance to start from, without the ranges of earlier fits.
 
-    A class starts by its `from_runs(runs)` if it has one, otherwise by its `guess`. They and any function are given
-    what their arguments name: `runs`, or the samples of all records one after the other as `velocity`, `force`,
-    `stroke`, `time`. The first two need not have these names.
+    A class starts by its `from_runs`. A function with an argument `runs` gets the records; any other function gets the
+    samples of all records one after the other: velocity, force, and `stroke` and `time` if it has such arguments.
     """
     check_start("law", law)
     if isinstance(law, AbstractDamper):
         return without_fitted_ranges(law)
-    make: Any = law
-    if isinstance(law, type):
-        make = getattr(law, "from_runs", None) or getattr(law, "guess", None)
-        if make is None:
-            remedy = f"Pass an instance, `{law.__name__}(...)`, as the start."
-            _checks.refuse("law", "know how to start from data", f"the class {law.__name__} without `guess`", remedy)
-    names = inspect.signature(make).parameters
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", np.exceptions.RankWarning)
-        if "runs" in names:
-            return without_fitted_ranges(make(tuple(runs)))
-        channels = {name: np.concatenate([getattr(run, name) for run in runs]) for name in CHANNELS}
-        asked = {name: channels[name] for name in ("stroke", "time") if name in names}
-        return without_fitted_ranges(make(channels["velocity"], channels["force"], **asked))
+        if isinstance(law, type):
+            return without_fitted_ranges(law.from_runs(tuple(runs)))
+        takes_runs = "runs" in inspect.signature(law).parameters
+        return without_fitted_ranges(law(tuple(runs)) if takes_runs else from_samples(law, runs))
 
 
 def check_start(argument: str, law: Any) -> None:
-    """Refuse anything that no fit can start from."""
+    """Refuse anything that is not a start of a fit."""
     if isinstance(law, AbstractDamper) or (isinstance(law, type) and issubclass(law, AbstractDamper)):
         return
     if isinstance(law, str):

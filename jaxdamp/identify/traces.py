@@ -109,18 +109,18 @@ def _averaged(values: np.ndarray, block: int) -> np.ndarray:
 
 
 def dominant_rate(run: BenchRun) -> float:
-    """How fast a record moves [rad/s]: RMS velocity over RMS stroke, or its frequency if that is higher."""
+    """Dominant angular frequency of a record [rad/s]: RMS velocity over RMS stroke, or its frequency if higher."""
     moved = float(np.std(run.stroke))
     return max(2 * np.pi * run.frequency, float(np.std(run.velocity)) / moved)
 
 
 def settling_time(run: BenchRun) -> float:
-    """Time [s] at the start of a record, half a cycle, in which a law with states forgets how it was started."""
+    """Settling time [s] at the start of a record, half a cycle, after which the initial states no longer matter."""
     return min(np.pi / dominant_rate(run), 0.25 * run.duration)
 
 
 def _with_warm_up(run: BenchRun, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Stroke, velocity and force, preceded by a copy of the record's own first cycle, its stroke shifted to join."""
+    """Stroke, velocity and force, preceded by a copy of the first cycle with a continuous stroke."""
     period = min(2 * np.pi / dominant_rate(run), run.duration)
     since = run.time - run.time[0]
     instants = period + np.arange(-count, 0) / run.sampling_rate
@@ -150,9 +150,9 @@ def _row(run: BenchRun, sigma: float, samples_per_cycle: int | None, warms_up: b
 
 
 def _grouped(rows: Sequence[_Row]) -> list[list[int]]:
-    """Numbers of the rows that march together, so that little time is lost on padding and few loops are compiled.
+    """Groups of rows that are computed in one loop, with little padding and few loops to compile.
 
-    All records of a group take the steps of its longest. A step costs about as much as 16 records beside each other.
+    All records of a group take the steps of the longest. A step costs about as much as 16 records in parallel.
     """
 
     def cost(group: list[int]) -> int:
@@ -203,7 +203,7 @@ def _on_device(array: np.ndarray) -> Array:
 
 
 def _stated(law: AbstractDamper, runs: Sequence[BenchRun]) -> dict[str, list[float]]:
-    """Values of the law that the records state, by path: the command, if the law takes one."""
+    """Values that the records state for the law, by path: the command, if the law has one."""
     commands = [run.command for run in runs if run.command is not None]
     if not takes_command(law) or not commands:
         return {}
@@ -225,13 +225,13 @@ def batches(
 ) -> tuple[tuple[Batch, ...], list[SampleRange]]:
     """Prepare records for a law.
 
-    Where a record has more than `samples_per_cycle`, blocks of samples are averaged, whose weight grows with the root
-    of their number, so that nothing is lost but the noise. For a memoryless law all records stand in one batch. For a
-    law with states every record is preceded by a copy of its first cycle, over which the states come from rest to
-    where a steady motion has them; the copy and the first half cycle of the record get weight zero.
+    If a record has more than `samples_per_cycle`, blocks of samples are averaged and weighted by the root of their
+    number. For a law without states all records are in one batch. For a law with states every record is preceded by a
+    copy of its first cycle, during which the states go from rest to those of the steady motion; the copy and the first
+    half cycle of the record get weight zero.
 
     Arguments:
-        law: the law, of which only matters whether it has states and takes a command.
+        law: the law; only its states and its command matter.
         runs: the records.
         sigma: standard deviation [N] of the force for each record.
         samples_per_cycle: see above; `None` takes every sample.
@@ -268,7 +268,7 @@ def _predict(batch: Batch, law: AbstractDamper) -> Array:
 
 
 def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
-    """Values at every sample from the means of blocks: straight lines between their middles and beyond the ends."""
+    """Values at every sample from the means of blocks, by straight lines between the centres and beyond the ends."""
     if block == 1:
         return values
     places = (np.arange(count) - 0.5 * (block - 1)) / block
@@ -300,5 +300,5 @@ def predict_by_record(
 
 
 def used_samples(law: AbstractDamper, run: BenchRun) -> slice:
-    """The samples of a record that a fit of this law looks at: all, or those after settling."""
+    """The samples of a record that a fit of this law uses: all, or those after settling."""
     return slice(0 if is_memoryless(law) else int(np.ceil(settling_time(run) * run.sampling_rate)), None)

@@ -1,4 +1,4 @@
-"""`train`: gradient descent for laws with many weights, stopped when records left out get no better."""
+"""`train`: gradient descent for laws with many weights, with early stopping on held-out records."""
 
 import dataclasses
 import functools
@@ -15,6 +15,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
+from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, with_fitted_range
 from jaxdamp.identify.covered import covered_range
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-CHUNK = 25  # steps in one compiled call, after each of which the records left out are looked at
+CHUNK = 25  # steps in one compiled call, after which the held-out records are evaluated
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -42,11 +43,11 @@ class Training(AbstractFitted):
         held_out: the records that decided when to stop.
         held_out_fit_percent: over the held-out records together.
         held_out_rmse: over the held-out records together [N].
-        steps: after how many steps each entry of the histories was taken.
+        steps: number of steps at each entry of the histories.
         history: RMSE [N] over the training records as trained on (averaged samples), for each entry.
         held_out_history: the same over the held-out records.
         best_step: the step that the law comes from.
-        stopped: why the training ended, in words.
+        stopped: reason for the end of the training, in words.
     """
 
     held_out: tuple[BenchRun, ...]
@@ -57,6 +58,30 @@ class Training(AbstractFitted):
     held_out_history: Float[np.ndarray, " entries"]
     best_step: int
     stopped: str
+
+    def table(self) -> Table:
+        """The errors on each record, trained on or held out."""
+        columns = Column("record"), Column("use"), Column("fit", "%", ".1f")
+        uses = ["training"] * len(self.runs) + ["held out"] * len(self.held_out)
+        rows = tuple((s.name, use, *s[2:0:-1], s.largest_error) for s, use in zip(self.scores, uses, strict=True))
+        return Table(
+            f"{type(self.law).__name__} after training",
+            (*columns, Column("RMSE", "N", ".1f"), Column("largest error", "N", ".1f")),
+            rows,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The training as numbers with units and words, ready for JSON; numbers that are not finite are None."""
+        return super().to_dict() | {
+            "held_out": [run.name for run in self.held_out],
+            "held_out_fit": with_unit(self.held_out_fit_percent, "%"),
+            "held_out_rmse": with_unit(self.held_out_rmse, "N"),
+            "steps": plain(self.steps),
+            "history": with_unit(self.history, "N"),
+            "held_out_history": with_unit(self.held_out_history, "N"),
+            "best_step": self.best_step,
+            "stopped": self.stopped,
+        }
 
     def plot(self, **options: Any) -> "Figure":
         """The errors over the steps of the training."""
@@ -89,25 +114,24 @@ def train(
     """Train a law with many weights, such as `Hybrid`, by gradient descent with early stopping.
 
     Minimises the mean squared error of the force over all samples of `runs` with the whole gradient in every step
-    (reverse mode through the law and its states). Every 25 steps the error on `held_out` is looked at; the law
-    returned is the one for which it was smallest. Nothing is random here: the same law, whose weights a key has drawn,
-    and the same records give the same result. Parameters stay in their domains by their smooth maps.
+    (reverse mode through the law and its states). Every 25 steps the error on `held_out` is evaluated; the result is
+    the law with the smallest one. Nothing is random here: the same law and the same records give the same result.
+    Smooth maps keep parameters in their domains.
 
-    A handful of parameters with a meaning are better served by `fit`, which also knows their errors.
+    For laws with few parameters use `fit`, which also computes their standard errors.
 
     Arguments:
-        law: a start, or as in `fit` a law class or a function that makes one from `runs`.
+        law: a start as in `fit`: a law, a law class, or a function that returns a law.
         runs: records to train on. A few steady cycles of each are enough: `run.last_cycles(3)`.
-        held_out: records that decide when to stop; they are not trained on. Judge the law on records that are in
-            neither of the two.
+        held_out: records that decide when to stop; they are not trained on. To assess the law, use further records.
         weighting: of `runs`, as in `fit`.
-        freeze: parameters to leave alone, by path, last part of a path, or pattern.
+        freeze: parameters to hold at their start, by path, last part of a path, or pattern.
         tie: parameters that take the values of others, as in `fit`.
-        steps: at most so many.
-        patience: stop when the held-out error has not fallen for so many steps.
-        learning_rate: of Adam, at the start; it falls to a hundredth along a cosine over `steps`.
+        steps: largest number of steps.
+        patience: number of steps without a decrease of the held-out error after which the training stops.
+        learning_rate: initial learning rate of Adam; it decreases to a hundredth along a cosine over `steps`.
         optimiser: any optax optimiser instead.
-        samples_per_cycle: slow records are averaged down to it.
+        samples_per_cycle: slow records are averaged in blocks down to this number.
 
     Raises:
         ValueError: no records on either side, a record on both; a law without finite forces; names that fit no
@@ -191,7 +215,7 @@ def _check(runs: Sequence[BenchRun], held_out: Sequence[BenchRun], steps: int, p
 
 @functools.lru_cache
 def _adam(learning_rate: float, steps: int) -> optax.GradientTransformation:
-    """Adam with clipped gradients; one object for each choice, so that the compiled step is found again."""
+    """Adam with clipped gradients; one object for each choice, so that the compiled step is reused."""
     schedule = optax.cosine_decay_schedule(learning_rate, steps, alpha=0.01)
     return optax.chain(optax.clip_by_global_norm(1.0), optax.adam(schedule))
 

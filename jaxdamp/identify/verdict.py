@@ -1,4 +1,4 @@
-"""How good fitted laws are and what they lack, in words."""
+"""The errors of fitted laws, explained in words."""
 
 from collections.abc import Sequence
 
@@ -7,16 +7,16 @@ from jaxdamp.identify.rungs import Rung, best_of
 from jaxdamp.identify.traces import is_memoryless
 
 
-HYSTERESIS = 0.05  # share of the squared error from which on it is worth a law with states
-SHAPE = 0.3  # share of the squared error from which on it is worth another curve
+HYSTERESIS = 0.05  # share of the squared error above which a law with states is worthwhile
+SHAPE = 0.3  # share of the squared error above which another curve is worthwhile
 
 
 def verdict(rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> tuple[str, ...]:
-    """How good the best law is, and what the errors of the laws are made of, a sentence each.
+    """Sentences on the error of the best law and on the shares of the errors of the laws.
 
     Arguments:
-        rungs: the fitted laws, one at least.
-        held_out: the records that they were scored on, if there are such.
+        rungs: the fitted laws, at least one.
+        held_out: the records that they were scored on, if any.
     """
     best = best_of(rungs)
     static = [rung for rung in rungs if is_memoryless(rung.result.law)]
@@ -31,7 +31,7 @@ def verdict(rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> tuple[str, .
                 " between the two halves of the stroke), which no such law can follow."
             )
         else:
-            sentences.append(f"{lead}, and hysteresis is not what it lacks: {100 * part:.0f} % of its squared error.")
+            sentences.append(f"{lead}; hysteresis is only {100 * part:.0f} % of its squared error.")
         if rung is best and part >= HYSTERESIS and len(static) == len(rungs):
             sentences.append("Try a law with hysteresis, such as besinger_lag or besinger_series_spring.")
         elif rung is not best:
@@ -39,7 +39,7 @@ def verdict(rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> tuple[str, .
             sentences.append(f"{best.name} has a {factor:.1f} times smaller error.")
     remaining = best.result.error_shares
     if not is_memoryless(best.result.law) and remaining.hysteresis >= HYSTERESIS:
-        sentences.append(f"Of what {best.name} leaves, {100 * remaining.hysteresis:.0f} % is still hysteresis.")
+        sentences.append(f"{100 * remaining.hysteresis:.0f} % of the squared error of {best.name} is still hysteresis.")
     if remaining.shape >= SHAPE:
         part = 100 * remaining.shape
         sentences.append(f"{part:.0f} % of the squared error of {best.name} is shape: another curve would fit better.")

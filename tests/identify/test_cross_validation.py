@@ -1,5 +1,7 @@
 """Held-out scores are those of laws that never saw the record."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -49,8 +51,11 @@ def test_groups_are_fitted_on_their_own(runs):
     found = identify.cross_validate({"bilinear": Bilinear}, both, by=group)
     assert found.groups == ("firm", "soft")
     assert found.fit_percent("bilinear", "soft") > 95.0
-    (row,) = found.table()
-    assert list(row) == ["law", "firm", "soft", "all", "rmse"]
+    (row,) = found.table().records()
+    assert list(row) == ["law", "firm", "soft", "all", "RMSE"] and row["RMSE"] == found.rmse("bilinear")
+    plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert plain["folds"][0]["rmse"] == {"value": found.folds[0].rmse, "unit": "N"}
+    assert plain["folds"][0]["group"] == "firm" and len(plain["folds"]) == 4
     more = found + identify.cross_validate({"linear": Linear}, both, by=group)
     assert more.laws == ("bilinear", "linear")
     with pytest.raises(ValueError, match="two records or more"):

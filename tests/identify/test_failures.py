@@ -60,6 +60,6 @@ def test_a_start_that_cannot_be_made_is_a_failure_of_that_law(sines, monkeypatch
     runs = sines(TRUTH, noise=5.0)
     comparison = compare(default_ladder(runs, ["table", "linear"]), runs)
     assert [rung.name for rung in comparison.rungs] == ["linear"]
-    assert comparison.failed[0].reason == "No start can be made from these records: no velocity"
+    assert comparison.failed[0].reason == "No start can be computed from these records: no velocity"
     with pytest.raises(ValueError, match="No start can be made"):
         fit(default_ladder(runs, ["table"])["table"], runs)

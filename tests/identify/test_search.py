@@ -127,7 +127,7 @@ def test_fisher_information_of_paper_001(amplitude, frequency, relative):
     assert weak >= {"compression_rate", "transition_velocity"}
     assert ("blow_off_rate" in weak) == (amplitude == 0.010)
     assert sum("not identifiable" in w for w in result.warnings) == len(weak)
-    assert sum("lies beyond the records" in w for w in result.warnings) == 1
+    assert sum("is outside the records" in w for w in result.warnings) == 1
 
 
 def test_a_search_that_is_cut_short_says_so(sines):

@@ -96,9 +96,9 @@ def test_a_search_stays_inside_the_conditions_of_a_law():
     assert isinstance(law, Besinger) and isinstance(result.law, Besinger)
     assert law.force_velocity(0.1) == result.law.force_velocity(0.1)
     assert {compression.note, rebound.note, result["transition_velocity"].note} == {"not identifiable"}
-    together = [w for w in result.warnings if w.startswith("These records cannot tell")]
+    together = [w for w in result.warnings if w.startswith("These records cannot distinguish")]
     assert len(together) == 1 and "compression_rate" in together[0] and "rebound_rate" in together[0]
-    assert any("transition_velocity" in w and "lies beyond the records" in w for w in result.warnings)
+    assert any("transition_velocity" in w and "is outside the records" in w for w in result.warnings)
 
 
 def test_starts_are_what_a_law_and_those_inside_propose():

@@ -1,5 +1,7 @@
 """Gradient descent with early stopping: it finds what is there, stops in time, and gives the same again."""
 
+import json
+
 import jax
 import numpy as np
 import optax
@@ -28,6 +30,12 @@ def test_finds_the_parameters(lagged):
     assert result.held_out_fit_percent > 97.0
     assert [s.name for s in result.scores] == [run.name for run in lagged]
     assert "Lag trained on 2 records" in repr(result)
+    rows = result.table().records()
+    assert [row["use"] for row in rows] == ["training", "training", "held out"]
+    assert [row["RMSE"] for row in rows] == [score.rmse for score in result.scores]
+    plain = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert plain["held_out_rmse"] == {"value": result.held_out_rmse, "unit": "N"}
+    assert plain["history"]["value"] == list(result.history) and plain["status"] == result.status.name.lower()
 
 
 @pytest.mark.slow
