@@ -1,7 +1,7 @@
 """Modules as plain dictionaries, ready for JSON.
 
 A module is `{"class": name, field: ...}`, a number or an array `{"value": ..., "unit": ...}`, a mapping
-`{"entries": ...}`, a function of this package with arguments of its own `{"function": name, "options": ...}`.
+`{"entries": ...}`, a function of this package with arguments `{"function": name, "options": ...}`.
 """
 
 import dataclasses
@@ -15,6 +15,7 @@ import numpy as np
 from jax.tree_util import Partial
 
 from jaxdamp import _checks
+from jaxdamp.dampers import AbstractDamper
 
 
 FITTED_TO = "fitted_to"
@@ -41,12 +42,12 @@ def known_functions() -> dict[str, Any]:
 
 
 def declared(field: Any) -> dict[str, Any] | None:
-    """What a field says of its number, if it is a parameter or a setting."""
+    """The declaration of a field, if it is a parameter or a setting."""
     return field.metadata.get("parameter") or field.metadata.get("setting")
 
 
 def own_fields(module: eqx.Module | type[eqx.Module]) -> list[dataclasses.Field]:
-    """The fields but for the range that a law was fitted to, which all laws have."""
+    """All fields except the fitted range, which all laws have."""
     return [field for field in dataclasses.fields(module) if field.name != FITTED_TO]
 
 
@@ -54,14 +55,14 @@ def plain_module(module: Any) -> dict[str, Any]:
     """A module with all modules inside."""
     name = type(module).__name__
     if known_classes().get(name) is not type(module):
-        remedy = "Give your class a name of its own; after redefining it, make its objects anew."
-        wrong = f"a {name} unlike another {name}"
+        remedy = "Give your class a unique name; after redefining it, create its objects again."
+        wrong = f"a {name} that differs from another {name}"
         _checks.refuse("module", "be of a class that can be found by its name", wrong, remedy)
     result: dict[str, Any] = {"class": name}
     for field in own_fields(module):
         value, where, number = getattr(module, field.name), f"{name}.{field.name}", declared(field)
         result[field.name] = _plain(value, where) if number is None else _quantity(value, number["unit"], where)
-    covered = getattr(module, FITTED_TO, None)
+    covered = module.fitted_to if isinstance(module, AbstractDamper) else None
     if covered is not None:
         _known_number(covered.limits, f"{name}.{FITTED_TO}")
         result[FITTED_TO] = {q.name: {"value": list(q.limits), "unit": q.unit} for q in covered.known()}
@@ -83,13 +84,13 @@ def _plain(value: Any, where: str) -> Any:
         _checks.finite(where, value)
     if value is None or type(value) in (bool, int, float, str):
         return value
-    remedy = "Write it without, or keep the parameters with `jaxdamp.parameters`."
+    remedy = "Remove it, or save the parameters with `jaxdamp.parameters`."
     must = "be a law, a number, a word, an array, another module or a tuple of these"
     _checks.refuse(where, must, f"a {type(value).__name__}", remedy)
 
 
 def _plain_function(value: Partial, where: str) -> dict[str, Any]:
-    """A function of this package with the arguments that are given already."""
+    """A function of this package with its fixed arguments."""
     name = getattr(value.func, "__name__", "")
     if value.args or known_functions().get(name) is not value.func:
         remedy = "A road of samples, `roads.from_profile`, can be written."

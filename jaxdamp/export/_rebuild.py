@@ -1,4 +1,4 @@
-"""Modules from the plain dictionaries that a file holds."""
+"""Modules from the plain dictionaries of a file."""
 
 import dataclasses
 import json
@@ -31,7 +31,7 @@ def rebuilt(plain: Any, where: str) -> Any:
         remedy = f"{hint}Import the module of your own classes first."
         _checks.refuse(where, "be of a class that is known", repr(name), remedy)
     fields = own_fields(kind)
-    # fields that a class was given after the file was written have their default
+    # fields that were added to a class after the file was written get their default
     later = [f for f in fields if declared(f) is None and f.default is not dataclasses.MISSING]
     is_law = issubclass(kind, AbstractDamper)
     given = {key: value for key, value in plain.items() if not (is_law and key == FITTED_TO)}

@@ -1,4 +1,4 @@
-"""Files are written whole or not at all."""
+"""Writing of files, completely or not at all."""
 
 import os
 from pathlib import Path
@@ -7,7 +7,7 @@ from jaxdamp import _checks
 
 
 def write_whole(path: str | os.PathLike[str], text: str) -> Path:
-    """Write a text file beside its place, then move it there: a reader never meets half a file."""
+    """Write a text file under a temporary name, then rename it: a reader never gets an incomplete file."""
     target = Path(path).expanduser()
     if not target.parent.is_dir():
         _checks.refuse("path", "lie in a folder that exists", target, "Make the folder first.")

@@ -15,14 +15,13 @@ from jaxdamp.rig import quasi_static
 
 
 def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: VectorLike) -> Path:
-    """Write the force of a law over velocity as a table, SI units, one point a line.
+    """Write the force of a law over velocity as a table in SI units, one point per line.
 
     A table holds one force for each velocity. For a law with states that is the force at constant velocity once the
-    states have settled (`jaxdamp.rig.quasi_static`); its hysteresis does not fit into a table, and the header says so.
-    Velocities at which the law has no settled or no finite force get no row: a comment in the file and a Python warning
-    say how many, where and why.
-    The header also says what the law was fitted to, and which rows lie beyond: marks in the rows themselves would keep
-    simulators from reading them.
+    states have settled (`jaxdamp.rig.quasi_static`); its hysteresis is not in the table, which the header states.
+    Velocities at which the law has no settled or no finite force have no row: a comment in the file and a Python
+    warning state how many, where and why. The header also states the fitted range of the law and the rows outside it,
+    since simulators could not read marks in the rows themselves.
 
     Arguments:
         law: the law.
@@ -43,7 +42,7 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
         _checks.refuse("velocities", "be one or more, strictly increasing", velocity, "Try `numpy.unique`.")
     curve = quasi_static(law, velocity)
     if not curve.settled.any():
-        remedy = "A table cannot hold such a law: take `respond` with the motion that you mean."
+        remedy = "A table cannot represent such a law: use `respond` with the intended motion."
         _checks.refuse("law", "have a force at constant velocity", f"{type(law).__name__}. {curve.note}", remedy)
     header = [
         f"# law: {law!r}",
@@ -67,7 +66,7 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
 
 
 def _range_lines(law: AbstractDamper, velocity: np.ndarray) -> list[str]:
-    """What the law was fitted to, and the rows that lie beyond."""
+    """Comments on the fitted range of the law and on the rows outside it."""
     lines = [] if law.fitted_to is None else [f"# fitted to: {law.fitted_to.words()}"]
     outside = extrapolated(law, velocity)
     if not outside.any():

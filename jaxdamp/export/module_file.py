@@ -1,4 +1,4 @@
-"""A law, a vehicle, a road as a text that people read, diff and keep: JSON with class names, numbers and units."""
+"""Laws, vehicles and roads as readable JSON with class names, numbers and units."""
 
 import json
 import os
@@ -17,26 +17,25 @@ from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.vehicles import AbstractVehicle
 
 
-KINDS: dict[str, Any] = {  # what a file holds, the most particular first
+KINDS: dict[str, Any] = {  # kinds of files, the most specific first
     "law": AbstractDamper,
     "vehicle": AbstractVehicle,
     "road": (AbstractRoad, WhiteRoad),
     "module": eqx.Module,
 }
 FORMATS = {f"jaxdamp {kind}": kind for kind in KINDS}
-PLAIN, WITH_RANGES = 1, 2  # versions: a file of the second may say what its laws were fitted to
+PLAIN, WITH_RANGES = 1, 2  # versions of the format: without and with fitted ranges
 
 
 def to_json(module: eqx.Module, path: str | os.PathLike[str] | None = None) -> str:
     """Write a law, a vehicle, a road or any other module of this package or of your own as JSON.
 
-    Every number stands with its unit, all digits are kept: `from_json` gives the same module, bit for bit. Classes that
-    you defined yourself are written by their name. The range that a law was fitted to stands with it, under
-    "fitted_to".
+    Every number has its unit and all digits: `from_json` gives exactly the same module. Your own classes are written by
+    their name. The fitted range of a law is written as "fitted_to".
 
     Arguments:
         module: any composition.
-        path: a file to write it to; an existing one is replaced, and never left half-written.
+        path: a file to write; an existing one is replaced, and never left incomplete.
 
     Returns:
         The text.
@@ -69,8 +68,8 @@ def to_json(module: eqx.Module, path: str | os.PathLike[str] | None = None) -> s
 def from_json(path_or_text: str | os.PathLike[str]) -> Any:
     """Read what `to_json` wrote.
 
-    A class of your own is found by its name if the module that defines it has been imported before. Values are checked
-    as constructors check them.
+    Your own classes are identified by name; import the module that defines them first. Values are checked as by the
+    constructors.
 
     Arguments:
         path_or_text: a file, or the text itself (anything that begins with `{`).

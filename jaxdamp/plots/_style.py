@@ -1,4 +1,4 @@
-"""What all pictures share: figure, colours, labels with unit and sign, legends beside the axes."""
+"""Common style of all pictures: figure, colours, labels with unit and sign, legends."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 
-# Okabe and Ito: told apart with every kind of colour vision. The pale yellow is left out, black serves baselines.
+# Okabe and Ito: distinguishable with every kind of colour vision; without the pale yellow; black is for baselines.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES = ("-", "--", ":", "-.")
 BLACK = "#222222"
@@ -27,7 +27,7 @@ SIMULATE = "Take what `jaxdamp.simulate(vehicle, road)` gives, or several by nam
 
 
 def new_figure(width: float, height: float) -> "matplotlib.figure.Figure":
-    """An empty figure [inch] that finds its own margins."""
+    """An empty figure [inch] with automatic margins."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), dpi=100, layout="constrained")

@@ -1,4 +1,4 @@
-"""A law at a glance: its loops, and what each of its numbers does."""
+"""A summary of a law: its loops, and the effect of each parameter."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -64,15 +64,15 @@ def law_card(
     """Loops of a law over velocity and stroke at several frequencies, and the effect of each of its parameters.
 
     The effect is p ∂F/∂p, by automatic differentiation through the law and its states: the change of the force [N] for
-    a change of the parameter by its own value, over the cycle of the highest frequency. A parameter whose curve is flat
-    cannot be found from such a test; two whose curves have one shape cannot be told apart. Parameters that are zero
-    have none. Of many numbers the eight with the largest effect are drawn. Velocities beyond those that the law was
-    fitted to are shaded.
+    a change of the parameter by its own value, over the cycle of the highest frequency. A parameter with a flat curve
+    cannot be identified from such a test; two parameters whose curves have the same shape cannot be distinguished.
+    Parameters that are zero have no effect. Only the eight largest effects are drawn. Velocities outside the fitted
+    range are shaded.
 
     Arguments:
         law: any law.
-        amplitude: of the sines [m], zero to peak.
-        frequencies: of the sines [Hz].
+        amplitude: amplitude of the sines [m], zero to peak.
+        frequencies: frequencies of the sines [Hz].
         title: above the picture; the classes of the law if it is left out.
     """
     check_module("law", law, (AbstractDamper,), "law_card(law)")

@@ -1,4 +1,4 @@
-"""A tuning: the law before and after, what it did to every ride metric, and how the search went."""
+"""A tuning: the law before and after, the change of every ride metric, and the course of the search."""
 
 import textwrap
 from typing import TYPE_CHECKING
@@ -68,7 +68,7 @@ def _changed(result: TuneResult) -> dict[str, tuple[AbstractDamper, AbstractDamp
 
 
 def _own_laws(vehicle: AbstractVehicle) -> list[AbstractDamper]:
-    """The laws of a vehicle, of several that act together that of one; those of lifting tyres left out."""
+    """The laws of a vehicle, one of several equal ones, without those of tyre lift-off."""
     frame = vehicle.frame()
     return [element.law for part in (*frame.links, *frame.wheels) for element in part.elements]
 

@@ -29,15 +29,15 @@ def force_velocity(
 ) -> "matplotlib.figure.Figure":
     """Force over velocity of one law or several, over the samples and the peak-velocity points of records.
 
-    A law with states is drawn at constant velocity, its states settled: the curve in the middle of its loops. Where it
-    has no settled or no finite force the curve has a gap, and a remark under the picture says why. Beyond the
-    velocities that a law was fitted to (`law.fitted_to`) its curve is dotted; where that holds for all, shaded.
+    A law with states is drawn at constant velocity with settled states: the curve in the middle of its loops. Where it
+    has no settled or no finite force the curve has a gap, and a remark under the picture gives the reason. Outside the
+    fitted velocities (`law.fitted_to`) a curve is dotted; where this applies to all laws, the picture is shaded.
 
     Arguments:
         laws: a law, or laws by name.
         velocities: where to draw the curves [m/s]; the range of the records, or −1 to 1 m/s, if left out.
         runs: measured records to draw under the curves.
-        baseline: name of the law to draw as a dashed black line, the one that the others are compared with.
+        baseline: name of the law to draw as a dashed black line, for comparison.
         note: a remark to write under the picture.
 
     Raises:
@@ -74,7 +74,7 @@ def draw_laws(
     velocities: Float[np.ndarray, " points"],
     baseline: str | None,
 ) -> tuple[list, list[str]]:
-    """One curve a law; the handles for the legend, and remarks on gaps in the curves."""
+    """One curve for each law; the handles for the legend, and remarks on gaps in the curves."""
     handles, gaps, number = [], [], 0
     for name, law in laws.items():
         curve = quasi_static(law, velocities)

@@ -1,4 +1,4 @@
-"""What a ride makes a damper do: force over velocity, and how long it spends at each velocity."""
+"""The use of a damper during a ride: force over velocity, and the share of time at each velocity."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -21,10 +21,10 @@ _BINS, _POINTS, _SHADE_POINTS = 41, 81, 2001
 def damper_use(
     responses: Response | Mapping[str, Response], *, damper: str | None = None
 ) -> "matplotlib.figure.Figure":
-    """Force over velocity during rides, each over its law at rest in velocity, and histograms of the velocity.
+    """Force over velocity during rides, with the quasi-static curve of the law, and histograms of the velocity.
 
-    The histograms are the share of time, and the share of the dissipated energy, in ranges of equal width: what of the
-    curve matters on this road. Velocities beyond those that the laws were fitted to are shaded.
+    The histograms are the share of time and the share of dissipated energy in ranges of equal width; they show which
+    part of the curve is important on this road. Velocities outside the fitted range of the laws are shaded.
 
     Arguments:
         responses: a response, or responses by name, of one kind of vehicle.

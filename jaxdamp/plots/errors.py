@@ -1,4 +1,4 @@
-"""The errors of several laws side by side."""
+"""The errors of several laws."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Where a law was fitted to records and where it is extrapolated, as pictures show it."""
+"""Marks of the fitted and the extrapolated range of laws in pictures."""
 
 import textwrap
 from collections.abc import Iterable, Mapping
@@ -33,7 +33,7 @@ def curve(axes: "matplotlib.axes.Axes", law: AbstractDamper, velocities: Points,
 
 
 def shade(axes: "matplotlib.axes.Axes", laws: Iterable[AbstractDamper], velocities: Points, label: str = LABEL) -> list:
-    """Shade the velocities at which every law that leaves its range is extrapolated; the handle for a legend.
+    """Shade the velocities at which all laws are extrapolated; returns the handle for a legend.
 
     Arguments:
         axes: over velocity.
@@ -52,7 +52,7 @@ def shade(axes: "matplotlib.axes.Axes", laws: Iterable[AbstractDamper], velociti
 
 
 def shade_channel(axes: "matplotlib.axes.Axes", responses: Iterable[Response], channel: str) -> None:
-    """Shade what lies beyond the velocities of the records, where the channel over time is a damper's velocity."""
+    """Shade velocities outside those of the records, if the channel is the velocity of a damper."""
     laws = [law for law in (_law_of(response, channel) for response in responses) if law is not None]
     if not laws:
         return
@@ -65,14 +65,14 @@ def shade_channel(axes: "matplotlib.axes.Axes", responses: Iterable[Response], c
 
 
 def _law_of(response: Response, channel: str) -> AbstractDamper | None:
-    """The law whose velocity a channel is."""
+    """The law that a velocity channel belongs to."""
     names = response.vehicle.frame().element_names
     at = [i for i, name in enumerate(names) if channel == f"{name}_velocity"]
     return response.vehicle.elements()[at[0]] if at else None
 
 
 def footnotes(figure: "matplotlib.figure.Figure", responses: Mapping[str, Response]) -> None:
-    """Below the picture, which dampers leave the range of their records and by how much."""
+    """Footnotes on the dampers used outside the range of their records, and by how much."""
     lines = [
         f"{name + ': ' if name else ''}{text}"
         for name, response in responses.items()

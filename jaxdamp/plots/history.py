@@ -11,14 +11,14 @@ if TYPE_CHECKING:
 
 
 def training_history(training: Training) -> "matplotlib.figure.Figure":
-    """Errors over the steps of a training, on its records and on those held out, and the step that was kept."""
+    """Errors over the steps of a training, on its records and on those held out, and the step of the result."""
     figure = _style.new_figure(8.0, 4.0)
     axes = figure.subplots()
     handles = []
     lines = (("training records", training.history), ("held-out records", training.held_out_history))
     for number, (label, values) in enumerate(lines):
         handles += axes.plot(training.steps, values, label=label, linewidth=1.8, **_style.line_style(number))
-    handles.append(axes.axvline(training.best_step, color=_style.GREY, linestyle=":", label="law kept"))
+    handles.append(axes.axvline(training.best_step, color=_style.GREY, linestyle=":", label="result"))
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(lambda value, _: _style.short(value))
     axes.yaxis.set_minor_formatter(lambda value, _: _style.short(value))

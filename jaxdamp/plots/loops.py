@@ -1,4 +1,4 @@
-"""The fit over its records: loops of force over velocity and over stroke, and what is left."""
+"""A fit and its records: loops of force over velocity and over stroke, and the residual."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -24,10 +24,10 @@ def fit_loops(
 ) -> "matplotlib.figure.Figure":
     """Loops of force over velocity and over stroke, measured and fitted, with the residual.
 
-    Of each record the last full cycle is drawn. Of many records only some are, spread evenly over the peak velocities,
-    and the title says so. The residual is fitted less measured; so that slow records with their many samples do not
-    cover the others, it is drawn at every nth sample over the velocity, and as means of n samples over the cycle, such
-    that some 300 points are left.
+    For each record the last full cycle is drawn. Of many records only some are drawn, spread evenly over the peak
+    velocities, and the title says so. The residual is fitted minus measured. It is reduced to about 300 points per
+    record (every nth sample over the velocity, means of n samples over the cycle), so that slow records with many
+    samples do not cover the others.
 
     Arguments:
         result: a fit.

@@ -1,4 +1,4 @@
-"""Rides over a road: time histories and the spectrum of the body's acceleration."""
+"""Rides: time histories and the spectrum of the body acceleration."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 
-WINDOW = 3.0  # s that are drawn over time: in more, a wheel's oscillations at 10 Hz cannot be told apart
+WINDOW = 3.0  # s, drawn over time: in more, wheel oscillations at 10 Hz cannot be distinguished
 _WORDS = {
     "sprung_acceleration": "body acceleration [m/s²]   (+ up)",
     "stroke": "stroke [mm]   (+ rebound)",
@@ -36,8 +36,8 @@ def ride(
 ) -> "matplotlib.figure.Figure":
     """Channels over time and the power spectral density of the first of them, overlaid for several responses.
 
-    The legend gives the RMS of the first channel over the whole run. Dampers that leave the range that their laws were
-    fitted to are named below; in a damper's velocity what lies beyond is shaded.
+    The legend gives the RMS of the first channel over the whole run. Dampers used outside the fitted range of their
+    laws are named below the picture, and velocities outside this range are shaded.
 
     Arguments:
         responses: a response, or responses by name, all of one kind of vehicle.
@@ -47,8 +47,7 @@ def ride(
             the legend adds the weighted RMS.
         window: part of the run to draw over time [s]; if left out, the whole run, or of a long one the 3 s around its
             largest first channel. The spectrum and the RMS are of the whole run.
-        reference: name of the response that the others are held against: a broad grey line beneath them, so that what
-            lies on it can be seen.
+        reference: name of the response to draw as a broad grey line beneath the others.
         frequencies: range of the spectrum [Hz].
 
     Raises:
@@ -117,7 +116,7 @@ def _line_styles(names: Iterable[str], reference: str | None) -> dict[str, dict[
 
 
 def ride_channels(response: Response) -> tuple[str, ...]:
-    """The channels that say most of a ride: body acceleration, first stroke, first dynamic tyre load."""
+    """The default channels: body acceleration, first stroke, first dynamic tyre load."""
     layout = response.system.layout
     acceleration = next(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting is not None)
     kinds = ChannelKind.STROKE, ChannelKind.TYRE_LOAD

@@ -18,7 +18,7 @@ def roughness_by_segment(roughness: RoughnessBySegment) -> "matplotlib.figure.Fi
     axes = figure.subplots()
     values, whole = 1e3 * np.asarray(roughness.segments), 1e3 * float(roughness.whole)
     bars = axes.bar(roughness.starts, values, roughness.lengths, align="edge", edgecolor="white", label="segment")
-    line = axes.axhline(whole, color=_style.GREY, linestyle="--", label=f"in all, {whole:.3g} m/km")
+    line = axes.axhline(whole, color=_style.GREY, linestyle="--", label=f"whole profile, {whole:.3g} m/km")
     title = "Roughness by segment"
     if roughness.is_partial:
         title += f" (the last one {roughness.lengths[-1]:.4g} m)"

@@ -1,9 +1,9 @@
-"""What a fit, a ride or a tuning says on a page: one HTML file with tables and pictures that needs nothing beside it.
+"""Pages of results of fits, rides and tunings: one self-contained HTML file with tables and pictures.
 
 - Pages: `fit_report(comparison)`, `ride_report(responses)`, `tuning_report(result)`; each gives a `Report`, to which
   more can be added before `write(path)`.
-- A page of your own: `Report`, with `add_fits` and `add_tuning` as ready sections.
-- Tables that stand on these pages: `records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
+- Your own page: `Report`, with the sections `add_fits` and `add_tuning`.
+- Tables of these pages: `records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
 """
 
 from jaxdamp._tables import Column, Table

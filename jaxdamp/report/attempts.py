@@ -1,4 +1,4 @@
-"""Pictures and files that may fail one by one: what fails is named, the others are made."""
+"""Independent pictures and files: if one fails, it is reported and the others are still created."""
 
 import warnings
 from collections.abc import Callable, Iterator
@@ -13,7 +13,7 @@ class Attempts:
         message: what an error says, in words.
 
     Attributes:
-        troubles: what could not be made, or only in part, and why, in words.
+        troubles: the parts that failed, completely or partly, and why, in words.
     """
 
     def __init__(self, check: Callable[[], None] = lambda: None, message: Callable[[Exception], str] = str) -> None:
@@ -22,7 +22,7 @@ class Attempts:
 
     @contextmanager
     def part(self, what: str) -> Iterator[None]:
-        """One part: an error in it is noted, not raised, whatever it is, because the rest must not be lost with it."""
+        """One part: any error in it is noted and not raised, so that the other parts are not lost."""
         self._check()
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", UserWarning)

@@ -1,4 +1,4 @@
-"""A page on laws fitted to records: how good they are, their parameters, their loops and curves."""
+"""A page on laws fitted to records: errors, parameters, loops and curves."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -35,9 +35,9 @@ def fit_report(
         title: of the page.
         runs: the records in the order of the page; the fitted ones and those held out, if left out.
         remarks: on the records.
-        failures: the laws without a fit, a sentence each, if others than those of the comparison.
-        folder: for the pictures as files of their own; in the page alone if it is left out.
-        attempts: what may fail by itself; new ones if left out.
+        failures: sentences on laws without a fit, instead of those of the comparison.
+        folder: folder for the pictures as separate files; without it they are only in the page.
+        attempts: collects parts that fail; a new one if left out.
 
     >>> from jaxdamp import bench, identify, report
     >>> from jaxdamp.dampers import Bilinear, Linear
@@ -57,7 +57,7 @@ def fit_report(
 
 
 def add_fits(report: Report, comparison: Comparison, failures: Sequence[str] | None = None) -> None:
-    """The sections of a page on fits: how good the laws are, the best one, the others."""
+    """The sections of a page on fits: errors of the laws, the best one, the others."""
     best, several = comparison.best, len(comparison.rungs) > 1
     report.heading("How good the laws are")
     report.text(*comparison.verdict)
@@ -136,7 +136,7 @@ def _add_curves(report: Report, comparison: Comparison) -> None:
 
 
 def _with_curves(report: Report, laws: Mapping[str, AbstractDamper], points: np.ndarray) -> dict[str, AbstractDamper]:
-    """The laws, in their order, whose force at constant velocity can be computed, as many as are drawn and the rest."""
+    """The laws to draw, whose force at constant velocity can be computed, and the rest."""
     sound: dict[str, AbstractDamper] = {}
     for name, law in laws.items():
         if len(sound) < MOST_CURVES:

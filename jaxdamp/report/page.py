@@ -1,4 +1,4 @@
-"""A page of results: one HTML file that needs nothing beside it."""
+"""A page of results: one self-contained HTML file."""
 
 import base64
 import html
@@ -45,8 +45,8 @@ class Report:
 
     Arguments:
         title: of the page.
-        folder: for the pictures as PNG files of their own; in the page alone if it is left out.
-        attempts: what may fail by itself, such as a picture; the page ends with what did fail.
+        folder: folder for the pictures as separate PNG files; without it they are only in the page.
+        attempts: collects parts that fail, such as a picture; they are listed at the end of the page.
     """
 
     def __init__(self, title: str, folder: Path | None = None, attempts: Attempts | None = None) -> None:
@@ -56,7 +56,7 @@ class Report:
         self._blocks = [f"<h1>{html.escape(title)}</h1>"]
 
     def heading(self, text: str) -> None:
-        """A section begins."""
+        """Start a section."""
         self._blocks.append(f"<h2>{html.escape(text)}</h2>")
 
     def text(self, *sentences: str) -> None:
@@ -74,11 +74,11 @@ class Report:
         self._blocks.append(table.to_html())
 
     def part(self, what: str) -> AbstractContextManager[None]:
-        """A part that may fail without the rest: `what` could not be made then, and the page says so."""
+        """A part that may fail; the page then reports that `what` could not be made."""
         return self.attempts.part(what)
 
     def picture(self, figure: "Figure | Callable[[], Figure]", caption: str, name: str) -> None:
-        """A figure, in the page and as a PNG file where the report has a folder; if it fails, the rest goes on.
+        """A figure, in the page and as a PNG file if the report has a folder; a failure is only reported.
 
         Arguments:
             figure: a figure, or a function that draws it, so that drawing may fail too.

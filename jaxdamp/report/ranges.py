@@ -1,4 +1,4 @@
-"""What laws were fitted to, and by how much rides leave it, as tables."""
+"""Tables of fitted ranges and of their use during rides."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ def fitted_range_table(covered: FittedRange) -> Table:
 
 
 def range_use_table(responses: Mapping[str, Response]) -> Table | None:
-    """What each damper did beside the range of its law; none where no law has a range."""
+    """The motion of each damper compared with the fitted range of its law; no table if no law has a range."""
     columns = [Column("law"), Column("damper"), Column("quantity"), Column("unit")]
     columns += [Column(name, spec=".3g") for name in ("lowest", "highest", "fitted from", "fitted to", "times")]
     columns += [Column("time outside", "%", ".0f")]

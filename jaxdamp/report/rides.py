@@ -1,4 +1,4 @@
-"""A page on rides: metrics, comfort, what the dampers did, pictures; several rides side by side."""
+"""A page on one or several rides: metrics, comfort, use of the dampers, pictures."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,10 +26,10 @@ def ride_report(
     Arguments:
         responses: of `simulate`, several by name.
         title: of the page.
-        laws: the dampers by the name of their ride, to be written out.
-        remarks: what to know beside the numbers; the notes of the responses, if left out.
-        folder: for the pictures as files of their own; in the page alone if it is left out.
-        attempts: what may fail by itself; new ones if left out.
+        laws: the dampers by the name of their ride, to be listed.
+        remarks: remarks on the results; the notes of the responses if left out.
+        folder: folder for the pictures as separate files; without it they are only in the page.
+        attempts: collects parts that fail; a new one if left out.
 
     >>> from jaxdamp import report, roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.2, duration=0.25)
@@ -48,7 +48,7 @@ def ride_report(
         report.table(table)
     report.picture(lambda: plots.ride(rides, weighting="Wk"), title, "ride.png")
     for damper in next(iter(rides.values())).dampers:
-        caption = f"What the ride makes the {damper.replace('_', ' ')} do"
+        caption = f"Use of the {damper.replace('_', ' ')} during the ride"
         report.picture(lambda name=damper: plots.damper_use(rides, damper=name), caption, f"{damper}.png")
     return report
 
@@ -67,5 +67,5 @@ def axles_sentence(responses: Mapping[str, Response]) -> str:
 
 
 def notes_of(responses: Mapping[str, Response]) -> list[str]:
-    """What each response says of itself, after its name."""
+    """The notes of each response, after its name."""
     return [f"{name}: {note}" for name, response in responses.items() for note in response.notes]

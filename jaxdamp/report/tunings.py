@@ -1,4 +1,4 @@
-"""A page on a tuning: what changed, what that did to the ride, on its road and on others."""
+"""A page on a tuning: parameters and ride metrics before and after, also on other roads."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -27,8 +27,8 @@ def tuning_report(
         title: of the page.
         rescored: the same cars on other roads, of `tune.rescore`.
         rides: responses before and after by name, to be drawn over each other.
-        folder: for the pictures as files of their own; in the page alone if it is left out.
-        attempts: what may fail by itself; new ones if left out.
+        folder: folder for the pictures as separate files; without it they are only in the page.
+        attempts: collects parts that fail; a new one if left out.
 
     >>> from jaxdamp import report, roads, tune, vehicles
     >>> result = tune.minimise("rms_dynamic_tyre_load", vehicles.presets.quarter_car_000(), roads.white("C", 20.0))
@@ -52,8 +52,8 @@ def add_tuning(
         report: the page.
         result: of `tune.minimise`.
         rescored: the same cars on other roads.
-        outcome: what the tuning did, in words.
-        elsewhere: what it does on the other roads, in words, if not those of `rescored`.
+        outcome: result of the tuning, in words.
+        elsewhere: result on the other roads, in words; by default those of `rescored`.
     """
     report.table(result.parameter_table())
     report.table(result.table())

@@ -1,4 +1,4 @@
-"""From a ride metric to a better damper: `minimise`; and whether it is better on other roads: `rescore`."""
+"""Tuning of parameters for ride metrics: `minimise`, and `rescore` on other roads."""
 
 from jaxdamp._status import Status
 from jaxdamp.tune.minimising import minimise

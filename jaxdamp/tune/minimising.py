@@ -1,4 +1,4 @@
-"""`minimise`: the best ride that the free parameters allow, by exact gradients."""
+"""`minimise`: tune the free parameters of a vehicle for a ride metric, by exact gradients."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -40,49 +40,50 @@ def minimise(
     max_steps: int = 100,
     progress: Callable[[int, float], None] | None = None,
 ) -> TuneResult[V]:
-    """Make a ride metric of a vehicle as small as its free parameters allow.
+    """Minimise a ride metric of a vehicle over its free parameters.
 
-    Sequential quadratic programming with exact first derivatives, taken forward through every step of the simulation
-    for all parameters at once. It finds a local optimum: start from a sensible vehicle. The search itself is in double
-    precision; a vehicle in single precision (see `jaxdamp.configure`) is tuned to about a thousandth of its numbers.
+    Sequential quadratic programming with exact first derivatives, computed in forward mode through the simulation for
+    all parameters at once. It finds a local optimum, so start from a reasonable vehicle. The search itself is in double
+    precision; a vehicle in single precision (see `jaxdamp.configure`) is tuned to about 0.1 % of its parameters.
 
-    Every number is searched within bounds, so that the result stays near a damper that can be built. Those that nobody
-    gives follow from its start and its domain:
+    Every parameter has bounds, so that the result stays near a damper that can be built. The default bounds are:
 
-    - numbers that keep their sign (rates, stiffnesses, forces, velocities, exponents, knots): a third to three times
-      the start;
-    - numbers of either sign (coefficients, offsets): from −1 to 3 times the start;
-    - zeros and weights of networks: what their domain allows.
+    - numbers of one sign (rates, stiffnesses, forces, velocities, exponents, knots): one third to three times the
+      start;
+    - numbers of either sign (coefficients, offsets): −1 to 3 times the start;
+    - zeros and weights of networks: their domain.
 
-    Domains hold in any case. A result at a bound is named in its `warnings`: the optimum may lie beyond it.
+    Domains are always respected. A parameter that ends at a bound is named in the `warnings`: the optimum may be
+    beyond.
 
     Arguments:
         metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`; a `metrics.Metric` of any
             channel; or a differentiable function of the metrics by name, such as
             `lambda m: m["rms_sprung_acceleration"] / 1.5 + m["dynamic_load_coefficient"] / 0.2`.
-        vehicle: where to start.
-        road: a road to drive over, the same in every step; or `roads.white(...)`, for the stationary response of the
-            linearised vehicle, which has no peaks.
+        vehicle: the vehicle to start from.
+        road: a road for the simulation, the same in every step; or `roads.white(...)` for the stationary response of
+            the linearised vehicle, which has no peaks.
         over: the parameters to change, by path, last part or pattern; all of the damper by default. A mapping
             `{parameter: (lower, upper)}` gives their bounds too, as `bounds` does.
-        freeze: parameters among these to leave alone.
-        bounds: bounds `{parameter: (lower, upper)}` in its unit, in place of those above; the start must lie between
-            them. None in place of a side or of both frees it: `bounds={"*": None}` leaves the domains only. Of two
-            names for one parameter the later counts.
+        freeze: parameters among these to hold at their start.
+        bounds: bounds `{parameter: (lower, upper)}` in the unit of the parameter, instead of the default ones; the
+            start must be between them. None removes one bound or both: with `bounds={"*": None}` only the domains
+            remain. If two names match a parameter, the later one counts.
         tie: parameters that take the values of others, such as `{"front.damper.*": "rear.damper.*"}`: one free value
             for each group (see `jaxdamp.parameters.free_parameters`).
         limits: hard limits `{metric: largest value}` in the metric's unit, such as
             `{"working_space_peak_to_peak": 0.1}`.
-        metrics: further metrics, each with a name that the function and the limits may use.
+        metrics: further metrics, which the function and the limits can use by name.
         duration: length of the run [s], as in `simulate`.
         dt: step [s], as in `simulate`.
-        max_steps: of the search.
+        max_steps: largest number of steps of the search.
         progress: called with the number of the step and the metric after each step; a line in the terminal if it is
             left out.
 
     Returns:
-        The tuned vehicle, all metrics before and after, and warnings: a search that does not end well, or a limit that
-        cannot be met, says so there, and so do dampers that leave the range that their laws were fitted to.
+        The tuned vehicle, all metrics before and after, and warnings: about a search that did not converge, a limit
+            that
+        cannot be satisfied, and dampers used outside the fitted range of their laws.
 
     Raises:
         ValueError: unknown metrics or parameters; bounds of a wrong shape, of a parameter that is not free, given in
@@ -117,7 +118,7 @@ def minimise(
     evaluator = Evaluator(lambda vehicle: objective.of(measured(vehicle)), space.free, list(objective.units(vehicle)))
     before, _ = evaluator.at(space.start)
     if not np.all(np.isfinite(list(before.values()))):
-        remedy = "`simulate` it on this road, which says what the step or the law lacks."
+        remedy = "Call `simulate` with this road; its error messages explain the cause."
         _checks.refuse("vehicle", "have finite metrics to start from", f"{name} = {before[name]}", remedy)
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
@@ -133,7 +134,7 @@ def minimise(
         status = Status.CONVERGED
     else:
         status = Status.STEP_LIMIT if ended.out_of_steps else Status.NO_BETTER_STEP
-    notes = [f"The limit {n} <= {limits[n]:.4g} is not met: {after[n]:.4g}. Loosen it, or free more." for n in missed]
+    notes = [f"The limit {n} <= {limits[n]:.4g} is not met: {after[n]:.4g}. Relax it, or free more." for n in missed]
     notes += bound_notes(space, changes)
     if status in (Status.STEP_LIMIT, Status.NO_BETTER_STEP):
         notes.append(early_end(ended, max_steps))
@@ -142,14 +143,15 @@ def minimise(
     notes += coarse
     if not any("does not bear" in note for note in coarse):
         notes += range_notes(vehicle, tuned, ride_of)
+    units = objective.units(vehicle)
     return TuneResult(
         vehicle=tuned,
         start=vehicle,
         metric=name,
         parameters=changes,
-        before=MetricValues(before),
-        after=MetricValues(after),
-        units=objective.units(vehicle),
+        before=MetricValues.with_units(before, units),
+        after=MetricValues.with_units(after, units),
+        units=units,
         limits=limits,
         active_limits=reached,
         warnings=tuple(notes),
@@ -160,6 +162,6 @@ def minimise(
 
 
 def driven(ride: Ride, free: FreeParameters) -> Measured:
-    """A ride as a function of its vehicle; the road is sampled once, or anew for axles that the parameters move."""
+    """A ride as a function of its vehicle; the road is sampled once, or again if parameters move the axles."""
     follows = ride.road is not None and moves_axles(free.build, free.values)
     return lambda vehicle: (ride.on_axles_of(vehicle) if follows else ride.of_vehicle(vehicle))()

@@ -1,4 +1,4 @@
-"""What a tuning minimises: a ride metric, a metric of any channel, or a function of metrics."""
+"""The objective of a tuning: a ride metric, a metric of any channel, or a function of metrics."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias, final
@@ -17,7 +17,7 @@ Function: TypeAlias = Callable[[Mapping[str, Scalar]], Scalar]
 
 
 class Objective(NamedTuple):
-    """What is minimised, with the metrics that it takes.
+    """The objective of a tuning and the metrics that it needs.
 
     Attributes:
         name: of the metric or the function.
@@ -30,18 +30,18 @@ class Objective(NamedTuple):
     metrics: tuple[Metric, ...]
 
     def of(self, values: Mapping[str, Scalar]) -> dict[str, Scalar]:
-        """The metrics with the function of them."""
+        """The metrics, and the value of the function."""
         return dict(values) if self.function is None else {**values, self.name: self.function(MetricValues(values))}
 
     def units(self, vehicle: AbstractVehicle) -> dict[str, str]:
-        """Unit of each metric; a function has none that is known."""
+        """Unit of each metric; that of a function is unknown."""
         units = {m.name: m.unit(vehicle.units) for m in self.metrics}
         return units if self.function is None else units | {self.name: ""}
 
 
 @final
 class _Asked(Mapping[str, Scalar]):
-    """Metrics of ones that remembers which were asked for."""
+    """Metrics with the value one, which record the names that a function uses."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self.values_of, self.names = MetricValues(dict.fromkeys(names, jnp.ones(()))), dict[str, None]()
@@ -65,18 +65,18 @@ def objective_of(
     more: Sequence[str | Metric],
     limited: Sequence[str],
 ) -> Objective:
-    """What is to be minimised on a road.
+    """The objective of a tuning on a road.
 
     Arguments:
         wanted: name of a ride metric, a metric, or a function of metrics by name.
-        vehicle: that is tuned.
-        road: of the tuning.
-        more: further metrics, which the function or limits may name.
+        vehicle: the vehicle to tune.
+        road: the road of the tuning.
+        more: further metrics, which the function or limits can use.
         limited: names of the metrics with limits.
 
     Raises:
-        ValueError: an unknown metric, one that this kind of road does not give, or one without a
-            slope; a function that does not give one number.
+        ValueError: an unknown metric, one that is not available on this kind of road, or one without a derivative; a
+            function that does not return one number.
     """
     extra = vehicle.chosen_metrics(list(more), "metrics") if more else []
     extra += vehicle.chosen_metrics([wanted], "metric") if isinstance(wanted, Metric) else []
@@ -96,13 +96,13 @@ def objective_of(
         _checks.one_of("metric", one, known)
         if not known[one].statistic.differentiable:
             _checks.refuse("metric", "have a slope", f"{one!r}, a count", "Tune on the dynamic load coefficient.")
-    # The others are for information: those without weightings, counts and means, which may be negative.
+    # Further metrics for information: those without weightings, counts and means, which may be negative.
     chosen = [m for m in known.values() if m.name in asked or _for_information(m)]
     return Objective(name, function, tuple(chosen))
 
 
 def _given(vehicle: AbstractVehicle, road: AbstractRoad | WhiteRoad, metrics: Sequence[Metric]) -> list[Metric]:
-    """The metrics that this kind of road gives: a white one what follows from an RMS."""
+    """The metrics that are available on a road; on a white road those that follow from an RMS."""
     return [m for m in metrics if not isinstance(road, WhiteRoad) or is_stationary(m, vehicle.layout.by_name)]
 
 
@@ -116,7 +116,7 @@ def _name(function: Any) -> str:
 
 
 def _asked_by(function: Function, names: Sequence[str]) -> list[str]:
-    """The metrics that a function looks at, and that it gives one number."""
+    """The metrics that a function uses, after a check that it returns one number."""
     asked = _Asked(names)
     value = function(asked)
     if np.shape(value) != () or not np.issubdtype(jnp.result_type(value), np.floating):

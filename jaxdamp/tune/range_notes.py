@@ -1,4 +1,4 @@
-"""By how much a tuning's start and its result leave the ranges that their laws were fitted to."""
+"""Use of laws outside their fitted ranges, before and after a tuning."""
 
 import warnings
 from collections.abc import Callable
@@ -12,19 +12,19 @@ from jaxdamp.vehicles import AbstractVehicle
 def range_notes(
     start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]
 ) -> list[str]:
-    """A sentence for each damper that leaves its range, at the start and after the tuning; none without ranges.
+    """A sentence for each damper used outside its fitted range, before and after the tuning.
 
     Arguments:
         start: the vehicle before.
         tuned: the vehicle after.
-        ride_of: the ride of a vehicle; on a white road velocities reach three standard deviations.
+        ride_of: the ride of a vehicle; on a white road, velocities up to three standard deviations are compared.
     """
     if not has_fitted_range((start, tuned)):
         return []
     notes = []
     for when, vehicle in (("At the start", start), ("After the tuning", tuned)):
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", CoarseStepWarning)  # the notes on the step say it
+            warnings.simplefilter("ignore", CoarseStepWarning)  # reported by the notes on the step
             ride = ride_of(vehicle)
         reach = f" (velocities of {DEVIATIONS:g} standard deviations)" if isinstance(ride.road, WhiteRoad) else ""
         notes += [f"{when}{reach}, {sentence}" for sentence in range_sentences(ride.range_use())]

@@ -1,4 +1,4 @@
-"""The numbers that a tuning may change, and the range of each."""
+"""The free parameters of a tuning and their ranges."""
 
 import dataclasses
 import math
@@ -21,8 +21,8 @@ from jaxdamp.parameters import (
 
 
 Pair = tuple[float, float]
-FACTOR = 3.0  # by which a number may fall or rise if nobody gives bounds
-INSIDE = 1e-6  # share of its unit by which a number stays off the open ends of its domain
+FACTOR = 3.0  # default factor by which a number may decrease or increase
+INSIDE = 1e-6  # distance from the open ends of a domain, relative to the unit of the coordinate
 NO_BOUND = (-math.inf, math.inf)
 
 
@@ -53,7 +53,7 @@ class SearchRange:
         return self.coordinates.free
 
     def side(self, values: np.ndarray) -> list[str]:
-        """The bound that each value lies on: `"lower"`, `"upper"`, or nothing."""
+        """The bound that each value is at: `"lower"`, `"upper"`, or nothing."""
         slack = 2 * INSIDE * self.unit
         low, high = values <= self.lower + slack, values >= self.upper - slack
         return ["lower" if at_low else "upper" if at_high else "" for at_low, at_high in zip(low, high, strict=True)]
@@ -90,7 +90,7 @@ def search_range(
 
 
 def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> dict[str, Pair]:
-    """Bounds by path, an open side infinite. Of two names for one parameter the later counts."""
+    """Bounds by path, infinite without a bound. If two names match a parameter, the later one counts."""
     known, leaders, found = [p.path for p in parameters(free.tree)], dict(free.ties), {}
     paths = [p.path for p in free.chosen]
     for name, bound in bounds.items():
@@ -110,11 +110,11 @@ def _pair(argument: str, name: str, bound: Any) -> Pair:
     label = f"{argument}[{name!r}]"
     must = "be a lower and an upper bound, as `(1000.0, 5000.0)`, or None for no bound"
     if not isinstance(bound, Sequence | np.ndarray) or isinstance(bound, str) or len(bound) != 2:
-        _checks.refuse(label, must, repr(bound), "To keep a parameter as it is, name it in `freeze`.")
+        _checks.refuse(label, must, repr(bound), "To hold a parameter at its start, name it in `freeze`.")
     try:
         lower, upper = (side if side is None else float(side) for side in bound)
     except (TypeError, ValueError):
-        _checks.refuse(label, must, repr(bound), "A side that should stay open is None.")
+        _checks.refuse(label, must, repr(bound), "Use None for a side without a bound.")
     pair = (-math.inf if lower is None else lower, math.inf if upper is None else upper)
     if not pair[0] < pair[1]:
         _checks.refuse(label, "have a lower bound below the upper one", repr(bound))
@@ -124,7 +124,7 @@ def _pair(argument: str, name: str, bound: Any) -> Pair:
 def _one_range(
     name: str, p: Parameter, value: float, unit: float, given: Pair | None
 ) -> tuple[float, float, tuple[str, str]]:
-    """The range of one number of a parameter: what its domain and its bounds have in common."""
+    """The range of one number of a parameter: the intersection of its domain and its bounds."""
     if given is not None and not given[0] <= value <= given[1]:
         remedy = "Start inside the bounds or widen them."
         _checks.refuse(name, f"start between {given[0]:g} and {given[1]:g} [{p.unit or '-'}]", value, remedy)
@@ -136,11 +136,11 @@ def _one_range(
 
 
 def _default(p: Parameter, value: float) -> Pair:
-    """A range in proportion to the start.
+    """The default range, in proportion to the start.
 
-    A third to three times the start, where a number keeps its sign (rates, forces, velocities, exponents, knots); as
-    far below the start as above it, where its sign is free (coefficients, offsets); no bound where the start is zero
-    or says nothing, as of the weights of a network.
+    One third to three times the start for numbers of one sign (rates, forces, velocities, exponents, knots); the same
+    distance below the start as above it for numbers of either sign (coefficients, offsets); no bound if the start is
+    zero or has no meaning, as for the weights of a network.
     """
     if value == 0.0 or p.domain == weight:
         return NO_BOUND

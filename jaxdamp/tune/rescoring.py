@@ -1,4 +1,4 @@
-"""`rescore`: what a tuning is worth on roads that it has not seen."""
+"""`rescore`: the result of a tuning on other roads."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -45,17 +45,17 @@ class Rescore:
 
     @property
     def summary(self) -> str:
-        """On how many roads the metric that was minimised falls, and by how much, in a sentence."""
+        """Number of roads on which the minimised metric decreases, and by how much, in a sentence."""
         gain = -100 * self.change(self.metric)
         return (
-            f"On {np.count_nonzero(gain > 0)} of {self.roads} roads {self.metric} falls, by {gain.mean():.0f} % on "
+            f"On {np.count_nonzero(gain > 0)} of {self.roads} roads {self.metric} decreases, by {gain.mean():.0f} % on "
             f"average ({gain.min():.0f} to {gain.max():.0f} %)."
         )
 
     def table(self) -> Table:
         """Means over the roads, the mean of the change, and its smallest and largest value on a road.
 
-        Metrics that are zero or negative on a road, which have no change in percent there, are left out.
+        Metrics that are zero or negative on a road are left out, since they have no change in percent.
         """
         rows = []
         for name, before in self.before.items():
@@ -63,7 +63,7 @@ class Rescore:
                 change, means = 100 * self.change(name), (float(before.mean()), float(self.after[name].mean()))
                 ends = (float(change.min()), float(change.max()))
                 rows.append(Compared(name, self.units[name], means, float(change.mean()), ends))
-        title = f"The same on {self.roads} fresh roads (means, and the change on each)"
+        title = f"Ride metrics on {self.roads} other roads (means, and the change on each road)"
         more = (Column("smallest", "%", "+.1f"), Column("largest", "%", "+.1f"))
         return comparison_table(title, "metric", ("before", "after"), rows, more)
 
@@ -82,14 +82,14 @@ class Rescore:
 def rescore(
     result: TuneResult[Any], roads: Sequence[AbstractRoad], *, duration: float | None = None, dt: float = 1e-3
 ) -> Rescore:
-    """Drive the start and the tuned vehicle over other roads, and gather all ride metrics.
+    """Compute all ride metrics of the original and the tuned vehicle on other roads.
 
-    A tuning knows one road. What it gains there and loses elsewhere shows on others, such as the same class with
-    another seed. Runs of a few seconds hold few waves of the body's slow motion, and scatter accordingly.
+    A tuning uses a single road. Other roads, such as the same class with another seed, show whether the improvement is
+    general. Runs of a few seconds contain only few periods of the slow body motion, so their results scatter.
 
     Arguments:
-        result: of `minimise`.
-        roads: one or more.
+        result: result of `minimise`.
+        roads: one or more roads.
         duration: length of each run [s], as in `simulate`.
         dt: step [s], as in `simulate`.
 

@@ -1,4 +1,4 @@
-"""What a tuning changed and what that did to the ride."""
+"""The result of a tuning."""
 
 import dataclasses
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
@@ -30,28 +30,28 @@ class Change(NamedTuple):
 
     @property
     def remark(self) -> str:
-        """The note, and the numbers tied to this one, in words."""
+        """The note, and the names of the numbers tied to this one."""
         return with_tied(self.note, self.tied)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class TuneResult(Generic[V]):
-    """A tuned vehicle beside the one it came from.
+    """A tuned vehicle and the vehicle before the tuning.
 
     Attributes:
         vehicle: the tuned vehicle.
-        start: the vehicle it came from.
+        start: the vehicle before the tuning.
         metric: name of the ride metric that was minimised.
         parameters: each free number before and after.
         before: all ride metrics of the start.
         after: all ride metrics of the tuned vehicle.
         units: unit of each metric.
-        limits: largest allowed value of metrics, as asked for.
-        active_limits: the metrics among these that are at their limit, or beyond.
-        warnings: what a user should know, in words.
-        status: how the search ended; `CONVERGED` only at a point where the gradient says optimum.
+        limits: largest allowed values of metrics.
+        active_limits: names of the metrics at their limit or beyond.
+        warnings: doubts about the result, in words.
+        status: how the search ended; `CONVERGED` only if the gradient condition of an optimum is satisfied.
         history: the metric after each step of the search.
-        objective: what was minimised, with all metrics of the tuning.
+        objective: the objective with all metrics of the tuning.
     """
 
     vehicle: V
@@ -70,7 +70,7 @@ class TuneResult(Generic[V]):
 
     @property
     def converged(self) -> bool:
-        """Whether the search ended at a point where the gradient says optimum."""
+        """Whether the search ended at an optimum, by its gradient."""
         return self.status is Status.CONVERGED
 
     def plot(self, **options: Any) -> "Figure":
@@ -81,7 +81,7 @@ class TuneResult(Generic[V]):
 
     @property
     def summary(self) -> str:
-        """What was reached and what stopped it, in a sentence."""
+        """The improvement, and the bounds and limits that are active, in a sentence."""
         before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
         share = f" ({100 * (after / before - 1):+.1f} %)" if before else ""
         stops = [f"{name} at its limit" for name in self.active_limits]
@@ -92,7 +92,7 @@ class TuneResult(Generic[V]):
         return f"{self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
 
     def table(self) -> Table:
-        """The ride metrics before and after, and which one was minimised and which are limited."""
+        """The ride metrics before and after, with notes on the minimised metric and on limits."""
         notes = {n: f"limit {top:.4g}{', reached' * (n in self.active_limits)}" for n, top in self.limits.items()}
         notes[self.metric] = "minimised"
         rows = [

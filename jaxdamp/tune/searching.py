@@ -1,4 +1,4 @@
-"""The search of a tuning: sequential quadratic programming in double precision, whatever the vehicle computes in."""
+"""The search of a tuning: sequential quadratic programming in double precision, whatever that of the vehicle."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, final
@@ -16,7 +16,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 class Tolerance(NamedTuple):
-    """What counts as reached: the scaled gradient left at an optimum, and the relative distance to a limit."""
+    """Tolerances: the scaled gradient at an optimum, and the relative distance to a limit."""
 
     slope: float
     limit: float
@@ -40,7 +40,7 @@ Limits = Mapping[str, Limit]
 Measured = Callable[[AbstractVehicle], dict[str, Scalar]]
 Slopes = Mapping[str, np.ndarray]
 OUT_OF_STEPS = 9  # SLSQP's own code
-RESTARTS = 2  # with a fresh curvature, where the search ends on a slope
+RESTARTS = 2  # with a new estimate of the curvature, if the search ends before an optimum
 
 
 class Ended(NamedTuple):
@@ -49,12 +49,12 @@ class Ended(NamedTuple):
     values: np.ndarray
     history: tuple[float, ...]
     out_of_steps: bool
-    slope_left: float  # length of the scaled gradient, relative to the metric, that no bound or limit holds back
+    slope_left: float  # length of the projected scaled gradient, relative to the metric
 
 
 @final
 class Evaluator:
-    """Metrics and their slopes at a point, computed together and kept for the last point asked for."""
+    """Metrics and their derivatives, computed together and cached for the last point."""
 
     def __init__(self, ride: Measured, free: FreeParameters, names: Sequence[str]) -> None:
         self.names = list(names)
@@ -96,7 +96,7 @@ def search(
 ) -> Ended:
     """SLSQP in coordinates, the objective divided by its start.
 
-    If it ends on a slope, its estimate of the curvature is out of date or a kink has stopped it: it begins again there.
+    If it ends before an optimum, its estimate of the curvature is wrong or a kink has stopped it: it is started again.
     """
     import scipy.optimize
 

@@ -1,4 +1,4 @@
-"""What the tuned vehicle says of the step, which was chosen for the start."""
+"""Checks of the step for the tuned vehicle, since it was chosen for the start."""
 
 import warnings
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]) -> list[str]:
-    """A sentence where the step is too long or too coarse for the tuned vehicle, or its laws need more substeps.
+    """A sentence if the step is too long or too coarse for the tuned vehicle, or if its laws need more substeps.
 
     Arguments:
         start: the vehicle before, for which the substeps were chosen.

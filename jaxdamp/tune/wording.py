@@ -1,4 +1,4 @@
-"""What a tuning did and how it ended, as records and in words."""
+"""The changes and the end of a tuning, as records and in words."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ def changes_of(space: SearchRange, values: np.ndarray) -> tuple[Change, ...]:
 
 
 def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
-    """A sentence for each number that ended at a bound: which bound, and what to do."""
+    """A sentence for each number at a bound: which bound, and the remedy."""
     notes = []
     for change, origin in zip(changes, space.origin, strict=True):
         if not change.note:
@@ -34,13 +34,13 @@ def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
             "domain": "the end of the values it may take",
         }[origin[upper]]
         value = f"{change.after:.5g} {change.unit}".rstrip()
-        notes.append(f"{change.name} ended {change.note}, {value} ({reason}). A better value may lie beyond.")
+        notes.append(f"{change.name} ended {change.note}, {value} ({reason}). A better value may be beyond.")
     return notes
 
 
 def early_end(ended: Ended, max_steps: int) -> str:
-    """Why a search that met all limits is not called converged."""
-    slope = f"the slope left there is {ended.slope_left:.1e} of the metric per 100 % of the parameters"
+    """Why a search that satisfied all limits did not converge."""
+    slope = f"the remaining slope is {ended.slope_left:.1e} of the metric per 100 % of the parameters"
     if ended.out_of_steps:
         return f"The search stopped after {max_steps} steps, before an optimum: {slope}. Allow more with `max_steps`."
     return (

@@ -23,7 +23,7 @@ def test_a_law_that_cannot_be_started_or_fitted_is_named_and_the_others_are_comp
     monkeypatch.setitem(ladder._MEMORYLESS, "polynomial", lambda velocity, force: Linear(np.nan))
     out = tmp_path / "fit"
     text = " ".join(jaxdamp("fit", records, "--law", "table,linear,polynomial,bilinear", "--out", out).output.split())
-    assert "table could not be fitted. No start can be made from these records: too few knees" in text
+    assert "table could not be fitted. No start can be computed from these records: too few knees" in text
     assert "polynomial could not be fitted." in text
     assert sorted(path.stem for path in (out / "laws").iterdir()) == ["bilinear", "linear"]
     report = (out / "report.html").read_text(encoding="utf-8")

@@ -237,7 +237,7 @@ def test_roughness_by_segment_draws_each_one_and_the_whole() -> None:
     np.testing.assert_allclose([bar.get_height() for bar in bars], 1e3 * np.asarray(roughness.segments))
     np.testing.assert_allclose([bar.get_x() for bar in bars], [0.0, 100.0, 200.0])
     assert bars[-1].get_width() == pytest.approx(49.75)
-    assert _legend(figure) == ["segment", f"in all, {1e3 * float(roughness.whole):.3g} m/km"]
+    assert _legend(figure) == ["segment", f"whole profile, {1e3 * float(roughness.whole):.3g} m/km"]
 
 
 # ---- sweep

@@ -15,7 +15,7 @@ def test_training_history(runs: BenchSet) -> None:
     lines = {str(line.get_label()): np.asarray(line.get_xydata()) for line in axes.get_lines()}
     np.testing.assert_allclose(lines["training records"], np.stack([result.steps, result.history], axis=1))
     np.testing.assert_allclose(lines["held-out records"][:, 1], result.held_out_history)
-    assert np.all(lines["law kept"][:, 0] == result.best_step)
+    assert np.all(lines["result"][:, 0] == result.best_step)
     assert axes.get_title(loc="left") == "after all 50 steps"
 
 

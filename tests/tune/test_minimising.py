@@ -210,7 +210,7 @@ def test_progress_and_history_follow_the_search():
         ),
         ({"over": {"damper.rate": 5000.0}}, r"over\['damper\.rate'\]` must be a lower and an upper bound.*`freeze`"),
         ({"over": {"damper.rate": (9000.0, 2000.0)}}, "have a lower bound below the upper one"),
-        ({"over": {"damper.rate": ("1", "x")}}, "A side that should stay open is None"),
+        ({"over": {"damper.rate": ("1", "x")}}, "Use None for a side without a bound"),
         ({"over": {"damper.rat": (1.0, 2.0)}}, "did you mean 'damper.rate'"),
         ({"over": {"damper.rate": (1.0, 1e4)}, "bounds": {"rate": (1.0, 1e4)}}, "Give the bounds in one place"),
         ({"bounds": {"sprung_mass": (1e3, 2e3)}}, r"`bounds\['sprung_mass'\]` must bound a parameter that is free"),
