@@ -93,7 +93,7 @@ def evaluation_method(acceleration: SignalLike, dt: ScalarLike | int, weighting:
     ratios = shock_ratios(acceleration, dt, weighting)
     if any(_checks.concrete(ratio) is None for ratio in ratios):
         remedy = "Use `shock_ratios` in compiled code."
-        _checks.refuse("acceleration", "be known: words do not compile", "traced", remedy)
+        _checks.refuse("acceleration", "be known: texts cannot be compiled", "traced", remedy)
     crest, transient, dose = (float(ratio) for ratio in ratios)
     if not all(map(math.isfinite, (crest, transient, dose))):
         remedy = "Fill the gaps of the record; one of zeros has no ratios."

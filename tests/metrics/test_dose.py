@@ -113,7 +113,7 @@ def test_no_words_about_nothing(record):
 
 
 def test_words_do_not_compile():
-    with pytest.raises(ValueError, match=r"`acceleration` must be known: words do not compile.*`shock_ratios`"):
+    with pytest.raises(ValueError, match=r"`acceleration` must be known: texts cannot be compiled.*`shock_ratios`"):
         jax.jit(lambda x: evaluation_method(x, 0.01, None).dose_ratio)(SINE)
 
 
