@@ -8,17 +8,17 @@ an array of shape [time, wheels]. A road with a single track has one column.
 - Random roads: `iso8608` and `iso8608_filtered` (a roughness class at a vehicle speed), `band_limited` (a flat spectrum
   between two frequencies).
 - Measured roads: `from_profile`, `read_profile` (text files), `read_crg` (OpenCRG).
-- Several wheels: `two_track` puts tracks beside each other. Simulations send a road on from axle to axle by its speed
-  and the vehicle's own axle positions; `delayed` does it with other delays, `in_phase` moves all axles at once.
-- From roads make roads: `joined`, `superposed`, and for the tyre `contact_patch` and `rolling_disc`.
-- How rough is it? `assess_roughness`, `class_limits`, `road_class`; `coherency` of two tracks.
-- For stationary responses: `white`, a road known by its spectrum alone.
+- Several wheels: `two_track` combines a left and a right track. Simulations delay the road from axle to axle by its
+  speed and the axle positions of the vehicle; `delayed` is for other delays, `in_phase` moves all axles at once.
+- Combined roads: `joined`, `superposed`, and for the tyre `contact_patch` and `rolling_disc`.
+- Roughness: `assess_roughness`, `class_limits`, `road_class`; `coherency` of two tracks.
+- For stationary responses: `white`, a road given only by its spectrum.
 
-Roads are pure functions of their parameters, so that they can be compiled, batched and differentiated in height,
-speed or roughness. Simulations start settled and at rest on the heights at time 0: random roads therefore fade in over
-the first half second (`ramp`).
+Roads are pure functions of their parameters, so that they can be compiled, batched and differentiated in height, speed
+or roughness. Simulations start at rest in static equilibrium on the heights at time 0: random roads therefore fade in
+over the first half second (`ramp`).
 
-Two roads through the same corner of a village, first a speed hump and then a poor surface, both at 10 m/s:
+A speed hump, then a rough surface, at 10 m/s:
 
 >>> import jax.numpy as jnp
 >>> from jaxdamp import roads

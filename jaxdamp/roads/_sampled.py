@@ -61,7 +61,7 @@ class SampledRoad(AbstractRoad):
 
     @property
     def speed(self) -> Scalar | None:
-        """The speed [m/s] that the road was made for."""
+        """The speed [m/s] that the road was created for."""
         return self.driven_at
 
     @property

@@ -1,4 +1,4 @@
-"""Axles behind each other on the same road."""
+"""Several axles on the same road."""
 
 from collections.abc import Sequence
 from typing import final
@@ -16,7 +16,7 @@ from jaxdamp.roads.base import AbstractRoad, Columns
 
 @final
 class Delayed(AbstractOnOneRoad):
-    """The same road under several axles, later under each; created by `delayed`."""
+    """The same road under several axles with delays; created by `delayed`."""
 
     road: AbstractRoad
     delay: Float[Array, " axles"]
@@ -24,13 +24,13 @@ class Delayed(AbstractOnOneRoad):
 
     @property
     def speed(self) -> Scalar | None:
-        """The speed [m/s] that the road was made for."""
+        """The speed [m/s] that the road was created for."""
         return self.driven_at
 
     def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] under each wheel at each `time` [s]: all wheels of the first axle, then of the second, ..."""
         time = jnp.asarray(time, self.delay.dtype)
-        # a record is level before its first sample; times before it that were asked for are left for it to refuse
+        # a record is level before its first sample; the road itself refuses given times before it
         begin = at_most(time, self.road.span[0])
         passed = at_least(time[None, :] - self.delay[:, None], begin[None, :])
         heights = self.road.height(passed.reshape(-1)).reshape(self.delay.size, time.size, self.road.wheels)
@@ -73,8 +73,8 @@ class InPhase(AbstractOnOneRoad):
 def in_phase(road: AbstractRoad) -> InPhase:
     """The road under all axles at the same time, as platforms move a vehicle on a test rig.
 
-    A vehicle of several axles goes over a road one axle after the other. For excitation in phase, and for roads over
-    time alone, which have no speed to delay them by, ask for it:
+    The axles of a vehicle meet a road one after the other. For excitation in phase, and for roads over time without a
+    speed, which cannot be delayed, use this function:
 
     >>> import jax.numpy as jnp
     >>> from jaxdamp.roads import sine
@@ -103,13 +103,13 @@ def delayed(
 ) -> Delayed:
     """The road under several axles, z_i(t) = z(t - tau_i) with tau_i = l_i/V.
 
-    The wheels come axle by axle, and within an axle in the order of the road's own tracks: on a road of `two_track`
-    the order of a car is front-left, front-right, rear-left, rear-right.
+    The columns are axle by axle, and for each axle in the order of the tracks of the road: for a car on a road of
+    `two_track` front-left, front-right, rear-left, rear-right.
 
-    At time 0 an axle l behind the front one stands on the piece of road l before the start: simulations settle the
-    vehicle there before they begin. What that piece is depends on the road. Formulas go on (a bump is level ground
-    before it begins; random roads and sines run on without a jump); a road that fades in (`ramp`) is level at height
-    zero; a periodic road repeats; a record that does not repeat is level at the height of its first sample.
+    At time 0 an axle at l behind the front axle is on the road at l before the start point, where the vehicle is in
+    static equilibrium. There, roads given by a formula continue (the ground before a bump is level; random roads and
+    sines continue without a jump); a road that fades in (`ramp`) is level at height zero; a periodic road repeats; a
+    record that is not periodic is level at the height of its first sample.
 
     Differentiable in `delays`, `positions` and `speed`.
 

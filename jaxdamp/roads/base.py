@@ -1,4 +1,4 @@
-"""What every road is."""
+"""The base class of all roads."""
 
 import math
 from abc import abstractmethod
@@ -11,14 +11,14 @@ from jaxdamp._types import Scalar, SignalLike
 
 
 class Columns(NamedTuple):
-    """What the columns of `AbstractRoad.height` stand for: axle by axle, and within an axle track by track, left first.
+    """The meaning of the columns of `AbstractRoad.height`: axle by axle, and for each axle the left track first.
 
     Attributes:
-        kind: "road": tracks side by side, over which the axles of a vehicle go one after the other; "in phase": the
-            same, but under all axles at once; "delayed": a set of tracks for each axle; "by wheel": a column for each
-            wheel of the vehicle, as the platforms of a test rig have it.
-        tracks: The number of tracks under an axle; of columns, where they are given by wheel.
-        delays: How much later than the front of the vehicle each axle passes [s], where the kind is "delayed".
+        kind: "road": parallel tracks, which the axles of a vehicle meet one after the other; "in phase": the same, but
+            under all axles at the same time; "delayed": a set of tracks for each axle; "by wheel": a column for each
+            wheel of the vehicle, as for the platforms of a test rig.
+        tracks: number of tracks under an axle; for "by wheel" the number of columns.
+        delays: delay of each axle behind the front of the vehicle [s], for "delayed".
     """
 
     kind: Literal["road", "in phase", "delayed", "by wheel"]
@@ -36,11 +36,11 @@ class Columns(NamedTuple):
 class AbstractRoad(eqx.Module):
     """The height of the ground under each wheel as a function of time.
 
-    Concrete roads are made by the functions of `jaxdamp.roads`. They are pytrees: their array leaves (heights, speed,
+    Roads are created by the functions of `jaxdamp.roads`. They are pytrees: their array leaves (heights, speed,
     roughness) can be traced, batched and differentiated.
 
-    The properties are those of a formula of time: one track, no speed, no samples, no beginning and no end. Roads made
-    for a speed, of samples or of other roads say otherwise.
+    The default properties are those of a formula of time: one track, no speed, no samples, no start and no end. Other
+    roads override them.
     """
 
     @abstractmethod
@@ -54,12 +54,12 @@ class AbstractRoad(eqx.Module):
 
     @property
     def speed(self) -> Scalar | None:
-        """The speed of the vehicle [m/s] that the road was made for; `None` for a road given over time alone."""
+        """The speed of the vehicle [m/s] that the road was created for; `None` for a road given over time only."""
         return None
 
     @property
     def columns(self) -> Columns:
-        """What the columns of `height` stand for."""
+        """The meaning of the columns of `height`."""
         return Columns("road", self.wheels)
 
     @property

@@ -35,7 +35,7 @@ class Bump(AbstractRoad):
 
     @property
     def speed(self) -> Scalar | None:
-        """The speed [m/s] that the road was made for."""
+        """The speed [m/s] that the road was created for."""
         return self.driven_at
 
     @eqx.filter_jit

@@ -36,7 +36,7 @@ class ContactPatch(AbstractOnOneRoad):
 
     @property
     def speed(self) -> Scalar:
-        """The speed [m/s] that the road was made for."""
+        """The speed [m/s] that the road was created for."""
         return self.driven_at
 
     def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
@@ -57,7 +57,7 @@ class RollingDisc(AbstractOnOneRoad):
 
     @property
     def speed(self) -> Scalar:
-        """The speed [m/s] that the road was made for."""
+        """The speed [m/s] that the road was created for."""
         return self.driven_at
 
     def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
@@ -79,7 +79,7 @@ def contact_patch(
 
     The mean is taken by Gauss-Legendre quadrature: with 9 points exact to 1e-6 while n L is below 2, and within
     0.3 % of the rise over the patch where a corner lies under it. The road is evaluated at `points` times as many
-    places.
+    positions.
 
     Arguments:
         road: any road, with one or several tracks.
@@ -106,7 +106,7 @@ def contact_patch(
 def rolling_disc(
     road: AbstractRoad, *, radius: ScalarLike | int, speed: ScalarLike | int, points: int = 181
 ) -> RollingDisc:
-    """The path of a rigid disc of radius R that rolls over the road and never sinks in.
+    """The path of a rigid disc of radius R that rolls over the road without penetrating it.
 
     z_d(x) = max over |a| <= R of z(x + a) - (R - sqrt(R^2 - a^2)): the height of the lowest point of the disc. It
     climbs a kerb of height h along an arc that begins sqrt(2 R h - h^2) before it, and does not reach the floor of a
@@ -114,9 +114,9 @@ def rolling_disc(
     over its patch as well: contact_patch(rolling_disc(road, ...), ...). Differentiable almost everywhere in the
     radius, the speed and the road (the point that touches changes by jumps).
 
-    The disc is taken as `points` points at equal angles: it meets a sharp edge, and leaves it, within R pi/(points - 1)
-    of the right place (5 mm for 0.3 m and the default). The road is evaluated at `points` times as many places: turn
-    long random roads into a record first, `from_profile(time, road.height(time))`.
+    The disc is represented by `points` points at equal angles: the contact with a sharp edge begins and ends within
+    R pi/(points - 1) of the exact position (5 mm for 0.3 m and the default). The road is evaluated at `points` times as
+    many positions: convert long random roads to a record first, `from_profile(time, road.height(time))`.
 
     Arguments:
         road: any road, with one or several tracks.

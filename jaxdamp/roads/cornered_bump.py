@@ -51,8 +51,8 @@ def half_sine_bump(
 ) -> Bump:
     """Half a period of a sine, z(t) = H sin(pi (t - t0)/T) for t0 <= t <= t0 + T, else zero: a pipe or sleeper.
 
-    Sharp (`rounding` zero) its slope jumps by pi H/T at both ends, which asks an infinite acceleration of a wheel that
-    touches in a point. Rounded, height, slope and curvature are continuous everywhere; the bump then begins T
+    Sharp (`rounding` zero) its slope jumps by pi H/T at both ends, which would require an infinite acceleration of a
+    wheel with point contact. Rounded, height, slope and curvature are continuous everywhere; the bump then begins T
     `rounding` earlier and ends as much later. Differentiable in every argument but `rounding`.
 
     Arguments:

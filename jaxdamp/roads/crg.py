@@ -33,7 +33,7 @@ def read_crg(
     periodic: bool = False,
     ramp: float | int = 0.0,
 ) -> SampledRoad:
-    """A road from an OpenCRG file: the surface along one or several lines beside its reference line.
+    """A road from an OpenCRG file: the surface along one or several lines parallel to its reference line.
 
     The vehicle follows the reference line, straight or curved, at a constant speed along that line; a wheel at the
     lateral position v keeps its distance v from it. Where the line curves, the wheel itself is faster or slower by
@@ -43,8 +43,8 @@ def read_crg(
     than their spacing/speed.
 
     All formats of OpenCRG are read (KRBI, KDBI, LRFI, LDFI), by the package pyopencrg: `pip install 'jaxdamp[io]'`.
-    The scales among the modifiers of a file are applied. Those that move the road change nothing here, and gaps of the
-    scan are not filled: a line through one is refused, since what lies there was not measured.
+    The scales among the modifiers of a file are applied. Those that move the whole road have no effect here. Gaps of
+    the scan are not filled: a line through a gap is refused.
 
         left_right = read_crg("belgian_block.crg", speed=10.0, lateral=[0.75, -0.75], start=730.0, stop=740.0)
 
@@ -126,7 +126,7 @@ def _range(u: np.ndarray, start: float | int | None, stop: float | int | None) -
 
 
 def _measured(surface: Any, first: int, last: int) -> str:
-    """Where the lines of the grid that have no gap between two points along the road lie."""
+    """The lateral range of the grid lines without a gap between two points along the road, in words."""
     whole = ~np.isnan(np.asarray(surface.z)[first : last + 1]).any(axis=0)
     v = np.asarray(surface.v)[whole]
     return f"whole lines lie between v = {v[0]:.6g} and {v[-1]:.6g} m" if v.size else "no line is whole in this one"

@@ -1,4 +1,4 @@
-"""A kerb: the ground rises once and stays up."""
+"""A kerb: a step of the ground."""
 
 from typing import final
 
@@ -38,8 +38,8 @@ def step(
 ) -> Step:
     """A step of the ground with a rounded flank, z(t) = H/2 (1 - cos(pi (t - t0)/T)) for t0 <= t <= t0 + T, then H.
 
-    Differentiable in every argument; that is why the ramp cannot be zero. Choose it several time steps long: a ramp
-    shorter than a step of the simulation is seen as a jump. The vertical acceleration jumps by pi^2 H/(2 T^2) at both
+    Differentiable in every argument, which is why the ramp cannot be zero. It should be several time steps long: a ramp
+    shorter than a step of the simulation acts as a jump. The vertical acceleration jumps by pi^2 H/(2 T^2) at both
     ends; with `smooth` the flank is a quintic polynomial instead and the acceleration is continuous.
 
     Arguments:

@@ -1,4 +1,4 @@
-"""One road after another."""
+"""Sequences of roads."""
 
 from typing import final
 
@@ -15,7 +15,7 @@ from jaxdamp.roads.base import AbstractRoad, Columns
 
 @final
 class Joined(AbstractRoad):
-    """A road that goes over into another one; created by `joined`."""
+    """A road followed by another one; created by `joined`."""
 
     first: AbstractRoad
     second: AbstractRoad
@@ -61,7 +61,7 @@ class Joined(AbstractRoad):
 
 
 def joined(first: AbstractRoad, second: AbstractRoad, *, at: ScalarLike | int | None = None) -> Joined:
-    """Drive over `first` up to the time t1, then over `second` from its own time 0, without a step between them.
+    """The road `first` up to the time t1, then `second` from its own time 0, without a step between them.
 
     z(t) = z1(t) up to t1, then z1(t1) + z2(t - t1) - z2(0): the second road is raised to where the first one stopped.
     Its `ramp`, if it has one, fades it in there. Several roads join in turn: joined(joined(a, b), c). Differentiable

@@ -48,11 +48,11 @@ def two_track(
 
     Either give both tracks: any two roads with one track each, for example a pothole on the right and level ground on
     the left. Or give a random road of `iso8608` and the `track_width` B: the right-hand track is then another random
-    road of the same spectrum, alike in long waves and independent in short ones, as on a surface without a preferred
-    direction (see `coherency`).
+    road of the same spectrum, coherent at long wavelengths and independent at short ones, as on an isotropic surface
+    (see `coherency`).
 
-    For the latter each cosine keeps its amplitude and has its phase shifted by arccos(gamma(n)), to a random side.
-    So every realisation, not only their average, has exactly the spectrum G_d of the class in both tracks,
+    For the latter each cosine has the same amplitude and a phase shifted by arccos(gamma(n)), with a random sign. So
+    every realisation, not only their average, has exactly the spectrum G_d of the class in both tracks,
     G_d (1 + gamma)/2 in their mean (heave) and 2 G_d (1 - gamma) in their difference (roll); the coherence over bands
     of many cosines is gamma^2. Differentiable in `track_width` and in what the road is differentiable in.
 

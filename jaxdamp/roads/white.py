@@ -1,4 +1,4 @@
-"""A road whose rate of height is white noise: the ISO 8608 road of waviness 2 without ends to its spectrum."""
+"""A road whose rate is white noise: the ISO 8608 road of waviness 2 with an unlimited spectrum."""
 
 from typing import final
 
@@ -13,11 +13,11 @@ from jaxdamp.roads.iso_classes import REFERENCE_SPATIAL_FREQUENCY, roughness
 
 @final
 class WhiteRoad(eqx.Module):
-    """A road known by its spectrum alone, for the stationary response of linear vehicles; created by `white`.
+    """A road given only by its spectrum, for the stationary response of linear vehicles; created by `white`.
 
     Attributes:
         velocity_psd: two-sided power spectral density of the rate of height [(m/s)²/Hz].
-        speed: at which the axles of a vehicle go over it, one after the other [m/s].
+        speed: speed of the vehicle, for the delays between axles [m/s].
     """
 
     velocity_psd: Scalar

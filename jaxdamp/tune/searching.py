@@ -26,7 +26,7 @@ DOUBLE, SINGLE = Tolerance(1e-4, 1e-6), Tolerance(1e-2, 1e-4)
 
 
 class Limit(NamedTuple):
-    """Largest allowed value of a metric, which may be negative or zero, and the size by which distances to it count."""
+    """Largest allowed value of a metric, which may be negative or zero, and the scale of distances to it."""
 
     top: float
     scale: float
@@ -132,17 +132,17 @@ def search(
 
 
 def active(limits: Limits, values: Mapping[str, float], tolerance: Tolerance) -> tuple[str, ...]:
-    """The limits that a vehicle is at, or beyond."""
+    """The active or violated limits."""
     return tuple(name for name, limit in limits.items() if limit.margin(values[name]) < tolerance.limit)
 
 
 def limits_of(tops: Mapping[str, float], start: Mapping[str, float]) -> dict[str, Limit]:
-    """The limits with their scales: their own size, or that of the metric at the start where a limit is zero."""
+    """The limits with their scales: their own magnitude, or that of the metric at the start if a limit is zero."""
     return {name: Limit(top, abs(top) or abs(start[name]) or 1.0) for name, top in tops.items()}
 
 
 def _constraints(evaluator: Evaluator, space: SearchRange, limits: Limits) -> list[dict]:
-    """Metrics below their limits, and vectors that must increase in order."""
+    """Constraints: metrics below their limits, and increasing vectors."""
     unit = space.unit
     below = [
         {
@@ -157,7 +157,7 @@ def _constraints(evaluator: Evaluator, space: SearchRange, limits: Limits) -> li
 
 
 def _slope_left(evaluator: Evaluator, space: SearchRange, values: np.ndarray, metric: str, limits: Limits) -> float:
-    """Length of the scaled gradient that neither a bound nor an active limit holds back, relative to the metric."""
+    """Length of the scaled gradient after projection on bounds and active limits, relative to the metric."""
     found, slopes = evaluator.at(values)
     unbound = np.array([not side for side in space.side(values)])
     gradient = (slopes[metric] * space.unit)[unbound]
