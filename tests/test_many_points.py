@@ -19,7 +19,7 @@ def test_conditions_between_several_numbers_are_checked():
     law = dampers.TemperatureScaled(dampers.Linear(1500.0), temperature=320.0)
     car = vehicles.presets.quarter_car_000(dampers.SeriesSpring(law, 1e6))
     reasons = outside_domains(car, {"sensitivity": np.array([0.002, 0.1]), "stiffness": np.array([1e5, 1e6])})
-    assert reasons.tolist() == ["", "sensitivity must leave a positive factor 1 − κ (T − T₀) on the force"]
+    assert reasons.tolist() == ["", "sensitivity must give a positive factor 1 − κ (T − T₀) on the force"]
 
 
 class Ordered(eqx.Module):

@@ -45,7 +45,7 @@ def test_fit_of_the_sensitivity():
 
 @pytest.mark.parametrize("temperature", [793.15, 900.0])
 def test_a_factor_that_is_not_positive_is_refused(temperature):
-    with pytest.raises(ValueError, match=r"`sensitivity` must leave a positive factor .* nearby"):
+    with pytest.raises(ValueError, match=r"`sensitivity` must give a positive factor .* nearby"):
         TemperatureScaled(Linear(1000.0), temperature)
 
 

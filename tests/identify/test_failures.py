@@ -61,5 +61,5 @@ def test_a_start_that_cannot_be_made_is_a_failure_of_that_law(sines, monkeypatch
     comparison = compare(default_ladder(runs, ["table", "linear"]), runs)
     assert [rung.name for rung in comparison.rungs] == ["linear"]
     assert comparison.failed[0].reason == "No start can be computed from these records: no velocity"
-    with pytest.raises(ValueError, match="No start can be made"):
+    with pytest.raises(ValueError, match="No start can be computed"):
         fit(default_ladder(runs, ["table"])["table"], runs)
