@@ -1,4 +1,4 @@
-"""What all benchmarks share: warm timing, the machine they ran on, a table, a file."""
+"""Common functions of the benchmarks: timing, description of the machine, table, file."""
 
 import json
 import os
@@ -17,9 +17,9 @@ PACKAGES = ("jax", "equinox", "diffrax", "optimistix", "scipy", "numba", "casadi
 
 
 def first_and_warm(work: Callable[[], Any], repeats: int = 9) -> tuple[float, float]:
-    """Seconds of the first call, which compiles, and of the best following one, results waited for.
+    """Seconds of the first call, which compiles, and of the best following one, until the results are ready.
 
-    The best, not the mean: whatever else the machine does only adds to it.
+    The best, not the mean, because other work on the machine only adds time.
     """
     samples = []
     for _ in range(repeats + 1):

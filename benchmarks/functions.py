@@ -1,4 +1,4 @@
-"""What elementary functions of float64 cost in a loop over many cars: which of them go by vectors on this processor.
+"""Time of elementary functions of float64 in a loop over many cars: which are vectorised on this processor?
 
 python -m benchmarks.functions
 """

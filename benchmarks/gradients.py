@@ -1,4 +1,4 @@
-"""What a gradient costs: derivatives of a ride metric by 1 to 64 parameters, in units of the run itself.
+"""Cost of a gradient: derivatives of a ride metric with respect to 1 to 64 parameters, relative to the run itself.
 
     python -m benchmarks.gradients
 
@@ -31,7 +31,7 @@ ROAD = roads.iso8608("C", speed=20.0, seed=0)
 
 
 def curve(count: int) -> tuple[Ride, np.ndarray]:
-    """A car with a damper of so many numbers, and these."""
+    """A car whose damper has this number of parameters, and their values."""
     rng = np.random.default_rng(count)
     if count == 1:
         law, start = dampers.Linear(2500.0), np.array([2500.0])

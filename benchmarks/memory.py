@@ -1,4 +1,4 @@
-"""Memory against the length of the run: what a compiled run and its derivatives need beside the road.
+"""Memory over the length of the run: needs of a compiled run and its derivatives, besides the road.
 
     python -m benchmarks.memory
 

@@ -1,10 +1,10 @@
 """How long one car takes for 10 s of road at 1 kHz, and an hour of it, and how accurate it is.
 
     python -m benchmarks.one_car            with loops compiled as one function (`jaxdamp.configure`)
-    python -m benchmarks.one_car --plain    as JAX comes
+    python -m benchmarks.one_car --plain    with the default settings of JAX
 
-"metrics" is `Ride` with one metric, compiled with its parameters as arguments; "all instants" is the engine behind
-`simulate`, which keeps the whole run.
+"metrics" is `Ride` with one metric, compiled with its parameters as arguments; "all channels" is the engine behind
+`simulate`, which stores the whole run.
 """
 
 import sys
@@ -75,7 +75,7 @@ def main() -> None:
         error = abs(float(found / jnp.sqrt(jnp.mean(exact**2))) - 1.0)
         rows.append([name, 1e3 * warm, 1e3 * saved, first, error])
     how = "as JAX comes" if PLAIN else "loops compiled as one function"
-    head = ["car and law", "metrics, ms", "all instants, ms", "first call, s", "error of the RMS"]
+    head = ["car and law", "metrics, ms", "all channels, ms", "first call, s", "error of the RMS"]
     report("one_car_plain" if PLAIN else "one_car", f"One car, 10 s at 1 kHz; {how}", head, rows)
 
     hour = np.tile(np.asarray(road.height(jnp.arange(10_000.0) * DT)), (361, 1))[:3_600_001]

@@ -2,8 +2,8 @@
 
     python -m benchmarks.work_precision
 
-A quarter car with a Besinger damper, alone and behind a lag, over a road given at 4 ms and straight between, so that
-all see the same road. Of C and jaxdamp the time is that of one car among many on one core; of `solve_ivp` of one.
+A quarter car with a Besinger damper, alone and behind a lag, over a road given at 4 ms and linear in between, so that
+all use the same road. Of C and jaxdamp the time is that of one car among many on one core; of `solve_ivp` of one.
 """
 
 from typing import Any

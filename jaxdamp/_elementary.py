@@ -45,7 +45,7 @@ def exponential(x: Numbers) -> Numbers:
     for k in reversed(range(_EXPONENTIAL_TERMS)):
         series = series * r + 1.0 / math.factorial(k)
     bits = _ONE - (jax.lax.bitcast_convert_type(twos + _WHOLE, jnp.int64) << _MANTISSA_BITS)
-    # A quotient, by 2⁻ᵏ: XLA would write products anew for all that use them.
+    # A quotient, by 2⁻ᵏ: XLA would compute a product again for each use.
     return series / jax.lax.bitcast_convert_type(bits, jnp.float64)
 
 

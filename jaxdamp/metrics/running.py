@@ -86,7 +86,7 @@ def _moving_sum(values: Signal, count: Int[Array, ""]) -> Signal:
         total = jnp.where(has, total + _delayed(block, taken), total)
         return total, taken + jnp.where(has, length, 0), block + _delayed(block, length), 2 * length
 
-    # a loop: written out, the compiler would compute every sum anew for each of its two uses, 2^digits times
+    # a loop: written out, the compiler would compute every sum again for each of its two uses, 2^digits times
     start = jnp.zeros_like(values), jnp.zeros_like(count), values, jnp.ones_like(count)
     return jax.lax.fori_loop(0, values.size.bit_length(), double, start)[0]
 
