@@ -3,9 +3,9 @@
     python -m benchmarks.throughput            all peers
     python -m benchmarks.throughput --c-only   jaxdamp and C
 
-All simulate the same road of class C at 20 m/s, 10 s at 1 kHz, each car with different dampers, in double precision, and
-compute the RMS of body acceleration. "error" is the largest relative error of four cars against adaptive integration at a
-tolerance of 1e-10. Every peer runs with as many cars as it needs to show its best rate.
+All simulate the same road of class C at 20 m/s, 10 s at 1 kHz, each car with different dampers, in double precision,
+and compute the RMS of body acceleration. "error" is the largest relative error of four cars against adaptive
+integration at a tolerance of 1e-10. Every peer runs with as many cars as it needs to show its best rate.
 """
 
 import sys
