@@ -16,6 +16,7 @@ from jaxdamp.bench.contradictions import Contradiction, contradictions, contradi
 from jaxdamp.bench.programmes import RandomTest, SineTest
 from jaxdamp.bench.read import read
 from jaxdamp.bench.runs import BenchRun
+from jaxdamp.bench.sensors import Sensors
 from jaxdamp.bench.sets import BenchSet, as_runs
 from jaxdamp.bench.velocity import estimate_velocity
 from jaxdamp.bench.virtual_dyno import VirtualDyno
@@ -27,6 +28,7 @@ __all__ = [
     "Contradiction",
     "PeakVelocityPoints",
     "RandomTest",
+    "Sensors",
     "SineTest",
     "VelocityLoops",
     "VirtualDyno",

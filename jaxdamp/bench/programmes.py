@@ -1,7 +1,8 @@
 """Test programmes of a bench: what stroke is run, exactly, with its velocity.
 
 Time zero is the first sample that is kept. Before it, over the test's warm-up, the motion grows smoothly out of rest
-at mid-stroke, so that neither a machine nor a law with states starts with a jump.
+at mid-stroke, so that neither a machine nor a law with states starts with a jump. A test with a run-up has no warm-up:
+its record shows the motion grow, from rest if there is a rest before it.
 """
 
 from collections.abc import Iterable
@@ -56,21 +57,59 @@ def _growth(time: Samples, start: float | int, stop: float | int) -> tuple[Sampl
     return s**3 * (10 - 15 * s + 6 * s**2), 30 * s**2 * (1 - s) ** 2 / (stop - start)
 
 
+class _Ends:
+    """What the two ends of a record show beside the steady motion, and the envelope that this gives the motion."""
+
+    rest_before: float | int
+    run_up: float | int
+    run_down: float | int
+    rest_after: float | int
+
+    @property
+    def begins_at_rest(self) -> bool:
+        """Whether the record shows the beginning of the motion, which then needs no warm-up."""
+        return self.run_up > 0
+
+    def _check_ends(self) -> None:
+        for rest, ramp in (("rest_before", "run_up"), ("rest_after", "run_down")):
+            _checks.nonnegative(rest, getattr(self, rest))
+            _checks.nonnegative(ramp, getattr(self, ramp))
+            if getattr(self, rest) > 0 and not getattr(self, ramp) > 0:
+                remedy = "Between rest and motion the amplitude needs time: the velocity must not jump."
+                _checks.refuse(ramp, f"be positive beside a `{rest}`", getattr(self, ramp), remedy)
+
+    def _envelope(self, time: Samples, warm_up: float | int, duration: float | int) -> tuple[Samples, Samples]:
+        """Share of the steady amplitude at instants [s], and its rate [1/s]."""
+        start, stop = (
+            (self.rest_before, self.rest_before + self.run_up) if self.begins_at_rest else (-warm_up, -warm_up / 2)
+        )
+        grown, rate = _growth(time, start, stop)
+        if not self.run_down > 0:
+            return grown, rate
+        end = duration - self.rest_after
+        gone, loss = _growth(time, end - self.run_down, end)
+        return grown * (1 - gone), rate * (1 - gone) - grown * loss
+
+
 @final
 @dataclass(frozen=True)
-class SineTest:
-    """Stroke x = a sin(2 π f t) from time zero on.
+class SineTest(_Ends):
+    """Stroke x = a sin(2 π f t) from time zero on, or from the end of the run-up.
 
     Arguments:
         amplitude: a [m], zero to peak.
         frequency: f [Hz].
-        cycles: recorded cycles.
+        cycles: recorded cycles of full amplitude.
         warm_up_cycles: cycles before the record. The amplitude grows over the first half of them, the rest is steady,
             so that laws with states are in steady state when the record begins.
         name: of the record; made of amplitude and frequency if left out.
+        rest_before: recorded rest at mid-stroke before the motion [s].
+        run_up: recorded time over which the amplitude grows [s]; it replaces the warm-up.
+        run_down: recorded time over which the amplitude falls to nothing [s].
+        rest_after: recorded rest after the motion [s].
 
     Raises:
-        ValueError: an amplitude, frequency or number of cycles that is not positive.
+        ValueError: an amplitude, frequency or number of cycles that is not positive; a rest without a ramp beside it.
 
     >>> test = SineTest(amplitude=0.0075, frequency=15.0)
     >>> test.name, round(test.peak_velocity, 3)
@@ -82,23 +121,28 @@ class SineTest:
     cycles: float | int = 3
     warm_up_cycles: float | int = 2
     name: str = ""
+    rest_before: float | int = 0.0
+    run_up: float | int = 0.0
+    run_down: float | int = 0.0
+    rest_after: float | int = 0.0
 
     def __post_init__(self) -> None:
         for argument in ("amplitude", "frequency", "cycles"):
             _checks.positive(argument, getattr(self, argument))
         _checks.nonnegative("warm_up_cycles", self.warm_up_cycles)
+        self._check_ends()
         if not self.name:
             object.__setattr__(self, "name", f"{1e3 * self.amplitude:g}mm_{self.frequency:g}Hz")
 
     @property
     def duration(self) -> float:
         """Length of the record [s]."""
-        return self.cycles / self.frequency
+        return self.rest_before + self.run_up + self.cycles / self.frequency + self.run_down + self.rest_after
 
     @property
     def warm_up(self) -> float:
         """Motion before the record [s]."""
-        return self.warm_up_cycles / self.frequency
+        return 0.0 if self.begins_at_rest else self.warm_up_cycles / self.frequency
 
     @property
     def highest_frequency(self) -> float:
@@ -107,24 +151,25 @@ class SineTest:
 
     @property
     def peak_velocity(self) -> float:
-        """2 π f a [m/s]."""
+        """2 π f a [m/s], of the steady motion."""
         return 2 * np.pi * self.frequency * self.amplitude
 
     def stroke(self, time: Samples) -> Samples:
         """Stroke [m] at instants [s]."""
-        grown, _ = _growth(time, -self.warm_up, -self.warm_up / 2)
-        return self.amplitude * grown * np.sin(2 * np.pi * self.frequency * time)
+        grown, _ = self._envelope(time, self.warm_up, self.duration)
+        return self.amplitude * grown * np.sin(2 * np.pi * self.frequency * (time - self.rest_before - self.run_up))
 
     def velocity(self, time: Samples) -> Samples:
         """Velocity [m/s] at instants [s]."""
-        grown, rate = _growth(time, -self.warm_up, -self.warm_up / 2)
+        grown, rate = self._envelope(time, self.warm_up, self.duration)
         omega = 2 * np.pi * self.frequency
-        return self.amplitude * (grown * omega * np.cos(omega * time) + rate * np.sin(omega * time))
+        angle = omega * (time - self.rest_before - self.run_up)
+        return self.amplitude * (grown * omega * np.cos(angle) + rate * np.sin(angle))
 
 
 @final
 @dataclass(frozen=True)
-class RandomTest:
+class RandomTest(_Ends):
     """Band-limited random stroke within a stroke and a velocity limit, as in paper 001.
 
     A sum of sines of equal amplitude and random phase, spaced by 1 / duration over the band and scaled so that the
@@ -133,14 +178,19 @@ class RandomTest:
     Arguments:
         stroke_limit: largest |x| [m]. Paper 001: 6 mm.
         velocity_limit: largest |v| [m/s]. Paper 001: 0.06 m/s.
-        duration: length of the record [s].
+        duration: length of the record [s], the run-up and the like included.
         band: lowest and highest frequency [Hz].
         seed: of the phases.
-        warm_up: motion before the record [s]; it grows over the first half.
+        warm_up: motion before the record [s]; it grows over the first half. None beside a run-up.
         name: of the record; made of the limits and the seed if left out.
+        rest_before: recorded rest at mid-stroke before the motion [s].
+        run_up: recorded time over which the amplitude grows [s]; it replaces the warm-up.
+        run_down: recorded time over which the amplitude falls to nothing [s].
+        rest_after: recorded rest after the motion [s].
 
     Raises:
-        ValueError: a limit or duration that is not positive, or a band without a line in it.
+        ValueError: a limit or duration that is not positive; a band without a line in it; a rest without a ramp beside
+            it; ends that leave nothing of the duration.
     """
 
     stroke_limit: float | int = 0.006
@@ -150,12 +200,22 @@ class RandomTest:
     seed: int = 0
     warm_up: float | int = 2.0
     name: str = ""
+    rest_before: float | int = 0.0
+    run_up: float | int = 0.0
+    run_down: float | int = 0.0
+    rest_after: float | int = 0.0
     _lines: Float[np.ndarray, "3 lines"] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for argument in ("stroke_limit", "velocity_limit", "duration"):
             _checks.positive(argument, getattr(self, argument))
         _checks.nonnegative("warm_up", self.warm_up)
+        self._check_ends()
+        ends = self.rest_before + self.run_up + self.run_down + self.rest_after
+        if not ends < self.duration:
+            _checks.refuse("duration", f"be longer than rests and ramps together, {ends:g} s", self.duration)
+        if self.begins_at_rest:
+            object.__setattr__(self, "warm_up", 0.0)
         low, high = self.band
         numbers = np.arange(max(1, np.ceil(low * self.duration)), np.floor(high * self.duration) + 1)
         if len(numbers) < 2:
@@ -196,11 +256,11 @@ class RandomTest:
 
     def stroke(self, time: Samples) -> Samples:
         """Stroke [m] at instants [s]."""
-        return _growth(time, -self.warm_up, -self.warm_up / 2)[0] * self._motion(time)[0]
+        return self._envelope(time, self.warm_up, self.duration)[0] * self._motion(time)[0]
 
     def velocity(self, time: Samples) -> Samples:
         """Velocity [m/s] at instants [s]."""
-        grown, rate = _growth(time, -self.warm_up, -self.warm_up / 2)
+        grown, rate = self._envelope(time, self.warm_up, self.duration)
         x, v = self._motion(time)
         return grown * v + rate * x
 

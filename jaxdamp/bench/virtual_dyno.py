@@ -2,8 +2,8 @@
 
 import zlib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import final
+from dataclasses import dataclass, fields, replace
+from typing import Any, final
 
 import equinox as eqx
 import jax
@@ -16,42 +16,45 @@ from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.programmes import Excitation
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sampling import FEWEST
+from jaxdamp.bench.sensors import Sensors, described
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.velocity import estimate_velocity
 from jaxdamp.dampers import AbstractDamper, require_finite_force
-from jaxdamp.rig import respond
+from jaxdamp.parameters import parameters
+from jaxdamp.rig import Rig
 
 
+Channels = Float[np.ndarray, "tests time"]
 _PER_CYCLE = 4000  # steps of the law per period of the fastest motion: error of about 1e-6, see the tests
 _PER_SAMPLE = 2  # and at least so many per sample, for stiff laws under slow motion
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class VirtualDyno:
-    """A test bench for a damper law, with the faults of sensors.
+    """A test bench for a damper law, with all that a real machine adds and with the faults of its sensors.
 
     The law is integrated on a grid much finer than the records (at least 4000 steps a period), under the exact stroke
-    and velocity; then the sensors are read. The velocity in the records is not the true one but `estimate_velocity` of
-    the measured stroke, as in records read from files.
+    and velocity; the machine adds its share (`rig`), and the sensors are read (`sensors`). The velocity in the records
+    is not the true one but `estimate_velocity` of the measured stroke, as in records read from files. A machine that
+    heats the damper begins with the warm-up of each test.
+
+    Rest, run-up and run-down belong to the tests (`SineTest`).
 
     Arguments:
-        law: the damper.
+        law: the damper. Friction that sticks and slips is a law too: `law + dampers.StribeckFriction(...)`.
+        rig: what the machine adds: gas, friction, moving mass, heat, delay, lag, offsets.
+        sensors: noise and faults of the channels.
         sampling_rate: of the records [Hz].
-        force_noise: standard deviation of the white noise of the load cell [N].
-        stroke_noise: of the stroke sensor [m].
-        force_delay: by which the force channel lags behind the stroke channel [s].
-        force_offset: zero error of the load cell [N].
-        mains_ripple: amplitude of the mains hum in the force [N].
-        stroke_ripple: and in the stroke [m].
-        mains_frequency: of the hum [Hz].
-        gas_force: constant force of the gas [N]. It pushes the rod out, so it is negative in our sign.
-        friction: Coulomb friction of the seal [N], F = friction · tanh(v / friction_velocity).
-        friction_velocity: where the friction is fully there [m/s].
-        seed: of all noise. The noise of a record depends on the seed and its name only, not on the other records.
+        temperature_channel: whether the records hold the temperature of the damper [K].
+        seed: of all that is random. The noise of a record depends on the seed and its name only, not on the other
+            records.
+        settings: any field of `Rig` or `Sensors` by its name, for short: `VirtualDyno(law, force_noise=5.0,
+            gas_force=-120.0)`.
 
     Raises:
-        ValueError: a negative noise, rate, delay or friction, or a positive gas force.
+        ValueError: what `Rig` and `Sensors` refuse; a sampling rate that is not positive.
+        TypeError: a name that is none of their fields.
 
     >>> from jaxdamp.bench import programmes
     >>> from jaxdamp.dampers import Linear
@@ -60,29 +63,42 @@ class VirtualDyno:
     """
 
     law: AbstractDamper
-    sampling_rate: float | int = 2000.0
-    force_noise: float | int = 0.0
-    stroke_noise: float | int = 0.0
-    force_delay: float | int = 0.0
-    force_offset: float | int = 0.0
-    mains_ripple: float | int = 0.0
-    stroke_ripple: float | int = 0.0
-    mains_frequency: float | int = 50.0
-    gas_force: float | int = 0.0
-    friction: float | int = 0.0
-    friction_velocity: float | int = 0.005
-    seed: int = 0
+    rig: Rig
+    sensors: Sensors
+    sampling_rate: float | int
+    temperature_channel: bool
+    seed: int
 
-    def __post_init__(self) -> None:
-        check_module("law", self.law, (AbstractDamper,), "VirtualDyno(law, force_noise=20.0)")
-        for argument in ("sampling_rate", "mains_frequency", "friction_velocity"):
-            _checks.positive(argument, getattr(self, argument))
-        for argument in ("force_noise", "stroke_noise", "force_delay", "mains_ripple", "stroke_ripple", "friction"):
-            _checks.nonnegative(argument, getattr(self, argument))
-        _checks.finite("force_offset", self.force_offset)
-        if not self.gas_force <= 0:
-            remedy = "It pushes the rod out, while our force counts positive when it resists extension."
-            _checks.refuse("gas_force", "be negative or zero", self.gas_force, remedy)
+    def __init__(
+        self,
+        law: AbstractDamper,
+        *,
+        rig: Rig | None = None,
+        sensors: Sensors | None = None,
+        sampling_rate: float | int = 2000.0,
+        temperature_channel: bool = False,
+        seed: int = 0,
+        **settings: Any,
+    ) -> None:
+        check_module("law", law, (AbstractDamper,), "VirtualDyno(law, force_noise=20.0)")
+        _checks.positive("sampling_rate", sampling_rate)
+        for_rig = {name: settings.pop(name) for name in _names(Rig) if name in settings}
+        for_sensors = {name: settings.pop(name) for name in _names(Sensors) if name in settings}
+        if settings:
+            name = next(iter(settings))
+            near = _checks.nearest(name, [*_names(Rig), *_names(Sensors)])
+            hint = f" Did you mean {near!r}?" if near else ""
+            raise TypeError(f"VirtualDyno has no argument {name!r}, and neither Rig nor Sensors such a field.{hint}")
+        made = {
+            "law": law,
+            "rig": replace(rig or Rig(), **for_rig),
+            "sensors": replace(sensors or Sensors(), **for_sensors),
+            "sampling_rate": sampling_rate,
+            "temperature_channel": temperature_channel,
+            "seed": seed,
+        }
+        for name, value in made.items():
+            object.__setattr__(self, name, value)
 
     def run(
         self, tests: Excitation | Iterable[Excitation], *, progress: Callable[[int, int], None] | None = None
@@ -111,9 +127,8 @@ class VirtualDyno:
             _checks.refuse("tests", "have different names", ", ".join(names), "Give `name` to tests that are alike.")
         runs: dict[int, BenchRun] = {}
         for members in self._groups(programme):
-            forces = self._forces([programme[i] for i in members])
-            for i, grid, force in zip(members, *forces, strict=True):
-                runs[i] = self._record(programme[i], grid, force)
+            for i, grid, force, warm in zip(members, *self._readings([programme[i] for i in members]), strict=True):
+                runs[i] = self._record(programme[i], grid, force, warm)
                 if progress is not None:
                     progress(len(runs), len(programme))
         return BenchSet(runs[i] for i in range(len(programme)))
@@ -136,7 +151,8 @@ class VirtualDyno:
         finer = max(_PER_SAMPLE, int(np.ceil(_PER_CYCLE * test.highest_frequency / self.sampling_rate)))
         step = 1 / (self.sampling_rate * finer)
         before = int(np.ceil(test.warm_up / step))
-        needed = before + round(test.duration * self.sampling_rate) * finer
+        behind = max(-float(self.rig.force_delay), 0.0) + 6 * self.sensors.clock_jitter
+        needed = before + round(test.duration * self.sampling_rate) * finer + int(np.ceil(behind / step))
         unit = 1 << max(needed.bit_length() - 3, 0)
         return step, before, -(-needed // unit) * unit
 
@@ -145,58 +161,52 @@ class VirtualDyno:
         counts = [self._fine_grid(test)[2] for test in programme]
         return [[i for i, count in enumerate(counts) if count == length] for length in dict.fromkeys(counts)]
 
-    def _forces(self, tests: list[Excitation]) -> tuple[list[Samples], list[Samples]]:
-        """Fine grids [s] of tests with equal grids, and the true forces [N] there."""
+    def _readings(self, tests: list[Excitation]) -> tuple[list[Samples], Channels, Channels]:
+        """Fine grids [s] of tests with equal grids; there, force at the load cell [N] and temperature [K]."""
         grids = []
         for test in tests:
             step, before, count = self._fine_grid(test)
             grids.append(step * np.arange(-before, count - before))
-        strokes = [test.stroke(grid) for test, grid in zip(tests, grids, strict=True)]
-        velocities = [test.velocity(grid) for test, grid in zip(tests, grids, strict=True)]
-        forces = _exact_response(self.law, np.stack(grids), np.stack(strokes), np.stack(velocities))
-        seal = [self.friction * np.tanh(velocity / self.friction_velocity) for velocity in velocities]
-        return grids, [force + rub + self.gas_force for force, rub in zip(forces, seal, strict=True)]
+        strokes = np.stack([test.stroke(grid) for test, grid in zip(tests, grids, strict=True)])
+        velocities = np.stack([test.velocity(grid) for test, grid in zip(tests, grids, strict=True)])
+        force, temperature = _exact_readings(self.law, self.rig, np.stack(grids), strokes, velocities)
+        return grids, force, temperature
 
-    def _record(self, test: Excitation, grid: Samples, true_force: Samples) -> BenchRun:
+    def _record(self, test: Excitation, grid: Samples, force: Samples, temperature: Samples) -> BenchRun:
         """What the sensors make of the truth."""
-        rng = np.random.default_rng([self.seed, zlib.crc32(test.name.encode())])
+        seed = [self.seed, zlib.crc32(test.name.encode())]
         time = np.arange(round(test.duration * self.sampling_rate)) / self.sampling_rate
-        phase = rng.uniform(0, 2 * np.pi, 2)
-        hum = 2 * np.pi * self.mains_frequency * time
-        stroke = test.stroke(time) + self.stroke_ripple * np.sin(hum + phase[0])
-        stroke = stroke + self.stroke_noise * rng.standard_normal(len(time))
-        force = np.interp(time - self.force_delay, grid, true_force) + self.force_offset
-        force = force + self.mains_ripple * np.sin(hum + phase[1]) + self.force_noise * rng.standard_normal(len(time))
+        taken = self.sensors.instants(time, seed)
+        stroke = test.stroke(taken) + float(self.rig.stroke_offset)
+        stroke, force = self.sensors.show(time, stroke, np.interp(taken, grid, force), seed)
         velocity, how = estimate_velocity(time, stroke)
-        return BenchRun(test.name, time, stroke, velocity, force, source="virtual dyno", notes=(self._note(), how))
+        warm = np.interp(time, grid, temperature) if self.temperature_channel else None
+        notes = (self._note(), how)
+        return BenchRun(test.name, time, stroke, velocity, force, warm, source="virtual dyno", notes=notes)
 
     def _note(self) -> str:
-        """The settings of the bench that are not zero, in words."""
-        parts = {
-            "force noise {:g} N": self.force_noise,
-            "stroke noise {:g} m": self.stroke_noise,
-            "force delay {:g} s": self.force_delay,
-            "force offset {:g} N": self.force_offset,
-            f"{self.mains_frequency:g} Hz ripple {{:g}} N in the force": self.mains_ripple,
-            f"{self.mains_frequency:g} Hz ripple {{:g}} m in the stroke": self.stroke_ripple,
-            "gas force {:g} N": self.gas_force,
-            "friction {:g} N": self.friction,
-        }
-        faults = [text.format(value) for text, value in parts.items() if value]
-        settings = ", ".join([f"sampled at {self.sampling_rate:g} Hz", *faults, f"seed {self.seed}"])
-        return f"made by the virtual dyno from {type(self.law).__name__}: {settings}"
+        """The settings of the bench that are not their defaults, in words."""
+        machine = [
+            described(p.path, p.value, p.unit)
+            for p, q in zip(parameters(self.rig), parameters(Rig()), strict=True)
+            if p.value != q.value
+        ]
+        faults = [f"sampled at {self.sampling_rate:g} Hz", *self.sensors.described(), *machine, f"seed {self.seed}"]
+        return f"made by the virtual dyno from {type(self.law).__name__}: {', '.join(faults)}"
 
 
-def _exact_response(
-    law: AbstractDamper,
-    time: Float[np.ndarray, "tests time"],
-    stroke: Float[np.ndarray, "tests time"],
-    velocity: Float[np.ndarray, "tests time"],
-) -> Float[np.ndarray, "tests time"]:
-    """`respond` for several tests, in float64 whatever the session's precision: its steps are microseconds."""
+def _names(kind: type) -> list[str]:
+    """The fields of a class."""
+    return [field.name for field in fields(kind)]
+
+
+def _exact_readings(
+    law: AbstractDamper, rig: Rig, time: Channels, stroke: Channels, velocity: Channels
+) -> tuple[Channels, Channels]:
+    """`Rig.readings` for several tests, in float64 whatever the session's precision: its steps are microseconds."""
     with jax.enable_x64(True):
-        exact = jax.tree.map(lambda leaf: leaf.astype(np.float64) if eqx.is_inexact_array(leaf) else leaf, law)
-        channels = (jax.numpy.asarray(channel) for channel in (time, stroke, velocity))
-        forces = np.asarray(jax.vmap(lambda t, x, v: respond(exact, t, x, v))(*channels))
-    require_finite_force(law, forces, "over the whole programme")
-    return forces
+        law_64, rig_64 = jax.tree.map(lambda a: a.astype(np.float64) if eqx.is_inexact_array(a) else a, (law, rig))
+        channels = (jax.numpy.asarray(channel) for channel in (time, stroke + rig_64.stroke_offset, velocity))
+        force, temperature = map(np.asarray, jax.vmap(lambda t, x, v: rig_64.readings(law_64, t, x, v))(*channels))
+    require_finite_force(law, force, "over the whole programme")
+    return force, temperature

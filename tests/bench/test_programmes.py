@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,39 @@ def test_warm_up_grows_out_of_rest(test):
     grid = np.linspace(-1.1 * test.warm_up, 0.5, 20001)
     steps = np.diff(test.velocity(grid)) / np.diff(grid)
     assert np.max(np.abs(np.diff(steps))) < 0.02 * np.max(np.abs(steps))  # no jump of the acceleration
+
+
+ENDS: dict[str, Any] = {"rest_before": 0.5, "run_up": 0.6, "run_down": 0.4, "rest_after": 0.3}
+
+
+@pytest.mark.parametrize("test", [SineTest(0.01, 3.0, **ENDS), RandomTest(duration=6.0, seed=3, **ENDS)])
+def test_rest_and_ramps(test):
+    time = np.linspace(-0.1, test.duration + 0.1, 30001)
+    stroke, velocity = test.stroke(time), test.velocity(time)
+    end = test.duration - 0.3
+    at_rest = (time <= 0.5) | (time >= end)
+    assert test.warm_up == 0.0
+    np.testing.assert_array_equal(stroke[at_rest], 0.0)
+    np.testing.assert_array_equal(velocity[at_rest], 0.0)
+    h = time[1] - time[0]
+    np.testing.assert_allclose(velocity[1:-1], (stroke[2:] - stroke[:-2]) / (2 * h), atol=1e-4 * velocity.max())
+    assert np.max(np.abs(np.diff(velocity))) < 5e-3 * np.max(velocity)  # no jump at the joints
+
+
+def test_full_amplitude_between_the_ramps():
+    test = SineTest(0.01, 3.0, cycles=4, **ENDS)
+    assert test.duration == pytest.approx(0.5 + 0.6 + 4 / 3 + 0.4 + 0.3)
+    time = np.linspace(1.1, 1.1 + 4 / 3, 500)
+    np.testing.assert_allclose(test.stroke(time), 0.01 * np.sin(6 * np.pi * (time - 1.1)), atol=1e-16)
+
+
+def test_a_rest_needs_a_ramp_and_a_random_test_some_duration():
+    with pytest.raises(ValueError, match="`run_up` must be positive beside a `rest_before`"):
+        SineTest(0.01, 3.0, rest_before=1.0)
+    with pytest.raises(ValueError, match="`run_down` must be positive beside a `rest_after`"):
+        RandomTest(rest_after=1.0)
+    with pytest.raises(ValueError, match="`duration` must be longer than rests and ramps together, 4 s"):
+        RandomTest(duration=4.0, run_up=4.0)
 
 
 def test_sine_is_steady_from_the_second_half_of_its_warm_up_on():

@@ -1,9 +1,12 @@
+from typing import Any
+
 import jax
 import numpy as np
 import pytest
 
-from jaxdamp.bench import RandomTest, SineTest, VirtualDyno, programmes, read
+from jaxdamp.bench import RandomTest, Sensors, SineTest, VirtualDyno, programmes, read
 from jaxdamp.dampers import Bilinear, Lag, Linear, SeriesSpring
+from jaxdamp.rig import Rig
 
 
 TEST = SineTest(0.01, 4.0, cycles=5)
@@ -83,11 +86,117 @@ def test_faults_of_the_sensors():
     assert np.max(np.abs(ripple)) == pytest.approx(4.0, rel=1e-2)
     hum = VirtualDyno(Linear(2000.0), stroke_ripple=5e-5).run(TEST)[0].stroke - clean.stroke
     assert np.max(np.abs(hum)) == pytest.approx(5e-5, rel=1e-2)
-    note = VirtualDyno(Linear(2000.0), force_delay=0.003, gas_force=-120.0).run(TEST)[0].notes[0]
-    assert (
-        note
-        == "made by the virtual dyno from Linear: sampled at 2000 Hz, force delay 0.003 s, gas force -120 N, seed 0"
+
+
+def test_the_note_lists_what_the_bench_adds():
+    dyno = VirtualDyno(Linear(2000.0), force_delay=0.003, gas_force=-120.0, reversed_force=True, spike_rate=2.0, seed=4)
+    assert dyno.run(TEST)[0].notes[0] == (
+        "made by the virtual dyno from Linear: sampled at 2000 Hz, spike rate 2 1/s, reversed force, gas force -120 N, "
+        "force delay 0.003 s, seed 4"
     )
+
+
+def channel(name: str, test: SineTest = TEST, **settings: Any) -> np.ndarray:
+    return getattr(VirtualDyno(Linear(2000.0), **settings).run(test)[0], name)
+
+
+def test_machine_and_sensors_are_objects_too():
+    rig, sensors = Rig(gas_force=-50.0, force_delay=0.002), Sensors(force_noise=3.0)
+    whole = channel("force", rig=rig, sensors=sensors)
+    np.testing.assert_array_equal(whole, channel("force", gas_force=-50.0, force_delay=0.002, force_noise=3.0))
+    with_offset = channel("force", rig=rig, sensors=sensors, force_offset=-10.0)
+    np.testing.assert_allclose(whole - 10.0, with_offset, rtol=1e-13)
+
+
+def test_the_record_is_what_the_machine_shows():
+    """`Rig.force` under the recorded stroke and velocity explains a record of the same machine."""
+    law = Bilinear(2600.0, 1200.0, 0.02)
+    rig = Rig(-120.0, 800.0, 30.0, moving_mass=1.5, force_delay=0.0013, force_lag=0.002, stroke_offset=1e-3)
+    run = VirtualDyno(law, rig=rig, sampling_rate=4000.0).run(TEST)[0]
+    assert np.mean(run.stroke) == pytest.approx(1e-3)
+    force = rig.force(law, run.time, run.stroke, run.velocity)
+    later = run.time > 0.05  # the lag begins settled
+    np.testing.assert_allclose(force[later], run.force[later], atol=0.1)
+
+
+def test_heat_lowers_the_damping_and_raises_the_gas_force():
+    test = SineTest(0.01, 4.0, cycles=40)
+    hot = {"heating": 0.01, "temperature_slope": 0.002, "gas_temperature_slope": 0.0034, "temperature_channel": True}
+    run = VirtualDyno(Linear(2000.0), gas_force=-100.0, cooling=0.02, **hot).run(test)[0]
+    power = 0.5 * 2000.0 * (2 * np.pi * 4.0 * 0.01) ** 2  # mean, 63 W
+    assert run.temperature is not None
+    rise = run.temperature - 293.15
+    lost = 0.02 + 0.01 * 0.002 * power
+    np.testing.assert_allclose(rise[-1], 0.01 * power / lost * (1 - np.exp(-lost * 10.4)), rtol=0.02)
+    np.testing.assert_allclose(
+        run.force, 2000.0 * test.velocity(run.time) * (1 - 0.002 * rise) - 100.0 * (1 + 0.0034 * rise), atol=1e-3
+    )
+    assert VirtualDyno(Linear(2000.0), heating=0.01).run(TEST)[0].temperature is None
+
+
+def test_clipping():
+    clean = channel("force")
+    np.testing.assert_allclose(channel("force", force_limit=300.0), np.clip(clean, -300, 300), atol=1e-12)
+    np.testing.assert_array_equal(np.abs(channel("stroke", stroke_limit=0.008)).max(), 0.008)
+
+
+def test_resolution():
+    clean, coarse = channel("force"), channel("force", force_resolution=5.0)
+    np.testing.assert_allclose(coarse, 5.0 * np.round(coarse / 5.0), atol=1e-9)
+    assert np.max(np.abs(coarse - clean)) <= 2.5 + 1e-9
+    assert 1e-4 - 1e-9 < np.diff(np.unique(channel("stroke", stroke_resolution=1e-4))).min() < 1.001e-4
+
+
+def test_spikes():
+    test = SineTest(0.01, 4.0, cycles=400)
+    spikes = channel("force", test, spike_rate=3.0, spike_size=250.0) - channel("force", test)
+    hit = np.abs(spikes) > 1e-9
+    assert np.count_nonzero(hit) == pytest.approx(300, abs=4 * np.sqrt(300))  # of 100 s
+    np.testing.assert_allclose(np.abs(spikes[hit]), 250.0)
+    assert 0.4 < np.mean(spikes[hit] > 0) < 0.6
+
+
+def test_jitter_of_the_clock():
+    """The error is the slope of the signal times the error of the instant, the same in all channels."""
+    clean, jittered = (VirtualDyno(Linear(2000.0), clock_jitter=j).run(TEST)[0] for j in (0.0, 1e-5))
+    np.testing.assert_array_equal(jittered.time, clean.time)
+    late = (jittered.stroke - clean.stroke) / VELOCITY
+    late = late[np.abs(VELOCITY) > 0.1]
+    assert np.std(late) == pytest.approx(1e-5, rel=0.1)
+    slope = -2000.0 * (2 * np.pi * 4.0) ** 2 * clean.stroke[np.abs(VELOCITY) > 0.1]
+    np.testing.assert_allclose((jittered.force - clean.force)[np.abs(VELOCITY) > 0.1], slope * late, atol=1e-2)
+
+
+def test_reversed_force():
+    np.testing.assert_array_equal(channel("force", reversed_force=True), -channel("force"))
+
+
+def test_stuck_channels():
+    time = np.arange(2500) / 2000
+    for name, unstuck in (("force", channel("force")), ("stroke", channel("stroke"))):
+        stuck = channel(name, **{f"{name}_stuck_from": 0.8})
+        np.testing.assert_array_equal(stuck[time < 0.8], unstuck[time < 0.8])
+        np.testing.assert_array_equal(stuck[time >= 0.8], unstuck[1600])
+
+
+def test_faults_are_seeded_and_leave_the_noise_alone():
+    faults: dict[str, Any] = {"spike_rate": 20.0, "spike_size": 100.0, "force_noise": 2.0}
+    one, same, other = (channel("force", seed=seed, **faults) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one, same)
+    assert not np.array_equal(one, other)
+    without = channel("force", seed=1, force_noise=2.0)
+    assert 10 < np.count_nonzero(np.abs(one - without) > 1e-9) < 45  # of 25 expected
+
+
+def test_a_record_with_rest_and_ramps():
+    test = SineTest(0.01, 4.0, cycles=5, rest_before=0.5, run_up=0.5, run_down=0.25, rest_after=0.25)
+    law = Lag(Linear(2000.0), 0.004)
+    run = VirtualDyno(law, force_noise=1.0, gas_force=-100.0).run(test)[0]
+    assert run.duration == pytest.approx(2.75)
+    at_rest = (run.time < 0.5) | (run.time > 2.5 + 0.05)
+    np.testing.assert_array_equal(run.stroke[(run.time < 0.5) | (run.time > 2.5)], 0.0)
+    np.testing.assert_allclose(run.force[at_rest], -100.0, atol=5.0)
+    assert run.frequency == pytest.approx(4.0, rel=1e-3)
 
 
 def test_a_programme_keeps_its_order_and_reports_progress():
@@ -118,13 +227,19 @@ def test_records_written_and_read_are_the_same(tmp_path):
         ("force_noise", -1.0),
         ("sampling_rate", 0.0),
         ("gas_force", 100.0),
-        ("force_delay", -0.001),
         ("force_offset", np.nan),
+        ("force_limit", 0.0),
+        ("clock_jitter", -1e-6),
     ],
 )
 def test_bad_settings(argument, value):
-    with pytest.raises(ValueError, match=f"`{argument}` must be"):
+    with pytest.raises(ValueError, match=rf"`(Rig\.)?{argument}` must be"):
         VirtualDyno(Linear(2000.0), **{argument: value})
+
+
+def test_an_unknown_setting_is_named():
+    with pytest.raises(TypeError, match=r"no argument 'force_limits'.* Did you mean 'force_limit'\?"):
+        VirtualDyno(Linear(2000.0), force_limits=100.0)
 
 
 def test_bad_programmes():

@@ -1,12 +1,12 @@
-"""The bench: the force of a law under a prescribed stroke, and at constant velocity."""
+"""The force of a law under a prescribed stroke."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
@@ -14,7 +14,6 @@ from jaxdamp._types import Signal, SignalLike
 from jaxdamp.dampers import (
     AbstractDamper,
     Motion,
-    coverage,
     has_fitted_range,
     range_use,
     require_finite_force,
@@ -161,103 +160,6 @@ def _solve(
     return jax.vmap(law.force)(stroke, velocity, states)
 
 
-class QuasiStatic(NamedTuple):
-    """Forces of a law at constant velocity, and where it has none.
-
-    Attributes:
-        velocity: the velocities asked for [m/s], shape (points,).
-        force: settled force [N], NaN where the law does not settle or has no finite force, shape (points,).
-        settled: which points have a force, shape (points,).
-        note: how many points have none, where and why, in words; empty if all have one.
-    """
-
-    velocity: Float[Array, " points"]
-    force: Float[Array, " points"]
-    settled: Bool[np.ndarray, " points"]
-    note: str
-
-
-LONGEST_HOLD = 64  # s at constant velocity
-STEADY = 1e-4  # change of a force while the time held doubles, relative to the scale of the forces: settled
-STILL = {"float64": 1e-9, "float32": 1e-3}  # the same, at which no longer hold can improve the curve
-
-
-def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.ndarray) -> QuasiStatic:
-    """Force [N] of a law at constant velocity, its states settled: the curve without hysteresis.
-
-    Each velocity is held at stroke zero for 1, 2, 4 ... up to 64 s, until no force changes any more; a memoryless law
-    answers at once. A point is settled if its force changed, over the last doubling of the time, by no more than 1e-4
-    of itself or of the largest settled force. Friction that acts through a bristle needs longer the slower it moves,
-    and a law that heats up or drifts never settles: such points are left without a force, and the note says so.
-
-    Arguments:
-        law: the damper law.
-        velocities: velocities [m/s], shape (points,).
-
-    Returns:
-        The forces, NaN at points without one, with a flag for each point and a note in words.
-
-    Raises:
-        ValueError: velocities that are not finite numbers in one dimension.
-
-    >>> from jaxdamp.dampers import Linear, SeriesSpring
-    >>> quasi_static(SeriesSpring(Linear(2000.0), stiffness=1e6), np.array([-0.5, 0.0, 0.5])).force
-    Array([-1000.,     0.,  1000.], dtype=float64)
-    """
-    check_module("law", law, (AbstractDamper,), "quasi_static(law, velocities)")
-    velocities = as_float(velocities)
-    if velocities.ndim != 1 or velocities.size == 0:
-        _checks.refuse("velocities", "be one or more in one dimension", f"of shape {velocities.shape}")
-    _checks.finite("velocities", velocities)
-    law = without_fitted_ranges(law)
-    states = jnp.broadcast_to(law.initial_state(), (velocities.size, law.initial_state().size))
-    states, force = _hold(law, velocities, states, jnp.asarray(0))
-    if law.initial_state().size == 0:
-        settled = np.isfinite(force)
-        return QuasiStatic(velocities, force, settled, _gaps(law, np.asarray(velocities), np.asarray(force), settled))
-    seconds, change = 0, np.full(velocities.shape, np.inf)
-    while seconds < LONGEST_HOLD:
-        longer = max(2 * seconds, 1)
-        before, (states, force) = force, _hold(law, velocities, states, jnp.asarray(1000 * (longer - seconds)))
-        seconds, change = longer, np.abs(np.asarray(force) - np.asarray(before))
-        if np.all(change <= STILL[str(force.dtype)] * np.max(np.abs(force))):
-            break
-    size = np.abs(np.asarray(force))
-    limit = STEADY if force.dtype == jnp.float64 else STILL["float32"]
-    alone = change <= limit * size
-    settled = np.isfinite(size) & (alone | (change <= limit * np.max(size, where=alone, initial=0.0)))
-    note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
-    return QuasiStatic(velocities, jnp.where(settled, force, jnp.nan), settled, note)
-
-
-def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled: np.ndarray) -> str:
-    """Where a law has no settled force, and why."""
-    finite = np.isfinite(force)
-    reasons = (
-        (~finite, f"the law gives no finite force. {coverage(law)}".strip()),
-        (finite & ~settled, f"the force still changes after {LONGEST_HOLD} s of constant velocity."),
-    )
-    notes = []
-    for at, why in reasons:
-        if at.any():
-            lower, upper = (f"{end:.3g}" for end in (velocity[at].min(), velocity[at].max()))
-            where = f"at {lower}" if lower == upper else f"from {lower} to {upper}"
-            notes.append(f"No force at {np.count_nonzero(at)} of {at.size} velocities, {where} m/s: {why}")
-    return " ".join(notes)
-
-
-@eqx.filter_jit
-def _hold(law: AbstractDamper, velocities: Array, states: Array, count: Int[Array, ""]) -> tuple[Array, Array]:
-    """States and forces after so many more milliseconds at constant velocities."""
-    zero, dt = jnp.zeros((), velocities.dtype), jnp.asarray(1e-3, velocities.dtype)
-
-    def one(v: Array, start: Array) -> tuple[Array, Array]:
-        state = jax.lax.fori_loop(0, count, lambda _, state: law.advance(zero, v, zero, v, state, dt), start)
-        return state, law.force(zero, v, state)
-
-    return jax.vmap(one)(velocities, states)
-
-
 @eqx.filter_jit
 def march(law: AbstractDamper, dt: Array, stroke: Signal, velocity: Signal, substeps: int) -> Signal:
     """`respond` without its checks, for use inside compiled functions."""
@@ -265,7 +167,7 @@ def march(law: AbstractDamper, dt: Array, stroke: Signal, velocity: Signal, subs
     if state.size == 0:
         return jax.vmap(lambda x, v: law.force(x, v, state))(stroke, velocity)
     fine_x = _refine(stroke, dt * velocity, substeps)
-    fine_v = _refine(velocity, dt * _slopes(velocity, dt), substeps)
+    fine_v = _refine(velocity, dt * slopes(velocity, dt), substeps)
     h = dt / substeps
 
     def step(state: Array, ends: tuple[Array, Array, Array, Array]) -> tuple[Array, None]:
@@ -288,7 +190,7 @@ def march(law: AbstractDamper, dt: Array, stroke: Signal, velocity: Signal, subs
     return jax.vmap(law.force)(stroke, velocity, states)
 
 
-def _slopes(values: Signal, dt: Array) -> Signal:
+def slopes(values: Signal, dt: Array) -> Signal:
     """Derivative by five-point differences, exact for quartics up to the ends."""
     if values.size < 5:
         return jnp.asarray(jnp.gradient(values, dt))
@@ -301,9 +203,13 @@ def _refine(values: Signal, steps: Signal, parts: int) -> Float[Array, " fine"]:
     """Cubic Hermite interpolation to `parts` intervals per sample; `steps` are slopes times the sample spacing."""
     if parts == 1:
         return values
-    s = jnp.arange(parts) / parts
-    h00, h10 = (1 + 2 * s) * (1 - s) ** 2, s * (1 - s) ** 2
-    h01, h11 = s * s * (3 - 2 * s), s * s * (s - 1)
     ends = (values[:-1, None], steps[:-1, None], values[1:, None], steps[1:, None])
-    fine = sum(end * basis[None, :] for end, basis in zip(ends, (h00, h10, h01, h11), strict=True))
+    fine = hermite(ends, (jnp.arange(parts) / parts)[None, :])
     return jnp.append(jnp.ravel(fine), values[-1])
+
+
+def hermite(ends: tuple[Array, Array, Array, Array], s: Array) -> Array:
+    """The cubic at a share s of an interval, from value and rise (slope × width) at its start and at its end."""
+    start, start_rise, stop, stop_rise = ends
+    rises = start_rise * (s * (1 - s) ** 2) + stop_rise * (s * s * (s - 1))
+    return start * ((1 + 2 * s) * (1 - s) ** 2) + stop * (s * s * (3 - 2 * s)) + rises

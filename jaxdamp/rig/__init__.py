@@ -1,0 +1,8 @@
+"""The test machine: the force of a law under a prescribed stroke, and what the machine adds to it."""
+
+from jaxdamp.rig.constant_velocity import QuasiStatic, quasi_static
+from jaxdamp.rig.machine import Readings, Rig
+from jaxdamp.rig.response import march, respond
+
+
+__all__ = ["QuasiStatic", "Readings", "Rig", "march", "quasi_static", "respond"]

@@ -1,0 +1,111 @@
+"""The force of a law at constant velocity: the curve without hysteresis."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxdamp import _checks
+from jaxdamp._field_types import check_module
+from jaxdamp.dampers import AbstractDamper, coverage, without_fitted_ranges
+from jaxdamp.parameters import as_float
+
+
+class QuasiStatic(NamedTuple):
+    """Forces of a law at constant velocity, and where it has none.
+
+    Attributes:
+        velocity: the velocities asked for [m/s], shape (points,).
+        force: settled force [N], NaN where the law does not settle or has no finite force, shape (points,).
+        settled: which points have a force, shape (points,).
+        note: how many points have none, where and why, in words; empty if all have one.
+    """
+
+    velocity: Float[Array, " points"]
+    force: Float[Array, " points"]
+    settled: Bool[np.ndarray, " points"]
+    note: str
+
+
+LONGEST_HOLD = 64  # s at constant velocity
+STEADY = 1e-4  # change of a force while the time held doubles, relative to the scale of the forces: settled
+STILL = {"float64": 1e-9, "float32": 1e-3}  # the same, at which no longer hold can improve the curve
+
+
+def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.ndarray) -> QuasiStatic:
+    """Force [N] of a law at constant velocity, its states settled: the curve without hysteresis.
+
+    Each velocity is held at stroke zero for 1, 2, 4 ... up to 64 s, until no force changes any more; a memoryless law
+    answers at once. A point is settled if its force changed, over the last doubling of the time, by no more than 1e-4
+    of itself or of the largest settled force. Friction that acts through a bristle needs longer the slower it moves,
+    and a law that heats up or drifts never settles: such points are left without a force, and the note says so.
+
+    Arguments:
+        law: the damper law.
+        velocities: velocities [m/s], shape (points,).
+
+    Returns:
+        The forces, NaN at points without one, with a flag for each point and a note in words.
+
+    Raises:
+        ValueError: velocities that are not finite numbers in one dimension.
+
+    >>> from jaxdamp.dampers import Linear, SeriesSpring
+    >>> quasi_static(SeriesSpring(Linear(2000.0), stiffness=1e6), np.array([-0.5, 0.0, 0.5])).force
+    Array([-1000.,     0.,  1000.], dtype=float64)
+    """
+    check_module("law", law, (AbstractDamper,), "quasi_static(law, velocities)")
+    velocities = as_float(velocities)
+    if velocities.ndim != 1 or velocities.size == 0:
+        _checks.refuse("velocities", "be one or more in one dimension", f"of shape {velocities.shape}")
+    _checks.finite("velocities", velocities)
+    law = without_fitted_ranges(law)
+    states = jnp.broadcast_to(law.initial_state(), (velocities.size, law.initial_state().size))
+    states, force = _hold(law, velocities, states, jnp.asarray(0))
+    if law.initial_state().size == 0:
+        settled = np.isfinite(force)
+        return QuasiStatic(velocities, force, settled, _gaps(law, np.asarray(velocities), np.asarray(force), settled))
+    seconds, change = 0, np.full(velocities.shape, np.inf)
+    while seconds < LONGEST_HOLD:
+        longer = max(2 * seconds, 1)
+        before, (states, force) = force, _hold(law, velocities, states, jnp.asarray(1000 * (longer - seconds)))
+        seconds, change = longer, np.abs(np.asarray(force) - np.asarray(before))
+        if np.all(change <= STILL[str(force.dtype)] * np.max(np.abs(force))):
+            break
+    size = np.abs(np.asarray(force))
+    limit = STEADY if force.dtype == jnp.float64 else STILL["float32"]
+    alone = change <= limit * size
+    settled = np.isfinite(size) & (alone | (change <= limit * np.max(size, where=alone, initial=0.0)))
+    note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
+    return QuasiStatic(velocities, jnp.where(settled, force, jnp.nan), settled, note)
+
+
+def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled: np.ndarray) -> str:
+    """Where a law has no settled force, and why."""
+    finite = np.isfinite(force)
+    reasons = (
+        (~finite, f"the law gives no finite force. {coverage(law)}".strip()),
+        (finite & ~settled, f"the force still changes after {LONGEST_HOLD} s of constant velocity."),
+    )
+    notes = []
+    for at, why in reasons:
+        if at.any():
+            lower, upper = (f"{end:.3g}" for end in (velocity[at].min(), velocity[at].max()))
+            where = f"at {lower}" if lower == upper else f"from {lower} to {upper}"
+            notes.append(f"No force at {np.count_nonzero(at)} of {at.size} velocities, {where} m/s: {why}")
+    return " ".join(notes)
+
+
+@eqx.filter_jit
+def _hold(law: AbstractDamper, velocities: Array, states: Array, count: Int[Array, ""]) -> tuple[Array, Array]:
+    """States and forces after so many more milliseconds at constant velocities."""
+    zero, dt = jnp.zeros((), velocities.dtype), jnp.asarray(1e-3, velocities.dtype)
+
+    def one(v: Array, start: Array) -> tuple[Array, Array]:
+        state = jax.lax.fori_loop(0, count, lambda _, state: law.advance(zero, v, zero, v, state, dt), start)
+        return state, law.force(zero, v, state)
+
+    return jax.vmap(one)(velocities, states)
