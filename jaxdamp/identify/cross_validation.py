@@ -11,7 +11,7 @@ from jaxdamp._progress import Progress
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import fit
-from jaxdamp.identify.result import AbstractFitted, score
+from jaxdamp.identify.result import AbstractFitted
 from jaxdamp.identify.starting import Start, check_starts
 from jaxdamp.parameters import parameters
 
@@ -149,6 +149,6 @@ def cross_validate(
                     shown(f"{name} without {run.name}, {len(folds) + 1} of {total}")
                     weighting = [np.inf if i == out else 1.0 for i in range(len(members))]
                     result = method(start, members, weighting=weighting, **options)
-                    held_out = score(result.law, members)[2][out]
+                    held_out = result.score(members)[2][out]
                     folds.append(Fold(name, group, run.name, held_out.fit_percent, held_out.rmse, result))
     return CrossValidation(tuple(folds))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxdamp._tables import Cell, Column, Shown, Table, with_tied
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.model import Model
 from jaxdamp.parameters import free_parameters
 
 
@@ -53,13 +53,13 @@ def rounded(value: float, error: float) -> tuple[str, str]:
     return next(texts), next(texts)
 
 
-def parameter_table(title: str, estimates: Sequence[Estimate], truth: AbstractDamper | None = None) -> Table:
+def parameter_table(title: str, estimates: Sequence[Estimate], truth: Model | None = None) -> Table:
     """Fitted values with standard errors, and the true values if they are known.
 
     Arguments:
         title: title of the table.
         estimates: estimates of a fit.
-        truth: the true law, as on a virtual bench; parameters are compared by name.
+        truth: the true law (on its rig, if one was fitted), as on a virtual bench; parameters are compared by name.
     """
     columns = [Column("parameter"), Column("unit"), Column("value", spec=".5g"), Column("standard error", spec=".2g")]
     columns += [Column("true", spec=".5g"), Column("(value − true)/se", spec="+.1f")] * (truth is not None)
@@ -76,7 +76,7 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: AbstractDa
     return Table(title, tuple(columns), tuple(rows))
 
 
-def _numbers(law: AbstractDamper) -> dict[str, float]:
-    """Every number of a law by name."""
-    free = free_parameters(law)
+def _numbers(model: Model) -> dict[str, float]:
+    """Every number of a model by name."""
+    free = free_parameters(model)
     return {name: float(value) for name, value in zip(free.names, free.values, strict=True)}

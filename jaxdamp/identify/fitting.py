@@ -13,6 +13,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.judging import judge
+from jaxdamp.identify.model import rig_of
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import Problem, linearised
 from jaxdamp.identify.result import FitResult
@@ -20,6 +21,7 @@ from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
 from jaxdamp.parameters import FreeParameters
+from jaxdamp.rig import Rig
 
 
 # Errors due to a law that does not suit the records, as opposed to a wrong call (`TypeError` and so on).
@@ -30,6 +32,7 @@ def fit(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],
     *,
+    rig: Rig | None = None,
     freeze: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tie: Mapping[str, str] | None = None,
@@ -60,6 +63,10 @@ def fit(
             either from the records, if its argument is called `runs`, or from all samples `(velocity, force)`, with
             `stroke` and `time` if it has arguments of these names.
         runs: one or more records.
+        rig: the test machine, if it adds to the force of the damper. Its parameters that differ from their defaults are
+            free, with these values as start, beside those of the law: `rig=Rig(gas_force=-100.0, force_delay=1e-3)`
+            estimates a gas force and a delay. `freeze` the known ones (`"rig.moving_mass"`). All paths of parameters
+            then begin with `law.` or `rig.`; their last parts stay the same.
         freeze: parameters to hold at their start, by path, last part of a path, or pattern.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
         tie: parameters that take the values of others, such as `{"terms.1.*": "terms.0.*"}`: one free value for each
@@ -96,6 +103,7 @@ def fit(
     problem = prepare(
         law,
         runs,
+        rig=rig,
         freeze=freeze,
         bounds=bounds,
         tie=tie,
@@ -121,7 +129,8 @@ def solve(problem: Problem, *, starts: int | None = None, max_steps: int = 200) 
     for name, count in (("max_steps", max_steps), ("starts", starts)):
         if count is not None and count < 1:
             _checks.refuse(name, "be 1 or more", count)
-    if is_linear(problem.law, problem.free):
+    rig = rig_of(problem.free.tree)
+    if is_linear(problem.law, problem.free) and not (rig and "heat" in rig.effects()):
         return _solve_linear(problem)
     return search_from(problem, starts=starts, max_steps=max_steps)
 

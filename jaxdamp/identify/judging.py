@@ -7,15 +7,16 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
-from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, takes_command, with_fitted_range
+from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, takes_command
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.estimating import estimate, on_correlation
+from jaxdamp.identify.model import Model, OnRig, is_memoryless, law_of, rig_of, with_range
 from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.result import FitResult, score
 from jaxdamp.identify.several import Solution
-from jaxdamp.identify.traces import is_memoryless, predict_runs
+from jaxdamp.identify.traces import predict_runs
 from jaxdamp.parameters import get, with_values
 
 
@@ -42,8 +43,9 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         )
     noise, inflation = noise_of(problem, best, force_noise)
     estimates = estimate(problem, solution, noise)
-    laws, law = _fitted(problem, best.values)
-    percent, rmse, scores = score(laws, problem.runs, np.isfinite(problem.sigma))
+    models, model = _fitted(problem, best.values)
+    law, rig = law_of(model), rig_of(model)
+    percent, rmse, scores = score(models or model, problem.runs, np.isfinite(problem.sigma))
     notes = [f"The search did not converge: {best.status.sentence} {_REMEDY}"] * (not best.converged)
     notes += [*notes_on(law, problem.fitted_to), *estimates.notes, *on_correlation(inflation)]
     return FitResult(
@@ -60,22 +62,20 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         starts=solution.starts,
         minima=estimates.minima,
         inflation=inflation,
-        record_laws=tuple(laws) if isinstance(laws, list) else (),
+        record_laws=tuple(map(law_of, models)),
+        rig=rig,
+        record_rigs=tuple(m.rig for m in models if isinstance(m, OnRig)),
     )
 
 
-def _fitted(problem: Problem, values: np.ndarray) -> tuple[AbstractDamper | list[AbstractDamper], AbstractDamper]:
-    """The fitted law with mean values, and the law of each record if they differ."""
-    covered, built = covered_range(problem.fitted_to), problem.free.started_at(values).tree
-    if not problem.per_record:
-        law = with_fitted_range(built, covered)
-        return law, law
+def _fitted(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:
+    """The fitted model of each record, where they differ, and the one with the mean of what differs."""
+    built = with_range(problem.free.started_at(values).tree, covered_range(problem.fitted_to))
     own = {path: get(built, path) for path in problem.per_record}
-    laws = [
-        with_fitted_range(with_values(built, {path: v[i] for path, v in own.items()}), covered)
-        for i in range(len(problem.runs))
-    ]
-    return laws, with_fitted_range(with_values(built, {path: jnp.mean(v) for path, v in own.items()}), covered)
+    if not own:
+        return [], built
+    models = [with_values(built, {path: v[i] for path, v in own.items()}) for i in range(len(problem.runs))]
+    return models, with_values(built, {path: jnp.mean(v) for path, v in own.items()})
 
 
 def notes_on(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:

@@ -6,18 +6,22 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.dampers import AbstractDamper, Reach
+from jaxdamp.dampers import Reach
+from jaxdamp.identify.model import Model, on_rig
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, started
 from jaxdamp.identify.traces import batches, owners
 from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
+from jaxdamp.rig import Rig
 
 
 def prepare(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],
     *,
+    rig: Rig | None = None,
     freeze: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tie: Mapping[str, str] | None = None,
@@ -48,10 +52,12 @@ def prepare(
     sigma = weights(weighting, runs)
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
     begin = started(law, fitted_to)
-    own = _per_record(begin, per_record, sigma)
-    free = free_parameters(_spread(begin, own, len(runs)), freeze=freeze, bounds=bounds, tie=tie)
+    model, absent = on_rig(begin, rig), _absent(rig)
+    own = _per_record(model, per_record, sigma, absent)
+    frozen = [*name_patterns("freeze", freeze), *absent]
+    free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
-    residuals, ranges = batches(begin, runs, sigma, samples_per_cycle, own)
+    residuals, ranges = batches(model, runs, sigma, samples_per_cycle, own)
     owner = owners(residuals, ranges)
     weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
     level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
@@ -59,10 +65,27 @@ def prepare(
     return Problem(free, residuals, level, runs, tuple(sigma), owner, reach, begin, own, weighting == "runs")
 
 
-def _per_record(law: AbstractDamper, names: Sequence[str], sigma: Sequence[float]) -> tuple[str, ...]:
+def _absent(rig: Rig | None) -> list[str]:
+    """Paths of the numbers of a machine that are left at their defaults, and so have no part in a fit."""
+    if rig is None:
+        return []
+    call = "fit(law, runs, rig=Rig(gas_force=-100.0, force_delay=1e-3))"
+    check_module("rig", rig, (Rig,), call)
+    pairs = list(zip(parameters(rig), parameters(Rig()), strict=True))
+    absent = [f"rig.{p.path}" for p, default in pairs if p.value == default.value]
+    if len(absent) == len(pairs):
+        remedy = f"Give what shall be found a start, as in `{call}`; leave out a machine that adds nothing."
+        _checks.refuse("rig", "have a number that is not at its default", "one that adds nothing", remedy)
+    return absent
+
+
+def _per_record(model: Model, names: Sequence[str], sigma: Sequence[float], absent: Sequence[str]) -> tuple[str, ...]:
     """Paths of the parameters that have a value for each record."""
-    by_path = {p.path: p for p in parameters(law)}
+    by_path = {p.path: p for p in parameters(model)}
     paths = match_paths(list(by_path), name_patterns("per_record", names))
+    for path in set(paths) & set(absent):
+        remedy = f"Give it a start: `rig=Rig({path.removeprefix('rig.')}=...)`."
+        _checks.refuse("per_record", "name parameters that are free", f"{path}, which the rig leaves out", remedy)
     for path in paths:
         if by_path[path].value.ndim:
             remedy = "Only single numbers can differ from record to record."
@@ -73,10 +96,10 @@ def _per_record(law: AbstractDamper, names: Sequence[str], sigma: Sequence[float
     return tuple(paths)
 
 
-def _spread(law: AbstractDamper, paths: Sequence[str], records: int) -> AbstractDamper:
-    """The law with a vector of values, one for each record, at some paths."""
-    values = {p.path: p.value for p in parameters(law)}
-    return with_values(law, {path: jnp.full(records, values[path]) for path in paths})
+def _spread(model: Model, paths: Sequence[str], records: int) -> Model:
+    """The model with a vector of values, one for each record, at some paths."""
+    values = {p.path: p.value for p in parameters(model)}
+    return with_values(model, {path: jnp.full(records, values[path]) for path in paths})
 
 
 def weights(weighting: str | Sequence[float], runs: Sequence[BenchRun]) -> list[float]:

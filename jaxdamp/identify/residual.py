@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.model import Model
 from jaxdamp.identify.traces import predict_by_record, used_samples
 
 
@@ -19,7 +19,7 @@ class ErrorShares(NamedTuple):
     rest: float  # noise, and changes from cycle to cycle
 
 
-def error_shares(law: AbstractDamper | Sequence[AbstractDamper], runs: BenchRun | Iterable[BenchRun]) -> ErrorShares:
+def error_shares(law: Model | Sequence[Model], runs: BenchRun | Iterable[BenchRun]) -> ErrorShares:
     """Split the squared force error of a law over records, record by record, by an analysis of variance.
 
     The samples of a record are sorted by velocity into bins, and each bin is divided by the half of the stroke: a cycle
@@ -30,7 +30,7 @@ def error_shares(law: AbstractDamper | Sequence[AbstractDamper], runs: BenchRun 
     `FitResult.error_shares` gives the shares of a fit over its own records.
 
     Arguments:
-        law: a law, fitted or not; or one for each record.
+        law: a law, fitted or not, or the `model` of a fit; or one for each record.
         runs: one record or several.
 
     >>> from jaxdamp import bench

@@ -13,8 +13,10 @@ from jaxdamp._tables import Table, plain, with_unit
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
+from jaxdamp.identify.model import Model, on_rig
 from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.traces import predict_by_record, predict_runs, used_samples
+from jaxdamp.rig import Rig
 
 
 if TYPE_CHECKING:
@@ -60,13 +62,13 @@ def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray])
 
 
 def score(
-    law: AbstractDamper | Sequence[AbstractDamper],
+    model: Model | Sequence[Model],
     runs: Sequence[BenchRun],
     counted: Sequence[bool] | np.ndarray | None = None,
 ) -> tuple[float, float, tuple[Score, ...]]:
-    """Fit percent and RMSE [N] of a law, or of one for each record, over the records that count, and for each."""
-    laws, forces = predict_by_record(law, runs)
-    used = [used_samples(own, run) for own, run in zip(laws, runs, strict=True)]
+    """Fit percent and RMSE [N] of a model, or of one for each record, over the records that count, and for each."""
+    models, forces = predict_by_record(model, runs)
+    used = [used_samples(own, run) for own, run in zip(models, runs, strict=True)]
     measured = [run.force[k] for run, k in zip(runs, used, strict=True)]
     predicted = [force[k] for force, k in zip(forces, used, strict=True)]
     rows = []
@@ -117,13 +119,18 @@ class AbstractFitted:
         """Whether the search ended by its tolerance."""
         return self.status is Status.CONVERGED
 
+    @property
+    def model(self) -> Model:
+        """What was fitted to the records: the law, on a machine if that was fitted too."""
+        return self.law
+
     def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
-        """Force [N] of the fitted law at every sample of records, old or new."""
-        return predict_runs(self.law, as_runs(runs))
+        """Force [N] that the fit expects at every sample of records, old or new, of the same machine."""
+        return predict_runs(self.model, as_runs(runs))
 
     def score(self, runs: Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
         """Fit percent, RMSE [N] and the scores by record, on other records."""
-        return score(self.law, as_runs(runs))
+        return score(self.model, as_runs(runs))
 
     def to_dict(self) -> dict[str, Any]:
         """The result as numbers with units and words, ready for JSON; numbers that are not finite are None.
@@ -154,6 +161,8 @@ class FitResult(AbstractFitted):
         inflation: factor on the standard errors because the residual is correlated from sample to sample; 1 if it is
             not, or if the noise was given.
         record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
+        rig: the fitted test machine, if one was fitted.
+        record_rigs: the test machine of each record, as `record_laws`.
     """
 
     parameters: tuple[Estimate, ...]
@@ -163,6 +172,13 @@ class FitResult(AbstractFitted):
     minima: tuple[Minimum, ...] = ()
     inflation: float = 1.0
     record_laws: tuple[AbstractDamper, ...] = ()
+    rig: Rig | None = None
+    record_rigs: tuple[Rig, ...] = ()
+
+    @property
+    def model(self) -> Model:
+        """What was fitted to the records: the law, on a machine if that was fitted too."""
+        return on_rig(self.law, self.rig)
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name."""
@@ -174,15 +190,24 @@ class FitResult(AbstractFitted):
     @functools.cached_property
     def error_shares(self) -> ErrorShares:
         """Shares of the squared error over the records: shape, hysteresis, rest (`identify.error_shares`)."""
-        return error_shares(self.record_laws or self.law, self.runs)
+        rigs = self.record_rigs or (None,) * len(self.record_laws)
+        return error_shares([*map(on_rig, self.record_laws, rigs)] or self.model, self.runs)
 
-    def table(self, truth: AbstractDamper | None = None, *, title: str = "") -> Table:
-        """The parameters with units, standard errors and meanings, compared with a true law if one is given."""
-        return parameter_table(title or f"Parameters of {type(self.law).__name__}", self.parameters, truth)
+    def table(self, truth: AbstractDamper | None = None, *, true_rig: Rig | None = None, title: str = "") -> Table:
+        """The parameters with units, standard errors and meanings, compared with a true law if one is given.
+
+        Arguments:
+            truth: the true law.
+            true_rig: the true test machine, if one was fitted.
+            title: of the table.
+        """
+        true = None if truth is None else on_rig(truth, None if self.rig is None else true_rig or Rig())
+        return parameter_table(title or f"Parameters of {type(self.law).__name__}", self.parameters, true)
 
     def to_dict(self) -> dict[str, Any]:
         """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         return super().to_dict() | {
+            **({} if self.rig is None else {"rig": repr(self.rig)}),
             "error_shares": plain(self.error_shares._asdict()),
             "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
             "covariance": plain(self.covariance),

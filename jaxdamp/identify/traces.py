@@ -11,17 +11,10 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import (
-    AbstractDamper,
-    command_paths,
-    require_finite_force,
-    takes_command,
-    with_command,
-    without_fitted_ranges,
-)
+from jaxdamp.dampers import command_paths, require_finite_force, takes_command, with_command, without_fitted_ranges
+from jaxdamp.identify.model import Model, blind_end, effects_of, is_memoryless, law_of, marched, rig_of
 from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.parameters import get, with_values
-from jaxdamp.rig import march
 
 
 STEP_ANGLE = 0.06  # rad of the dominant frequency per step: keeps the error of a law's step near 1e-4
@@ -42,18 +35,20 @@ class Batch(AbstractResiduals):
     fixed: dict[str, Float[Array, " runs"]]  # values of the law that each record states, by path, such as its command
     per_record: tuple[str, ...] = eqx.field(static=True)  # paths where the law has a value for each record
     substeps: int = eqx.field(static=True)
+    temperature: Float[Array, "runs time"] | None = None  # where the model takes it from the records
+    effects: tuple[str, ...] = eqx.field(static=True, default=())  # of the machine (`Rig.effects`)
 
-    def predict(self, law: AbstractDamper) -> Float[Array, "runs time"]:
-        """Force of the law under these strokes [N]."""
+    def predict(self, model: Model) -> Float[Array, "runs time"]:
+        """Force of the model under these strokes [N]."""
 
-        def one(dt: Array, x: Array, v: Array, values: dict[str, Array]) -> Array:
-            return march(with_values(law, values), dt, x, v, self.substeps)
+        def one(dt: Array, x: Array, v: Array, temperature: Array | None, values: dict[str, Array]) -> Array:
+            return marched(with_values(model, values), self.effects, dt, x, v, temperature, self.substeps)
 
-        own = {path: get(law, path)[self.number] for path in self.per_record}
-        return jax.vmap(one)(self.dt, self.stroke, self.velocity, self.fixed | own)
+        own = {path: get(model, path)[self.number] for path in self.per_record}
+        return jax.vmap(one)(self.dt, self.stroke, self.velocity, self.temperature, self.fixed | own)
 
-    def __call__(self, model: AbstractDamper) -> Float[Array, " samples"]:
-        """Weighted difference of the law's force from the measured one; zero where the weight is, even beside NaN."""
+    def __call__(self, model: Model) -> Float[Array, " samples"]:
+        """Weighted difference of the model's force from the measured one; zero where the weight is, even beside NaN."""
         return jnp.ravel(jnp.where(self.weight > 0, (self.predict(model) - self.force) * self.weight, 0.0))
 
     def used(self) -> Bool[np.ndarray, " samples"]:
@@ -76,20 +71,15 @@ class SampleRange(NamedTuple):
 
 
 class _Row(NamedTuple):
-    """A record made ready for a law with states."""
+    """A record made ready for a model with memory."""
 
     dt: float
-    signals: tuple[np.ndarray, np.ndarray, np.ndarray]  # stroke, velocity, force
+    signals: list[np.ndarray]  # stroke, velocity, force, and the temperature if it is used
     weight: np.ndarray
     number: int
     warm_up: int
     block: int
     substeps: int
-
-
-def is_memoryless(law: AbstractDamper) -> bool:
-    """Whether the law has no states."""
-    return jax.eval_shape(law.initial_state).size == 0
 
 
 def _round_up(count: int) -> int:
@@ -119,16 +109,17 @@ def settling_time(run: BenchRun) -> float:
     return min(np.pi / dominant_rate(run), 0.25 * run.duration)
 
 
-def _with_warm_up(run: BenchRun, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Stroke, velocity and force, preceded by a copy of the first cycle with a continuous stroke."""
+def _with_warm_up(run: BenchRun, count: int, channels: Sequence[str]) -> list[np.ndarray]:
+    """Channels, preceded by a copy of the first cycle with a continuous stroke."""
     period = min(2 * np.pi / dominant_rate(run), run.duration)
     since = run.time - run.time[0]
     instants = period + np.arange(-count, 0) / run.sampling_rate
     stroke, velocity = (np.interp(instants, since, values) for values in (run.stroke, run.velocity))
     stroke = stroke + run.stroke[0] - np.interp(period, since, run.stroke)
-    before = (stroke, velocity, np.zeros(count))
-    after = (run.stroke, run.velocity, run.force)
-    return tuple(np.concatenate(pair) for pair in zip(before, after, strict=True))  # type: ignore[return-value]
+    before = {"stroke": stroke, "velocity": velocity, "force": np.zeros(count)}
+    if "temperature" in channels and run.temperature is not None:
+        before["temperature"] = np.full(count, run.temperature[0])
+    return [np.concatenate([before[channel], getattr(run, channel)]) for channel in channels]
 
 
 def _block(run: BenchRun, samples_per_cycle: int | None) -> int:
@@ -137,16 +128,19 @@ def _block(run: BenchRun, samples_per_cycle: int | None) -> int:
     return 1 if samples_per_cycle is None else max(int(cycle / samples_per_cycle), 1)
 
 
-def _row(run: BenchRun, sigma: float, samples_per_cycle: int | None, warms_up: bool, number: int) -> _Row:
+def _row(
+    run: BenchRun, sigma: float, samples_per_cycle: int | None, model: Model, channels: Sequence[str], number: int
+) -> _Row:
     dt, omega = 1.0 / run.sampling_rate, dominant_rate(run)
-    block = _block(run, samples_per_cycle)
+    block, warms_up = _block(run, samples_per_cycle), not is_memoryless(model)
     substeps = int(np.clip(np.ceil(omega * dt * block / STEP_ANGLE), 1, 8))
     warm_up = int(min(2 * np.pi / omega, run.duration) / (dt * block)) if warms_up else 0
-    stroke, velocity, force = (_averaged(values, block) for values in _with_warm_up(run, warm_up * block))
-    weight = np.full(len(force), np.sqrt(block) / sigma)
+    signals = [_averaged(values, block) for values in _with_warm_up(run, warm_up * block, channels)]
+    weight = np.full(len(signals[0]), np.sqrt(block) / sigma)
+    weight[len(weight) - blind_end(model, dt * block) :] = 0.0
     if warms_up:
         weight[: warm_up + int(np.ceil(settling_time(run) / (dt * block)))] = 0.0
-    return _Row(dt * block, (stroke, velocity, force), weight, number, warm_up, block, substeps)
+    return _Row(dt * block, signals, weight, number, warm_up, block, substeps)
 
 
 def _grouped(rows: Sequence[_Row]) -> list[list[int]]:
@@ -170,31 +164,40 @@ def _grouped(rows: Sequence[_Row]) -> list[list[int]]:
     return groups
 
 
-def _batch(rows: Sequence[_Row], fixed: Mapping[str, Sequence[float]], per_record: tuple[str, ...]) -> Batch:
+def _batch(
+    rows: Sequence[_Row],
+    fixed: Mapping[str, Sequence[float]],
+    per_record: tuple[str, ...],
+    effects: tuple[str, ...],
+) -> Batch:
     length = _round_up(max(len(row.weight) for row in rows))
-    columns = [np.stack([_pad(row.signals[k], length) for row in rows]) for k in range(3)]
+    signals = zip(*(row.signals for row in rows), strict=True)
+    columns = [_on_device(np.stack([_pad(values, length) for values in channel])) for channel in signals]
+    stroke, velocity, force, *temperature = columns
     weight = np.stack([_pad(row.weight, length, "constant") for row in rows])
     number = np.array([row.number for row in rows])
-    arrays = map(_on_device, (np.array([row.dt for row in rows]), *columns, weight, number))
+    dt, substeps = np.array([row.dt for row in rows]), max(row.substeps for row in rows)
     own = {path: _on_device(np.array(values, float)[number]) for path, values in fixed.items()}
-    return Batch(*arrays, fixed=own, per_record=per_record, substeps=max(row.substeps for row in rows))
+    arrays = (_on_device(dt), stroke, velocity, force, _on_device(weight), _on_device(number))
+    return Batch(*arrays, own, per_record, substeps, temperature[0] if temperature else None, effects)
 
 
 def _memoryless_batch(
-    runs: Sequence[BenchRun], sigma: Sequence[float], samples_per_cycle: int | None
+    runs: Sequence[BenchRun], sigma: Sequence[float], samples_per_cycle: int | None, channels: Sequence[str]
 ) -> tuple[tuple[Batch, ...], list[SampleRange]]:
     blocks = [_block(run, samples_per_cycle) for run in runs]
     counts = [len(run) // block for run, block in zip(runs, blocks, strict=True)]
     ends = np.cumsum(counts)
     length = _round_up(int(ends[-1]))
-    stroke, velocity, force = (
+    columns = [
         _pad(np.concatenate([_averaged(getattr(r, name), b) for r, b in zip(runs, blocks, strict=True)]), length)[None]
-        for name in ("stroke", "velocity", "force")
-    )
+        for name in channels
+    ]
     weight = np.repeat(np.sqrt(blocks) / np.asarray(sigma), counts)
-    arrays = (np.ones(1), stroke, velocity, force, _pad(weight, length, "constant")[None], np.zeros(1, int))
+    arrays = (np.ones(1), *columns[:3], _pad(weight, length, "constant")[None], np.zeros(1, int))
+    temperature = _on_device(columns[3]) if len(columns) > 3 else None
     ranges = [SampleRange(0, 0, int(end) - n, int(end), b) for end, n, b in zip(ends, counts, blocks, strict=True)]
-    return (Batch(*map(_on_device, arrays), fixed={}, per_record=(), substeps=1),), ranges
+    return (Batch(*map(_on_device, arrays), fixed={}, per_record=(), substeps=1, temperature=temperature),), ranges
 
 
 def _on_device(array: np.ndarray) -> Array:
@@ -202,55 +205,71 @@ def _on_device(array: np.ndarray) -> Array:
     return jnp.asarray(array, float if array.dtype.kind == "f" else int)
 
 
-def _stated(law: AbstractDamper, runs: Sequence[BenchRun]) -> dict[str, list[float]]:
+def _stated(model: Model, runs: Sequence[BenchRun]) -> dict[str, list[float]]:
     """Values that the records state for the law, by path: the command, if the law has one."""
-    commands = [run.command for run in runs if run.command is not None]
+    commands, law = [run.command for run in runs if run.command is not None], law_of(model)
     if not takes_command(law) or not commands:
         return {}
-    lacking = [run.name for run in runs if run.command is None]
-    if lacking:
-        must, remedy = "all state their command", 'Pass it when reading, `bench.read(..., command={"*_0.5A": 0.5})`.'
-        _checks.refuse("runs", must, f"without one: {', '.join(lacking)}", remedy)
+    remedy = 'Pass it when reading, `bench.read(..., command={"*_0.5A": 0.5})`.'
+    _refuse_some("command", runs, remedy)
     for command in set(commands):
         with_command(law, command)  # refuses what is out of range
-    return dict.fromkeys(command_paths(law), commands)
+    return dict.fromkeys(command_paths(model), commands)
+
+
+def _refuse_some(what: str, runs: Sequence[BenchRun], remedy: str) -> None:
+    """Refuse records of which some state what others do not."""
+    lacking = [run.name for run in runs if getattr(run, what) is None]
+    if lacking:
+        _checks.refuse("runs", f"all state their {what}", f"without one: {', '.join(lacking)}", remedy)
+
+
+def _channels(model: Model, runs: Sequence[BenchRun]) -> list[str]:
+    """The channels that a model is compared with, the temperature among them if it says something of the force."""
+    channels, rig = ["stroke", "velocity", "force"], rig_of(model)
+    if rig is None or not (np.any(rig.temperature_slope) or np.any(rig.gas_temperature_slope)):
+        return channels
+    if all(run.temperature is None for run in runs):
+        return channels
+    _refuse_some("temperature", runs, "Fit those with and those without it apart.")
+    return [*channels, "temperature"]
 
 
 def batches(
-    law: AbstractDamper,
+    model: Model,
     runs: Sequence[BenchRun],
     sigma: Sequence[float],
     samples_per_cycle: int | None,
     per_record: tuple[str, ...] = (),
 ) -> tuple[tuple[Batch, ...], list[SampleRange]]:
-    """Prepare records for a law.
+    """Prepare records for a model.
 
     If a record has more than `samples_per_cycle`, blocks of samples are averaged and weighted by the root of their
-    number. For a law without states all records are in one batch. For a law with states every record is preceded by a
-    copy of its first cycle, during which the states go from rest to those of the steady motion; the copy and the first
-    half cycle of the record get weight zero.
+    number. For a model without memory all records are in one batch. For a law with states, or a rig with delay, lag,
+    heat or moving mass, every record is preceded by a copy of its first cycle, during which the states go from rest to
+    those of the steady motion; the copy and the first half cycle of the record get weight zero.
 
     Arguments:
-        law: the law; only its states and its command matter.
+        model: the law, on a rig or not; only its memory and what it takes from the records matter.
         runs: the records.
         sigma: standard deviation [N] of the force for each record.
         samples_per_cycle: see above; `None` takes every sample.
-        per_record: paths where the law that the batches are given has a value for each record.
+        per_record: paths where the model that the batches are given has a value for each record.
 
     Returns:
         The batches, and for each record where it is.
     """
-    fixed, warms_up = _stated(law, runs), not is_memoryless(law)
-    if not (warms_up or fixed or per_record):
-        return _memoryless_batch(runs, sigma, samples_per_cycle)
+    fixed, channels = _stated(model, runs), _channels(model, runs)
+    if is_memoryless(model) and not (fixed or per_record):
+        return _memoryless_batch(runs, sigma, samples_per_cycle, channels)
     pairs = zip(runs, sigma, strict=True)
-    rows = [_row(run, s, samples_per_cycle, warms_up, number) for number, (run, s) in enumerate(pairs)]
+    rows = [_row(run, s, samples_per_cycle, model, channels, number) for number, (run, s) in enumerate(pairs)]
     groups = _grouped(rows)
     ranges: dict[int, SampleRange] = {}
     for number, group in enumerate(groups):
         for k, i in enumerate(group):
             ranges[i] = SampleRange(number, k, rows[i].warm_up, len(rows[i].weight), rows[i].block)
-    made = tuple(_batch([rows[i] for i in group], fixed, per_record) for group in groups)
+    made = tuple(_batch([rows[i] for i in group], fixed, per_record, effects_of(model)) for group in groups)
     return made, [ranges[i] for i in range(len(runs))]
 
 
@@ -263,8 +282,8 @@ def owners(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> Int[np.ndarr
 
 
 @eqx.filter_jit
-def _predict(batch: Batch, law: AbstractDamper) -> Array:
-    return batch.predict(law)
+def _predict(batch: Batch, model: Model) -> Array:
+    return batch.predict(model)
 
 
 def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
@@ -276,29 +295,31 @@ def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
     return values[left] + (places - left) * (values[left + 1] - values[left])
 
 
-def predict_runs(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[np.ndarray]:
-    """Force [N] of the law at every sample of every record."""
-    law = without_fitted_ranges(law)
-    made, ranges = batches(law, runs, [1.0] * len(runs), None if is_memoryless(law) else PREDICTED_PER_CYCLE)
-    forces = [np.asarray(_predict(batch, law)) for batch in made]
+def predict_runs(model: Model, runs: Sequence[BenchRun]) -> list[np.ndarray]:
+    """Force [N] of the model at every sample of every record."""
+    model = without_fitted_ranges(model)
+    made, ranges = batches(model, runs, [1.0] * len(runs), None if is_memoryless(model) else PREDICTED_PER_CYCLE)
+    forces = [np.asarray(_predict(batch, model)) for batch in made]
     spread = [
         _spread(forces[p.batch][p.row, p.start : p.stop], p.block, len(run))
         for p, run in zip(ranges, runs, strict=True)
     ]
     for run, force in zip(runs, spread, strict=True):
-        require_finite_force(law, force[used_samples(law, run)], f"over the record {run.name!r}")
+        require_finite_force(law_of(model), force[used_samples(model, run)], f"over the record {run.name!r}")
     return spread
 
 
-def predict_by_record(
-    law: AbstractDamper | Sequence[AbstractDamper], runs: Sequence[BenchRun]
-) -> tuple[list[AbstractDamper], list[np.ndarray]]:
-    """The law of each record and its force [N] there, of one law for all records or of one for each."""
-    if isinstance(law, AbstractDamper):
-        return [law] * len(runs), predict_runs(law, runs)
-    return list(law), [predict_runs(own, [run])[0] for own, run in zip(law, runs, strict=True)]
+def predict_by_record(model: Model | Sequence[Model], runs: Sequence[BenchRun]) -> tuple[list[Model], list[np.ndarray]]:
+    """The model of each record and its force [N] there, of one model for all records or of one for each."""
+    if isinstance(model, Sequence):
+        return list(model), [predict_runs(own, [run])[0] for own, run in zip(model, runs, strict=True)]
+    return [model] * len(runs), predict_runs(model, runs)
 
 
-def used_samples(law: AbstractDamper, run: BenchRun) -> slice:
-    """The samples of a record that a fit of this law uses: all, or those after settling."""
-    return slice(0 if is_memoryless(law) else int(np.ceil(settling_time(run) * run.sampling_rate)), None)
+def used_samples(model: Model, run: BenchRun) -> slice:
+    """The samples of a record that a fit of this model uses: all, or those from settling to a blind end."""
+    if is_memoryless(model):
+        return slice(0, None)
+    block = _block(run, PREDICTED_PER_CYCLE)
+    blind = blind_end(model, block / run.sampling_rate) * block
+    return slice(int(np.ceil(settling_time(run) * run.sampling_rate)), len(run) - blind)

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from jaxdamp.bench import BenchRun
+from jaxdamp.identify.model import is_memoryless
 from jaxdamp.identify.rungs import Rung, best_of
-from jaxdamp.identify.traces import is_memoryless
 
 
 HYSTERESIS = 0.05  # share of the squared error above which a law with states is worthwhile

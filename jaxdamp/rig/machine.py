@@ -13,7 +13,7 @@ from jaxdamp._types import Number, Scalar, Signal, SignalLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import Module, as_float, check_parameters, nonnegative, parameter, positive, readable, setting
 from jaxdamp.rig.channel import delayed, lagged
-from jaxdamp.rig.response import respond, slopes
+from jaxdamp.rig.response import march, respond, slopes
 
 
 not_positive = dataclasses.replace(
@@ -143,9 +143,24 @@ class Rig(Module):
             _checks.finite("temperature", temperature)
         return _readings(self, self.effects(), law_force, dt, stroke, rate, temperature)
 
+    def march(
+        self,
+        law: AbstractDamper,
+        effects: tuple[str, ...],
+        dt: Scalar,
+        stroke: Signal,
+        velocity: Signal,
+        temperature: Signal | None = None,
+        substeps: int = 1,
+    ) -> Readings:
+        """`readings` without its checks, for use inside compiled functions, with the `effects` known outside."""
+        force = march(law, dt, stroke - self.stroke_offset, velocity, substeps)
+        return _readings(self, effects, force, dt, stroke, velocity, temperature)
+
     def effects(self) -> tuple[str, ...]:
-        """Which effects that cost time over a whole record are there; one that is traced counts as there."""
+        """Which effects there are that depend on more than the instant; one that is traced counts as there."""
         numbers = {
+            "inertia": (self.moving_mass,),
             "heat": (self.heating, self.initial_rise),
             "lag": (self.force_lag,),
             "delay": (self.force_delay,),
@@ -174,7 +189,9 @@ def _readings(
         rise = jnp.zeros_like(law_force)
     gas = rig.gas_force + rig.gas_stiffness * (stroke - rig.stroke_offset)
     force = law_force * (1.0 - rig.temperature_slope * rise) + gas * (1.0 + rig.gas_temperature_slope * rise)
-    force = force + friction + rig.moving_mass * slopes(velocity, dt)
+    force = force + friction
+    if "inertia" in effects:
+        force = force + rig.moving_mass * slopes(velocity, dt)
     if "lag" in effects:
         force = lagged(force, rig.force_lag / dt)
     if "delay" in effects:

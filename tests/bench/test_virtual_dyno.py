@@ -174,7 +174,8 @@ def test_reversed_force():
 def test_stuck_channels():
     time = np.arange(2500) / 2000
     for name, unstuck in (("force", channel("force")), ("stroke", channel("stroke"))):
-        stuck = channel(name, **{f"{name}_stuck_from": 0.8})
+        since: dict[str, Any] = {f"{name}_stuck_from": 0.8}
+        stuck = channel(name, **since)
         np.testing.assert_array_equal(stuck[time < 0.8], unstuck[time < 0.8])
         np.testing.assert_array_equal(stuck[time >= 0.8], unstuck[1600])
 

@@ -1,0 +1,75 @@
+"""What explains the records of a bench: a law, or a law on a machine that adds to its force."""
+
+from typing import final
+
+import jax
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp.dampers import AbstractDamper, FittedRange, with_fitted_range
+from jaxdamp.parameters import Module
+from jaxdamp.rig import Rig, march
+
+
+@final
+class OnRig(Module):
+    """A law on a machine; paths of parameters begin with `law.` and `rig.`."""
+
+    law: AbstractDamper
+    rig: Rig
+
+
+Model = AbstractDamper | OnRig
+
+
+def on_rig(law: AbstractDamper, rig: Rig | None) -> Model:
+    """The law, on the machine if there is one."""
+    return law if rig is None else OnRig(law, rig)
+
+
+def law_of(model: Model) -> AbstractDamper:
+    """The law itself."""
+    return model.law if isinstance(model, OnRig) else model
+
+
+def rig_of(model: Model) -> Rig | None:
+    """The machine, if there is one."""
+    return model.rig if isinstance(model, OnRig) else None
+
+
+def effects_of(model: Model) -> tuple[str, ...]:
+    """What of the machine depends on more than the instant (`Rig.effects`); asked of known numbers, not traced ones."""
+    return model.rig.effects() if isinstance(model, OnRig) else ()
+
+
+def is_memoryless(model: Model) -> bool:
+    """Whether the force depends on stroke and velocity of the instant alone."""
+    return jax.eval_shape(law_of(model).initial_state).size == 0 and not effects_of(model)
+
+
+def with_range(model: Model, fitted_to: FittedRange) -> Model:
+    """The same with the range that the law was fitted to."""
+    return on_rig(with_fitted_range(law_of(model), fitted_to), rig_of(model))
+
+
+def blind_end(model: Model, dt: float) -> int:
+    """So many samples at the end of a record cannot be predicted: their force needs the motion behind the end."""
+    if not effects_of(model):
+        return 0
+    assert isinstance(model, OnRig)
+    return 2 + int(np.ceil(np.max(np.abs(np.asarray(model.rig.force_delay))) / dt))
+
+
+def marched(
+    model: Model,
+    effects: tuple[str, ...],
+    dt: Array,
+    stroke: Float[Array, " time"],
+    velocity: Float[Array, " time"],
+    temperature: Float[Array, " time"] | None,
+    substeps: int,
+) -> Float[Array, " time"]:
+    """Force [N] in a record with this motion, for use inside compiled functions."""
+    if isinstance(model, AbstractDamper):
+        return march(model, dt, stroke, velocity, substeps)
+    return model.rig.march(model.law, effects, dt, stroke, velocity, temperature, substeps).force

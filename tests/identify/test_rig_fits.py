@@ -1,0 +1,161 @@
+"""Fits of a law together with the machine that its records come from."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from jaxdamp import identify
+from jaxdamp.bench import BenchRun, BenchSet, SineTest, VirtualDyno
+from jaxdamp.dampers import AbstractDamper, Bilinear, CoulombFriction, Linear, SeriesSpring
+from jaxdamp.export import from_json, to_json
+from jaxdamp.rig import Rig
+
+
+LAW, START = Bilinear(2600.0, 1200.0), Bilinear(1500.0, 1500.0)
+TESTS = [SineTest(0.02, 1.0), SineTest(0.01, 4.0), SineTest(0.005, 10.0)]
+RIG = Rig(gas_force=-120.0, force_offset=25.0, force_delay=1e-3)
+
+
+def records(
+    law: AbstractDamper = LAW, rig: Rig = RIG, tests: list[SineTest] = TESTS, rate: float = 500.0, **more: Any
+) -> BenchSet:
+    return VirtualDyno(law, rig=rig, force_noise=5.0, sampling_rate=rate, seed=1, **more).run(tests)
+
+
+def assert_recovered(result: identify.FitResult, law: AbstractDamper, rig: Rig) -> None:
+    rows = result.table(law, true_rig=rig).rows
+    away = {str(row[0]): float(str(row[5])) for row in rows}
+    assert all(abs(a) < 3.0 for a in away.values()), away
+
+
+@pytest.fixture(scope="module")
+def result() -> identify.FitResult:
+    """Gas force known, offset and delay not."""
+    start = Rig(gas_force=-120.0, force_offset=-5.0, force_delay=2e-4)
+    return identify.fit(START, records(), rig=start, freeze=["gas_force"])
+
+
+def test_law_and_machine_are_recovered_together(result):
+    assert [e.name for e in result.parameters] == [
+        "law.rebound_rate",
+        "law.compression_rate",
+        "rig.force_delay",
+        "rig.force_offset",
+    ]
+    assert result["rig.force_delay"].unit == "s"
+    assert result.converged and not result.warnings
+    assert result.fit_percent > 97.0
+    assert result.rmse == pytest.approx(5.0, rel=0.05)
+    assert_recovered(result, LAW, RIG)
+    assert result["rig.force_delay"].standard_error < 3e-5
+    assert isinstance(result.law, Bilinear) and result.rig.gas_force == -120.0
+
+
+def test_a_fit_without_the_machine_is_wrong_and_says_so(result):
+    blind = identify.fit(START, records())
+    rate = blind["rebound_rate"]
+    assert abs(rate.value - 2600.0) > 500.0  # the offset pulls both slopes together
+    assert rate.standard_error > 100.0  # inflated by the correlation of the residual
+    assert any("misses something systematic" in warning for warning in blind.warnings)
+    assert blind.rig is None and blind.fit_percent < result.fit_percent - 15.0
+
+
+def test_predictions_are_those_of_the_machine(result):
+    new = VirtualDyno(LAW, rig=RIG, sampling_rate=500.0).run(SineTest(0.015, 3.0))[0]
+    (force,) = result.predict(new)
+    used = slice(len(new) // 6, -3)
+    np.testing.assert_allclose(force[used], new.force[used], atol=4.0)  # of 730 N
+    np.testing.assert_allclose(result.score([new])[1], np.std(force[used] - new.force[used]), rtol=0.5)
+    alone = np.asarray(result.law.force_velocity(0.2))
+    assert float(alone) == pytest.approx(520.0, abs=2.0)
+    assert sum(result.error_shares) == pytest.approx(1.0)
+
+
+def test_the_machine_is_kept_with_the_result(result):
+    assert from_json(to_json(result.rig)).force_delay == result.rig.force_delay
+    assert result.to_dict()["rig"].startswith("Rig(gas_force=-120.0")
+    assert result.law.fitted_to is not None
+
+
+def test_gas_and_offset_cannot_be_told_apart():
+    found = identify.fit(START, records(rig=replace(RIG, force_delay=0.0)), rig=Rig(gas_force=-10.0, force_offset=1.0))
+    assert found.steps == 0  # all of it linear: a closed form
+    assert any("cannot tell rig.gas_force and rig.force_offset apart" in w for w in found.warnings)
+    total = found["rig.gas_force"].value + found["rig.force_offset"].value
+    assert total == pytest.approx(-95.0, abs=1.0)
+
+
+def test_an_offset_of_each_record():
+    offsets = (20.0, -30.0, 5.0)
+    pairs = zip(TESTS, offsets, strict=True)
+    runs = [records(rig=Rig(gas_force=-120.0, force_offset=off), tests=[test])[0] for test, off in pairs]
+    start = Rig(gas_force=-120.0, force_offset=1.0)
+    found = identify.fit(START, runs, rig=start, freeze=["gas_force"], per_record=["force_offset"])
+    for i, offset in enumerate(offsets):
+        estimate = found[f"rig.force_offset[{i}]"]
+        assert abs(estimate.value - offset) < 3 * estimate.standard_error
+        assert float(found.record_rigs[i].force_offset) == pytest.approx(estimate.value)
+    assert found.rig is not None and found.rig.force_offset == pytest.approx(
+        np.mean([r.force_offset for r in found.record_rigs])
+    )
+    assert found.error_shares.shape < 0.05
+
+
+def test_temperature_slope_by_the_measured_temperature():
+    rig = Rig(temperature_slope=0.003, heating=0.01, cooling=0.01)
+    runs = records(rig=rig, tests=[SineTest(0.02, f, cycles=40) for f in (2.0, 4.0)], temperature_channel=True)
+    assert all(run.temperature is not None and run.temperature.max() > 293.15 + 5.0 for run in runs)
+    found = identify.fit(START, runs, rig=Rig(temperature_slope=1e-3))
+    assert_recovered(found, LAW, rig)
+    assert found["rig.temperature_slope"].standard_error < 1e-4
+    some = [runs[0], replace(runs[1], temperature=None)]
+    with pytest.raises(ValueError, match="`runs` must all state their temperature, but is without one: 20mm_4Hz"):
+        identify.fit(START, some, rig=Rig(temperature_slope=1e-3))
+
+
+def test_comparisons_and_cross_validations_take_the_machine():
+    runs, rig = records(rig=Rig(gas_force=-120.0)), Rig(gas_force=-10.0)
+    laws = {"linear": Linear, "bilinear": Bilinear}
+    best = identify.compare(laws, runs, rig=rig).best
+    assert best.name == "bilinear"
+    assert best.result["rig.gas_force"].value == pytest.approx(-120.0, abs=1.0)
+    validated = identify.cross_validate({"bilinear": Bilinear}, runs, rig=rig)
+    assert all(fold.fit_percent > 90.0 for fold in validated.folds)
+
+
+def test_what_a_fit_refuses():
+    runs = records()
+    with pytest.raises(ValueError, match="`rig` must have a number that is not at its default"):
+        identify.fit(START, runs, rig=Rig())
+    with pytest.raises(
+        ValueError, match=r"rig.friction, which the rig leaves out. Give it a start: `rig=Rig\(friction="
+    ):
+        identify.fit(START, runs, rig=Rig(gas_force=-1.0), per_record=["rig.friction"])
+
+
+@pytest.mark.slow
+def test_a_law_with_states_and_everything_that_a_machine_adds():
+    """Heat and lag too; the friction of the machine is told from the law by its velocity alone, so it stays out."""
+    law = SeriesSpring(Bilinear(2600.0, 1200.0), 3e5)
+    rig = Rig(gas_force=-120.0, gas_stiffness=1500.0, force_delay=1e-3, moving_mass=4.0, temperature_slope=0.002)
+    rig = replace(rig, heating=0.01, cooling=0.02)
+    tests = [SineTest(0.02, 1.0, cycles=20), SineTest(0.01, 4.0, cycles=80), SineTest(0.005, 12.0, cycles=200)]
+    runs = records(law, rig, tests, rate=1000.0)
+    start = Rig(-20.0, 500.0, force_delay=2e-4, moving_mass=1.0, temperature_slope=1e-3, heating=0.01, cooling=0.02)
+    stiff = SeriesSpring(START, 1e5)
+    found = identify.fit(stiff, runs, rig=start, freeze=["cubic_stiffness", "heating", "cooling"])
+    assert found.fit_percent > 97.0
+    assert_recovered(found, law, rig)
+
+
+def test_friction_of_law_and_machine_are_one():
+    """What the machine's friction explains is what a friction in the law explains."""
+    law = Linear(1500.0) + CoulombFriction(30.0, 0.02)
+    runs = records(law, Rig(), tests=[SineTest(0.02, 1.0)])
+    start = Rig(friction=5.0, friction_velocity=0.02)
+    found = identify.fit(Linear(1000.0), runs, rig=start, freeze=["friction_velocity"])
+    assert found.steps == 0
+    assert abs(found["rig.friction"].value - 30.0) < 3 * found["rig.friction"].standard_error
+    assert isinstance(runs[0], BenchRun)
