@@ -43,9 +43,9 @@ class VirtualDyno:
 
     Arguments:
         law: the damper. Friction that sticks and slips is a law too: `law + dampers.StribeckFriction(...)`.
+        sampling_rate: of the records [Hz].
         rig: what the machine adds: gas, friction, moving mass, heat, delay, lag, offsets.
         sensors: noise and faults of the channels.
-        sampling_rate: of the records [Hz].
         temperature_channel: whether the records hold the temperature of the damper [K].
         seed: of all that is random. The noise of a record depends on the seed and its name only, not on the other
             records.
@@ -63,24 +63,27 @@ class VirtualDyno:
     """
 
     law: AbstractDamper
+    sampling_rate: float | int
     rig: Rig
     sensors: Sensors
-    sampling_rate: float | int
     temperature_channel: bool
     seed: int
 
     def __init__(
         self,
         law: AbstractDamper,
+        sampling_rate: float | int = 2000.0,
         *,
         rig: Rig | None = None,
         sensors: Sensors | None = None,
-        sampling_rate: float | int = 2000.0,
         temperature_channel: bool = False,
         seed: int = 0,
         **settings: Any,
     ) -> None:
         check_module("law", law, (AbstractDamper,), "VirtualDyno(law, force_noise=20.0)")
+        rig, sensors = rig or Rig(), sensors or Sensors()
+        check_module("rig", rig, (Rig,), "VirtualDyno(law, rig=Rig(gas_force=-100.0))")
+        _checks.instance("sensors", sensors, Sensors, "be sensors", "Write `bench.Sensors(force_noise=5.0)`.")
         _checks.positive("sampling_rate", sampling_rate)
         for_rig = {name: settings.pop(name) for name in _names(Rig) if name in settings}
         for_sensors = {name: settings.pop(name) for name in _names(Sensors) if name in settings}
@@ -91,8 +94,8 @@ class VirtualDyno:
             raise TypeError(f"VirtualDyno has no argument {name!r}, and neither Rig nor Sensors such a field.{hint}")
         made = {
             "law": law,
-            "rig": replace(rig or Rig(), **for_rig),
-            "sensors": replace(sensors or Sensors(), **for_sensors),
+            "rig": replace(rig, **for_rig),
+            "sensors": replace(sensors, **for_sensors),
             "sampling_rate": sampling_rate,
             "temperature_channel": temperature_channel,
             "seed": seed,

@@ -54,6 +54,8 @@ class Rig(Module):
     sample is interpolated by cubics, whose error falls with the fourth power of the sampling step (1e-4 of the force at
     14 samples a period, 1e-6 at 45).
 
+    In a fit a record is led in by a copy of its first cycle, and ϑ begins with that.
+
     The friction of seals that hold more at rest than in motion is a law: `law + StribeckFriction(...)`, or `LuGre`.
 
     >>> import numpy as np
