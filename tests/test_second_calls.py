@@ -1,5 +1,7 @@
 """A second call compiles nothing, with other numbers of the same kind."""
 
+from typing import Any
+
 import jax
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from jaxdamp import Ride, bench, identify, respond, roads, simulate
 from jaxdamp.bench import BenchSet, SineTest
 from jaxdamp.dampers import Bilinear, BoucWen, Lag, Spring
+from jaxdamp.rig import Rig
 from jaxdamp.vehicles.presets import half_car_002
 
 
@@ -52,13 +55,17 @@ def test_of_a_law_with_other_numbers(name):
     assert first > 0 and others == [0, 0]
 
 
-def test_of_a_fit_of_other_records():
+STARTS: dict[str, dict[str, Any]] = {"alone": {}, "on a machine": {"rig": Rig(gas_force=-50.0, force_delay=1e-3)}}
+
+
+@pytest.mark.parametrize("machine", STARTS)
+def test_of_a_fit_of_other_records(machine):
     def runs(rate: float) -> BenchSet:
-        dyno = bench.VirtualDyno(Bilinear(rate, 900.0), sampling_rate=200.0, force_noise=5.0)
+        dyno = bench.VirtualDyno(Bilinear(rate, 900.0), sampling_rate=200.0, force_noise=5.0, gas_force=-100.0)
         return dyno.run([SineTest(0.01, 2.0)])
 
     def fit(records: BenchSet) -> float:
-        return identify.fit(Bilinear, records)["rebound_rate"].value
+        return identify.fit(Bilinear, records, **STARTS[machine]).parameters[0].value
 
     made = [runs(rate) for rate in (1500.0, 1700.0, 1900.0)]
     first, *others = in_calls(fit, made)
