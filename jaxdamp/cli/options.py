@@ -103,6 +103,9 @@ class ReadOptions:
     units: tuple[str, ...] = ()
     sampling_rate: float | None = None
     delimiter: str | None = None
+    gains: tuple[str, ...] = ()
+    manifest: Path | None = None
+    skip_bad: bool = False
 
     def read(self, files: Sequence[Path]) -> BenchSet:
         """Read the records."""
@@ -114,4 +117,7 @@ class ReadOptions:
             units=assignments("units", self.units),
             sampling_rate=self.sampling_rate,
             delimiter=self.delimiter,
+            gains=assignments("gains", self.gains),
+            manifest=True if self.manifest is None else self.manifest,
+            skip_bad=self.skip_bad,
         )
