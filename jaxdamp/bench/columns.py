@@ -188,7 +188,7 @@ def is_record(table: RawTable, choice: Choice) -> bool:
     """Whether a table has a stroke or a force, or its columns have no names to tell."""
     if not table.is_named:
         return len(table.columns) > 1
-    return any(_candidates(table, role, choice) or role in choice.columns for role in REQUIRED)
+    return any(role in choice.columns or _candidates(table, role, choice) for role in REQUIRED)
 
 
 def _column(table: RawTable, role: str, choice: Choice) -> tuple[Column | None, list[str]]:
@@ -208,33 +208,37 @@ def _given(table: RawTable, role: str, wanted: str | int | None) -> int | None:
     given = Setting("columns", {role: wanted})
     if isinstance(wanted, int):
         if not 0 <= wanted < len(table.columns):
-            raise ArgumentError(
-                f"{given}, but {table.where} has columns 0 to {len(table.columns) - 1} ({names}).", given
-            )
+            raise ArgumentError(f"{given}: {table.where} has columns 0 to {len(table.columns) - 1} ({names}).", given)
         return wanted
-    hits = [index for index, name in enumerate(table.names) if name == wanted]
+    hits = _places(table, wanted)
     if len(hits) == 1:
         return hits[0]
     if hits:
         numbers = Setting("columns", {role: hits[0]})
         raise ArgumentError(
-            f"{given}, but {table.where} has {len(hits)} columns of that name. Give the number: {numbers}.",
+            f"{given}: {table.where} has {len(hits)} columns of that name. Give the number: {numbers}.",
             given,
             numbers,
         )
     near = _checks.nearest(wanted, table.names)
     hint = f" Did you mean {near!r}?" if near else ""
-    raise ArgumentError(f"{given}, but {table.where} has {names}.{hint}", given)
+    raise ArgumentError(f"{given}: {table.where} has {names}.{hint}", given)
+
+
+def _places(table: RawTable, wanted: str | int | None) -> list[int]:
+    """The columns that a number or a header, with or without its unit, names."""
+    if not isinstance(wanted, str):
+        return [] if wanted is None else [wanted]
+    exact = [index for index, name in enumerate(table.names) if name == wanted]
+    bare = wanted.strip().lower()
+    return exact or [index for index, name in enumerate(table.names) if split_header(name)[0].lower() == bare]
 
 
 def _candidates(table: RawTable, role: str, choice: Choice) -> list[int]:
     """The columns that their names say to be this quantity and that are not given to another."""
-    taken = {wanted for other, wanted in choice.columns.items() if other != role}
-    return [
-        i
-        for i, column in enumerate(table.columns)
-        if i not in taken and column.name not in taken and role_of(column.name, column.unit) == role
-    ]
+    taken = {place for wanted in choice.columns.values() for place in _places(table, wanted)}
+    columns = enumerate(table.columns)
+    return [i for i, column in columns if i not in taken and role_of(column.name, column.unit) == role]
 
 
 def _named(table: RawTable, role: str, choice: Choice) -> tuple[int | None, list[str]]:

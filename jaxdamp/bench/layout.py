@@ -22,6 +22,8 @@ def split(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return line.split()
     row = line.split(delimiter)
+    if " " not in line and '"' not in line and delimiter != "|":
+        return row[:-1] if len(row) > 1 and not row[-1] else row
     if '"' in line:
         try:
             row = next(csv.reader([line.strip(" ")], delimiter=delimiter, skipinitialspace=True))

@@ -16,7 +16,7 @@ from jaxdamp.bench.raw import RawColumn, RawTable
 
 
 _LOOK_AT = 2000  # lines that decide on the delimiter
-_CHUNK = 100_000  # lines that are divided at a time, to bound the memory
+_CHUNK = 5_000  # lines that are divided at a time, to bound the memory
 _CONTENT = {  # how files of other formats begin
     b"PK\x03\x04": "an XLSX workbook (.xlsx)",
     b"MATLAB": "a MATLAB file (.mat)",

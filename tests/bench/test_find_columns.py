@@ -67,6 +67,13 @@ def test_columns_by_name_number_and_none():
     assert len(find_columns(_table(count=3), {"time": 0, "stroke": 1, "force": 2}, units)) == 3
 
 
+def test_a_header_is_named_without_its_unit():
+    table = _table("t_s", "Hub [mm]", "X [mm]", "F_N")
+    assert find_columns(table, {"stroke": "hub"})["stroke"].index == 1
+    with pytest.raises(ValueError, match=r"has 2 columns of that name.*columns=\{\"stroke\": 1\}"):
+        find_columns(_table("t_s", "x [mm]", "x [mm]", "F_N"), {"stroke": "x"})
+
+
 def test_two_columns_for_one_role():
     with pytest.raises(ValueError, match=r"'LVDT_mm' and 'x_mm' could all be the stroke\. Choose one: columns="):
         find_columns(_table("t_s", "LVDT_mm", "x_mm", "F_N"))
