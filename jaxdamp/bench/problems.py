@@ -16,7 +16,7 @@ class Problems:
     >>> problems.raise_any()
     Traceback (most recent call last):
     ...
-    jaxdamp._checks.ArgumentError: 2 problems:
+    jaxdamp.bench.problems.Several: 2 problems:
       1. one
       2. two
     """

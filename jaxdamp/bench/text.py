@@ -44,6 +44,8 @@ def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
     if delimiter is not None and len(delimiter) != 1:
         _checks.refuse("delimiter", "be one character", repr(delimiter))
     top = list(islice(((n, line) for n, line in enumerate(lines, 1) if line.strip()), _LOOK_AT))
+    if not top:
+        raise ValueError(f"{file} is empty: export it from the bench again.")
     layout = _choose(file, top, delimiter)
     rows = [(n, split(line, layout.delimiter)) for n, line in top]
     header = header_of(rows, layout)
@@ -63,8 +65,6 @@ def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
 def text_lines(file: Path) -> list[str]:
     """The lines of a text file in UTF-8, UTF-16 or the Western code page of Windows."""
     raw = file.read_bytes()
-    if not raw.strip():
-        raise ValueError(f"{file} is empty: export it from the bench again.")
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return raw.decode("utf-16", errors="replace").splitlines()
     other = next((name for begin, name in _CONTENT.items() if raw.startswith(begin)), None)

@@ -35,6 +35,7 @@ class File(NamedTuple):
         return float(text.lower().replace("d", "e")) if NUMBER.fullmatch(text) else None
 
 
+SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]
 FORMS = ("{:.6f}", "{:.4e}", "{:+.3f}", "{:.9g}", "{:10.4f}", '"{:.5f}"', "{:.4E}")
 
 
@@ -90,7 +91,7 @@ def faulty(draw) -> File:
 def whole_files(tmp_path_factory, examples: int) -> None:
     path = tmp_path_factory.mktemp("fuzz") / "run.csv"
 
-    @settings(max_examples=examples, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=examples, deadline=None, derandomize=True, suppress_health_check=SLOW)
     @given(files())
     def whole(file: File) -> None:
         path.write_text(file.text(), encoding="utf-8")
@@ -104,7 +105,7 @@ def whole_files(tmp_path_factory, examples: int) -> None:
 def typed_over(tmp_path_factory, examples: int) -> None:
     path = tmp_path_factory.mktemp("fuzz") / "run.csv"
 
-    @settings(max_examples=examples, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=examples, deadline=None, derandomize=True, suppress_health_check=SLOW)
     @given(faulty())
     def typed(file: File) -> None:
         check(file, path)
@@ -118,7 +119,7 @@ def any_bytes(tmp_path_factory, examples: int) -> None:
     words = st.text("0123456789.,;\t| \n\"'eE-+:x_[]mN{}<", max_size=300)
     header = st.sampled_from(["", "t_s,x_mm,F_N\n", "t [s];x [mm];F [N]\n"])
 
-    @settings(max_examples=examples, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=examples, deadline=None, derandomize=True, suppress_health_check=SLOW)
     @given(st.binary(max_size=200) | st.tuples(header, words).map(lambda parts: "".join(parts).encode()))
     def anything(content: bytes) -> None:
         path.write_bytes(content)
