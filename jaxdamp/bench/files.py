@@ -10,19 +10,18 @@ from pathlib import Path
 from jaxdamp import _checks
 
 
-TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc")
-_BY_NAME = (".txt", ".dat", ".asc")  # in a folder these may be notes: they are read where they are named
+MAYBE_NOTES = (".txt", ".dat", ".asc")  # of a folder these are not read: they may be notes
+TEXT_SUFFIXES = (".csv", ".tsv", *MAYBE_NOTES)
 
 
 def find_files(
-    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], suffixes: Collection[str] = TEXT_SUFFIXES
+    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], suffixes: Collection[str] = (".csv",)
 ) -> tuple[Path, ...]:
     """The files that the paths name, in natural order within a folder or pattern ("2mm" before "10mm").
 
     Arguments:
-        paths: a file, a folder, a glob pattern, or several of these. Of a folder all files with a suffix that has a
-            reader are meant, but for .txt, .dat and .asc, which may be notes.
-        suffixes: those that have a reader, in lower case.
+        paths: a file, a folder, a glob pattern, or several of these.
+        suffixes: of the files that a folder stands for, in lower case.
 
     Raises:
         FileNotFoundError: a file does not exist, or a pattern or folder holds nothing.
@@ -48,11 +47,10 @@ def natural_key(text: str) -> list[tuple[int, float, str]]:
 def _expand(path: str | os.PathLike[str], suffixes: Collection[str]) -> Iterator[Path]:
     text, file = os.fspath(path), Path(path).expanduser()
     if file.is_dir():
-        usual = set(suffixes) - set(_BY_NAME)
         files = [f for f in file.iterdir() if f.is_file() and not f.name.startswith((".", "~$"))]
-        inside = [f for f in files if f.suffix.lower() in usual]
+        inside = [f for f in files if f.suffix.lower() in suffixes]
         if not inside:
-            others = sorted(f.name for f in files if f.suffix.lower() in _BY_NAME)
+            others = sorted(f.name for f in files if f.suffix.lower() in MAYBE_NOTES)
             hint = (
                 f" It holds {', '.join(others[:5])}: name these files, or a pattern such as '*.txt'." if others else ""
             )

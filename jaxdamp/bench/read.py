@@ -14,7 +14,7 @@ from jaxdamp.bench.files import find_files
 from jaxdamp.bench.manifest import find_manifest, merged, read_manifest
 from jaxdamp.bench.problems import Problems
 from jaxdamp.bench.raw import RawTable
-from jaxdamp.bench.readers import Reader, read_tables, with_own
+from jaxdamp.bench.readers import Reader, folder_suffixes, read_tables, with_own
 from jaxdamp.bench.record import Interpretation, records
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
@@ -105,20 +105,23 @@ def read(
     if file is not None:
         stated = read_manifest(file)
         given, note = merged(stated, given), (f"read as the manifest {file} says",)
-        asked = [file.parent / pattern for pattern in stated["files"]] if _is_folder(asked, stated) else asked
+        asked = _files_of(asked, stated)
     signs.check_words(given["sign"], given["force_sign"])
     if given["sampling_rate"] is not None:
         _checks.positive("sampling_rate", given["sampling_rate"])
     choice = Choice(*({**(given[name] or {})} for name in ("columns", "units", "gains")))
     how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"])
-    runs, left_out = _read_files(find_files(asked, own_readers), own_readers, given["delimiter"], how, skip_bad)
+    files = find_files(asked, folder_suffixes(readers))
+    runs, left_out = _read_files(files, own_readers, given["delimiter"], how, skip_bad)
     runs = [(base, replace(run, notes=(*run.notes, *note))) for base, run in runs]
     return BenchSet(_commanded(_with_settings(runs, given["settings"]), given["command"]), left_out)
 
 
-def _is_folder(asked: Sequence[str | os.PathLike[str]], manifest: Mapping[str, Any]) -> bool:
-    """Whether a folder is read whose manifest names the files."""
-    return "files" in manifest and len(asked) == 1 and Path(asked[0]).expanduser().is_dir()
+def _files_of(asked: list[str | os.PathLike[str]], manifest: Mapping[str, Any]) -> list[str | os.PathLike[str]]:
+    """What is read: the files that the manifest names, if a folder is asked for."""
+    if "files" not in manifest or len(asked) > 1 or not Path(asked[0]).expanduser().is_dir():
+        return asked
+    return [Path(asked[0]).expanduser() / pattern for pattern in manifest["files"]]
 
 
 def _read_files(

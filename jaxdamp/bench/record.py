@@ -37,7 +37,7 @@ def records(table: RawTable, name: str, how: Interpretation) -> list[BenchRun]:
     """
     columns, doubts = find_columns(table, how.choice)
     sampling.check_count(len(table), table.where)
-    channels, notes = _channels(table, columns)
+    channels, notes = _channels(table, columns, how.choice)
     notes = [_columns_note(table, columns), *table.notes, *doubts, *notes]
     parts = _parts(table, channels.pop("time", None), channels["stroke"], how.sampling_rate)
     if len(parts) == 1:
@@ -46,7 +46,7 @@ def records(table: RawTable, name: str, how: Interpretation) -> list[BenchRun]:
     return [_record(table, columns, channels, part, n, how, notes) for part, n in zip(parts, names, strict=True)]
 
 
-def _channels(table: RawTable, columns: Mapping[str, Column]) -> tuple[dict[str, Samples], list[str]]:
+def _channels(table: RawTable, columns: Mapping[str, Column], choice: Choice) -> tuple[dict[str, Samples], list[str]]:
     """The numbers of every quantity in SI, and notes on those that were left out."""
     channels, notes, problems = {}, [], Problems()
     for role, column in columns.items():
@@ -54,7 +54,7 @@ def _channels(table: RawTable, columns: Mapping[str, Column]) -> tuple[dict[str,
             try:
                 channels[role], note = _values(table, table.columns[column.index], column)
             except ValueError as error:
-                if role in (*REQUIRED, "time", "velocity"):
+                if role in REQUIRED or role == "time" or choice.asks_for(role):
                     raise
                 note = f"{role} left out: {error}"
             notes += [note] if note else []
@@ -170,7 +170,7 @@ def _record(
         temperature=None if temperature is None else part.of(temperature),
         command=stated.get("command"),
         settings=stated.get("settings", {}),
-        source=where,
+        source=str(table.file),
         notes=(*stated.get("notes", ()), *notes, *part.notes, *decision.notes, source or "velocity as the file states"),
     )
 

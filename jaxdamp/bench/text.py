@@ -52,11 +52,9 @@ def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
     if header is None:
         raise ValueError(f"{file}: no row has a number in each of its {layout.count} columns: mend or shorten it.")
     numbers, body, notes = _body(lines, rows[header.first][0], layout)
-    fast = _all_at_once(body, layout)
-    if fast is None:
+    columns = _all_at_once(body, layout)
+    if columns is None:
         columns = columns_of(file, numbers, _in_chunks(body, layout.delimiter, layout.count), layout)
-    else:
-        columns = [RawColumn("", column) for column in fast.T]
     columns = [replace(c, name=n, unit=u) for c, n, u in zip(columns, header.names, header.units, strict=True)]
     preamble = tuple(line for _, line in top[: header.top])
     return [RawTable(file, tuple(columns), lines=numbers, preamble=preamble, notes=notes)]
@@ -127,18 +125,26 @@ def _body(lines: list[str], first: int, layout: Layout) -> tuple[Sequence[int], 
     return numbers, body, notes
 
 
-def _all_at_once(body: list[str], layout: Layout) -> np.ndarray | None:
-    """All numbers by NumPy's reader, rows by columns; None where a row needs a closer look."""
-    if layout.delimiter != "," and any("," in line for line in body):
+def _all_at_once(body: list[str], layout: Layout) -> list[RawColumn] | None:
+    """The columns by NumPy's reader; None where a row needs a closer look."""
+    mark, lines = layout.delimiter, body
+    if mark != "," and any("," in line for line in body):
         if not _plain_decimal_commas(body):
             return None
-        body = [line.replace(",", ".") for line in body]
+        lines = [line.replace(",", ".") for line in body]
+    texts = [index for index in range(layout.count) if index not in layout.numeric]
+    if texts and (mark in " |" or any('"' in line or line.count(mark) != layout.count - 1 for line in body)):
+        return None
     try:
-        delimiter = None if layout.delimiter == " " else layout.delimiter
-        values = np.loadtxt(body, delimiter=delimiter, comments=None, ndmin=2)
+        delimiter, numeric = (None if mark == " " else mark), (layout.numeric if texts else None)
+        values = np.loadtxt(lines, delimiter=delimiter, usecols=numeric, comments=None, ndmin=2)
     except ValueError:
         return None
-    return values if values.shape == (len(body), layout.count) else None
+    if values.shape != (len(body), len(layout.numeric)):
+        return None
+    columns = dict(zip(layout.numeric, values.T, strict=True))
+    columns |= {i: np.array([line.split(mark, i + 1)[i].strip() for line in body], dtype=object) for i in texts}
+    return [RawColumn("", columns[index]) for index in range(layout.count)]
 
 
 def _plain_decimal_commas(body: list[str]) -> bool:

@@ -75,7 +75,8 @@ def _names_of(runs: BenchSet, pattern: str) -> list[str]:
         here = [run.name for run in runs if Path(run.source).resolve() == path.resolve()]
         if here:
             return here
-    return [pattern.removesuffix(".csv").removesuffix(".txt")]
+    suffix = path.suffix
+    return [pattern.removesuffix(suffix) if suffix.lower() in bench.READERS else pattern]
 
 
 def decisions(runs: Sequence[BenchRun]) -> list[str]:

@@ -46,6 +46,7 @@ def test_xlsx(tmp_path):
     assert runs.names == ("set/cold", "set/warm")
     same(runs[0])
     same(runs[1])
+    assert runs[1].source == str(tmp_path / "set.xlsx")
     assert any("1 row of another form behind the numbers left out" in note for note in runs[0].notes)
     start = datetime.datetime(2026, 3, 1, 9, 30)
     stamps = [start + datetime.timedelta(milliseconds=5 * i) for i in range(300)]
@@ -195,6 +196,8 @@ def test_a_reader_of_ones_own(tmp_path):
 
     np.stack([T, X, F], axis=1).tofile(tmp_path / "a.RAW")
     same(read(tmp_path, readers={".raw": read_raw})[0])
+    (tmp_path / "a.RAW").rename(tmp_path / "a.dat")
+    same(read(tmp_path, readers={".dat": read_raw})[0])
     assert ".raw" not in READERS
     with pytest.raises(ValueError, match="in lower case"):
         read(tmp_path, readers={"raw": read_raw})

@@ -49,6 +49,12 @@ def files(draw) -> File:
     numbers = np.random.default_rng(draw(st.integers(0, 2**32 - 1))).uniform(-size, size, (rows, count))
     numbers[0] = 0.125  # a decimal sign that divides no thousands
     cells = [[form.format(number).replace(".", decimal) for number in row] for row in numbers]
+    if draw(st.booleans()):  # a column of text or of time stamps
+        kind, index = (
+            draw(st.sampled_from(["run", "10:00:{:02}", "2026-01-01T10:00:{:02}"])),
+            draw(st.integers(0, count - 1)),
+        )
+        cells = [[*row[:index], kind.format(n), *row[index + 1 :]] for n, row in enumerate(cells)]
     words = st.lists(st.text("abc:# %", min_size=1, max_size=12).filter(str.strip), max_size=3)
     return File(delimiter, decimal, draw(words), [f"channel{i}" for i in range(count)], cells, draw(words))
 

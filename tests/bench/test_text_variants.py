@@ -129,6 +129,8 @@ def test_faults_in_channels_that_are_not_needed_stop_nothing(write):
     for header, why in (("t_s,x_mm,F_N,temp,spare", "names no unit"), ("t_s,x_mm,F_N,T_degC,T2_degC", "Choose one")):
         run = read(write("b.csv", header=header, extra=[temperature, temperature]))[0]
         assert run.temperature is None and any(why in note for note in run.notes)
+    run = read(write("v.csv", header="t_s,x_mm,F_N,v_mm_s", extra=[np.full(600, np.nan)]))[0]
+    assert any("velocity left out: " in n and "is nan" in n for n in run.notes) and "harmonic" in run.notes[-1]
     with pytest.raises(ValueError, match="Choose one"):
         read(
             write("c.csv", header="t_s,x_mm,F_N,temp [K],temp [degC]", extra=[temperature] * 2),
