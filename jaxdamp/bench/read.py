@@ -128,13 +128,17 @@ def _read_files(
     files: Sequence[Path], readers: Mapping[str, Reader], delimiter: str | None, how: Interpretation, skip_bad: bool
 ) -> tuple[list[tuple[str, BenchRun]], tuple[str, ...]]:
     """The records of all files, each with its name before it was cut at gaps, and what was left out and why."""
-    runs, problems = [], Problems()
+    runs, errors, problems = [], [], Problems()
     for file, name in zip(files, _names(files), strict=True):
-        with problems.collected():
+        try:
             runs += _read_file(read_tables(file, readers, delimiter), name, how)
-    if not skip_bad or not runs:
-        problems.raise_any()
-    return runs, tuple(str(error) for error in problems.errors)
+        except (ValueError, OSError, ImportError) as error:
+            errors.append(error)
+    for error in errors if not skip_bad or not runs else ():
+        with problems.collected():
+            raise error
+    problems.raise_any()
+    return runs, tuple(map(str, errors))
 
 
 def _names(files: Sequence[Path]) -> list[str]:

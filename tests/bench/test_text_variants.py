@@ -147,14 +147,14 @@ def test_all_problems_of_a_file_in_one_message(write):
 
 def test_all_problems_of_a_folder_and_skipping_them(write, tmp_path):
     write("good.csv")
-    write("one.csv", header="t_s,x,F_N")
+    write("one.csv", header="t_s,x,F")
     (tmp_path / "two.csv").write_text("")
-    with pytest.raises(ValueError, match=r"(?s)2 problems:.*one\.csv, column 'x'.*two\.csv is empty"):
+    with pytest.raises(ValueError, match=r"(?s)3 problems:.*one\.csv, column 'x'.*two\.csv is empty"):
         read(tmp_path)
     runs = read(tmp_path, skip_bad=True)
     assert runs.names == ("good",)
-    assert len(runs.left_out) == 2 and "two.csv is empty" in runs.left_out[1]
+    assert len(runs.left_out) == 2 and "2 problems" in runs.left_out[0] and "two.csv is empty" in runs.left_out[1]
     assert "left out 2" in repr(runs) and "two.csv is empty" in runs.describe()
     (tmp_path / "good.csv").unlink()
-    with pytest.raises(ValueError, match="2 problems"):
+    with pytest.raises(ValueError, match="3 problems"):
         read(tmp_path, skip_bad=True)
