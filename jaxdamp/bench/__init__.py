@@ -14,7 +14,9 @@ from jaxdamp.bench.analysis import (
 )
 from jaxdamp.bench.contradictions import Contradiction, contradictions, contradictions_in_words
 from jaxdamp.bench.programmes import RandomTest, SineTest
+from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.read import read
+from jaxdamp.bench.readers import READERS
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sensors import Sensors
 from jaxdamp.bench.sets import BenchSet, as_runs
@@ -23,11 +25,14 @@ from jaxdamp.bench.virtual_dyno import VirtualDyno
 
 
 __all__ = [
+    "READERS",
     "BenchRun",
     "BenchSet",
     "Contradiction",
     "PeakVelocityPoints",
     "RandomTest",
+    "RawColumn",
+    "RawTable",
     "Sensors",
     "SineTest",
     "VelocityLoops",

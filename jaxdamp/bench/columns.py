@@ -2,19 +2,24 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from difflib import get_close_matches
+from dataclasses import dataclass, field
 from typing import NoReturn
+
+import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench.tables import Table
-from jaxdamp.bench.units import SI, USUAL, Conversion, conversion, named_conversion
+from jaxdamp.bench.gains import gain_conversion
+from jaxdamp.bench.problems import Problems
+from jaxdamp.bench.raw import RawColumn, RawTable
+from jaxdamp.bench.stamps import is_stamp
+from jaxdamp.bench.units import SI, USUAL, Conversion, conversion, named_conversion, ratio
 
 
 ROLES = tuple(SI)
+REQUIRED = ("stroke", "force")
 _WORDS = {
-    "time": ("time", "zeit", "elapsed", "clock", "t"),
+    "time": ("time", "zeit", "elapsed", "clock", "timestamp", "datetime", "uhrzeit", "epoch", "t"),
     "stroke": (
         "stroke",
         "displacement",
@@ -38,12 +43,20 @@ _NOT_MEASURED = {"setpoint", "command", "cmd", "demand", "target", "soll", "refe
 
 @dataclass(frozen=True)
 class Column:
-    """One quantity of a table: where it stands, what its header says and how to bring it to SI."""
+    """One quantity of a table: where it stands, what its header says and how to bring it to SI.
+
+    The conversion is None for time stamps, which are read as text.
+    """
 
     role: str
     index: int
     header: str
-    conversion: Conversion
+    conversion: Conversion | None
+
+    @property
+    def unit(self) -> str:
+        """The unit of the file."""
+        return "time stamps" if self.conversion is None else self.conversion.unit
 
 
 def split_header(header: str) -> tuple[str, str | None]:
@@ -85,7 +98,8 @@ def role_of(header: str, unit: str = "") -> str | None:
     """
     name, written = split_header(header)
     written = unit or written
-    words = _words(name)
+    signal = _signal(name)
+    words = _words(name.removesuffix(signal))
     if _NOT_MEASURED.intersection(words):
         return None
     long = [role for word in reversed(words) for role in ROLES if len(word) > 1 and word in _WORDS[role]]
@@ -98,104 +112,193 @@ def role_of(header: str, unit: str = "") -> str | None:
     return (long + (short if len(words) <= 2 else []) or [None])[0]
 
 
-def find_columns(
-    table: Table,
-    columns: Mapping[str, str | int | None] | None = None,
-    units: Mapping[str, str] | None = None,
-) -> dict[str, Column]:
+@dataclass(frozen=True)
+class Choice:
+    """What the caller says about the columns.
+
+    Arguments:
+        columns: quantity to header or number of the column (from 0); None means that the file's column is not used.
+        units: quantity to unit; wins over the header.
+        gains: quantity to gain of the sensor, "500 N/V".
+    """
+
+    columns: Mapping[str, str | int | None] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    gains: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("columns", "units", "gains"):
+            _checks.instance(name, getattr(self, name), Mapping, "be a mapping of quantities", "Write a dictionary.")
+            for role in getattr(self, name):
+                _checks.one_of(name, role, ROLES)
+
+    def asks_for(self, role: str) -> bool:
+        """Whether the caller wants this quantity, so that it must not be left out."""
+        return self.columns.get(role) is not None or role in self.units or role in self.gains
+
+
+def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tuple[str, ...]]:
     """Assign the columns of a table to time, stroke, velocity, force and temperature.
+
+    A quantity that a record can do without, velocity or temperature, is left out where its column is doubtful, and a
+    note says so, unless the caller asked for it.
 
     Arguments:
         table: the table read from a file.
-        columns: quantity to header or number of the column (from 0); None means that the file's column is not used.
-        units: quantity to unit; wins over the header.
+        choice: what the caller says about the columns.
+
+    Returns:
+        The column of each quantity, and notes.
 
     Raises:
-        ValueError: a quantity is missing or named by two columns, or a unit is missing or unknown.
+        ValueError: a quantity is missing or named by two columns, or a unit is missing or unknown; all that is wrong.
     """
-    columns, units = dict(columns or {}), dict(units or {})
-    for role in columns:
-        _checks.one_of("columns", role, ROLES)
-    for role in units:
-        _checks.one_of("units", role, ROLES)
-    if not table.names and not columns:
+    if not table.is_named and not choice.columns:
         numbers = Setting("columns", {"time": 0, "stroke": 1, "force": 2})
         names = Setting("units", {"time": "s", "stroke": "mm", "force": "N"})
         raise ArgumentError(
-            f"{table.file} has no header row, so its columns have no names: pass their numbers and units, for example "
+            f"{table.where} has no header row, so its columns have no names: pass their numbers and units, for example "
             f"{numbers}, {names}.",
             numbers,
             names,
         )
-    found = {}
+    found, notes, problems = {}, [], Problems()
     for role in ROLES:
-        index = _given(table, role, columns[role]) if role in columns else _named(table, role, columns)
-        if index is not None:
-            found[role] = _with_unit(table, role, index, units)
-    for role in ("stroke", "force"):
-        if role not in found:
-            _refuse_missing(table, role, found)
-    return found
+        with problems.collected():
+            try:
+                column, more = _column(table, role, choice)
+            except ArgumentError as error:
+                if role in REQUIRED or role == "time" or choice.asks_for(role):
+                    found[role] = None  # there is one, but it is at fault
+                    raise
+                notes.append(f"{role} left out: {error}")
+                continue
+            notes += more
+            if column is not None:
+                found[role] = column
+    for role in REQUIRED:
+        with problems.collected():
+            if role not in found:
+                _refuse_missing(table, role, found)
+    problems.raise_any()
+    return found, tuple(notes)
 
 
-def _label(table: Table, index: int) -> str:
-    return table.names[index] if table.names else f"number {index}"
+def is_record(table: RawTable, choice: Choice) -> bool:
+    """Whether a table has a stroke or a force, or its columns have no names to tell."""
+    if not table.is_named:
+        return len(table.columns) > 1
+    return any(role in choice.columns or _candidates(table, role, choice) for role in REQUIRED)
 
 
-def _given(table: Table, role: str, wanted: str | int | None) -> int | None:
+def _column(table: RawTable, role: str, choice: Choice) -> tuple[Column | None, list[str]]:
+    """The column of a quantity, and a note where its unit decided between several."""
+    notes: list[str] = []
+    if role in choice.columns:
+        index = _given(table, role, choice.columns[role])
+    else:
+        index, notes = _named(table, role, choice)
+    return (None if index is None else _with_unit(table, role, index, choice)), notes
+
+
+def _given(table: RawTable, role: str, wanted: str | int | None) -> int | None:
     if wanted is None:
         return None
-    count = table.values.shape[1]
-    if isinstance(wanted, int):
-        if not 0 <= wanted < count:
-            given = Setting("columns", {role: wanted})
-            raise ArgumentError(f"{given}: {table.file} has columns 0 to {count - 1}.", given)
-        return wanted
+    names = ", ".join(map(repr, table.names))
     given = Setting("columns", {role: wanted})
-    hits = [i for i, name in enumerate(table.names) if name == wanted]
-    hits = hits or [i for i, name in enumerate(table.names) if split_header(name)[0].lower() == wanted.strip().lower()]
+    if isinstance(wanted, int):
+        if not 0 <= wanted < len(table.columns):
+            raise ArgumentError(f"{given}: {table.where} has columns 0 to {len(table.columns) - 1} ({names}).", given)
+        return wanted
+    hits = _places(table, wanted)
     if len(hits) == 1:
         return hits[0]
     if hits:
-        raise ArgumentError(f"{given} fits columns {hits} of {table.file}: pass the number of one of them.", given)
-    near = get_close_matches(wanted, table.names, 1)
-    hint = f" Did you mean {near[0]!r}?" if near else ""
-    names = ", ".join(map(repr, table.names)) or "no header"
-    raise ArgumentError(f"{given}: {table.file} has {names}.{hint}", given)
-
-
-def _named(table: Table, role: str, columns: Mapping[str, str | int | None]) -> int | None:
-    taken = {_given(table, r, wanted) for r, wanted in columns.items()}
-    unit_row = table.unit_row or ("",) * len(table.names)
-    hits = [
-        i
-        for i, (name, unit) in enumerate(zip(table.names, unit_row, strict=True))
-        if i not in taken and role_of(name, unit) == role
-    ]
-    if len(hits) > 1:
-        names = [table.names[i] for i in hits]
-        choice = Setting("columns", {role: names[0]})
+        numbers = Setting("columns", {role: hits[0]})
         raise ArgumentError(
-            f"{table.file}: the columns {' and '.join(map(repr, names))} could all be the {role}. Choose one: "
-            f"{choice}.",
-            choice,
+            f"{given}: {table.where} has {len(hits)} columns of that name. Give the number: {numbers}.",
+            given,
+            numbers,
         )
-    return hits[0] if hits else None
+    near = _checks.nearest(wanted, table.names)
+    hint = f" Did you mean {near!r}?" if near else ""
+    raise ArgumentError(f"{given}: {table.where} has {names}.{hint}", given)
 
 
-def _with_unit(table: Table, role: str, index: int, units: Mapping[str, str]) -> Column:
-    header = _label(table, index)
-    where = f"{table.file}, column {header!r}"
-    if role in units:
-        return Column(role, index, header, named_conversion(role, units[role], where))
-    if table.unit_row and table.unit_row[index]:
-        return Column(role, index, header, named_conversion(role, table.unit_row[index], where))
-    name, written = split_header(header) if table.names else (header, None)
-    if written:
-        return Column(role, index, header, named_conversion(role, written, where))
-    tail = _tail_unit(name, role)
+def _places(table: RawTable, wanted: str | int | None) -> list[int]:
+    """The columns that a number or a header, with or without its unit, names."""
+    if not isinstance(wanted, str):
+        return [] if wanted is None else [wanted]
+    exact = [index for index, name in enumerate(table.names) if name == wanted]
+    bare = wanted.strip().lower()
+    return exact or [index for index, name in enumerate(table.names) if split_header(name)[0].lower() == bare]
+
+
+def _candidates(table: RawTable, role: str, choice: Choice) -> list[int]:
+    """The columns that their names say to be this quantity and that are not given to another."""
+    taken = {place for wanted in choice.columns.values() for place in _places(table, wanted)}
+    columns = enumerate(table.columns)
+    return [i for i, column in columns if i not in taken and role_of(column.name, column.unit) == role]
+
+
+def _named(table: RawTable, role: str, choice: Choice) -> tuple[int | None, list[str]]:
+    hits = _candidates(table, role, choice)
+    stamped = [i for i, column in enumerate(table.columns) if column.is_text and _is_clock(column)]
+    if role == "time" and not hits:
+        hits = stamped
+    if len(hits) < 2:
+        return (hits[0] if hits else None), []
+    fitting = [i for i in hits if _fits(table.columns[i], role, choice) or (role == "time" and i in stamped)]
+    names = [table.names[i] for i in hits]
+    if len(fitting) == 1:
+        rest = " and ".join(repr(table.names[i]) for i in hits if i != fitting[0])
+        return fitting[0], [f"{role} from {table.names[fitting[0]]!r} rather than {rest}, by their units"]
+    choose = Setting("columns", {role: names[0] if names.count(names[0]) == 1 else hits[0]})
+    raise ArgumentError(
+        f"{table.where}: the columns {' and '.join(map(repr, names))} could all be the {role}. Choose one: {choose}.",
+        choose,
+    )
+
+
+def _fits(column: RawColumn, role: str, choice: Choice) -> bool:
+    """Whether a column has a unit of this quantity, or of the signal that its gain takes."""
+    name, written = split_header(column.name)
+    unit = column.unit or written
+    if role in choice.gains:
+        return unit is None or conversion(role, unit) is None
+    if column.is_text:
+        return False
+    return (conversion(role, unit) if unit else _tail_unit(name, role)) is not None
+
+
+def _is_clock(column: RawColumn) -> bool:
+    """Whether a column of text holds times of day."""
+    texts = np.asarray(column.values)[:3]
+    return len(texts) > 0 and all(":" in str(text) and is_stamp(str(text)) for text in texts)
+
+
+def _with_unit(table: RawTable, role: str, index: int, choice: Choice) -> Column:
+    column, header = table.columns[index], table.names[index]
+    where = f"{table.where}, column {header!r}"
+    if column.is_text:
+        if role == "time":
+            return Column(role, index, header, None)
+        raise ArgumentError(f"{where} ({role}) holds text ({np.asarray(column.values)[0]!r}), not numbers.")
+    name, written = split_header(column.name)
+    tail = None if column.unit or written else _tail_unit(name, role)
+    stated = column.unit or written or ""
+    if role in choice.gains:
+        unit = choice.units.get(role) or stated or _signal(name)
+        return Column(role, index, header, gain_conversion(role, choice.gains[role], unit, where))
+    if role in choice.units:
+        return Column(role, index, header, named_conversion(role, choice.units[role], where))
+    if stated:
+        return Column(role, index, header, named_conversion(role, stated, where))
     if tail:
         return Column(role, index, header, tail[1])
+    signal = _signal(name)
+    if signal:
+        named_conversion(role, signal, where)  # refuses it, with the gain as the remedy
     example = Setting("units", {role: USUAL[role][0]})
     raise ArgumentError(
         f"{where} ({role}) names no unit, and none is assumed. Pass it, for example {example}, or put it into the "
@@ -204,29 +307,35 @@ def _with_unit(table: Table, role: str, index: int, units: Mapping[str, str]) ->
     )
 
 
-def _refuse_missing(table: Table, role: str, found: Mapping[str, Column]) -> NoReturn:
+def _signal(name: str) -> str:
+    """The unit of a sensor's signal behind an underscore or a space, as in "F_mV"; empty if there is none."""
+    tail = re.split(r"[_\s]+", name)[-1] if re.search(r"[_\s]", name) else ""
+    return tail if tail and ratio(tail, "V") is not None else ""
+
+
+def _refuse_missing(table: RawTable, role: str, found: Mapping[str, Column | None]) -> NoReturn:
     """Refuse a table without a stroke or a force; propose a column that is no other quantity."""
-    names = ", ".join(map(repr, table.names)) or f"{table.values.shape[1]} columns without names"
-    taken = {column.index for column in found.values()}
-    left = [i for i in range(table.values.shape[1]) if i not in taken]
-    free = [i for i in left if not table.names or not _is_other(table, i, role)]
+    names = ", ".join(map(repr, table.names))
+    taken = {column.index for column in found.values() if column is not None}
+    left = [i for i, column in enumerate(table.columns) if i not in taken and not column.is_text]
+    free = [i for i in left if not _is_other(table.columns[i], role)]
     if not free:
         raise ArgumentError(
-            f"{table.file} has no column for the {role}: its columns are {names}, all of them other quantities. A "
+            f"{table.where} has no column for the {role}: its columns are {names}, all of them other quantities. A "
             f"record needs the {role}: export the file again with it."
         )
-    choice = Setting("columns", {role: table.names[free[0]] if table.names else free[0]})
+    choice = Setting("columns", {role: table.columns[free[0]].name or free[0]})
     raise ArgumentError(
-        f"{table.file} has no column for the {role}: its columns are {names}. Name it, for example {choice}.", choice
+        f"{table.where} has no column for the {role}: its columns are {names}. Name it, for example {choice}.", choice
     )
 
 
-def _is_other(table: Table, index: int, role: str) -> bool:
+def _is_other(column: RawColumn, role: str) -> bool:
     """Whether the header or the unit of a column says that it is another quantity."""
-    unit = table.unit_row[index] if table.unit_row else ""
-    header = table.names[index]
-    name, written = split_header(header)
-    said = role_of(header, unit)
-    unit = unit or written or ""
-    foreign = bool(unit) and conversion(role, unit) is None
+    if not column.name:
+        return False
+    name, written = split_header(column.name)
+    said = role_of(column.name, column.unit)
+    unit = column.unit or written or ""
+    foreign = bool(unit) and conversion(role, unit) is None and ratio(unit, "V") is None
     return foreign or (said is not None and said != role) or bool(_NOT_MEASURED.intersection(_words(name)))

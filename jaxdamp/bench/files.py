@@ -3,21 +3,25 @@
 import glob
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from difflib import get_close_matches
 from pathlib import Path
 
 from jaxdamp import _checks
 
 
-TEXT_ENDINGS = (".csv", ".txt", ".dat", ".tsv", ".asc")
+MAYBE_NOTES = (".txt", ".dat", ".asc")  # of a folder these are not read: they may be notes
+TEXT_SUFFIXES = (".csv", ".tsv", *MAYBE_NOTES)
 
 
-def find_files(paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> tuple[Path, ...]:
+def find_files(
+    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], suffixes: Collection[str] = (".csv",)
+) -> tuple[Path, ...]:
     """The files that the paths name, in natural order within a folder or pattern ("2mm" before "10mm").
 
     Arguments:
-        paths: a file, a folder (all its `*.csv`), a glob pattern, or several of these.
+        paths: a file, a folder, a glob pattern, or several of these.
+        suffixes: of the files that a folder stands for, in lower case.
 
     Raises:
         FileNotFoundError: a file does not exist, or a pattern or folder holds nothing.
@@ -26,7 +30,7 @@ def find_files(paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]])
     asked = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
     if not asked:
         _checks.refuse("paths", "name at least one file", "empty")
-    files = [file for path in asked for file in _expand(path)]
+    files = [file for path in asked for file in _expand(path, suffixes)]
     for file in files:
         if files.count(file) > 1:
             must, value = "name every file once", f"naming {file}, which is there {files.count(file)} times"
@@ -40,16 +44,17 @@ def natural_key(text: str) -> list[tuple[int, float, str]]:
     return [(0, float(part), "") if i % 2 else (1, 0.0, part.lower()) for i, part in enumerate(parts)]
 
 
-def _expand(path: str | os.PathLike[str]) -> Iterator[Path]:
+def _expand(path: str | os.PathLike[str], suffixes: Collection[str]) -> Iterator[Path]:
     text, file = os.fspath(path), Path(path).expanduser()
     if file.is_dir():
-        inside = [f for f in file.iterdir() if f.suffix.lower() == ".csv" and f.is_file()]
+        files = [f for f in file.iterdir() if f.is_file() and not f.name.startswith((".", "~$"))]
+        inside = [f for f in files if f.suffix.lower() in suffixes]
         if not inside:
-            others = sorted(f.name for f in file.iterdir() if f.suffix.lower() in TEXT_ENDINGS)
+            others = sorted(f.name for f in files if f.suffix.lower() in MAYBE_NOTES)
             hint = (
                 f" It holds {', '.join(others[:5])}: name these files, or a pattern such as '*.txt'." if others else ""
             )
-            raise FileNotFoundError(f"Folder {file} holds no *.csv file.{hint}")
+            raise FileNotFoundError(f"Folder {file} holds no *.csv or other file of records.{hint}")
         yield from sorted(inside, key=lambda f: natural_key(f.name))
     elif file.exists():
         yield file
@@ -71,5 +76,5 @@ def _near(file: Path) -> str:
     near = get_close_matches(file.name, names, 3, cutoff=0.5)
     if near:
         return f" Did you mean {' or '.join(repr(str(folder / name)) for name in near)}?"
-    text = [name for name in names if Path(name).suffix.lower() in TEXT_ENDINGS]
+    text = [name for name in names if Path(name).suffix.lower() in TEXT_SUFFIXES]
     return f" The folder {str(folder)!r} holds {', '.join(text[:5]) if text else 'no text files'}."

@@ -1,24 +1,24 @@
 """Bench files in, records in SI and one sign convention out."""
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
-
-import numpy as np
+from pathlib import Path
+from typing import Any
 
 from jaxdamp import _checks
-from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench import sampling
 from jaxdamp.bench import sign as signs
-from jaxdamp.bench.columns import Column, find_columns
+from jaxdamp.bench.columns import Choice, is_record
 from jaxdamp.bench.files import find_files
-from jaxdamp.bench.motion import Samples
-from jaxdamp.bench.runs import COMMAND_MARK, FILE_MARK, NOTE_MARK, BenchRun
+from jaxdamp.bench.manifest import find_manifest, merged, read_manifest
+from jaxdamp.bench.problems import Problems
+from jaxdamp.bench.raw import RawTable
+from jaxdamp.bench.readers import Reader, folder_suffixes, read_tables, with_own
+from jaxdamp.bench.record import Interpretation, records
+from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
-from jaxdamp.bench.tables import Table, read_table
-from jaxdamp.bench.units import is_unit
-from jaxdamp.bench.velocity import estimate_velocity
+from jaxdamp.bench.settings import Settings, settings_by_name
 
 
 def read(
@@ -28,16 +28,21 @@ def read(
     force_sign: str | None = None,
     columns: Mapping[str, str | int | None] | None = None,
     units: Mapping[str, str] | None = None,
+    gains: Mapping[str, str] | None = None,
     sampling_rate: float | int | None = None,
     delimiter: str | None = None,
-    command: float | Mapping[str, float] | None = None,
+    command: float | int | str | Mapping[str, float | int] | None = None,
+    settings: str | Mapping[str, Settings] | None = None,
+    manifest: str | os.PathLike[str] | bool = True,
+    readers: Mapping[str, Reader] | None = None,
+    skip_bad: bool = False,
 ) -> BenchSet:
-    r"""Read bench records from text files.
+    r"""Read bench records from text files, workbooks, MATLAB, TDMS, MDF4 and Parquet files.
 
     Columns are found by their headers ("t_s,x_mm,F_N", "time [s]; stroke (mm); force [N]", "Displacement, in", a row
     of units under the header), lines above the header are skipped, and delimiter and decimal comma are found out.
     Nothing is guessed that the file does not show: a missing unit is an error, and what was decided stands in each
-    record's notes.
+    record's notes. docs/reading.md says more.
 
     Arguments:
         paths: a file, several, a pattern such as "runs/*.csv", or a folder.
@@ -49,20 +54,30 @@ def read(
         columns: quantity to header or number (from 0) of its column, for "time", "stroke", "velocity", "force" and
             "temperature"; None leaves the file's column unused.
         units: quantity to unit, where the header has none or a wrong one.
+        gains: quantity to gain of its sensor, for columns in volts: `{"force": "500 N/V", "stroke": "10 mm/V - 2 mm"}`.
         sampling_rate: samples per second [Hz], for files without a time column.
-        delimiter: the character between columns, if the search fails.
-        command: what was set on the damper and held, such as a coil current: one number for all files, or a number for
-            each record by name or pattern, such as `{"*_0.5A": 0.5, "*_1.0A": 1.0}`.
+        delimiter: the character between columns of text files, if the search fails.
+        command: what was set on the damper and held, such as a coil current: one number for all files, a number for
+            each record by name or pattern, such as `{"*_0.5A": 0.5, "*_1.0A": 1.0}`, or the name of a setting.
+        settings: what else is known of the records: pattern to settings, `{"hot_*": {"temperature": 80}}`, or a pattern
+            with names in braces, `"*_{current}A"`, that takes the settings from the names of the records.
+        manifest: a TOML file with these arguments; True takes `jaxdamp.toml` of the folder that is read, and a note
+            says so; False takes none. What is given in the call wins.
+        readers: suffix to function that reads such files, beside or instead of `READERS` (docs/own_reader.md).
+        skip_bad: leave out files that cannot be read, instead of reading none; `BenchSet.left_out` says which and why.
 
     Returns:
-        The records, named after their files, in the order of the paths, folders and patterns in natural order.
+        The records, named after their files, in the order of the paths, folders and patterns in natural order. A
+        record inside a file of several has its name behind that of the file.
 
     Raises:
         FileNotFoundError: no such file, or a pattern or folder without files.
-        ValueError: naming file, line or column, the value and the remedy.
+        ValueError: naming file, line or column, the value and the remedy; all problems of all files at once.
+        ImportError: a format needs a library of the extra `io`.
 
     >>> import tempfile
     >>> from pathlib import Path
+    >>> import numpy as np
     >>> folder = Path(tempfile.mkdtemp())
     >>> t = np.arange(400) / 200
     >>> rows = [f"{a},{20 * np.sin(9 * a)},{.5 * np.cos(9 * a)}" for a in t]
@@ -73,27 +88,99 @@ def read(
     >>> print(run.notes[1])
     force and stroke of the file agree in sign (work per cycle +31.41 J)
     """
-    signs.check_words(sign, force_sign)
-    if sampling_rate is not None:
-        _checks.positive("sampling_rate", sampling_rate)
-    files = find_files(paths)
-    stems = [file.stem for file in files]
-    names = [f"{f.parent.name}/{f.stem}" if stems.count(f.stem) > 1 else f.stem for f in files]
-    runs = []
-    for file, name in zip(files, names, strict=True):
-        table = read_table(file, delimiter, is_unit)
-        found = find_columns(table, columns, units)
-        runs.append(_record(table, found, name, sign, force_sign, sampling_rate))
-    return BenchSet(_commanded(runs, command))
+    asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
+    given: dict[str, Any] = {
+        "sign": sign,
+        "force_sign": force_sign,
+        "columns": columns,
+        "units": units,
+        "gains": gains,
+        "sampling_rate": sampling_rate,
+        "delimiter": delimiter,
+        "command": command,
+        "settings": settings,
+    }
+    own_readers, note = with_own(readers), ()
+    file = find_manifest(manifest, asked)
+    if file is not None:
+        stated = read_manifest(file)
+        given, note = merged(stated, given), (f"read as the manifest {file} says",)
+        asked = _files_of(asked, stated)
+    signs.check_words(given["sign"], given["force_sign"])
+    if given["sampling_rate"] is not None:
+        _checks.positive("sampling_rate", given["sampling_rate"])
+    choice = Choice(*({**(given[name] or {})} for name in ("columns", "units", "gains")))
+    how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"])
+    files = find_files(asked, folder_suffixes(readers))
+    runs, left_out = _read_files(files, own_readers, given["delimiter"], how, skip_bad)
+    runs = [(base, replace(run, notes=(*run.notes, *note))) for base, run in runs]
+    return BenchSet(_commanded(_with_settings(runs, given["settings"]), given["command"]), left_out)
 
 
-def _commanded(runs: list[BenchRun], command: float | Mapping[str, float] | None) -> list[BenchRun]:
+def _files_of(asked: list[str | os.PathLike[str]], manifest: Mapping[str, Any]) -> list[str | os.PathLike[str]]:
+    """What is read: the files that the manifest names, if a folder is asked for."""
+    if "files" not in manifest or len(asked) > 1 or not Path(asked[0]).expanduser().is_dir():
+        return asked
+    return [Path(asked[0]).expanduser() / pattern for pattern in manifest["files"]]
+
+
+def _read_files(
+    files: Sequence[Path], readers: Mapping[str, Reader], delimiter: str | None, how: Interpretation, skip_bad: bool
+) -> tuple[list[tuple[str, BenchRun]], tuple[str, ...]]:
+    """The records of all files, each with its name before it was cut at gaps, and what was left out and why."""
+    runs, errors, problems = [], [], Problems()
+    for file, name in zip(files, _names(files), strict=True):
+        try:
+            runs += _read_file(read_tables(file, readers, delimiter), name, how)
+        except (ValueError, OSError, ImportError) as error:
+            errors.append(error)
+    for error in errors if not skip_bad or not runs else ():
+        with problems.collected():
+            raise error
+    problems.raise_any()
+    return runs, tuple(map(str, errors))
+
+
+def _names(files: Sequence[Path]) -> list[str]:
+    """The name of each file without its suffix, with its folder or suffix only where others have the same name."""
+    names = [file.stem for file in files]
+    folders = {name: {f.parent for f in files if f.stem == name} for name in names}
+    names = [f"{f.parent.name}/{f.stem}" if len(folders[f.stem]) > 1 else f.stem for f in files]
+    return [f"{n} ({f.suffix[1:]})" if names.count(n) > 1 else n for f, n in zip(files, names, strict=True)]
+
+
+def _read_file(tables: Sequence[RawTable], name: str, how: Interpretation) -> list[tuple[str, BenchRun]]:
+    """The records of a file. Tables without stroke and force are left out of a file that has others, with a note."""
+    good = [table for table in tables if is_record(table, how.choice)] or tables
+    rest = ", ".join(repr(table.record) for table in tables if table not in good)
+    note = (f"{rest} of the file left out: neither stroke nor force",) if rest else ()
+    runs, problems = [], Problems()
+    for table in good:
+        base = f"{name}/{table.record}" if len(good) > 1 else name
+        with problems.collected():
+            runs += [(base, replace(run, notes=(*run.notes, *note))) for run in records(table, base, how)]
+    problems.raise_any()
+    return runs
+
+
+def _with_settings(
+    runs: list[tuple[str, BenchRun]], settings: str | Mapping[str, Settings] | None
+) -> list[tuple[str, BenchRun]]:
+    table = settings_by_name([base for base, _ in runs], settings)
+    return [(base, replace(run, settings={**run.settings, **table[base]})) for base, run in runs]
+
+
+def _commanded(
+    runs: list[tuple[str, BenchRun]], command: float | int | str | Mapping[str, float | int] | None
+) -> list[BenchRun]:
     """The records with the commands given."""
     if command is None:
-        return runs
+        return [run for _, run in runs]
+    if isinstance(command, str):
+        return [replace(run, command=_setting(run, command)) for _, run in runs]
     if not isinstance(command, Mapping):
-        return [replace(run, command=command) for run in runs]
-    fitting = {run.name: [key for key in command if fnmatchcase(run.name, key)] for run in runs}
+        return [replace(run, command=command) for _, run in runs]
+    fitting = {base: [key for key in command if fnmatchcase(base, key)] for base, _ in runs}
     unused = [key for key in command if not any(key in keys for keys in fitting.values())]
     if unused:
         names = ", ".join(fitting)
@@ -102,115 +189,15 @@ def _commanded(runs: list[BenchRun], command: float | Mapping[str, float] | None
     if doubtful:
         must = "fit each record with exactly one pattern"
         _checks.refuse("command", must, f"fitting otherwise for {', '.join(doubtful)}")
-    return [replace(run, command=command[fitting[run.name][0]]) for run in runs]
+    return [replace(run, command=command[fitting[base][0]]) for base, run in runs]
 
 
-def _record(
-    table: Table,
-    columns: dict[str, Column],
-    name: str,
-    sign: str | None,
-    force_sign: str | None,
-    sampling_rate: float | int | None,
-) -> BenchRun:
-    where = str(table.file)
-    sampling.check_count(len(table.values), where)
-    channels = {}
-    for role, column in columns.items():
-        values = column.conversion(np.ascontiguousarray(table.values[:, column.index]))
-        sampling.check_numbers(values, f"{role} (column {column.header!r})", where, table.lines)
-        channels[role] = values
-    notes = [_columns_note(table, columns)]
-    time, note = _time(channels.get("time"), len(table.values), sampling_rate, where, table.lines)
-    notes += [note] if note else []
-    stroke, force = channels["stroke"], channels["force"]
-    sampling.check_stroke(stroke, f"{where}, column {columns['stroke'].header!r}")
-    own = bool(table.preamble) and table.preamble[0].strip() == FILE_MARK
-    if own:
-        if sign == "compression-positive" or force_sign == "opposite":
-            given = [Setting(name, word) for name, word in (("sign", sign), ("force_sign", force_sign)) if word]
-            words = " and ".join(map(str, given))
-            raise ArgumentError(f"{where} states that it is rebound-positive: read it without {words}.", *given)
-        decision = signs.Decision(1.0, 1.0, ("positive stroke is rebound, as the file states",))
-    else:
-        decision = signs.decide(time, stroke, force, sign, force_sign, where)
-    velocity, how = channels.get("velocity"), "velocity as the file states"
-    if velocity is None or not own:
-        velocity, how = _velocity(time, stroke, velocity, where)
-    earlier = [line.strip().removeprefix(NOTE_MARK) for line in table.preamble if line.startswith(NOTE_MARK)]
-    stated = [line.removeprefix(COMMAND_MARK) for line in table.preamble if own and line.startswith(COMMAND_MARK)]
-    return BenchRun(
-        name,
-        time,
-        _turned(stroke, decision.motion),
-        _turned(velocity, decision.motion),
-        _turned(force, decision.force),
-        temperature=channels.get("temperature"),
-        command=float(stated[0]) if stated else None,
-        source=where,
-        notes=(*earlier, *notes, *decision.notes, how),
-    )
-
-
-def _turned(values: Samples, factor: float) -> Samples:
-    return values if factor == 1.0 else values * factor
-
-
-def _columns_note(table: Table, columns: dict[str, Column]) -> str:
-    used = ", ".join(f"{c.role} from {c.header!r} in {c.conversion.unit}" for c in columns.values())
-    taken = {column.index for column in columns.values()}
-    rest = [name for i, name in enumerate(table.names) if i not in taken]
-    return f"{used}; brought to SI" + (f"; not used: {', '.join(rest)}" if rest else "")
-
-
-def _time(
-    time: Samples | None, count: int, rate: float | int | None, where: str, lines: tuple[int, ...]
-) -> tuple[Samples, str]:
-    """The instants, from the time column or the sampling rate given."""
-    if time is None:
-        if rate is None:
-            example, name = Setting("sampling_rate", 1000), Setting("columns", {"time": ...})
-            raise ArgumentError(
-                f"{where} has no time column: pass the rate at which it was sampled, for example {example} "
-                f"[Hz], or name the column with {name}.",
-                example,
-                name,
-            )
-        return sampling.uniform_time(rate, count), f"time from the sampling rate given, {rate:g} Hz"
-    time, note = sampling.check_time(time, where, lines)
-    own = (count - 1) / (time[-1] - time[0])
-    if rate is not None and abs(rate / own - 1) > 0.01:
-        given, without = Setting("sampling_rate", rate), Setting("columns", {"time": None})
-        raise ArgumentError(
-            f"{where}: {given} contradicts the time column, which has {own:.6g} Hz. Leave one of "
-            f"them out: {without} leaves out the column.",
-            given,
-            without,
+def _setting(run: BenchRun, name: str) -> float:
+    """The setting of a record that is its command."""
+    value = run.settings.get(name)
+    if not isinstance(value, int | float):
+        known = ", ".join(f"{key}={value!r}" for key, value in run.settings.items()) or "none"
+        _checks.refuse(
+            "command", f"name a setting that is a number, also of {run.name!r}", repr(name), f"Its settings: {known}."
         )
-    return time, note
-
-
-def _velocity(time: Samples, stroke: Samples, measured: Samples | None, where: str) -> tuple[Samples, str]:
-    """The velocity column if it is the derivative of the stroke, otherwise the derivative."""
-    derived, how = estimate_velocity(time, stroke)
-    if measured is None:
-        return derived, how
-    without = Setting("columns", {"velocity": None})
-    remedy = f"Mend the column or its unit, or derive the velocity from the stroke: {without}."
-    power = float(np.dot(measured, measured) * np.dot(derived, derived))
-    likeness = float(np.dot(measured, derived)) / np.sqrt(power) if power > 0 else 0.0
-    scale = float(np.dot(measured, derived) / np.dot(derived, derived))
-    if likeness < -0.8:
-        fault = f"has the opposite sign of the stroke's derivative (correlation {likeness:.3f})"
-    elif likeness < 0.8:
-        fault = f"is not the derivative of the stroke (correlation {likeness:.3f})"
-    elif not 0.8 < scale < 1.25:
-        fault = f"is {scale:.4g} times the stroke's derivative: one of the two has a wrong unit"
-    else:
-        fault = ""
-    if fault:
-        raise ArgumentError(f"{where}: the velocity column {fault}. {remedy}", without)
-    doubt = " - they differ, look at both" if likeness < 0.99 or not 0.97 < scale < 1.03 else ""
-    return measured, (
-        f"velocity as measured; it is {scale:.4g} times the stroke's derivative, correlation {likeness:.4f}{doubt}"
-    )
+    return float(value)

@@ -1,8 +1,9 @@
 """One record of a test bench."""
 
+import json
 import os
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, final
@@ -19,6 +20,7 @@ from jaxdamp.bench.velocity import estimate_velocity
 FILE_MARK = "# jaxdamp bench record: stroke and velocity positive in extension, force positive resisting it"
 NOTE_MARK = "# note: "
 COMMAND_MARK = "# command: "
+SETTINGS_MARK = "# settings: "
 _HEADERS = {"time": "time [s]", "stroke": "stroke [m]", "velocity": "velocity [m/s]", "force": "force [N]"}
 
 
@@ -47,6 +49,7 @@ class BenchRun:
         temperature: [K], shape (time,), if it was measured.
         command: what was set on the damper for this record and held: coil current, voltage, clicks, in a unit of your
             choice; for laws that take a command (`dampers.with_command`).
+        settings: what else is known of the record, by name: clicks, temperature, the test.
         source: the file, or what else the record comes from.
         notes: sentences on what was done to the data.
 
@@ -70,6 +73,7 @@ class BenchRun:
     command: float | None = None
     source: str = ""
     notes: tuple[str, ...] = ()
+    settings: Mapping[str, float | int | str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         where = f"record {self.name!r}"
@@ -214,6 +218,7 @@ class BenchRun:
             lines.append(f"  temperature  {warm.min():.1f} … {warm.max():.1f} °C")
         if self.command is not None:
             lines.append(f"  command      {self.command:g}")
+        lines += [f"  {key:<12} {value}" for key, value in self.settings.items()]
         return "\n".join(lines + [f"  - {note}" for note in self.notes])
 
     def __repr__(self) -> str:
@@ -230,8 +235,9 @@ class BenchRun:
         if self.temperature is not None:
             channels, header = [*channels, self.temperature], [*header, "temperature [K]"]
         command = [] if self.command is None else [f"{COMMAND_MARK}{self.command!r}"]
+        settings = [SETTINGS_MARK + json.dumps(dict(self.settings))] if self.settings else []
         notes = [NOTE_MARK + " ".join(note.split()) for note in self.notes]
-        lines = [FILE_MARK, *command, *notes, ",".join(header)]
+        lines = [FILE_MARK, *command, *settings, *notes, ",".join(header)]
         lines += [",".join(map(repr, row)) for row in np.stack(channels, axis=1).tolist()]
         path = Path(path)
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")

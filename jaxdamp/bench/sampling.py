@@ -1,6 +1,7 @@
 """Checks of a record's samples before anything is computed from them."""
 
 from collections.abc import Sequence
+from typing import NoReturn
 
 import numpy as np
 from jaxtyping import Float
@@ -11,6 +12,8 @@ from jaxdamp.bench.motion import Samples
 
 FEWEST = 20  # samples of a record
 _GAP = 1.5  # sampling steps that are taken for a gap
+_OFTEN = 0.02  # share of such steps beyond which a clock jitters
+_WIDE_GAP = 3.0  # sampling steps that are a gap even then
 _JITTER = 0.02  # sampling steps by which an instant may be off
 
 
@@ -19,7 +22,7 @@ def uniform_time(rate: float | int, count: int) -> Samples:
     return np.arange(count) / rate
 
 
-def check_time(time: Samples, where: str, lines: Sequence[int] | None = None) -> tuple[Samples, str]:
+def check_time(time: Samples, where: str) -> tuple[Samples, str]:
     """The instants of a uniformly sampled record, and a sentence if they had to be made uniform.
 
     Instants that were only rounded when they were written (three decimals at 300 Hz) are put back on the uniform grid.
@@ -27,45 +30,89 @@ def check_time(time: Samples, where: str, lines: Sequence[int] | None = None) ->
     Raises:
         ValueError: time goes back or stands still, samples are missing, or the steps are not uniform.
     """
-    what, lines = ("line", lines) if lines else ("sample", range(len(time)))
+    check_order(time, where)
+    if is_uniform(time):
+        return time, ""
+    missing = gaps(time)
+    if missing.size:
+        refuse_gaps(time, missing, where)
+    rounded = without_rounding(time)
+    if rounded is not None:
+        return rounded
     steps = np.diff(time)
-    without, rate = Setting("columns", {"time": None}), Setting("sampling_rate")
-    again = f"leave its column out and give the rate: {without}, {rate}"
-    back = np.flatnonzero(steps <= 0)
+    raise ValueError(
+        f"{where}: the samples are not uniform in time, the steps go from {steps.min():.4g} to {steps.max():.4g} s. "
+        "Resample all channels with numpy.interp to one rate; `bench.read` does so with files."
+    )
+
+
+def check_order(time: Samples, where: str, lines: Sequence[int] | None = None) -> None:
+    """Refuse a time that goes back or stands still, naming where."""
+    back = np.flatnonzero(np.diff(time) <= 0)
     if back.size:
         i = int(back[0]) + 1
+        without, rate = Setting("columns", {"time": None}), Setting("sampling_rate")
         raise ArgumentError(
-            f"{where}, {what} {lines[i]}: time goes from {time[i - 1]:.9g} s to {time[i]:.9g} s, but must increase. "
-            f"Cut the record there; or, if its clock is too coarse, {again}.",
+            f"{where}, {_place(i, lines)}: time goes from {time[i - 1]:.9g} s to {time[i]:.9g} s, but must increase. "
+            f"Cut the record there; or, if its clock is too coarse, leave its column out and give the rate: "
+            f"{without}, {rate}.",
             without,
             rate,
         )
-    number = np.arange(len(time)) - (len(time) - 1) / 2
-    step = float(np.dot(number, time) / np.dot(number, number))
-    off = float(np.max(np.abs(time - time.mean() - step * number)))
-    if off <= _JITTER * step:
-        return time, ""
+
+
+def is_uniform(time: Samples) -> bool:
+    """Whether increasing instants lie on a uniform grid, as near as a clock needs."""
+    step, off = _grid(time)
+    return off <= _JITTER * step
+
+
+def gaps(time: Samples) -> np.ndarray:
+    """Numbers of the samples behind which time jumps. A clock with steps of many lengths only jitters."""
+    steps = np.diff(time)
     usual = float(np.median(steps))
-    gaps = np.flatnonzero(steps > _GAP * usual)
-    if gaps.size:
-        i = int(gaps[0]) + 1
-        raise ArgumentError(
-            f"{where}, {what} {lines[i]}: {steps[i - 1] / usual - 1:.0f} samples are missing between {time[i - 1]:.6g} "
-            f"and {time[i]:.6g} s ({gaps.size} such gaps in all; the usual step is {usual:.4g} s). Cut the record "
-            f"into the parts before and after the gap; or, if its clock is too coarse, {again}.",
-            without,
-            rate,
-        )
-    quantum = 10.0 ** -_decimals(time)
-    if off <= 0.6 * quantum:
-        note = f"time was rounded to {quantum:g} s in the file; it is put back on a grid of {1 / step:.6g} Hz"
-        return time[0] + step * np.arange(len(time)), note
+    if is_uniform(time):
+        return np.empty(0, dtype=int)
+    wide = steps > _GAP * usual
+    if np.mean(wide) > _OFTEN:
+        wide = steps > _WIDE_GAP * usual
+    return np.flatnonzero(wide)
+
+
+def refuse_gaps(time: Samples, missing: np.ndarray, where: str, lines: Sequence[int] | None = None) -> NoReturn:
+    """Refuse a record with samples missing behind these."""
+    i, steps = int(missing[0]) + 1, np.diff(time)
+    usual = float(np.median(steps))
+    without, rate = Setting("columns", {"time": None}), Setting("sampling_rate")
     raise ArgumentError(
-        f"{where}: the samples are not uniform in time, the steps go from {steps.min():.4g} to {steps.max():.4g} s. "
-        f"Resample all channels with numpy.interp to one rate; or, if only the clock jitters, {again}.",
+        f"{where}, {_place(i, lines)}: {steps[i - 1] / usual - 1:.0f} samples are missing between {time[i - 1]:.6g} "
+        f"and {time[i]:.6g} s ({missing.size} such gaps in all; the usual step is {usual:.4g} s). Cut the record "
+        f"into the parts before and after the gap; or, if its clock is too coarse, leave its column out and give the "
+        f"rate: {without}, {rate}.",
         without,
         rate,
     )
+
+
+def without_rounding(time: Samples) -> tuple[Samples, str] | None:
+    """The uniform instants that were rounded when they were written (three decimals at 300 Hz), and a note."""
+    step, off = _grid(time)
+    quantum = 10.0 ** -_decimals(time)
+    if off > 0.6 * quantum:
+        return None
+    note = f"time was rounded to {quantum:g} s in the file; it is put back on a grid of {1 / step:.6g} Hz"
+    return time[0] + step * np.arange(len(time)), note
+
+
+def _grid(time: Samples) -> tuple[float, float]:
+    """Step of the uniform grid next to the instants, and the largest distance from it."""
+    number = np.arange(len(time)) - (len(time) - 1) / 2
+    step = float(np.dot(number, time) / np.dot(number, number))
+    return step, float(np.max(np.abs(time - time.mean() - step * number)))
+
+
+def _place(sample: int, lines: Sequence[int] | None) -> str:
+    return f"line {lines[sample]}" if lines is not None and len(lines) else f"sample {sample}"
 
 
 def _decimals(time: Samples) -> int:
@@ -82,10 +129,9 @@ def check_numbers(
     """Refuse NaN and infinity, naming the first."""
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
-        at = f", line {lines[bad[0]]}" if lines else f", sample {bad[0]}"
         raise ValueError(
-            f"{where}{at}: the {role} is {values[bad[0]]} ({bad.size} such values in all). Cut the record there or "
-            "mend it."
+            f"{where}, {_place(int(bad[0]), lines)}: the {role} is {values[bad[0]]} ({bad.size} such values in all). "
+            "Cut the record there or mend it."
         )
 
 

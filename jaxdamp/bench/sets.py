@@ -20,6 +20,10 @@ Selection = str | Iterable[str] | Callable[[BenchRun], bool]
 class BenchSet:
     """Records in order, found by number or by name.
 
+    Arguments:
+        runs: the records.
+        left_out: a sentence on each file that was to be read too, but could not (`read(skip_bad=True)`).
+
     >>> import numpy as np
     >>> time = np.arange(1000) / 1000
     >>> wave = np.sin(6 * np.pi * time)
@@ -33,14 +37,16 @@ class BenchSet:
     """
 
     runs: tuple[BenchRun, ...]
+    left_out: tuple[str, ...]
 
-    def __init__(self, runs: Iterable[BenchRun] = ()) -> None:
+    def __init__(self, runs: Iterable[BenchRun] = (), left_out: Iterable[str] = ()) -> None:
         runs = as_runs(runs)
         names = [run.name for run in runs]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             _checks.refuse("runs", "have different names", f"twice {', '.join(map(repr, twice))}")
         object.__setattr__(self, "runs", runs)
+        object.__setattr__(self, "left_out", tuple(left_out))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -72,7 +78,7 @@ class BenchSet:
 
     def __add__(self, other: "BenchSet") -> "BenchSet":
         """Both sets, one behind the other."""
-        return BenchSet(self.runs + other.runs)
+        return BenchSet(self.runs + other.runs, self.left_out + other.left_out)
 
     def _index(self, name: str) -> int:
         if name in self.names:
@@ -112,7 +118,8 @@ class BenchSet:
 
     def describe(self) -> str:
         """All records and what was done to their data, in words."""
-        return "\n\n".join(run.describe() for run in self.runs)
+        missing = [f"left out: {sentence}" for sentence in self.left_out]
+        return "\n\n".join([run.describe() for run in self.runs] + missing)
 
     def write(self, folder: str | os.PathLike[str]) -> tuple[Path, ...]:
         """Write every record to `<folder>/<name>.csv`, making the folder if need be. `read(folder)` reads them."""
@@ -137,6 +144,8 @@ class BenchSet:
                 f"  {run.name:<{width}}  {run.frequency:>7.4g}  {1e3 * run.amplitude:>7.4g}  "
                 f"{run.peak_velocity:>7.3g}  {force:>17}  {run.work_per_cycle:>8.4g}  {run.cycles:>6}"
             )
+        if self.left_out:
+            lines.append(f"  left out {len(self.left_out)}: see left_out")
         return "\n".join(lines)
 
 

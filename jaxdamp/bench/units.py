@@ -22,6 +22,8 @@ USUAL = {
     "force": ("N", "kN", "daN", "lbf", "kgf"),
     "temperature": ("degC", "K", "degF"),
 }
+GAINS = {"time": "0.001 s", "stroke": "10 mm", "velocity": "0.5 m/s", "force": "500 N", "temperature": "100 K"}
+SIGNALS = ("count", "counts", "digit", "digits", "ma", "mv/v", "%fs")  # units of a signal, beside volts
 # How bench software writes units that pint reads as something else or not at all, in lower case, per quantity.
 _WRITTEN = {
     "time": {"sec": "s", "secs": "s", "sek": "s", "msec": "ms", "µs": "us", "μs": "us"},
@@ -97,9 +99,25 @@ def conversion(role: str, written: str) -> Conversion | None:
     return Conversion(text, float(two - zero) / 2, float(zero))
 
 
+@lru_cache(maxsize=256)
 def is_unit(written: str) -> bool:
-    """Whether this text is a unit of any quantity that a record has."""
-    return any(conversion(role, written) is not None for role in SI)
+    """Whether this text is a unit of any quantity that a record has, or of a sensor's signal."""
+    return any(conversion(role, written) is not None for role in SI) or ratio(written, "V") is not None
+
+
+@lru_cache(maxsize=256)
+def ratio(written: str, other: str) -> float | None:
+    """How many of another unit one of this unit is, or None if they measure different things.
+
+    >>> ratio("mV", "V"), ratio("mm", "V"), ratio("digits", "digits")
+    (0.001, None, 1.0)
+    """
+    if written.strip().lower() == other.strip().lower():
+        return 1.0
+    try:
+        return float(_registry().Quantity(1.0, written.strip()).to(other.strip()).magnitude)
+    except Exception:  # as in `conversion`
+        return None
 
 
 def named_conversion(role: str, written: str, where: str) -> Conversion:
@@ -109,6 +127,13 @@ def named_conversion(role: str, written: str, where: str) -> Conversion:
         return found
     near = get_close_matches(written, [*USUAL[role], *_WRITTEN[role]], 1, cutoff=0.4)
     hint = f"Did you mean {near[0]!r}? " if near else ""
+    if ratio(written, "V") is not None or written.strip().lower() in SIGNALS:
+        gain = Setting("gains", {role: f"{GAINS[role]}/{written}"})
+        raise ArgumentError(
+            f"{where}: {written!r} is the unit of a sensor's signal, not of {role}. Pass the gain of the sensor, for "
+            f"example {gain}.",
+            gain,
+        )
     other = next((r for r in SI if conversion(r, written) is not None), None)
     what = f"is a unit of {other}, not of {role}" if other else f"is no known unit of {role}"
     example = near[0] if near else USUAL[role][0]

@@ -49,7 +49,10 @@ def common(
 
 @app.command()
 def fit(
-    files: Annotated[list[Path], typer.Argument(help="Text files with records, patterns, or folders of *.csv.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(help="Files with records (CSV, XLSX, MATLAB, TDMS, MDF4, Parquet), patterns, or folders."),
+    ],
     law: Annotated[
         list[str],
         typer.Option(help='Names of laws, see "jaxdamp laws": "linear,besinger"; or "all". May be repeated.'),
@@ -77,6 +80,14 @@ def fit(
         float | None, typer.Option(help="Samples per second [Hz], for files without a time column.")
     ] = None,
     delimiter: Annotated[str | None, typer.Option(help="Character between columns, if it is not found.")] = None,
+    gains: Annotated[
+        list[str], typer.Option(help="Gains of sensors, for columns in volts: force=500 N/V,stroke=10 mm/V - 2 mm.")
+    ] = [],  # noqa: B006
+    manifest: Annotated[
+        Path | None,
+        typer.Option(help="TOML file that says how to read the files; jaxdamp.toml in a folder is taken by itself."),
+    ] = None,
+    skip_bad: Annotated[bool, typer.Option("--skip-bad", help="Leave out files that cannot be read.")] = False,
     weighting: Annotated[
         str, typer.Option(help='"samples": every sample counts the same; "runs": every record, by its RMS force.')
     ] = "samples",
@@ -92,7 +103,17 @@ def fit(
 
     with console.plain_errors(debug):
         console.prepare()
-        options = fitting.ReadOptions(sign, force_sign, tuple(columns), tuple(units), sampling_rate, delimiter)
+        options = fitting.ReadOptions(
+            sign,
+            force_sign,
+            tuple(columns),
+            tuple(units),
+            sampling_rate,
+            delimiter,
+            gains=tuple(gains),
+            manifest=manifest,
+            skip_bad=skip_bad,
+        )
         fitting.run_fit(
             console.Screen(), files, options, laws=law, held_out=held_out, weighting=weighting, out=out, replace=replace
         )

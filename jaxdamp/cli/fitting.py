@@ -63,7 +63,7 @@ def run_fit(
         with screen.stage("Reading the records"):
             runs = options.read(files)
         fitted, held = split(runs, held_out)
-        remarks = decisions(tuple(runs))
+        remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
         screen.say()

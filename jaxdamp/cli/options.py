@@ -75,7 +75,8 @@ def _names_of(runs: BenchSet, pattern: str) -> list[str]:
         here = [run.name for run in runs if Path(run.source).resolve() == path.resolve()]
         if here:
             return here
-    return [pattern.removesuffix(".csv").removesuffix(".txt")]
+    suffix = path.suffix
+    return [pattern.removesuffix(suffix) if suffix.lower() in bench.READERS else pattern]
 
 
 def decisions(runs: Sequence[BenchRun]) -> list[str]:
@@ -103,6 +104,9 @@ class ReadOptions:
     units: tuple[str, ...] = ()
     sampling_rate: float | None = None
     delimiter: str | None = None
+    gains: tuple[str, ...] = ()
+    manifest: Path | None = None
+    skip_bad: bool = False
 
     def read(self, files: Sequence[Path]) -> BenchSet:
         """Read the records."""
@@ -114,4 +118,7 @@ class ReadOptions:
             units=assignments("units", self.units),
             sampling_rate=self.sampling_rate,
             delimiter=self.delimiter,
+            gains=assignments("gains", self.gains),
+            manifest=True if self.manifest is None else self.manifest,
+            skip_bad=self.skip_bad,
         )

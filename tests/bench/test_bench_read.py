@@ -105,7 +105,10 @@ def test_velocity_column_that_contradicts_the_stroke(write, column, message):
     [
         ({"replace": {9: "0.03,nan,1.0"}}, r"run\.csv, line 11: the stroke \(column 'x_mm'\) is nan"),
         ({"replace": {9: "0.03,1.0,inf"}}, r"line 11: the force \(column 'F_N'\) is inf"),
-        ({"drop": range(100, 110)}, r"run\.csv, line 102: 10 samples are missing between 0\.33 and 0\.366667 s"),
+        (
+            {"drop": [*range(150, 160), *range(300, 310), *range(450, 460)]},
+            r"run\.csv, line 152: 10 samples are missing between 0\.496667 and 0\.533333 s \(3 such gaps",
+        ),
         ({"replace": {100: "0.2,1.0,1.0"}}, r"run\.csv, line 102: time goes from 0\.33 s to 0\.2 s, but must increase"),
         (
             {"scale": (1, 0, 1), "header": "t_s,F_N,x_mm", "extra": [np.ones(600)]},
@@ -121,10 +124,28 @@ def test_bad_files(write, faults, message):
         read(write(**faults))
 
 
-def test_irregular_sampling(write, rng):
-    time = np.arange(600) / 300 + rng.uniform(-0.1, 0.1, 600) / 300
-    with pytest.raises(ValueError, match="not uniform in time"):
-        read(write(header="x_mm,F_N,t_s", scale=(0, 1e3, 1), extra=[time]))
+def test_a_clock_that_jitters_is_resampled(tmp_path, rng):
+    time = np.arange(600) / 300 + rng.uniform(-0.2, 0.2, 600) / 300
+    x, f = 20 * np.sin(3 * np.pi * time), 500 * np.cos(3 * np.pi * time)
+    rows = [f"{a},{b},{c}" for a, b, c in zip(time, x, f, strict=True)]
+    (tmp_path / "run.csv").write_text("\n".join(["t_s,x_mm,F_N", *rows]))
+    run = read(tmp_path / "run.csv")[0]
+    np.testing.assert_allclose(np.diff(run.time), np.ptp(time) / 599, rtol=1e-9)
+    np.testing.assert_allclose(run.stroke, 0.020 * np.sin(3 * np.pi * run.time), atol=5e-6)
+    np.testing.assert_allclose(run.force, 500 * np.cos(3 * np.pi * run.time), atol=0.1)
+    assert any("clock jitters by up to 0." in note and "linear interpolation at" in note for note in run.notes)
+
+
+def test_a_record_with_gaps_is_cut_into_parts(write):
+    path = write(count=1200, drop=[*range(100, 110), *range(700, 705)])
+    runs = read(path, command={"run": 2.0})
+    assert runs.names == ("run_part1", "run_part2")
+    assert [len(run) for run in runs] == [590, 495]
+    assert all(run.command == 2.0 for run in runs)
+    whole = read(write("whole.csv", count=1200))[0]
+    np.testing.assert_array_equal(runs[0].force, whole.force[110:700])
+    assert any("part 2 of 3 between gaps in time, 0.366667 to 2.33 s" in note for note in runs[0].notes)
+    assert any("1 part without a full cycle left out, 100 samples" in note for note in runs[1].notes)
 
 
 def test_bad_words_are_refused_before_a_file_is_opened():

@@ -3,13 +3,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jaxdamp.bench.columns import find_columns, role_of
-from jaxdamp.bench.tables import Table
+from jaxdamp.bench.columns import Choice, role_of
+from jaxdamp.bench.columns import find_columns as find
+from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.units import conversion
 
 
-def _table(*names: str, units: tuple[str, ...] = (), count: int = 0) -> Table:
-    return Table(Path("run.csv"), names, units, np.zeros((30, len(names) or count)), tuple(range(30)), ())
+def _table(*names: str, units: tuple[str, ...] = (), count: int = 0) -> RawTable:
+    names = names or ("",) * count
+    units = units or ("",) * len(names)
+    return RawTable(Path("run.csv"), tuple(RawColumn(n, np.zeros(30), u) for n, u in zip(names, units, strict=True)))
+
+
+def find_columns(table, columns=None, units=None, gains=None):
+    return find(table, Choice(columns or {}, units or {}, gains or {}))[0]
 
 
 @pytest.mark.parametrize(
@@ -39,7 +46,7 @@ def test_role_of_a_header(header, role):
 
 def test_units_from_headers_rows_and_arguments():
     found = find_columns(_table("t_s", "Displacement, in", "Velocity (in/s)", "force lbf", "temp [degC]"))
-    assert {role: column.conversion.unit for role, column in found.items()} == {
+    assert {role: column.unit for role, column in found.items()} == {
         "time": "s",
         "stroke": "in",
         "velocity": "in/s",
@@ -47,9 +54,9 @@ def test_units_from_headers_rows_and_arguments():
         "temperature": "degC",
     }
     found = find_columns(_table("time", "stroke", "force", units=("ms", "mm", "kN")))
-    assert found["force"].conversion.factor == 1000.0
+    assert found["force"].unit == "kN"
     found = find_columns(_table("time [s]", "stroke", "force [N]"), units={"stroke": "mm", "force": "kN"})
-    assert (found["stroke"].conversion.unit, found["force"].conversion.unit) == ("mm", "kN")
+    assert (found["stroke"].unit, found["force"].unit) == ("mm", "kN")
 
 
 def test_columns_by_name_number_and_none():
@@ -58,6 +65,13 @@ def test_columns_by_name_number_and_none():
     assert (found["stroke"].index, found["force"].index, "velocity" in found) == (1, 4, False)
     units = {"time": "s", "stroke": "mm", "force": "N"}
     assert len(find_columns(_table(count=3), {"time": 0, "stroke": 1, "force": 2}, units)) == 3
+
+
+def test_a_header_is_named_without_its_unit():
+    table = _table("t_s", "Hub [mm]", "X [mm]", "F_N")
+    assert find_columns(table, {"stroke": "hub"})["stroke"].index == 1
+    with pytest.raises(ValueError, match=r"has 2 columns of that name.*columns=\{\"stroke\": 1\}"):
+        find_columns(_table("t_s", "x [mm]", "x [mm]", "F_N"), {"stroke": "x"})
 
 
 def test_two_columns_for_one_role():

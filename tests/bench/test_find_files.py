@@ -11,8 +11,10 @@ def _touch(folder: Path, *names: str) -> None:
 
 
 def test_folder_gives_its_csv_files_in_natural_order(tmp_path):
-    _touch(tmp_path, "10mm.csv", "2mm.csv", "1.5mm.csv", "notes.txt", "2mm_B.CSV")
+    _touch(tmp_path, "10mm.csv", "2mm.csv", "1.5mm.csv", "notes.txt", "2mm_B.CSV", "~$a.xlsx", "20mm.xlsx")
     assert [f.name for f in find_files(tmp_path)] == ["1.5mm.csv", "2mm.csv", "2mm_B.CSV", "10mm.csv"]
+    found = find_files(tmp_path, (".csv", ".xlsx"))
+    assert [f.name for f in found] == ["1.5mm.csv", "2mm.csv", "2mm_B.CSV", "10mm.csv", "20mm.xlsx"]
 
 
 def test_pattern_and_list(tmp_path):
@@ -43,7 +45,7 @@ def test_empty_pattern_folder_and_list(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"No file matches the pattern '.*\*\.csv'"):
         find_files(str(tmp_path / "*.csv"))
     _touch(tmp_path, "a.txt")
-    with pytest.raises(FileNotFoundError, match=r"holds no \*\.csv file\. It holds a\.txt"):
+    with pytest.raises(FileNotFoundError, match=r"holds no \*\.csv or other file of records\. It holds a\.txt"):
         find_files(tmp_path)
     with pytest.raises(ValueError, match="at least one file"):
         find_files([])

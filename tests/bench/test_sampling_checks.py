@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from jaxdamp.bench.sampling import check_time
+from jaxdamp.bench.sampling import check_order, check_time
 
 
 T = np.arange(200) / 300
@@ -22,7 +22,7 @@ def test_time_that_goes_back_or_stands():
     back = T.copy()
     back[50] = back[48]
     with pytest.raises(ValueError, match=r"run, line 152: time goes from 0\.163.* must increase"):
-        check_time(back, "run", tuple(range(102, 302)))
+        check_order(back, "run", tuple(range(102, 302)))
     stands = T.copy()
     stands[50] = stands[49]
     with pytest.raises(ValueError, match=r"sample 50: time goes from"):

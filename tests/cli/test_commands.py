@@ -230,3 +230,21 @@ def test_errors_of_the_reader_speak_of_options(tmp_path: Path, text: str, messag
 def test_debug_shows_where_an_error_comes_from(records: Path, tmp_path: Path) -> None:
     words = ["fit", str(records), "--law", "besingr", "--out", str(tmp_path / "fit"), "--debug"]
     assert isinstance(CliRunner().invoke(app, words).exception, ValueError)
+
+
+def test_a_manifest_gains_and_files_left_out(tmp_path: Path, runs: BenchSet) -> None:
+    folder = tmp_path / "lab"
+    folder.mkdir()
+    for index, run in enumerate(runs):
+        rows = [f"{t},{100 * x},{f / 500}" for t, x, f in zip(run.time, run.stroke, run.force, strict=True)]
+        (folder / f"{index}mm.csv").write_text("\n".join(["t_s,x [V],F [V]", *rows]))
+    (folder / "broken.csv").write_text("nothing here\n")
+    words = ("fit", folder, "--law", "linear", "--out", tmp_path / "fit")
+    said = refused(tmp_path, *words)
+    assert "7 problems" in said and "--gains 'force=500 N/V'" in said and "broken.csv holds no rows" in said
+    (tmp_path / "bench.toml").write_text('sign = "rebound-positive"\n[gains]\nforce = "500 N/V"\n')
+    options = ("--manifest", tmp_path / "bench.toml", "--gains", "stroke=10 mm/V", "--skip-bad")
+    said = " ".join(jaxdamp(*words, *options).output.split())
+    assert f"read as the manifest {tmp_path / 'bench.toml'} says (all records)" in said
+    assert f"left out: {folder / 'broken.csv'} holds no rows of numbers" in said
+    assert len(_rows(tmp_path / "fit" / "tables" / "records.csv")) == 3

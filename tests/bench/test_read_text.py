@@ -1,8 +1,22 @@
 import numpy as np
 import pytest
 
-from jaxdamp.bench.tables import read_table
-from jaxdamp.bench.units import is_unit
+from jaxdamp.bench import read
+from jaxdamp.bench.raw import RawTable
+from jaxdamp.bench.text import read_text
+
+
+def read_table(path, delimiter=None) -> RawTable:
+    (table,) = read_text(path, delimiter)
+    return table
+
+
+def values(table: RawTable) -> np.ndarray:
+    return np.stack([column.values for column in table.columns], axis=1)
+
+
+def units(table: RawTable) -> tuple[str, ...]:
+    return tuple(column.unit for column in table.columns)
 
 
 @pytest.mark.parametrize(
@@ -10,26 +24,26 @@ from jaxdamp.bench.units import is_unit
 )
 def test_delimiters_and_decimal_signs(write, delimiter, decimal):
     path = write(header=f"t_s{delimiter}x_mm{delimiter}F_N", delimiter=delimiter, decimal=decimal)
-    table = read_table(path, "|" if delimiter == "|" else None)
+    table = read_table(path)
     assert table.names == ("t_s", "x_mm", "F_N")
-    assert table.values.shape == (600, 3)
-    assert table.values[150, 1] == pytest.approx(20e0 * np.sin(2 * np.pi * 1.5 * 0.5), abs=1e-7)
-    assert table.lines[:2] == (2, 3)
+    assert values(table).shape == (600, 3)
+    assert values(table)[150, 1] == pytest.approx(20e0 * np.sin(2 * np.pi * 1.5 * 0.5), abs=1e-7)
+    assert tuple(table.lines[:2]) == (2, 3)
 
 
 def test_preamble_and_row_of_units(write):
     preamble = ["Damper bench 7", "Rate,2000,Hz", "", "Operator,A. B.", "time,stroke,force"]
-    table = read_table(write(preamble=preamble, header="[s],[mm],[N]"), is_unit=is_unit)
+    table = read_table(write(preamble=preamble, header="[s],[mm],[N]"))
     assert table.names == ("time", "stroke", "force")
-    assert table.unit_row == ("s", "mm", "N")
+    assert units(table) == ("s", "mm", "N")
     assert table.preamble == ("Damper bench 7", "Rate,2000,Hz", "Operator,A. B.")
     assert table.lines[0] == 7
 
 
 def test_a_preamble_that_looks_like_a_header_is_no_row_of_units(write):
-    table = read_table(write(preamble=["front,left,new"], header="t_s,x_mm,F_N"), is_unit=is_unit)
+    table = read_table(write(preamble=["front,left,new"], header="t_s,x_mm,F_N"))
     assert table.names == ("t_s", "x_mm", "F_N")
-    assert table.unit_row == ()
+    assert units(table) == ("", "", "")
 
 
 def test_quotes_and_trailing_delimiters(tmp_path):
@@ -37,7 +51,7 @@ def test_quotes_and_trailing_delimiters(tmp_path):
     (tmp_path / "a.csv").write_text('"Time, s","Force, N",\n' + rows)
     table = read_table(tmp_path / "a.csv")
     assert table.names == ("Time, s", "Force, N")
-    np.testing.assert_array_equal(table.values[:, 1], np.arange(30.0) ** 2)
+    np.testing.assert_array_equal(values(table)[:, 1], np.arange(30.0) ** 2)
 
 
 def test_white_space_header_with_apart_units(write):
@@ -54,7 +68,7 @@ def test_other_encodings(write):
 
 
 def test_no_header(write):
-    assert read_table(write(header=None)).names == ()
+    assert not read_table(write(header=None)).is_named
 
 
 def test_empty_file_and_binary_file(tmp_path):
@@ -84,11 +98,11 @@ def test_wrong_delimiter(write):
 @pytest.mark.parametrize("row", [0, 77])
 def test_text_among_the_numbers_names_line_and_column(write, row):
     with pytest.raises(ValueError, match=rf"run\.csv, line {row + 2}, column 'x_mm': 'overload' is not a number"):
-        read_table(write(replace={row: "0.25,overload,1.0"}))
+        read(write(replace={row: "0.25,overload,1.0"}))
 
 
 def test_missing_value(write):
     with pytest.raises(ValueError, match=r"line 79, column 'x_mm': the value is missing"):
-        read_table(write(replace={77: "0.25,,1.0"}))
+        read(write(replace={77: "0.25,,1.0"}))
     with pytest.raises(ValueError, match=r"line 79: 2 values where the file has 3 columns"):
-        read_table(write(replace={77: "0.25,1.0"}))
+        read(write(replace={77: "0.25,1.0"}))

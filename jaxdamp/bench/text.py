@@ -1,0 +1,163 @@
+"""Text files with columns of numbers: delimiter, decimal sign, preamble, header, footer."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._checks import ArgumentError, Setting
+from jaxdamp.bench.cells import PLAIN_COMMA, columns_of
+from jaxdamp.bench.layout import DELIMITERS, Layout, header_of, layout_of, split
+from jaxdamp.bench.raw import RawColumn, RawTable
+
+
+_LOOK_AT = 2000  # lines that decide on the delimiter
+_CHUNK = 5_000  # lines that are divided at a time, to bound the memory
+_CONTENT = {  # how files of other formats begin
+    b"PK\x03\x04": "an XLSX workbook (.xlsx)",
+    b"MATLAB": "a MATLAB file (.mat)",
+    b"\x89HDF": "an HDF5 file, perhaps of MATLAB (.mat)",
+    b"TDSm": "a TDMS file (.tdms)",
+    b"MDF ": "an MDF4 file (.mf4)",
+    b"PAR1": "a Parquet file (.parquet)",
+    b"\xd0\xcf\x11\xe0": "an old Excel workbook (.xls), to be saved as .xlsx",
+}
+
+
+def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
+    """Read a text file with columns of numbers, one record a file.
+
+    The delimiter is the one of comma, semicolon, tab, white space and vertical bar with which most digits are those
+    of numbers and time stamps. The comma is the decimal sign where it is not the delimiter and no number has a point.
+    The header is the last line without a number above the first row of numbers; a row of units may stand between the
+    two. Lines of another form behind the last row of numbers are left out, and a note counts them.
+
+    Raises:
+        ValueError: naming file, line and value if the file is empty, has one column only, a wrong delimiter, rows of
+            different lengths or two decimal signs.
+    """
+    lines = text_lines(file)
+    if delimiter is not None and len(delimiter) != 1:
+        _checks.refuse("delimiter", "be one character", repr(delimiter))
+    top = list(islice(((n, line) for n, line in enumerate(lines, 1) if line.strip()), _LOOK_AT))
+    if not top:
+        raise ValueError(f"{file} is empty: export it from the bench again.")
+    layout = _choose(file, top, delimiter)
+    rows = [(n, split(line, layout.delimiter)) for n, line in top]
+    header = header_of(rows, layout)
+    if header is None:
+        raise ValueError(f"{file}: no row has a number in each of its {layout.count} columns: mend or shorten it.")
+    numbers, body, notes = _body(lines, rows[header.first][0], layout)
+    columns = _all_at_once(body, layout)
+    if columns is None:
+        columns = columns_of(file, numbers, _in_chunks(body, layout.delimiter, layout.count), layout)
+    columns = [replace(c, name=n, unit=u) for c, n, u in zip(columns, header.names, header.units, strict=True)]
+    preamble = tuple(line for _, line in top[: header.top])
+    return [RawTable(file, tuple(columns), lines=numbers, preamble=preamble, notes=notes)]
+
+
+def text_lines(file: Path) -> list[str]:
+    """The lines of a text file in UTF-8, UTF-16 or the Western code page of Windows."""
+    raw = file.read_bytes()
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return raw.decode("utf-16", errors="replace").splitlines()
+    other = next((name for begin, name in _CONTENT.items() if raw.startswith(begin)), None)
+    if other or b"\0" in raw[:4096]:
+        found = f"it looks like {other}: give it that ending" if other else "its format is unknown"
+        raise ValueError(f"{file} is not a text file; {found}, or export it from the bench software as CSV.")
+    try:
+        return raw.decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        return raw.decode("cp1252", errors="replace").splitlines()
+
+
+def _choose(file: Path, top: list[tuple[int, str]], given: str | None) -> Layout:
+    """The layout with the delimiter given, or with the one that fits best."""
+    candidates = [*DELIMITERS] if given in DELIMITERS or given is None else [*DELIMITERS, given]
+    found = {d: layout_of([(n, split(line, d)) for n, line in top], d) for d in candidates}
+    fitting = {d: layout for d, layout in found.items() if layout is not None and len(layout.full) > 1}
+    best = max(fitting.values(), key=lambda layout: layout.score, default=None)
+    if given is not None:
+        if given in fitting:
+            return fitting[given]
+        setting = Setting("delimiter", given)
+        hint = "" if best is None else f" It looks like {best.delimiter!r} ({DELIMITERS[best.delimiter]}): leave "
+        hint += f"{setting} out." if hint else ""
+        raise ArgumentError(f"{file} has no columns divided by {given!r}, the delimiter that was given.{hint}", setting)
+    kind = _other_format(top[0][1])
+    if best is not None and not kind:
+        return best
+    if any(found.values()) and not kind:
+        raise ValueError(
+            f"{file} has only one column of numbers: a record needs at least the stroke and the force, side by side, "
+            "divided by comma, semicolon, tab, white space or vertical bar."
+        )
+    raise ValueError(f"{file} holds no rows of numbers: its first line is {top[0][1][:80]!r}.{kind}")
+
+
+def _other_format(first: str) -> str:
+    """A sentence on a file that is text, but of another kind."""
+    begin = first.lstrip()
+    kind = "JSON" if re.match(r"\{|\[\s*[\[{\d]", begin) else "HTML or XML" if begin.startswith("<") else ""
+    remedy = "export the record from the bench software as CSV, one column a channel"
+    return f" It looks like {kind}: {remedy}." if kind else ""
+
+
+def _body(lines: list[str], first: int, layout: Layout) -> tuple[Sequence[int], list[str], tuple[str, ...]]:
+    """Numbers and texts of the lines from the first row of numbers to the last, and a note on those behind it."""
+    stop = len(lines)
+    while stop > first and not layout.is_row(split(lines[stop - 1], layout.delimiter)):
+        stop -= 1
+    behind = [(n, line) for n, line in enumerate(lines[stop:], stop + 1) if line.strip()]
+    notes = ()
+    if behind:
+        number, line = behind[0]
+        count = f"{len(behind)} line{'s' * (len(behind) > 1)} of another form"
+        notes = (f"{count} behind the numbers left out, the first is line {number}: {line.strip()[:60]!r}",)
+    body, numbers = lines[first - 1 : stop], range(first, stop + 1)
+    if not all(map(str.strip, body)):
+        numbers = [n for n, line in zip(numbers, body, strict=True) if line.strip()]
+        body = [line for line in body if line.strip()]
+    return numbers, body, notes
+
+
+def _all_at_once(body: list[str], layout: Layout) -> list[RawColumn] | None:
+    """The columns by NumPy's reader; None where a row needs a closer look."""
+    mark, lines = layout.delimiter, body
+    if mark != "," and any("," in line for line in body):
+        if not _plain_decimal_commas(body):
+            return None
+        lines = [line.replace(",", ".") for line in body]
+    texts = [index for index in range(layout.count) if index not in layout.numeric]
+    if texts and (mark in " |" or any('"' in line or line.count(mark) != layout.count - 1 for line in body)):
+        return None
+    try:
+        delimiter, numeric = (None if mark == " " else mark), (layout.numeric if texts else None)
+        values = np.loadtxt(lines, delimiter=delimiter, usecols=numeric, comments=None, ndmin=2)
+    except ValueError:
+        return None
+    if values.shape != (len(body), len(layout.numeric)):
+        return None
+    columns = dict(zip(layout.numeric, values.T, strict=True))
+    columns |= {i: np.array([line.split(mark, i + 1)[i].strip() for line in body], dtype=object) for i in texts}
+    return [RawColumn("", columns[index]) for index in range(layout.count)]
+
+
+def _plain_decimal_commas(body: list[str]) -> bool:
+    """Whether commas are the only decimal sign, and at least one cannot be a separator of thousands."""
+    return not any("." in line for line in body) and any(PLAIN_COMMA.search(line) for line in body)
+
+
+def _in_chunks(body: list[str], delimiter: str, count: int) -> Iterator[list[list[str]]]:
+    """The cells of some lines at a time."""
+    for start in range(0, len(body), _CHUNK):
+        lines = body[start : start + _CHUNK]
+        rows = [split(line, delimiter) for line in lines]
+        for cells, line in zip(rows, lines, strict=True):
+            if len(cells) == count - 1 and line.rstrip(" ").endswith(delimiter):
+                cells.append("")  # the last value is missing
+        yield rows
