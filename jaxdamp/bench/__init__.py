@@ -5,14 +5,27 @@ Stroke and velocity are positive in extension (rebound), force is positive when 
 
 from jaxdamp.bench import programmes
 from jaxdamp.bench.analysis import (
+    FoldedCycles,
     PeakVelocityPoints,
     VelocityLoops,
     continuous_velocity_loop,
+    fold_cycles,
     last_steady_cycle,
     peak_velocity_points,
     steady_cycles,
 )
 from jaxdamp.bench.contradictions import Contradiction, contradictions, contradictions_in_words
+from jaxdamp.bench.evaluation import (
+    OEM_VELOCITIES,
+    Evaluation,
+    GasAndFriction,
+    Limit,
+    LimitCheck,
+    Measurement,
+    evaluate,
+    read_limits,
+    separate_gas_and_friction,
+)
 from jaxdamp.bench.programmes import RandomTest, SineTest
 from jaxdamp.bench.read import read
 from jaxdamp.bench.runs import BenchRun
@@ -23,9 +36,16 @@ from jaxdamp.bench.virtual_dyno import VirtualDyno
 
 
 __all__ = [
+    "OEM_VELOCITIES",
     "BenchRun",
     "BenchSet",
     "Contradiction",
+    "Evaluation",
+    "FoldedCycles",
+    "GasAndFriction",
+    "Limit",
+    "LimitCheck",
+    "Measurement",
     "PeakVelocityPoints",
     "RandomTest",
     "Sensors",
@@ -37,9 +57,13 @@ __all__ = [
     "contradictions",
     "contradictions_in_words",
     "estimate_velocity",
+    "evaluate",
+    "fold_cycles",
     "last_steady_cycle",
     "peak_velocity_points",
     "programmes",
     "read",
+    "read_limits",
+    "separate_gas_and_friction",
     "steady_cycles",
 ]
