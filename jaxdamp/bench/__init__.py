@@ -26,6 +26,7 @@ from jaxdamp.bench.evaluation import (
     read_limits,
     separate_gas_and_friction,
 )
+from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import RandomTest, SineTest
 from jaxdamp.bench.read import read
 from jaxdamp.bench.runs import BenchRun
@@ -50,6 +51,7 @@ __all__ = [
     "RandomTest",
     "Sensors",
     "SineTest",
+    "Steps",
     "VelocityLoops",
     "VirtualDyno",
     "as_runs",
@@ -60,6 +62,7 @@ __all__ = [
     "evaluate",
     "fold_cycles",
     "last_steady_cycle",
+    "low_pass_gain",
     "peak_velocity_points",
     "programmes",
     "read",
