@@ -26,6 +26,7 @@ from jaxdamp.bench.evaluation import (
     read_limits,
     separate_gas_and_friction,
 )
+from jaxdamp.bench.preflight import Finding, Preflight, preflight
 from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import RandomTest, SineTest
 from jaxdamp.bench.read import read
@@ -42,12 +43,14 @@ __all__ = [
     "BenchSet",
     "Contradiction",
     "Evaluation",
+    "Finding",
     "FoldedCycles",
     "GasAndFriction",
     "Limit",
     "LimitCheck",
     "Measurement",
     "PeakVelocityPoints",
+    "Preflight",
     "RandomTest",
     "Sensors",
     "SineTest",
@@ -64,6 +67,7 @@ __all__ = [
     "last_steady_cycle",
     "low_pass_gain",
     "peak_velocity_points",
+    "preflight",
     "programmes",
     "read",
     "read_limits",

@@ -12,6 +12,7 @@ from jaxdamp.plots.errors import ladder
 from jaxdamp.plots.evaluation import evaluation, gas_and_friction
 from jaxdamp.plots.history import training_history
 from jaxdamp.plots.loops import fit_loops
+from jaxdamp.plots.preflight import preflight
 from jaxdamp.plots.rides import ride
 from jaxdamp.plots.roughness import roughness_by_segment
 from jaxdamp.plots.sweeps import sweep
@@ -27,6 +28,7 @@ __all__ = [
     "gas_and_friction",
     "ladder",
     "law_card",
+    "preflight",
     "ride",
     "roughness_by_segment",
     "sweep",

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 WINDOW = 0.05  # share of a stated velocity within which samples, or records, count as taken at it
 _PEAKS = ("rebound velocity", "rebound force", "compression velocity", "compression force", "rebound/compression ratio")
 _MIDDLE = ("mid-stroke rebound force", "mid-stroke compression force")
-_LOOPS = ("mean force", "energy per cycle", "equivalent damping", "hysteresis area", "hysteresis width")
+_LOOPS = ("mean force", "static force", "energy per cycle", "equivalent damping", "hysteresis area", "hysteresis width")
 TABLES = {"peak_forces": (*_PEAKS, *_MIDDLE), "loops": _LOOPS}
 
 

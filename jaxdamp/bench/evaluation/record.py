@@ -29,6 +29,7 @@ def cycle_figures(cycles: FoldedCycles) -> dict[tuple[str, str], Figures]:
     - force at peak velocity: mean over the samples within 2 % of the largest velocity of that direction;
     - force at mid-stroke: mean over the central 10 % of the stroke range;
     - rebound/compression ratio: of the magnitudes of the forces at peak velocity;
+    - static force: at zero velocity, mean of both ends of the stroke;
     - energy: ∮ F v dt; equivalent damping: ∮ F v dt / ∮ v² dt, which is E / (π ω X²) for a sine;
     - hysteresis area: −∮ F dv, positive where the force lags behind the velocity;
     - hysteresis width: force at zero velocity at the rebound end of the stroke less that at the compression end,
@@ -53,6 +54,7 @@ def cycle_figures(cycles: FoldedCycles) -> dict[tuple[str, str], Figures]:
         ("mid-stroke rebound force", "N"): _mean_where(force, central & (velocity > 0)),
         ("mid-stroke compression force", "N"): _mean_where(force, central & (velocity < 0)),
         ("mean force", "N"): force.mean(axis=1),
+        ("static force", "N"): 0.5 * (ends[0] + ends[1]),
         ("energy per cycle", "J"): energy,
         ("equivalent damping", "N s/m"): energy / squared,
         ("hysteresis area", "W"): -_loop_integral(force, velocity),
