@@ -89,7 +89,7 @@ class Steps:
 
 def processed(raw: "BenchRun", steps: Steps) -> "BenchRun":
     """A record of the raw one, with all steps done and named in its notes."""
-    run = raw
+    run = replace(raw)
     if steps.delay is not None:
         run = _align(run, float(steps.delay))
     if steps.low_pass is not None:
@@ -170,7 +170,7 @@ def _cut_rest(run: "BenchRun") -> "BenchRun":
     first, last = moving_span(run.time, run.stroke)
     before, after = run.time[first] - run.time[0], run.time[-1] - run.time[last]
     if not before and not after:
-        return _noted(run, "no rest before or after the motion")
+        return run
     note = f"rest cut off: {before:.3g} s before and {after:.3g} s after the motion"
     return _cut(run, slice(first, last + 1), note)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from jaxdamp import _checks, bench, identify
 from jaxdamp._checks import Setting
 from jaxdamp.bench import BenchRun, BenchSet
+from jaxdamp.cli.processing import commands
 from jaxdamp.cli.wording import in_options
 
 
@@ -103,6 +104,7 @@ class ReadOptions:
     units: tuple[str, ...] = ()
     sampling_rate: float | None = None
     delimiter: str | None = None
+    command: tuple[str, ...] = ()
 
     def read(self, files: Sequence[Path]) -> BenchSet:
         """Read the records."""
@@ -114,4 +116,5 @@ class ReadOptions:
             units=assignments("units", self.units),
             sampling_rate=self.sampling_rate,
             delimiter=self.delimiter,
+            command=commands(self.command),
         )

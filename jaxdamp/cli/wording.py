@@ -7,13 +7,16 @@ from jaxdamp._checks import ArgumentError, Setting
 
 
 OPTIONS = (
+    "between",
     "columns",
+    "command",
     "delimiter",
     "dt",
     "duration",
     "force_sign",
     "held_out",
     "law",
+    "limits",
     "road",
     "sampling_rate",
     "seed",
@@ -21,9 +24,18 @@ OPTIONS = (
     "speed",
     "units",
     "vehicle",
+    "velocities",
     "weighting",
 )
-OTHER_WORDS = {"paths": "FILES", "path_or_text": "The law file", "road_class": "CLASS in --road iso:CLASS"}
+OTHER_WORDS = {
+    "last_cycles": "Option --cycles",
+    "low_pass": "Option --filter",
+    "path_or_text": "The law file",
+    "paths": "FILES",
+    "road_class": "CLASS in --road iso:CLASS",
+    "skip_cycles": "Option --cycles",
+    "start": "The beginning in --between",
+}
 
 
 def option(argument: str) -> str:
