@@ -210,7 +210,7 @@ def test_table_plain_data_text_and_picture():
     found = preflight([recorded(test=RESTING, force_limit=450.0), recorded(force_delay=0.003)])
     assert not found.ok and len(found.of("error")) == 1
     rows = found.table().records()
-    assert rows[0]["severity"] == "error" and rows[0]["from"] > 1.0 and rows[0]["unit"] == "N"
+    assert rows[0]["severity"] == "error" and float(rows[0]["from"] or 0.0) > 1.0 and rows[0]["unit"] == "N"
     assert json.loads(json.dumps(found.to_dict(), allow_nan=False))["ok"] is False
     assert "Preflight of 2 records: 1 error" in repr(found) and "- error, force clipped" in repr(found)
     figure = found.plot()
