@@ -138,7 +138,7 @@ class Compared(NamedTuple):
 
     name: str
     unit: str
-    values: Sequence[float]  # one for each condition
+    values: Sequence[Cell]  # one for each condition
     change: float | None  # from the first to the last [%]
     more: tuple[Cell, ...] = ()
 

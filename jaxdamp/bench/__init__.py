@@ -5,14 +5,29 @@ Stroke and velocity are positive in extension (rebound), force is positive when 
 
 from jaxdamp.bench import programmes
 from jaxdamp.bench.analysis import (
+    FoldedCycles,
     PeakVelocityPoints,
     VelocityLoops,
     continuous_velocity_loop,
+    fold_cycles,
     last_steady_cycle,
     peak_velocity_points,
     steady_cycles,
 )
 from jaxdamp.bench.contradictions import Contradiction, contradictions, contradictions_in_words
+from jaxdamp.bench.evaluation import (
+    OEM_VELOCITIES,
+    Evaluation,
+    GasAndFriction,
+    Limit,
+    LimitCheck,
+    Measurement,
+    evaluate,
+    read_limits,
+    separate_gas_and_friction,
+)
+from jaxdamp.bench.preflight import Finding, Preflight, preflight
+from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.read import read
@@ -25,16 +40,26 @@ from jaxdamp.bench.virtual_dyno import VirtualDyno
 
 
 __all__ = [
+    "OEM_VELOCITIES",
     "READERS",
     "BenchRun",
     "BenchSet",
     "Contradiction",
+    "Evaluation",
+    "Finding",
+    "FoldedCycles",
+    "GasAndFriction",
+    "Limit",
+    "LimitCheck",
+    "Measurement",
     "PeakVelocityPoints",
+    "Preflight",
     "RandomTest",
     "RawColumn",
     "RawTable",
     "Sensors",
     "SineTest",
+    "Steps",
     "VelocityLoops",
     "VirtualDyno",
     "as_runs",
@@ -42,9 +67,15 @@ __all__ = [
     "contradictions",
     "contradictions_in_words",
     "estimate_velocity",
+    "evaluate",
+    "fold_cycles",
     "last_steady_cycle",
+    "low_pass_gain",
     "peak_velocity_points",
+    "preflight",
     "programmes",
     "read",
+    "read_limits",
+    "separate_gas_and_friction",
     "steady_cycles",
 ]

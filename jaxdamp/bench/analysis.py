@@ -40,6 +40,16 @@ class VelocityLoops(NamedTuple):
     cycles: tuple[int, ...]  # over so many the mean of each record is taken
 
 
+class FoldedCycles(NamedTuple):
+    """The steady cycles of one record at equal fractions of their periods."""
+
+    starts: Float[np.ndarray, " cycles"]  # s
+    periods: Float[np.ndarray, " cycles"]  # s
+    stroke: Float[np.ndarray, "cycles points"]  # m, positive in rebound
+    velocity: Float[np.ndarray, "cycles points"]  # m/s, positive in rebound
+    force: Float[np.ndarray, "cycles points"]  # N, positive when it resists extension
+
+
 def steady_cycles(run: BenchRun) -> list[slice]:
     """The samples of each full cycle whose stroke range is within 10 % of the median one.
 
@@ -78,7 +88,7 @@ def peak_velocity_points(runs: BenchRun | Iterable[BenchRun]) -> PeakVelocityPoi
            [1200., 2600.]])
     """
     rows = []
-    for run in _records(runs, "peak_velocity_points(runs)"):
+    for run in as_records(runs, "peak_velocity_points(runs)"):
         part = last_steady_cycle(run)
         velocity, force = run.velocity[part], run.force[part]
         peaks = (min(velocity.min(), 0.0), max(velocity.max(), 0.0))
@@ -116,19 +126,14 @@ def continuous_velocity_loop(runs: BenchRun | Iterable[BenchRun], points: int = 
     """
     if points < 4:
         _checks.refuse("points", "be 4 or more", points)
-    means, cycles = [], []
-    for run in _records(runs, "continuous_velocity_loop(runs)"):
-        instants = _steady_instants(run)
-        if not instants:
-            remedy = "Take `run.velocity` and `run.force` of a record without one as they are."
-            _checks.refuse("runs", "be records with a full cycle", f"{run.name!r}, without one", remedy)
-        means.append(_mean_cycle(run, np.array(instants), points))
-        cycles.append(len(instants))
-    time, stroke, velocity, force = np.stack(means, axis=1)
-    return VelocityLoops(time, stroke, velocity, force, tuple(cycles))
+    folded = [fold_cycles(run, points) for run in as_records(runs, "continuous_velocity_loop(runs)")]
+    means = [np.stack([part.mean(axis=0) for part in (f.stroke, f.velocity, f.force)]) for f in folded]
+    stroke, velocity, force = np.stack(means, axis=1)
+    time = np.stack([f.periods.mean() * (np.arange(points) / points) for f in folded])
+    return VelocityLoops(time, stroke, velocity, force, tuple(len(f.periods) for f in folded))
 
 
-def _records(runs: BenchRun | Iterable[BenchRun], call: str) -> tuple[BenchRun, ...]:
+def as_records(runs: BenchRun | Iterable[BenchRun], call: str) -> tuple[BenchRun, ...]:
     """One record or several, but not none."""
     chosen = as_runs(runs, call=call)
     if not chosen:
@@ -151,14 +156,28 @@ def _steady_instants(run: BenchRun) -> list[tuple[float, float]]:
     return [ends for ends, yes in zip(cycles, steady, strict=True) if yes] or cycles[-1:]
 
 
-def _mean_cycle(run: BenchRun, cycles: Float[np.ndarray, "cycles 2"], points: int) -> Float[np.ndarray, "4 points"]:
-    """Time, stroke, velocity and force of the mean cycle, from mid-stroke into rebound on."""
-    starts, periods = cycles[:, 0], cycles[:, 1] - cycles[:, 0]
-    fractions = np.arange(points) / points
-    instants = starts[:, None] + periods[:, None] * fractions
-    channels = [
-        np.interp(instants, run.time, channel).mean(axis=0) for channel in (run.stroke, run.velocity, run.force)
-    ]
-    above = channels[0] > 0.5 * (channels[0].max() + channels[0].min())
+def fold_cycles(run: BenchRun, points: int | None = None) -> FoldedCycles:
+    """The steady cycles of a record (`steady_cycles`), each read at equal fractions of its own period.
+
+    They begin with the first point whose stroke lies above its middle on the way into rebound.
+
+    Arguments:
+        run: the record.
+        points: of a cycle; as many as it has samples, at least 64, if left out.
+
+    Raises:
+        ValueError: a record without a full cycle.
+    """
+    instants = _steady_instants(run)
+    if not instants:
+        remedy = "Take `run.velocity` and `run.force` of a record without one as they are."
+        _checks.refuse("runs", "be records with a full cycle", f"{run.name!r}, without one", remedy)
+    ends = np.array(instants)
+    periods = ends[:, 1] - ends[:, 0]
+    points = max(64, round(float(np.mean(periods)) * run.sampling_rate)) if points is None else points
+    times = ends[:, :1] + periods[:, None] * (np.arange(points) / points)
+    channels = [np.interp(times, run.time, channel) for channel in (run.stroke, run.velocity, run.force)]
+    path = channels[0].mean(axis=0)
+    above = path > 0.5 * (path.max() + path.min())
     first = int(np.argmax(above & ~np.roll(above, 1)))
-    return np.stack([periods.mean() * fractions, *(np.roll(channel, -first) for channel in channels)])
+    return FoldedCycles(ends[:, 0], periods, *(np.roll(channel, -first, axis=1) for channel in channels))

@@ -53,7 +53,7 @@ def contradictions(runs: Sequence[BenchRun]) -> list[Contradiction]:
     >>> [round(found.share, 2) for found in contradictions([soft, hard])]
     [0.39]
     """
-    pairs = [pair for pair in itertools.combinations(runs, 2) if _alike(*pair)]
+    pairs = [pair for pair in itertools.combinations(runs, 2) if same_motion(*pair)]
     cycles = {id(run): _mean_cycle(run) for run in {id(run): run for pair in pairs for run in pair}.values()}
     found = []
     for a, b in pairs:
@@ -83,7 +83,8 @@ def contradictions_in_words(found: Sequence[Contradiction]) -> list[str]:
     ]
 
 
-def _alike(a: BenchRun, b: BenchRun) -> bool:
+def same_motion(a: BenchRun, b: BenchRun) -> bool:
+    """Whether the amplitudes of two records, and their frequencies, agree within 5 %."""
     pairs = ((a.frequency, b.frequency), (a.amplitude, b.amplitude))
     return all(abs(p - q) <= ALIKE * max(p, q) for p, q in pairs)
 

@@ -88,3 +88,27 @@ def cycle_works(time: Samples, stroke: Samples, power: Samples) -> Float[np.ndar
     work = np.concatenate([[0.0], np.cumsum((power[1:] + power[:-1]) / 2) * step])
     work = np.concatenate([work, [work[-1] + 2 * step * power[-1]]])  # the last cycle may end behind the last sample
     return np.diff(np.interp(cycle_instants(time, stroke), np.append(time, time[-1] + 2 * step), work))
+
+
+def moving_span(time: Samples, stroke: Samples) -> tuple[int, int]:
+    """First and last sample of the motion, without the rest before and after it.
+
+    A record rests where, from its first sample on, the stroke stays for a quarter of a period or longer within 1 % of
+    the amplitude, or within the noise if that is more, of where it is then; and likewise at its end. A fiftieth of a
+    period beyond the motion is left, so that its first and last cycle are whole.
+    """
+    quarter = max(round(0.25 / dominant_frequency(time, stroke) * (len(time) - 1) / (time[-1] - time[0])), 2)
+    tolerance = max(0.005 * float(np.ptp(stroke)), 5.0 * white_noise(stroke))
+
+    def rest(x: Samples) -> int:
+        away = np.flatnonzero(np.abs(x - np.median(x[:quarter])) > tolerance)
+        first = int(away[0]) if len(away) else 0
+        return max(first - max(quarter // 12, 2), 0) if first >= quarter else 0
+
+    return rest(stroke), len(stroke) - 1 - rest(stroke[::-1])
+
+
+def white_noise(values: Samples) -> float:
+    """Standard deviation of the white noise in a channel, from its third differences; the median leaves out jumps."""
+    differences = np.diff(values, 3)
+    return float(np.median(np.abs(differences)) / (0.6745 * np.sqrt(20.0)))

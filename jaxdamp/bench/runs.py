@@ -3,10 +3,10 @@
 import json
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
@@ -14,6 +14,7 @@ from jaxtyping import ArrayLike, Float
 from jaxdamp import _checks
 from jaxdamp.bench import sampling
 from jaxdamp.bench.motion import cycle_instants, cycle_works, dominant_frequency, motion_amplitude
+from jaxdamp.bench.processing import Steps, choose_cycles, cut_between, processed
 from jaxdamp.bench.velocity import estimate_velocity
 
 
@@ -74,6 +75,7 @@ class BenchRun:
     source: str = ""
     notes: tuple[str, ...] = ()
     settings: Mapping[str, float | int | str] = field(default_factory=dict)
+    _origin: "Origin | None" = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         where = f"record {self.name!r}"
@@ -164,27 +166,65 @@ class BenchRun:
         works = cycle_works(self.time, self.stroke, self.force * self.velocity)
         return float(np.median(works)) if len(works) else self.dissipated_energy
 
+    @property
+    def raw(self) -> "BenchRun":
+        """The record before all processing and cutting; itself if nothing was done to it."""
+        return self if self._origin is None else self._origin.raw
+
+    @property
+    def steps(self) -> Steps:
+        """The steps of processing that were done."""
+        return Steps() if self._origin is None else self._origin.steps
+
+    def process(self, **steps: Any) -> "BenchRun":
+        """A record with further steps of processing, each named in its notes; `raw` stays as it is.
+
+        The steps of this record and the further ones are done in one fixed order, that of the arguments, so the order
+        in which they are asked for does not matter; where it would, the call is refused.
+
+        Arguments:
+            steps: those of `bench.Steps`: `delay`, `low_pass`, `between`, `moving`, `skip_cycles`, `last_cycles`,
+                `without`, `mean_cycle`.
+
+        Raises:
+            ValueError: a step that this record cannot have, such as more cycles than there are, or a filter behind
+                `between` or `last_cycles`, which would begin anew at the cut.
+
+        >>> time = np.arange(3000) / 1000
+        >>> stroke = 0.01 * np.sin(2 * np.pi * 2 * np.clip(time - 0.5, 0.0, 2.0))
+        >>> run = BenchRun.from_arrays("2 Hz", time, stroke, np.cos(12.566 * time))
+        >>> part = run.process(low_pass=100.0).process(moving=True)
+        >>> part.notes[-1]
+        'rest cut off: 0.491 s before and 0.49 s after the motion'
+        >>> part.raw is run
+        True
+        """
+        origin = Origin(self, self, Steps()) if self._origin is None else self._origin
+        more = Steps(**steps)
+        if origin.base is not origin.raw:
+            for step in ("delay", "low_pass"):
+                if getattr(more, step) is not None:
+                    remedy = "Begin with `run.raw`, and cut by `process(between=...)` or `process(last_cycles=...)`."
+                    why = "be asked for before a record is cut, since it needs what lies beyond the cut"
+                    _checks.refuse(step, why, getattr(more, step), remedy)
+        together = origin.steps.and_then(more)
+        return processed(origin.base, together)._from(Origin(origin.raw, origin.base, together))
+
+    def _from(self, origin: "Origin | None") -> "BenchRun":
+        object.__setattr__(self, "_origin", origin)
+        return self
+
+    def _cut(self, part: "BenchRun") -> "BenchRun":
+        """A part of the record as a record of its own, which still knows the raw one."""
+        return part._from(Origin(self.raw, part, Steps()))
+
     def between(self, start: float | int, stop: float | int) -> "BenchRun":
         """The part of the record with start ≤ time < stop [s]; the velocity is not computed anew."""
-        part = (self.time >= start) & (self.time < stop)
-        if not np.any(part):
-            first, last = f"{self.time[0]:.6g}", f"{self.time[-1]:.6g}"
-            _checks.refuse(
-                "start", "leave some of the record", f"{start} with stop {stop}", f"It runs from {first} to {last} s."
-            )
-        return replace(
-            self,
-            **{channel: getattr(self, channel)[part] for channel in _HEADERS},
-            temperature=None if self.temperature is None else self.temperature[part],
-            notes=(*self.notes, f"cut to {self.time[part][0]:g} … {self.time[part][-1]:g} s"),
-        )
+        return self._cut(cut_between(self, start, stop))
 
     def last_cycles(self, count: int = 1) -> "BenchRun":
         """The last full cycles of the record, from one passage of mid-stroke to another."""
-        if not 1 <= count <= self.cycles:
-            _checks.refuse("count", f"be between 1 and the number of full cycles, {self.cycles}", count)
-        instants, half = cycle_instants(self.time, self.stroke), 0.5 / self.sampling_rate
-        return self.between(float(instants[-1 - count]) - half, float(instants[-1]) - half)
+        return self._cut(choose_cycles(self, 0, count))
 
     def summary(self) -> dict[str, Any]:
         """The figures of the record in SI, one row of the set's table."""
@@ -242,3 +282,11 @@ class BenchRun:
         path = Path(path)
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
         return path
+
+
+class Origin(NamedTuple):
+    """Where a processed record comes from: the raw record, the part of it that the steps begin with, the steps."""
+
+    raw: BenchRun
+    base: BenchRun
+    steps: Steps

@@ -112,6 +112,10 @@ class BenchSet:
         """All records but those that `select` would give."""
         return BenchSet(run for run, yes in zip(self.runs, self._chosen(what), strict=True) if not yes)
 
+    def process(self, **steps: Any) -> "BenchSet":
+        """Every record with further steps of processing, see `BenchRun.process`."""
+        return BenchSet(run.process(**steps) for run in self.runs)
+
     def table(self) -> list[dict[str, Any]]:
         """One row of figures in SI per record: a list that `pandas.DataFrame` takes as it is."""
         return [run.summary() for run in self.runs]

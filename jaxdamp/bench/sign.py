@@ -16,7 +16,8 @@ from jaxdamp.bench.motion import Samples, cycle_instants, cycle_works
 
 SIGNS = ("rebound-positive", "compression-positive")
 FORCE_SIGNS = ("same", "opposite")
-_LEAST_LOSS = 0.05
+LEAST_LOSS = 0.05  # of a viscous damper's work, from which the sign of the work is clear
+OPPOSITE = "force and stroke of the file have opposite signs"  # begins the note of a record whose force was turned
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def decide(
     """
     check_words(sign, force_sign)
     work, loss = loss_fraction(time, stroke, force)
-    clear = abs(loss) >= _LEAST_LOSS
+    clear = abs(loss) >= LEAST_LOSS
     done = f"work per cycle {work:+.4g} J"
     if sign is None and force_sign is None and not clear:
         ways = [Setting("sign", word) for word in SIGNS]
@@ -107,7 +108,7 @@ def decide(
 def _explain(sign: str | None, force_sign: str, work: str, clear: bool) -> tuple[str, ...]:
     notes = []
     if force_sign == "opposite":
-        notes.append(f"force and stroke of the file have opposite signs ({work}): force turned")
+        notes.append(f"{OPPOSITE} ({work}): force turned")
     elif clear:
         notes.append(f"force and stroke of the file agree in sign ({work})")
     else:

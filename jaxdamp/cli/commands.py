@@ -47,12 +47,50 @@ def common(
     """Options before a command. The help of the application stands above."""
 
 
+Files = Annotated[
+    list[Path],
+    typer.Argument(help="Files with records (CSV, XLSX, MATLAB, TDMS, MDF4, Parquet), patterns, or folders."),
+]
+Sign = Annotated[
+    str | None, typer.Option(help="Direction that the files count positive: rebound-positive or compression-positive.")
+]
+ForceSign = Annotated[
+    str | None,
+    typer.Option(
+        help='"same" if the files\' force is positive when it resists motion in their positive direction, '
+        'otherwise "opposite".'
+    ),
+]
+Columns = Annotated[
+    list[str], typer.Option(help="Headers or numbers (from 0) of columns: time=t_s,stroke=1,velocity=none.")
+]
+Units = Annotated[list[str], typer.Option(help="Units that the headers do not give: stroke=mm,force=kN.")]
+SamplingRate = Annotated[float | None, typer.Option(help="Samples per second [Hz], for files without a time column.")]
+Delimiter = Annotated[str | None, typer.Option(help="Character between columns, if it is not found.")]
+Gains = Annotated[
+    list[str], typer.Option(help="Gains of sensors, for columns in volts: force=500 N/V,stroke=10 mm/V - 2 mm.")
+]
+Manifest = Annotated[
+    Path | None,
+    typer.Option(help="TOML file that says how to read the files; jaxdamp.toml in a folder is taken by itself."),
+]
+SkipBad = Annotated[bool, typer.Option("--skip-bad", help="Leave out files that cannot be read.")]
+Command = Annotated[
+    list[str], typer.Option(help="What was set on the damper, by name or pattern: '*_0.5A=0.5,*_1A=1'.")
+]
+Cycles = Annotated[str | None, typer.Option(help="Full cycles to keep: 3 or last:3, or skip:2.")]
+Between = Annotated[str | None, typer.Option(help="Part of the records to keep, start:end [s].")]
+Filter = Annotated[
+    float | None, typer.Option("--filter", help="Zero-phase low-pass of stroke, velocity and force [Hz].")
+]
+KeepRest = Annotated[
+    bool, typer.Option("--keep-rest", help="Keep the rest before and after the motion, which is cut off otherwise.")
+]
+
+
 @app.command()
 def fit(
-    files: Annotated[
-        list[Path],
-        typer.Argument(help="Files with records (CSV, XLSX, MATLAB, TDMS, MDF4, Parquet), patterns, or folders."),
-    ],
+    files: Files,
     law: Annotated[
         list[str],
         typer.Option(help='Names of laws, see "jaxdamp laws": "linear,besinger"; or "all". May be repeated.'),
@@ -60,34 +98,20 @@ def fit(
     held_out: Annotated[
         list[str], typer.Option(help='Records to score on, not to fit: a name or a pattern, such as "30mm_*".')
     ] = [],  # noqa: B006
-    sign: Annotated[
-        str | None,
-        typer.Option(help="Direction that the files count positive: rebound-positive or compression-positive."),
-    ] = None,
-    force_sign: Annotated[
-        str | None,
-        typer.Option(
-            help='"same" if the files\' force is positive when it resists motion in their positive direction, '
-            'otherwise "opposite".'
-        ),
-    ] = None,
-    columns: Annotated[
-        list[str],
-        typer.Option(help="Headers or numbers (from 0) of columns: time=t_s,stroke=1,velocity=none."),
-    ] = [],  # noqa: B006
-    units: Annotated[list[str], typer.Option(help="Units that the headers do not give: stroke=mm,force=kN.")] = [],  # noqa: B006
-    sampling_rate: Annotated[
-        float | None, typer.Option(help="Samples per second [Hz], for files without a time column.")
-    ] = None,
-    delimiter: Annotated[str | None, typer.Option(help="Character between columns, if it is not found.")] = None,
-    gains: Annotated[
-        list[str], typer.Option(help="Gains of sensors, for columns in volts: force=500 N/V,stroke=10 mm/V - 2 mm.")
-    ] = [],  # noqa: B006
-    manifest: Annotated[
-        Path | None,
-        typer.Option(help="TOML file that says how to read the files; jaxdamp.toml in a folder is taken by itself."),
-    ] = None,
-    skip_bad: Annotated[bool, typer.Option("--skip-bad", help="Leave out files that cannot be read.")] = False,
+    sign: Sign = None,
+    force_sign: ForceSign = None,
+    columns: Columns = [],  # noqa: B006
+    units: Units = [],  # noqa: B006
+    sampling_rate: SamplingRate = None,
+    delimiter: Delimiter = None,
+    gains: Gains = [],  # noqa: B006
+    manifest: Manifest = None,
+    skip_bad: SkipBad = False,
+    command: Command = [],  # noqa: B006
+    cycles: Cycles = None,
+    between: Between = None,
+    low_pass: Filter = None,
+    keep_rest: KeepRest = False,
     weighting: Annotated[
         str, typer.Option(help='"samples": every sample counts the same; "runs": every record, by its RMS force.')
     ] = "samples",
@@ -103,20 +127,71 @@ def fit(
 
     with console.plain_errors(debug):
         console.prepare()
-        options = fitting.ReadOptions(
-            sign,
-            force_sign,
-            tuple(columns),
-            tuple(units),
-            sampling_rate,
-            delimiter,
-            gains=tuple(gains),
-            manifest=manifest,
-            skip_bad=skip_bad,
-        )
+        numbers = (tuple(columns), tuple(units), sampling_rate, delimiter)
+        reading = (sign, force_sign, *numbers, tuple(gains), manifest, skip_bad, tuple(command))
         fitting.run_fit(
-            console.Screen(), files, options, laws=law, held_out=held_out, weighting=weighting, out=out, replace=replace
+            console.Screen(),
+            files,
+            fitting.ReadOptions(*reading),
+            laws=law,
+            held_out=held_out,
+            weighting=weighting,
+            processing=fitting.ProcessOptions(cycles, between, low_pass, keep_rest),
+            out=out,
+            replace=replace,
         )
+
+
+@app.command()
+def bench(
+    files: Files,
+    sign: Sign = None,
+    force_sign: ForceSign = None,
+    columns: Columns = [],  # noqa: B006
+    units: Units = [],  # noqa: B006
+    sampling_rate: SamplingRate = None,
+    delimiter: Delimiter = None,
+    gains: Gains = [],  # noqa: B006
+    manifest: Manifest = None,
+    skip_bad: SkipBad = False,
+    command: Command = [],  # noqa: B006
+    cycles: Cycles = None,
+    between: Between = None,
+    low_pass: Filter = None,
+    keep_rest: KeepRest = False,
+    velocities: Annotated[
+        str | None, typer.Option(help="At which forces are stated [m/s]: 0.052,0.131; usual ones if left out.")
+    ] = None,
+    limits: Annotated[
+        Path | None, typer.Option(help="CSV of limits: quantity, minimum, maximum, velocity, setting, record.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-bench"),
+    replace: Replace = False,
+    debug: Debug = False,
+) -> None:
+    """Look over bench records and evaluate them: what is odd, forces, rates, gas force, friction, limits.
+
+    Writes a page, pictures, and tables. Records with an error are named and not evaluated. Ends with exit code 1 if a
+    limit is not kept.
+    """
+    from jaxdamp.cli import benching, console
+
+    with console.plain_errors(debug):
+        console.prepare()
+        numbers = (tuple(columns), tuple(units), sampling_rate, delimiter)
+        reading = (sign, force_sign, *numbers, tuple(gains), manifest, skip_bad, tuple(command))
+        passed = benching.run_bench(
+            console.Screen(),
+            files,
+            benching.ReadOptions(*reading),
+            processing=benching.ProcessOptions(cycles, between, low_pass, keep_rest),
+            velocities=velocities,
+            limits=limits,
+            out=out,
+            replace=replace,
+        )
+    if not passed:
+        raise typer.Exit(1)
 
 
 @app.command()

@@ -10,6 +10,7 @@ from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.options import ReadOptions, decisions, law_names, split
+from jaxdamp.cli.processing import ProcessOptions
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.wording import message
 from jaxdamp.identify import Comparison, Failure, Rung
@@ -49,6 +50,7 @@ def run_fit(
     laws: Sequence[str] = ("all",),
     held_out: Sequence[str] = (),
     weighting: str = "samples",
+    processing: ProcessOptions | None = None,
     out: Path,
     replace: bool = False,
 ) -> Comparison:
@@ -61,7 +63,7 @@ def run_fit(
     attempts = Attempts(interrupt.check, message)
     with results_folder(out, "fit", replace=replace) as results:
         with screen.stage("Reading the records"):
-            runs = options.read(files)
+            runs = (processing or ProcessOptions()).apply(options.read(files))
         fitted, held = split(runs, held_out)
         remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.table(records_table(tuple(runs), tuple(held)))

@@ -8,6 +8,7 @@ from pathlib import Path
 from jaxdamp import _checks, bench, identify
 from jaxdamp._checks import Setting
 from jaxdamp.bench import BenchRun, BenchSet
+from jaxdamp.cli.processing import commands
 from jaxdamp.cli.wording import in_options
 
 
@@ -107,6 +108,7 @@ class ReadOptions:
     gains: tuple[str, ...] = ()
     manifest: Path | None = None
     skip_bad: bool = False
+    command: tuple[str, ...] = ()
 
     def read(self, files: Sequence[Path]) -> BenchSet:
         """Read the records."""
@@ -121,4 +123,5 @@ class ReadOptions:
             gains=assignments("gains", self.gains),
             manifest=True if self.manifest is None else self.manifest,
             skip_bad=self.skip_bad,
+            command=commands(self.command),
         )

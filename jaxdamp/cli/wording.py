@@ -7,7 +7,9 @@ from jaxdamp._checks import ArgumentError, Setting
 
 
 OPTIONS = (
+    "between",
     "columns",
+    "command",
     "delimiter",
     "dt",
     "duration",
@@ -15,6 +17,7 @@ OPTIONS = (
     "gains",
     "held_out",
     "law",
+    "limits",
     "manifest",
     "road",
     "sampling_rate",
@@ -23,9 +26,18 @@ OPTIONS = (
     "speed",
     "units",
     "vehicle",
+    "velocities",
     "weighting",
 )
-OTHER_WORDS = {"paths": "FILES", "path_or_text": "The law file", "road_class": "CLASS in --road iso:CLASS"}
+OTHER_WORDS = {
+    "last_cycles": "Option --cycles",
+    "low_pass": "Option --filter",
+    "path_or_text": "The law file",
+    "paths": "FILES",
+    "road_class": "CLASS in --road iso:CLASS",
+    "skip_cycles": "Option --cycles",
+    "start": "The beginning in --between",
+}
 
 
 def option(argument: str) -> str:

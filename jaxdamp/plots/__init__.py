@@ -9,8 +9,10 @@ from jaxdamp.plots.changes import tuning
 from jaxdamp.plots.curves import force_velocity
 from jaxdamp.plots.damper_use import damper_use
 from jaxdamp.plots.errors import ladder
+from jaxdamp.plots.evaluation import evaluation, gas_and_friction
 from jaxdamp.plots.history import training_history
 from jaxdamp.plots.loops import fit_loops
+from jaxdamp.plots.preflight import preflight
 from jaxdamp.plots.rides import ride
 from jaxdamp.plots.roughness import roughness_by_segment
 from jaxdamp.plots.sweeps import sweep
@@ -20,10 +22,13 @@ from jaxdamp.plots.validation import cross_validation
 __all__ = [
     "cross_validation",
     "damper_use",
+    "evaluation",
     "fit_loops",
     "force_velocity",
+    "gas_and_friction",
     "ladder",
     "law_card",
+    "preflight",
     "ride",
     "roughness_by_segment",
     "sweep",

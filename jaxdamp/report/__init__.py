@@ -1,13 +1,14 @@
 """Pages of results of fits, rides and tunings: one self-contained HTML file with tables and pictures.
 
-- Pages: `fit_report(comparison)`, `ride_report(responses)`, `tuning_report(result)`; each gives a `Report`, to which
-  more can be added before `write(path)`.
+- Pages: `bench_report(evaluation, preflight)`, `fit_report(comparison)`, `ride_report(responses)`,
+  `tuning_report(result)`; each gives a `Report`, to which more can be added before `write(path)`.
 - Your own page: `Report`, with the sections `add_fits` and `add_tuning`.
 - Tables of these pages: `records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
 """
 
 from jaxdamp._tables import Column, Table
 from jaxdamp.report.attempts import Attempts
+from jaxdamp.report.benches import bench_report
 from jaxdamp.report.fits import (
     add_fits,
     failure_sentences,
@@ -30,6 +31,7 @@ __all__ = [
     "add_fits",
     "add_tuning",
     "axles_sentence",
+    "bench_report",
     "failure_sentences",
     "fit_report",
     "fitted_range_table",

@@ -1,0 +1,138 @@
+"""The preflight: all checks of all records."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, final
+
+from jaxdamp import _checks
+from jaxdamp._tables import Cell, Column, Table, plain
+from jaxdamp.bench.analysis import as_records
+from jaxdamp.bench.preflight import bench_checks, channel_checks, consistency, motion_checks
+from jaxdamp.bench.preflight.finding import SEVERITIES, Examined, Finding
+from jaxdamp.bench.runs import BenchRun
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+
+# In this order; where one family finds an error in a record, the later ones are left out for it.
+FAMILIES = (
+    (motion_checks.magnitudes, motion_checks.few_samples, motion_checks.few_cycles),
+    (channel_checks.stuck, channel_checks.clipping, motion_checks.rest, motion_checks.run_up),
+    (channel_checks.spikes, channel_checks.quantisation, channel_checks.ripple, consistency.velocity, consistency.sign),
+    (motion_checks.jitter, consistency.gas_force, consistency.delay, consistency.breakaway, consistency.drift),
+)
+BENCH = (bench_checks.turned_by_the_reader, bench_checks.turned_motion, bench_checks.mixed_settings)
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Preflight:
+    """The findings on records, errors first.
+
+    Attributes:
+        findings: all of them.
+        records: the names of the records that were checked.
+    """
+
+    findings: tuple[Finding, ...]
+    records: tuple[str, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is no error; warnings and notes may be there."""
+        return not self.of("error")
+
+    def of(self, severity: str) -> tuple[Finding, ...]:
+        """The findings of one severity: "error", "warning" or "note"."""
+        _checks.one_of("severity", severity, SEVERITIES)
+        return tuple(finding for finding in self.findings if finding.severity == severity)
+
+    def named(self, name: str) -> tuple[Finding, ...]:
+        """The findings of one name, such as "rest before"."""
+        return tuple(finding for finding in self.findings if finding.name == name)
+
+    def table(self) -> Table:
+        """A row for each finding."""
+        columns = (Column("severity"), Column("record"), Column("from", "s"), Column("to", "s"), Column("finding"))
+        columns += (Column("message"), Column("size"), Column("unit"), Column("remedy"))
+        rows: list[tuple[Cell, ...]] = []
+        for f in self.findings:
+            start, stop = (None, None) if f.between is None else f.between
+            rows.append((f.severity, f.record, start, stop, f.name, f.message, f.size, f.unit, f.remedy))
+        return Table(self.summary(), columns, tuple(rows))
+
+    def summary(self) -> str:
+        """How many records were checked, and how much was found, in words."""
+        counts = [(len(self.of(severity)), severity) for severity in SEVERITIES]
+        words = ", ".join(f"{count} {severity}{'s' * (count > 1)}" for count, severity in counts if count)
+        records = f"{len(self.records)} record{'s' * (len(self.records) > 1)}"
+        return f"Preflight of {records}: {words or 'nothing odd'}"
+
+    def sentences(self) -> list[str]:
+        """Each kind of finding once, with the records that it is about and the largest of its sizes."""
+        kinds: dict[tuple[str, str], list[Finding]] = {}
+        for finding in self.findings:
+            kinds.setdefault((finding.severity, finding.name), []).append(finding)
+        said = []
+        for (severity, name), members in kinds.items():
+            worst = max(members, key=lambda finding: abs(finding.size or 0.0))
+            others = [f.record for f in members if f is not worst]
+            more = f" Also {', '.join(others[:3])}" + (f" and {len(others) - 3} more" if len(others) > 3 else "") + "."
+            said.append(
+                f"{severity}, {name}: {worst.record}: {worst.message}.{more * bool(others)} {worst.remedy}".rstrip()
+            )
+        return said
+
+    def to_dict(self) -> dict[str, Any]:
+        """All findings as plain data."""
+        return {"ok": self.ok, "records": list(self.records), "findings": plain(self.table().records())}
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """Which finding is in which record."""
+        from jaxdamp import plots
+
+        return plots.preflight(self)
+
+    def __repr__(self) -> str:
+        return "\n".join([self.summary(), *(f"- {sentence}" for sentence in self.sentences())])
+
+
+def preflight(runs: BenchRun | Iterable[BenchRun]) -> Preflight:
+    """Look over records before anything is computed from them.
+
+    Each check compares with the noise of the record itself. Of a record with an error only that is said which does not
+    follow from the error.
+
+    Arguments:
+        runs: one record or several of a bench; only several can contradict one another.
+
+    Raises:
+        ValueError: no record.
+
+    >>> from jaxdamp import bench
+    >>> from jaxdamp.dampers import Linear
+    >>> test = bench.SineTest(0.02, 2.0, cycles=6, rest_before=1.0, run_up=1.0)
+    >>> found = bench.preflight(bench.VirtualDyno(Linear(1500.0), force_noise=3.0, stroke_noise=1e-5).run(test))
+    >>> found.ok, [finding.name for finding in found.findings]
+    (True, ['rest before', 'run-up'])
+    """
+    chosen = as_records(runs, "preflight(runs)")
+    findings = [finding for run in chosen for finding in _of_record(run)]
+    wrong = {finding.record for finding in findings if finding.severity == "error"}
+    sound = [run for run in chosen if run.name not in wrong]
+    findings += [finding for check in BENCH for finding in check(sound)]
+    findings = bench_checks.hysteresis_or_delay(findings)
+    findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
+    return Preflight(tuple(findings), tuple(run.name for run in chosen))
+
+
+def _of_record(run: BenchRun) -> list[Finding]:
+    """The findings of all families up to the first with an error."""
+    examined, findings = Examined(run), []
+    for family in FAMILIES:
+        findings += [finding for check in family for finding in check(examined)]
+        if any(finding.severity == "error" for finding in findings):
+            break
+    return findings

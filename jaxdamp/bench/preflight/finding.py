@@ -1,0 +1,118 @@
+"""A finding, and what all checks of a record share."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.bench.analysis import FoldedCycles, fold_cycles
+from jaxdamp.bench.motion import Samples, moving_span, white_noise
+from jaxdamp.bench.runs import BenchRun
+
+
+SEVERITIES = ("error", "warning", "note")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something odd about a record, or about several together.
+
+    Arguments:
+        severity: "error": nothing computed from the record can be trusted; "warning": results are wrong to some
+            degree; "note": to know.
+        name: of the artefact, such as "rest before".
+        record: name of the record; of several, joined by commas.
+        message: what was seen, in words.
+        size: of the artefact in `unit`; None where it has none.
+        unit: of the size, SI.
+        between: start and end of the place in the record [s]; None for the whole record.
+        remedy: what to do.
+    """
+
+    severity: str
+    name: str
+    record: str
+    message: str
+    size: float | None = None
+    unit: str = ""
+    between: tuple[float, float] | None = None
+    remedy: str = ""
+
+    def __post_init__(self) -> None:
+        _checks.one_of("severity", self.severity, SEVERITIES)
+
+    def __str__(self) -> str:
+        return f"{self.severity}: {self.record}: {self.message}. {self.remedy}".rstrip()
+
+
+class Examined:
+    """A record with what several checks need of it, computed once.
+
+    Attributes:
+        run: the record.
+        moving: the samples of the motion, without rest before and after.
+    """
+
+    def __init__(self, run: BenchRun) -> None:
+        self.run = run
+        first, last = moving_span(run.time, run.stroke)
+        self.moving = slice(first, last + 1)
+
+    @cached_property
+    def cycles(self) -> FoldedCycles | None:
+        """The steady cycles; none in a record without a full one."""
+        return fold_cycles(self.run) if self.run.cycles else None
+
+    @cached_property
+    def noise(self) -> dict[str, float]:
+        """Standard deviation of the white noise of each channel over the motion, and at least its rounding."""
+        return {name: max(white_noise(values), step(values) / np.sqrt(12)) for name, values in self.channels.items()}
+
+    @property
+    def channels(self) -> dict[str, Samples]:
+        """Stroke and force over the motion."""
+        return {"stroke": self.run.stroke[self.moving], "force": self.run.force[self.moving]}
+
+    @property
+    def samples_per_cycle(self) -> float:
+        """Samples in a period."""
+        return self.run.sampling_rate / self.run.frequency
+
+    def finding(
+        self,
+        severity: str,
+        name: str,
+        message: str,
+        size: float | int | None = None,
+        unit: str = "",
+        samples: tuple[int, int] | None = None,
+        remedy: str = "",
+    ) -> list[Finding]:
+        """One finding of this record; its place is given by the first and the last sample."""
+        place = None if samples is None else (float(self.run.time[samples[0]]), float(self.run.time[samples[1]]))
+        size = None if size is None else float(size)
+        return [Finding(severity, name, self.run.name, message, size, unit, place, remedy)]
+
+
+def step(values: Samples) -> float:
+    """The step that all values are multiples of apart, if there is one; zero else.
+
+    It is the smallest difference between two values, when nearly all other differences are multiples of it and the
+    values repeat much more often than they would by chance.
+    """
+    levels = np.unique(values)
+    if len(levels) > 0.8 * len(values) or len(levels) < 3:
+        return 0.0
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > 1e-9 * np.ptp(levels)]
+    smallest = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
+    multiples = gaps / smallest
+    regular = np.abs(multiples - np.round(multiples)) < 0.1
+    return smallest if len(gaps) and np.mean(regular) > 0.95 else 0.0
+
+
+def runs_of(mask: np.ndarray) -> list[tuple[int, int]]:
+    """First and last index of each stretch where a mask is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]

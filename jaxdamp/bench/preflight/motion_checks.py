@@ -1,0 +1,108 @@
+"""Checks of the motion: rest, run-up and run-down, cycles, samples, clock, magnitudes."""
+
+import numpy as np
+
+from jaxdamp.bench.analysis import steady_cycles
+from jaxdamp.bench.motion import cycle_instants
+from jaxdamp.bench.preflight.finding import Examined, Finding, step
+
+
+FEWEST_CYCLES = 3  # from which a scatter over cycles can be told
+FEWEST_SAMPLES = 30  # a cycle, as the reader recommends
+_ALIVE = 0.3  # share of the force's deviation in motion by which it moves when it is not at rest
+_CLEAR = 6.0  # standard errors from which an effect is there
+# What machines and dampers do: beyond it, a unit, the clock or a column is wrong more often than right.
+_USUAL = (
+    ("peak velocity", "m/s", 1e-4, 6.0, "Are stroke and force exchanged, is time in ms, or the stroke in mm?"),
+    ("amplitude", "m", 1e-5, 0.5, "Are stroke and force exchanged, or is the stroke in mm?"),
+    ("frequency", "Hz", 1e-3, 200.0, "Is time in ms or in minutes?"),
+    ("largest force", "N", 1.0, 2e5, "Is the force in kN, or stroke and force exchanged?"),
+)
+
+
+def rest(e: Examined) -> list[Finding]:
+    """Rest before and after the motion, during which the force rests too."""
+    found = []
+    ends = (("rest before", 0, e.moving.start), ("rest after", e.moving.stop - 1, len(e.run) - 1))
+    for name, first, last in ends:
+        if last > first and np.std(e.run.force[first : last + 1]) < _ALIVE * np.std(e.run.force[e.moving]):
+            seconds = e.run.time[last] - e.run.time[first]
+            share = 100 * (last - first) / len(e.run)
+            message = f"{seconds:.3g} s of rest {name.split()[1]} the motion, {share:.2g} % of the record"
+            remedy = "Laws with memory and means suffer: `process(moving=True)` cuts it off."
+            found += e.finding("warning", name, message, seconds, "s", (first, last), remedy)
+    return found
+
+
+def run_up(e: Examined) -> list[Finding]:
+    """Run-up and run-down of the machine: motion before the first and behind the last steady cycle."""
+    steady, count = steady_cycles(e.run), e.run.cycles
+    if not steady or len(steady) < 0.5 * count:
+        return []
+    found, period, end = [], 1 / e.run.frequency, len(e.run) - 1
+    first, last = e.moving.start, min(e.moving.stop - 1, end)
+    ends = (
+        ("run-up", first, steady[0].start, first > 0),
+        ("run-down", min(steady[-1].stop - 1, end), last, last < end),
+    )
+    for name, start, stop, beside_rest in ends:
+        seconds = e.run.time[stop] - e.run.time[start]
+        # A record that begins within the motion has up to a period before its first full cycle.
+        if seconds > (0.4 if beside_rest else 1.05) * period:
+            message = f"{seconds:.3g} s of {name}, in which the amplitude is not steady"
+            remedy = "Means over cycles leave it out; for fits choose cycles: `process(skip_cycles=...)`."
+            found += e.finding("note", name, message, seconds, "s", (start, stop), remedy)
+    return found
+
+
+def few_cycles(e: Examined) -> list[Finding]:
+    """Too few full cycles to know the scatter."""
+    count = max(len(cycle_instants(e.run.time, e.run.stroke)) - 1, 0)
+    if count >= FEWEST_CYCLES:
+        return []
+    message = f"{count} full cycle{'s' * (count != 1)}, so the scatter from cycle to cycle is not known"
+    return e.finding("warning", "few cycles", message, count, "", None, f"Record {FEWEST_CYCLES} or more.")
+
+
+def few_samples(e: Examined) -> list[Finding]:
+    """Too few samples in a cycle for velocity and loops."""
+    samples = e.samples_per_cycle
+    if samples >= FEWEST_SAMPLES:
+        return []
+    message = f"{samples:.3g} samples a cycle: velocity, loops and peaks are coarse"
+    remedy = f"Sample at {FEWEST_SAMPLES * e.run.frequency:.3g} Hz or more."
+    return e.finding("warning", "few samples", message, samples, "", None, remedy)
+
+
+def magnitudes(e: Examined) -> list[Finding]:
+    """Numbers that no damper test has."""
+    values = (e.run.peak_velocity, e.run.amplitude, e.run.frequency, float(np.max(np.abs(e.run.force))))
+    found = []
+    for value, (what, unit, low, high, question) in zip(values, _USUAL, strict=True):
+        if not low <= value <= high:
+            message = f"unusual: the {what} is {value:.3g} {unit}"
+            found += e.finding("warning", f"unusual {what}", message, value, unit, None, question)
+    return found
+
+
+def jitter(e: Examined) -> list[Finding]:
+    """A clock whose instants are not those written: the noise of the stroke grows with its velocity.
+
+    The variance of the fifth differences of the stroke, σ² + τ² v², is compared between the fast and the slow half.
+    """
+    stroke = e.channels["stroke"]
+    if len(stroke) < 200 or step(stroke) > 0:
+        return []
+    noise = np.diff(stroke, 5) / np.sqrt(252.0)
+    speed = np.abs(np.gradient(stroke)[2:-3]) * e.run.sampling_rate
+    fast, slow = speed > np.quantile(speed, 0.7), speed < np.quantile(speed, 0.3)
+    more, less = np.mean(noise[fast] ** 2), np.mean(noise[slow] ** 2)
+    # Differences are correlated over some five samples, so that a fifth of them counts.
+    uncertain = np.sqrt(2 * 5 * (more**2 / fast.sum() + less**2 / slow.sum()))
+    if more - less < _CLEAR * uncertain or more < 1.5 * less or more < (1e-6 * np.ptp(stroke)) ** 2:
+        return []
+    size = float(np.sqrt((more - less) / (np.mean(speed[fast] ** 2) - np.mean(speed[slow] ** 2))))
+    share = 100 * size * e.run.sampling_rate
+    message = f"the clock jitters by {1e6 * size:.3g} µs, {share:.2g} % of a step: the faster the stroke, the noisier"
+    remedy = "Take the clock of the hardware, not of the computer."
+    return e.finding("warning", "clock jitter", message, size, "s", None, remedy)

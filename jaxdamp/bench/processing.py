@@ -1,0 +1,217 @@
+"""Processing of records: steps with names, in one fixed order, always from the raw record.
+
+A processed record knows its raw one and its steps. Every further step is added to these, and all are done anew from the
+raw record in the order of the fields of `Steps`: so it does not matter in which order they were asked for.
+"""
+
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp import _checks
+from jaxdamp.bench.motion import Samples, cycle_instants, moving_span
+
+
+if TYPE_CHECKING:
+    from jaxdamp.bench.evaluation.separation import GasAndFriction
+    from jaxdamp.bench.runs import BenchRun
+
+
+ORDER = 4  # of the Butterworth filter, which is run forwards and backwards
+FEWEST_POINTS = 64  # of a mean cycle
+CHANNELS = ("stroke", "velocity", "force")
+
+
+@final
+@dataclass(frozen=True)
+class Steps:
+    """What is done to a raw record, in this order.
+
+    Arguments:
+        delay: by which the force channel lags behind the stroke channel [s]; the force is read so much later.
+        low_pass: cut-off frequency [Hz] of a zero-phase filter on stroke, velocity and force alike; half is left there.
+        between: start and end of the part that is kept [s].
+        moving: cut off the rest before and after the motion.
+        skip_cycles: number of full cycles left out at the beginning.
+        last_cycles: number of full cycles kept, the last ones.
+        without: gas force and friction to be subtracted from the force.
+        mean_cycle: the mean over the full cycles in place of all.
+    """
+
+    delay: float | int | None = None
+    low_pass: float | int | None = None
+    between: tuple[float | int, float | int] | None = None
+    moving: bool = False
+    skip_cycles: int | None = None
+    last_cycles: int | None = None
+    without: "GasAndFriction | None" = None
+    mean_cycle: bool = False
+
+    def __post_init__(self) -> None:
+        if self.delay is not None:
+            _checks.finite("delay", self.delay)
+        if self.low_pass is not None:
+            _checks.positive("low_pass", self.low_pass)
+        for argument, least in (("skip_cycles", 0), ("last_cycles", 1)):
+            if getattr(self, argument) is not None and getattr(self, argument) < least:
+                _checks.refuse(argument, f"be {least} or more", getattr(self, argument))
+
+    def and_then(self, more: "Steps") -> "Steps":
+        """Both, where they agree: windows are intersected, of two numbers of last cycles the smaller one is taken.
+
+        Raises:
+            ValueError: a window is asked for when cycles are chosen already, because then it would be another choice;
+                or one step with two values.
+        """
+        if more.between is not None and (self.skip_cycles, self.last_cycles) != (None, None):
+            remedy = "Cut in time first, or begin with `run.raw`: cycles are counted in the part that is kept."
+            _checks.refuse("between", "be given before cycles are chosen", more.between, remedy)
+        merged: dict[str, Any] = {}
+        for field in fields(self):
+            old, new = getattr(self, field.name), getattr(more, field.name)
+            if old in (None, False) or new in (None, False):
+                merged[field.name] = old if new in (None, False) else new
+            elif field.name == "between":
+                merged["between"] = (max(old[0], new[0]), min(old[1], new[1]))
+            elif field.name == "last_cycles":
+                merged["last_cycles"] = min(old, new)
+            elif field.name == "skip_cycles":
+                merged["skip_cycles"] = old + new
+            elif old is new or (field.name != "without" and old == new):
+                merged[field.name] = old
+            else:
+                remedy = "Begin with `run.raw`."
+                _checks.refuse(field.name, "be given once", f"{new} after {old}", remedy)
+        return Steps(**merged)
+
+
+def processed(raw: "BenchRun", steps: Steps) -> "BenchRun":
+    """A record of the raw one, with all steps done and named in its notes."""
+    run = replace(raw)
+    if steps.delay is not None:
+        run = _align(run, float(steps.delay))
+    if steps.low_pass is not None:
+        run = _low_pass(run, float(steps.low_pass))
+    if steps.between is not None:
+        run = cut_between(run, *steps.between)
+    if steps.moving:
+        run = _cut_rest(run)
+    if steps.skip_cycles is not None or steps.last_cycles is not None:
+        run = choose_cycles(run, steps.skip_cycles or 0, steps.last_cycles)
+    if steps.without is not None:
+        run = _subtract(run, steps.without)
+    return _mean_cycle(run) if steps.mean_cycle else run
+
+
+def low_pass_gain(frequency: float, cutoff: float, sampling_rate: float) -> float:
+    """What the zero-phase filter leaves of a sine: 1 / (1 + (tan(π f / f_s) / tan(π f_c / f_s))^8), all in Hz.
+
+    >>> [round(low_pass_gain(f, 50.0, 2000.0), 4) for f in (15.0, 50.0, 60.0)]
+    [0.9999, 0.5, 0.1876]
+    """
+    warped = np.tan(np.pi * frequency / sampling_rate) / np.tan(np.pi * cutoff / sampling_rate)
+    return float(1.0 / (1.0 + warped ** (2 * ORDER)))
+
+
+def _noted(run: "BenchRun", note: str, **changes: Any) -> "BenchRun":
+    return replace(run, **changes, notes=(*run.notes, note))
+
+
+def _cut(run: "BenchRun", part: np.ndarray | slice, note: str) -> "BenchRun":
+    """The samples of a part."""
+    warm = None if run.temperature is None else run.temperature[part]
+    channels = {name: getattr(run, name)[part] for name in ("time", *CHANNELS)}
+    return _noted(run, note, **channels, temperature=warm)
+
+
+def _align(run: "BenchRun", delay: float) -> "BenchRun":
+    """The force of a time later by the delay, by cubics; the end of the record for which there is none is cut off."""
+    from scipy.interpolate import CubicSpline
+
+    there = (run.time + delay >= run.time[0]) & (run.time + delay <= run.time[-1])
+    if there.sum() < 0.5 * len(run):
+        _checks.refuse("delay", f"be shorter than half the record, {run.duration:.4g} s", delay)
+    force = CubicSpline(run.time, run.force)(run.time + delay)
+    note = f"force channel read {1e3 * delay:.4g} ms later, to make up for its delay"
+    return _cut(replace(run, force=force), there, note)
+
+
+def _low_pass(run: "BenchRun", cutoff: float) -> "BenchRun":
+    """Stroke, velocity and force through a Butterworth filter, forwards and backwards."""
+    from scipy.signal import butter, sosfiltfilt
+
+    if not cutoff < 0.45 * run.sampling_rate:
+        must = f"be less than 0.45 times the sampling rate of {run.name!r}, {0.45 * run.sampling_rate:.4g} Hz"
+        _checks.refuse("low_pass", must, cutoff)
+    # Each pass leaves the root of a half at its own cut-off, so that both leave a half there.
+    sections = butter(ORDER, cutoff, fs=run.sampling_rate, output="sos")
+    pad = min(len(run) - 1, 3 * int(np.ceil(run.sampling_rate / cutoff)))
+    filtered = {name: sosfiltfilt(sections, getattr(run, name), padlen=pad) for name in CHANNELS}
+    tones = [k * run.frequency for k in (1, 3) if 2 * k * run.frequency < run.sampling_rate]
+    gains = [100 * low_pass_gain(tone, cutoff, run.sampling_rate) for tone in tones]
+    left = ", ".join(f"{gain:.3g} % at {tone:.3g} Hz" for gain, tone in zip(gains, tones, strict=True))
+    peak = 100 * (1 - np.ptp(filtered["force"]) / np.ptp(run.force))
+    note = f"stroke, velocity and force filtered at {cutoff:g} Hz with zero phase: it leaves {left}, and takes "
+    return _noted(run, f"{note}{peak:.2g} % off the range of the force", **filtered)
+
+
+def cut_between(run: "BenchRun", start: float | int, stop: float | int) -> "BenchRun":
+    """The part with start ≤ time < stop [s]."""
+    part = (run.time >= start) & (run.time < stop)
+    if not np.any(part):
+        remedy = f"It runs from {run.time[0]:.6g} to {run.time[-1]:.6g} s."
+        _checks.refuse("start", "leave some of the record", f"{start} with stop {stop}", remedy)
+    return _cut(run, part, f"cut to {run.time[part][0]:g} … {run.time[part][-1]:g} s")
+
+
+def _cut_rest(run: "BenchRun") -> "BenchRun":
+    first, last = moving_span(run.time, run.stroke)
+    before, after = run.time[first] - run.time[0], run.time[-1] - run.time[last]
+    if not before and not after:
+        return run
+    note = f"rest cut off: {before:.3g} s before and {after:.3g} s after the motion"
+    return _cut(run, slice(first, last + 1), note)
+
+
+def choose_cycles(run: "BenchRun", skip: int, last: int | None) -> "BenchRun":
+    """Full cycles of the record, half a sample before the passages of mid-stroke."""
+    count = run.cycles
+    most = count - skip
+    if skip and most < 1:
+        _checks.refuse("skip_cycles", f"be less than the number of full cycles of {run.name!r}, {count}", skip)
+    if last is not None and not 1 <= last <= most:
+        must = f"be between 1 and the number of full cycles, {most}"
+        _checks.refuse("last_cycles", must, f"{last} for {run.name!r}")
+    instants, half = cycle_instants(run.time, run.stroke), 0.5 / run.sampling_rate
+    first = count - last if last is not None else skip
+    start, stop = instants[first] - half, instants[-1] - half
+    part = (run.time >= start) & (run.time < stop)
+    note = f"cut to {run.time[part][0]:g} … {run.time[part][-1]:g} s, cycles {first + 1} to {count} of {count}"
+    return _cut(run, part, note)
+
+
+def _subtract(run: "BenchRun", found: "GasAndFriction") -> "BenchRun":
+    """Without gas force and friction; friction grows in proportion below the velocities it was measured at."""
+    friction = found.friction * np.clip(run.velocity / found.velocities[0], -1.0, 1.0)
+    force = run.force - found.static_force(run.stroke) - friction
+    gas = f"gas force {found.gas_force:.4g} N with {found.gas_rate:.4g} N/m"
+    note = f"{gas} and friction {found.friction:.4g} N subtracted, as measured on {found.record}"
+    return _noted(run, note, force=force)
+
+
+def _mean_cycle(run: "BenchRun") -> "BenchRun":
+    """The mean cycle at equal steps of time, two periods of it, so that it is a record with a full cycle."""
+    from jaxdamp.bench.analysis import fold_cycles
+
+    cycles = fold_cycles(run)
+    count, period = len(cycles.periods), float(cycles.periods.mean())
+    points = cycles.force.shape[1]
+    time = np.arange(2 * points) * (period / points)
+    channels: dict[str, Float[np.ndarray, " time"] | Samples] = {
+        name: np.tile(getattr(cycles, name).mean(axis=0), 2) for name in CHANNELS
+    }
+    scatter = f"{np.sqrt(np.mean(np.var(cycles.force, axis=0, ddof=1))):.3g} N" if count > 1 else "unknown"
+    note = f"mean cycle over {count} cycles, twice; scatter of the force from cycle to cycle {scatter} (RMS)"
+    return _noted(run, note, time=time, **channels, temperature=None)

@@ -1,0 +1,99 @@
+"""`jaxdamp bench`: records of a bench in, what is odd about them and their evaluation out."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from jaxdamp import bench
+from jaxdamp.bench import BenchSet, Evaluation, Preflight
+from jaxdamp.cli import interrupt
+from jaxdamp.cli.console import Screen
+from jaxdamp.cli.fitting import write_table
+from jaxdamp.cli.options import ReadOptions, decisions
+from jaxdamp.cli.processing import ProcessOptions
+from jaxdamp.cli.results import results_folder
+from jaxdamp.cli.wording import message
+from jaxdamp.report import Attempts, bench_report, records_table
+
+
+_COLOURS = {"error": "red", "warning": "yellow", "note": ""}
+
+
+def run_bench(
+    screen: Screen,
+    files: Sequence[Path],
+    options: ReadOptions,
+    *,
+    processing: ProcessOptions,
+    velocities: str | None = None,
+    limits: Path | None = None,
+    out: Path,
+    replace: bool = False,
+) -> bool:
+    """Look over records, evaluate those without an error, and write all of it into a folder.
+
+    Returns:
+        Whether all limits are kept; true without limits.
+
+    Raises:
+        ValueError: what the library refuses; no record without an error.
+    """
+    processing.steps()
+    wanted, chosen = _velocities(velocities), None if limits is None else bench.read_limits(limits)
+    attempts = Attempts(interrupt.check, message)
+    with results_folder(out, "bench", replace=replace) as results:
+        with screen.stage("Reading the records"):
+            raw = options.read(files)
+        with screen.stage("Looking the records over"):
+            found = bench.preflight(raw)
+        screen.table(records_table(tuple(raw)))
+        screen.heading(found.summary())
+        for sentence in found.sentences():
+            screen.points([sentence], style=_COLOURS[sentence.split(",")[0]])
+        runs = processing.apply(_sound(raw, found))
+        remarks = decisions(tuple(runs))
+        screen.heading("What was done to the records")
+        screen.points(remarks)
+        with screen.stage("Evaluating the records"):
+            evaluation = bench.evaluate(runs, velocities=wanted)
+        check = None if chosen is None else evaluation.check(chosen)
+        for name in ("velocities", "settings", "peak_forces", "loops"):
+            screen.table(evaluation.tables()[name])
+        screen.points(evaluation.notes, style="yellow")
+        if check is not None:
+            screen.table(check.table())
+        (results.draft / "tables").mkdir()
+        write_table(results.draft, "preflight", found.table())
+        _write_evaluation(results.draft, evaluation)
+        if check is not None:
+            write_table(results.draft, "limits", check.table())
+        results.publish("the pictures and the report")
+        with screen.stage("Pictures and report"):
+            places = {"folder": results.draft, "attempts": attempts}
+            page = bench_report(evaluation, found, check, remarks=remarks, **places)
+            page.write(results.draft / "report.html")
+    screen.files(out, results.published)
+    screen.points(attempts.troubles, style="yellow")
+    return check is None or check.passed
+
+
+def _velocities(text: str | None) -> list[float] | None:
+    if text is None:
+        return None
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"Option --velocities must read like 0.052,0.131 [m/s], but is {text!r}.") from None
+
+
+def _sound(runs: BenchSet, found: Preflight) -> BenchSet:
+    """The records without an error."""
+    wrong = {finding.record for finding in found.of("error")}
+    sound = BenchSet(run for run in runs if run.name not in wrong)
+    if not len(sound):
+        raise ValueError(" ".join(f"{finding}" for finding in found.of("error")))
+    return sound
+
+
+def _write_evaluation(folder: Path, evaluation: Evaluation) -> None:
+    for name, table in evaluation.tables().items():
+        write_table(folder, name, table)

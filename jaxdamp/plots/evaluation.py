@@ -1,0 +1,159 @@
+"""Records without a law: mean loops, forces over velocity with limits and a baseline, gas force and friction."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp import _checks
+from jaxdamp.bench import Evaluation, FoldedCycles, GasAndFriction, LimitCheck
+from jaxdamp.plots import _style
+
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+
+
+_REMEDY = "Take what `bench.evaluate(runs)` gives."
+_MOST_LABELLED = 14  # records in a legend
+
+
+def evaluation(
+    evaluation: Evaluation, baseline: Evaluation | None = None, limits: LimitCheck | None = None
+) -> "matplotlib.figure.Figure":
+    """Mean cycles of records over velocity, stroke, acceleration and time, and forces over velocity.
+
+    One setting: a colour for each record, from slow to fast. Several: a colour for each setting.
+
+    Arguments:
+        evaluation: what is to be shown.
+        baseline: another evaluation, drawn dashed in grey beneath.
+        limits: drawn as bars at their velocities.
+    """
+    from matplotlib.lines import Line2D
+
+    _checks.instance("evaluation", evaluation, Evaluation, "be an evaluation", _REMEDY)
+    figure = _style.new_figure(14.0, 8.5)
+    panels = figure.subplot_mosaic([["v", "peaks", "peaks"], ["x", "a", "t"]], height_ratios=(1.25, 1.0))
+    handles = []
+    if baseline is not None:
+        _checks.instance("baseline", baseline, Evaluation, "be an evaluation", _REMEDY)
+        style: dict[str, Any] = {"color": _style.GREY, "linestyle": "--", "linewidth": 1.0, "zorder": 1.5}
+        for run in baseline.runs:
+            _draw_cycle(panels, baseline.cycles[run.name], style)
+        _draw_forces(panels["peaks"], baseline, dict.fromkeys(baseline.settings, style))
+        handles.append(Line2D([], [], label="baseline", **style))
+    colours, labels = _colours(evaluation)
+    for run in sorted(evaluation.runs, key=lambda run: -run.peak_velocity):
+        _draw_cycle(panels, evaluation.cycles[run.name], {"color": colours[run.name], "linewidth": 1.3})
+    several = len(evaluation.settings) > 1
+    styles = {
+        name: {"color": colours[runs[0].name] if several else _style.BLACK, "linewidth": 1.4}
+        for name, runs in evaluation.settings.items()
+    }
+    _draw_forces(panels["peaks"], evaluation, styles)
+    handles += [Line2D([], [], color=colour, linewidth=2.0, label=label) for label, colour in labels]
+    marks: dict[str, Any] = {"marker": "o", "markerfacecolor": "white", "color": _style.BLACK, "linestyle": ""}
+    handles.append(Line2D([], [], label="at peak velocity", **marks))
+    handles.append(Line2D([], [], label="at stated velocity", **{**marks, "marker": "D", "markerfacecolor": None}))
+    handles += _draw_limits(panels["peaks"], limits) if limits is not None else []
+    _dress(panels)
+    _style.legend_beside(figure, handles)
+    return figure
+
+
+def gas_and_friction(found: GasAndFriction) -> "matplotlib.figure.Figure":
+    """Force over stroke in both directions, its even part with the gas force, and its odd part with the friction."""
+    _checks.instance("found", found, GasAndFriction, "be separated", "Take `bench.separate_gas_and_friction(run)`.")
+    figure = _style.new_figure(9.0, 5.0)
+    axes = figure.subplots()
+    x = 1e3 * found.stroke
+    handles = []
+    curves = (("into rebound", found.rebound), ("into compression", found.compression))
+    curves += (("even part: gas", found.even), ("odd part: friction and damping", found.odd))
+    for number, (label, force) in enumerate(curves):
+        handles += axes.plot(x, force, label=label, linewidth=1.6, **_style.line_style(number))
+    dotted: dict[str, Any] = {"color": _style.BLACK, "linestyle": ":"}
+    handles += axes.plot(x, found.static_force(found.stroke), label="gas force by its rate", **dotted)
+    handles.append(axes.axhline(found.friction, color=_style.BLACK, linewidth=0.8, label="friction at zero velocity"))
+    _style.dress(axes, _style.STROKE, _style.FORCE, f"{found.record}: force over stroke")
+    _style.cross(axes)
+    _style.legend_beside(figure, handles)
+    return figure
+
+
+def _colours(evaluation: Evaluation) -> tuple[dict[str, Any], list[tuple[str, Any]]]:
+    """The colour of each record, and the entries of the legend."""
+    if len(evaluation.settings) > 1:
+        names = list(evaluation.settings)
+        chosen = {name: _style.graded(i, len(names)) for i, name in enumerate(names)}
+        colours = {run.name: chosen[name] for name, runs in evaluation.settings.items() for run in runs}
+        return colours, [(f"setting {name}" if name else "no setting", chosen[name]) for name in names]
+    order = sorted(evaluation.runs, key=lambda run: run.peak_velocity)
+    colours = {run.name: _style.graded(i, len(order)) for i, run in enumerate(order)}
+    shown = order if len(order) <= _MOST_LABELLED else [order[0], order[-1]]
+    return colours, [(f"{run.name} ({run.peak_velocity:.2g} m/s)", colours[run.name]) for run in shown]
+
+
+def _draw_cycle(panels: Mapping[str, "matplotlib.axes.Axes"], cycles: FoldedCycles, style: Mapping[str, Any]) -> None:
+    """The mean cycle of a record, closed."""
+    stroke, velocity, force = (
+        _closed(values.mean(axis=0)) for values in (cycles.stroke, cycles.velocity, cycles.force)
+    )
+    phase = np.linspace(0.0, 1.0, len(force))
+    step = float(cycles.periods.mean()) / (len(force) - 1)
+    acceleration = _closed((np.roll(velocity[:-1], -1) - np.roll(velocity[:-1], 1)) / (2 * step))
+    for name, values in (("v", velocity), ("x", 1e3 * stroke), ("a", acceleration), ("t", phase)):
+        panels[name].plot(values, force, **style)
+
+
+def _closed(values: Float[np.ndarray, " points"]) -> Float[np.ndarray, " more"]:
+    return np.append(values, values[0])
+
+
+def _draw_forces(axes: "matplotlib.axes.Axes", evaluation: Evaluation, styles: Mapping[str, Mapping[str, Any]]) -> None:
+    """Forces at peak velocity of each setting joined by lines, and those at stated velocities."""
+    for setting, runs in evaluation.settings.items():
+        own = {(m.quantity, m.record): m.value for m in evaluation.measurements}
+        for side in ("rebound", "compression"):
+            pairs = sorted((own[f"{side} velocity", run.name], own[f"{side} force", run.name]) for run in runs)
+            axes.plot(*np.array(pairs).T, marker="o", markersize=4.5, markerfacecolor="white", **styles[setting])
+        stated = [
+            ((1 if m.quantity == "rebound force" else -1) * m.velocity, m.value)
+            for m in evaluation.measurements
+            if m.setting == setting and m.velocity is not None and m.unit == "N"
+        ]
+        if stated:
+            axes.plot(*np.array(stated).T, "D", markersize=4.5, color=styles[setting]["color"], zorder=3)
+
+
+def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list[Any]:
+    """Bars from the least to the largest force at stated velocities; one-sided limits end at the measured value."""
+    from matplotlib.lines import Line2D
+
+    colours = {True: _style.COLOURS[2], False: _style.COLOURS[1]}
+    seen = set()
+    for limit, measured in limits.results:
+        if limit.velocity is None or measured is None or measured.unit != "N":
+            continue
+        kept = limit.kept_by(measured.value)
+        low = measured.value if limit.minimum is None else limit.minimum
+        high = measured.value if limit.maximum is None else limit.maximum
+        at = limit.velocity if limit.quantity.startswith("rebound") else -limit.velocity
+        axes.plot([at, at], [low, high], color=colours[kept], linewidth=7.0, alpha=0.45, solid_capstyle="butt")
+        seen.add(kept)
+    words = {True: "limits, kept", False: "limits, not kept"}
+    return [Line2D([], [], color=colours[kept], linewidth=7.0, alpha=0.45, label=words[kept]) for kept in sorted(seen)]
+
+
+def _dress(panels: Mapping[str, "matplotlib.axes.Axes"]) -> None:
+    _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Mean cycles: force over velocity")
+    _style.dress(panels["peaks"], _style.VELOCITY, _style.FORCE, "Forces at peak and at stated velocities")
+    _style.dress(panels["x"], _style.STROKE, _style.FORCE, "Force over stroke")
+    _style.dress(panels["a"], "acceleration [m/s²]   (+ rebound)", _style.FORCE, "Force over acceleration")
+    _style.dress(panels["t"], "time in the cycle, over its period [–]", _style.FORCE, "Force over time")
+    for name, axes in panels.items():
+        _style.cross(axes, vertical=name != "t")
+        axes.locator_params(axis="x", nbins=6)

@@ -1,0 +1,45 @@
+"""Findings of a preflight: which is in which record."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.bench import Preflight
+from jaxdamp.plots import _style
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+
+_SHADES = {"error": "#D55E00", "warning": "#E69F00", "note": "#56B4E9"}
+
+
+def preflight(found: Preflight) -> "matplotlib.figure.Figure":
+    """A row for each record, a column for each kind of finding, coloured by severity, with its size."""
+    from matplotlib.patches import Patch, Rectangle
+
+    _checks.instance("found", found, Preflight, "be a preflight", "Take what `bench.preflight(runs)` gives.")
+    names = list(dict.fromkeys(finding.name for finding in found.findings))
+    figure = _style.new_figure(4.5 + 1.0 * max(len(names), 2), 2.0 + 0.34 * len(found.records))
+    axes = figure.subplots()
+    for finding in found.findings:
+        for record in (name for name in found.records if name in finding.record.split(", ")):
+            x, y = names.index(finding.name), found.records.index(record)
+            axes.add_patch(Rectangle((x - 0.46, y - 0.44), 0.92, 0.88, color=_SHADES[finding.severity], alpha=0.55))
+            text = "" if finding.size is None else f"{_style.short(finding.size)} {finding.unit}"
+            axes.text(x, y, text, ha="center", va="center", fontsize="small")
+    axes.set_xticks(range(len(names)), names, rotation=30, ha="left")
+    axes.set_yticks(range(len(found.records)), found.records)
+    axes.xaxis.tick_top()
+    axes.set_xlim(-0.5, max(len(names), 1) - 0.5)
+    axes.set_ylim(len(found.records) - 0.5, -0.5)
+    axes.set_xticks(np.arange(len(names) + 1) - 0.5, minor=True)
+    axes.set_yticks(np.arange(len(found.records) + 1) - 0.5, minor=True)
+    axes.grid(True, which="minor", color="0.9", linewidth=0.8)
+    axes.tick_params(which="both", length=0)
+    axes.spines[:].set_visible(False)
+    figure.suptitle(found.summary())
+    _style.legend_beside(figure, [Patch(color=colour, alpha=0.55, label=word) for word, colour in _SHADES.items()])
+    return figure

@@ -1,0 +1,94 @@
+"""`jaxdamp bench` and the processing options of `jaxdamp fit`, called as a user does."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
+from jaxdamp.dampers import Bilinear
+from jaxdamp.export import from_json
+
+from .invoking import jaxdamp, refused
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Records with rest, and one of them clipped."""
+    ends: dict[str, Any] = {"rest_before": 0.5, "run_up": 1.0, "run_down": 1.0, "rest_after": 0.5}
+    tests = [SineTest(0.01, f, cycles=5, name=f"10mm_{f:g}Hz", **ends) for f in (1.0, 2.0, 4.0)]
+    settings: dict[str, Any] = {"sampling_rate": 500.0, "force_noise": 2.0}
+    runs = VirtualDyno(Bilinear(2600.0, 1200.0), **settings).run(tests)
+    clipped = VirtualDyno(Bilinear(2600.0, 1200.0), force_limit=150.0, **settings)
+    bad = clipped.run(SineTest(0.01, 2.0, cycles=5, name="clipped", **ends))
+    folder = tmp_path_factory.mktemp("bench")
+    BenchSet([*runs, *bad]).write(folder)
+    return folder
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def test_bench_prints_and_writes_preflight_evaluation_and_limits(folder: Path, tmp_path: Path) -> None:
+    limits, out = tmp_path / "limits.csv", tmp_path / "out"
+    limits.write_text(
+        "quantity,velocity,minimum,maximum\nrebound force,0.131,330,350\ncompression force,0.131,-150,-100\n"
+    )
+    text = jaxdamp("bench", folder, "--limits", limits, "--cycles", "last:4", "--out", out, code=1).output
+    flat = " ".join(text.split())
+    for said in ("2 errors", "error, force clipped: clipped", "rest before", "rest cut off", "Limits: not all passed"):
+        assert said in flat, said
+    written = {row["quantity"]: row for row in rows(out / "tables" / "velocities.csv")}
+    assert float(written["rebound force at 0.131 m/s"]["value"]) == pytest.approx(2600 * 0.131, rel=0.01)
+    assert {row["record"] for row in rows(out / "tables" / "peak_forces.csv")} == {"10mm_1Hz", "10mm_2Hz", "10mm_4Hz"}
+    verdicts = [row["verdict"] for row in rows(out / "tables" / "limits.csv")]
+    assert verdicts == ["passed", "FAILED"]
+    findings = rows(out / "tables" / "preflight.csv")
+    assert findings[0]["severity"] == "error" and findings[0]["record"] == "clipped"
+    for name in ("evaluation.png", "preflight.png", "gas_and_friction_1.png"):
+        assert (out / name).read_bytes().startswith(b"\x89PNG")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 3 and "Forces at stated velocities" in page and "FAILED" in page
+
+
+def test_settings_stated_on_the_command_line(folder: Path, tmp_path: Path) -> None:
+    words = ("--command", "*_1Hz=1,*_2Hz=2,*_4Hz=2,clipped=3", "--velocities", "0.03,0.05")
+    text = jaxdamp("bench", folder, *words, "--keep-rest", "--out", tmp_path / "out").output
+    assert "rebound force at 0.05 m/s" in text and "rest cut off" not in text
+    (header, *_) = (tmp_path / "out" / "tables" / "velocities.csv").read_text().splitlines()
+    assert header == "quantity,unit,1,2,change [%]"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--cycles", "all"), "Option --cycles must read like 3, last:3 or skip:2, but is 'all'"),
+        (("--cycles", "99"), "Option --cycles must be between 1 and the number of full cycles"),
+        (("--between", "2"), "Option --between must read like 2:10"),
+        (("--between", "50:60"), "The beginning in --between must leave some of the record"),
+        (("--filter", "400"), "Option --filter must be less than 0.45 times the sampling rate"),
+        (("--command", "warm"), "Option --command must read like"),
+        (("--velocities", "fast"), "Option --velocities must read like"),
+        (("--velocities", "-1"), "Option --velocities must be positive"),
+    ],
+)
+def test_wrong_options_are_refused_in_words(words: tuple[str, ...], message: str, folder: Path, tmp_path: Path) -> None:
+    assert message in refused(tmp_path, "bench", folder, *words, "--out", tmp_path / "out")
+
+
+def test_records_with_errors_only_are_refused(folder: Path, tmp_path: Path) -> None:
+    said = refused(tmp_path, "bench", folder / "clipped.csv", "--out", tmp_path / "out")
+    assert "the force is clipped at" in said
+
+
+def test_fit_processes_the_records_first(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ("--law", "bilinear,linear", "--cycles", "last:3", "--filter", "100", "--between", "0:6", "--out", out)
+    flat = " ".join(jaxdamp("fit", folder / "10mm_1Hz.csv", folder / "10mm_2Hz.csv", *words).output.split())
+    for said in ("rest cut off", "filtered at 100 Hz with zero phase", "cut to", "of"):
+        assert said in flat
+    law = from_json(out / "best_law.json")
+    assert isinstance(law, Bilinear) and float(law.rebound_rate) == pytest.approx(2600.0, rel=0.01)
+    assert all(int(row["cycles"]) == 3 for row in rows(out / "tables" / "records.csv"))
