@@ -23,6 +23,9 @@ from benchmarks import ours  # noqa: E402
 from benchmarks._timing import best, first_and_warm, report  # noqa: E402
 from benchmarks.peers import c, casadi_map, finite_differences, problem  # noqa: E402
 from jaxdamp import Ride, dampers, roads  # noqa: E402
+from jaxdamp.sweeps import points  # noqa: E402
+from jaxdamp.sweeps.program import prepare  # noqa: E402
+from jaxdamp.sweeps.tracing import trace  # noqa: E402
 from jaxdamp.vehicles.presets import quarter_car_000  # noqa: E402
 
 
@@ -75,6 +78,19 @@ def row(name: str, level: Callable[[Array], Array], at: np.ndarray) -> list[Any]
     return [name, at.shape[0], 1e3 * run, *ratios, first, *[once for once, _ in found]]
 
 
+def swept(cars: int) -> list[Any]:
+    """So many cars as `sweep` lays them out, its compiled program alone."""
+    ride = ours.ride("besinger", problem.heights("besinger")).side_by_side()
+    cloud = points(ours.point("besinger", problem.draw("besinger", cars)))
+    columns, times = cloud.columns(np.arange(cars)), []
+    for gradients in (False, "forward", "reverse"):
+        program = prepare(trace(ride, cloud.names, gradients), cars, None, 1, ride.lanes)
+        times.append(first_and_warm(lambda program=program: program.start(columns)))
+    (first, run), *found = times
+    ratios = [warm / run for _, warm in found]
+    return [f"{cars} cars in a sweep, Besinger", len(cloud.names), 1e3 * run, *ratios, first, *[o for o, _ in found]]
+
+
 def main() -> None:
     rows: list[list[Any]] = []
     for count in (1, 4, 8, 16, 64):
@@ -86,6 +102,7 @@ def main() -> None:
     for cars in (16, 32, 64, 128):
         table = problem.draw("besinger", cars).T
         rows.append(row(f"{cars} cars side by side, Besinger", jax.vmap(besinger(many=True), in_axes=1), table))
+    rows += [swept(cars) for cars in (32, 128, 512)]
     head = ["work", "parameters", "run, ms", "forward / run", "reverse / run"]
     head += [f"first {what}, s" for what in ("run", "forward", "reverse")]
     report("gradients", "Gradient of the RMS of body acceleration, 10 s at 1 kHz, one core", head, rows)

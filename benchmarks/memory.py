@@ -22,7 +22,8 @@ from benchmarks import ours  # noqa: E402
 from benchmarks._timing import report  # noqa: E402
 from benchmarks.peers import problem  # noqa: E402
 from jaxdamp.parameters import replace  # noqa: E402
-from jaxdamp.simulation.exponential import exponential_steps  # noqa: E402
+from jaxdamp.simulation import Exponential  # noqa: E402
+from jaxdamp.simulation.recorder import recorded  # noqa: E402
 
 
 DT = 1e-3
@@ -45,7 +46,8 @@ def main() -> None:
     def saved(every: int) -> Callable[[Array, Array], Array]:
         def run(heights: Array, rate: Array) -> Array:
             changed = replace(ride.vehicle, {path: rate})
-            return exponential_steps(changed.system(), heights, jnp.asarray(DT), every=every).motion
+            saved, _ = recorded(Exponential(), changed.system(), heights, jnp.asarray(DT), every=every)
+            return saved.motion
 
         return run
 

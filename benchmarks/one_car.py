@@ -24,7 +24,8 @@ from benchmarks._timing import first_and_warm, report  # noqa: E402
 from benchmarks.peers import problem  # noqa: E402
 from jaxdamp import Ride, dampers, roads, simulate, vehicles  # noqa: E402
 from jaxdamp.parameters import get, parameters  # noqa: E402
-from jaxdamp.simulation.exponential import exponential_steps  # noqa: E402
+from jaxdamp.simulation import Exponential  # noqa: E402
+from jaxdamp.simulation.recorder import recorded  # noqa: E402
 from jaxdamp.vehicles import presets  # noqa: E402
 
 
@@ -63,7 +64,7 @@ def main() -> None:
         coarse = np.asarray(heights)
         first, warm = timed(on_road(car, coarse, DT))
         _, saved = first_and_warm(
-            lambda car=car, heights=heights: exponential_steps(car.system(), heights, jnp.asarray(DT))
+            lambda car=car, heights=heights: recorded(Exponential(), car.system(), heights, jnp.asarray(DT))[0]
         )
         exact = simulate(
             car,

@@ -1,16 +1,102 @@
-"""States driven by a prescribed stroke, by the solvers of diffrax; imported when asked for."""
+"""States of ordinary differential equations by the solvers of diffrax; imported when asked for."""
 
+from collections.abc import Callable
 from typing import Any
 
 import diffrax
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+from jax.extend.core import Primitive
+from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, Float
 
+from jaxdamp import _checks
+from jaxdamp._jacobian import Mode
 from jaxdamp._types import Scalar, Signal, State
 
 
 STEPS_PER_INSTANT = 1000  # on average: more are a law too fast for the solver, and would take for ever
+
+
+def check_solver(solver: Any, rtol: float, atol: float) -> None:
+    """Refuse what is no solver of diffrax, and tolerances that are not positive."""
+    if not isinstance(solver, diffrax.AbstractSolver):
+        _checks.refuse("solver", "be a solver of diffrax", _checks.described(solver), "Pass `diffrax.Kvaerno5()`.")
+    _checks.positive("rtol", rtol)
+    _checks.positive("atol", atol)
+
+
+def verdict(result: Any) -> str:
+    """What a solver says of its end; nothing if it is content."""
+    return diffrax.RESULTS[result]
+
+
+def solve(
+    field: Callable[[Scalar, Any], Any],
+    start: Any,
+    time: Signal,
+    solver: diffrax.AbstractSolver,
+    rtol: float,
+    atol: float,
+    *,
+    mode: Mode = "forward",
+    every: int = 1,
+    steps_per_instant: int = STEPS_PER_INSTANT,
+) -> tuple[Any, Any]:
+    """States of ẏ = field(t, y) at every so many-th instant, and the solver's verdict.
+
+    Arguments:
+        field: smooth between the instants, where steps end.
+        start: states at the first instant, any tree.
+        time: uniform instants [s].
+        solver: of diffrax.
+        rtol: relative tolerance.
+        atol: absolute tolerance.
+        mode: the derivatives that pass; reverse ones drive the run again from checkpoints.
+        every: states are saved at one instant in so many.
+        steps_per_instant: after so many times the number of instants it gives up.
+    """
+    forward = mode == "forward"
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(lambda t, y, args: field(jnp.asarray(t), y)),
+        solver,
+        time[0],
+        time[-1],
+        0.1 * (time[-1] - time[0]) / (time.size - 1),
+        start,
+        saveat=diffrax.SaveAt(ts=time[::every]),
+        stepsize_controller=diffrax.ClipStepSizeController(
+            diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=time[1:-1]
+        ),
+        max_steps=steps_per_instant * time.size,
+        adjoint=diffrax.ForwardMode() if forward else diffrax.RecursiveCheckpointAdjoint(),
+        throw=False,
+    )
+    assert solution.ys is not None
+    return (jax.tree.map(forward_only, solution.ys) if forward else solution.ys), solution.result
+
+
+_FORWARD_ONLY = "pass no reverse derivatives (`jax.grad`) as they are. Pass `simulation.Adaptive(..., mode='reverse')`"
+_forward_only = Primitive("forward_only")
+_forward_only.def_impl(lambda x: x)
+_forward_only.def_abstract_eval(lambda x: x)
+batching.defvectorized(_forward_only)
+mlir.register_lowering(_forward_only, lambda context, x: [x])
+
+
+def _refuse_reverse(cotangent: Any, x: Any) -> Any:
+    raise ValueError(
+        f"Adaptive engines {_FORWARD_ONLY}, or take `simulation.Exponential()`, which passes forward and reverse ones."
+    )
+
+
+ad.deflinear2(_forward_only, _refuse_reverse)
+
+
+def forward_only(x: Array) -> Array:
+    """The same numbers, which refuse reverse derivatives with a sentence."""
+    return _forward_only.bind(x)
 
 
 def hermite(now: Scalar, time: Signal, values: Signal, slopes: Signal) -> tuple[Scalar, Scalar]:
@@ -34,30 +120,14 @@ def driven_states(
     solver: diffrax.AbstractSolver,
     rtol: float,
     atol: float,
+    mode: Mode = "forward",
 ) -> tuple[Float[Array, "time states"], Any]:
     """States at the instants, ẏ = rate(x, v, y), and the solver's verdict.
 
     The stroke is cubic between the instants and v its derivative; steps end at the instants, where v has kinks.
     """
 
-    def field(now: Any, state: State, args: None) -> State:
-        del args
-        return rate(*hermite(jnp.asarray(now), time, stroke, velocity), state)
+    def field(now: Scalar, state: State) -> State:
+        return rate(*hermite(now, time, stroke, velocity), state)
 
-    solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(field),
-        solver,
-        time[0],
-        time[-1],
-        0.1 * (time[1] - time[0]),
-        start,
-        saveat=diffrax.SaveAt(ts=time),
-        stepsize_controller=diffrax.ClipStepSizeController(
-            diffrax.PIDController(rtol=rtol, atol=atol), jump_ts=time[1:-1]
-        ),
-        max_steps=STEPS_PER_INSTANT * time.size,
-        adjoint=diffrax.ForwardMode(),
-        throw=False,
-    )
-    assert solution.ys is not None
-    return solution.ys, solution.result
+    return solve(field, start, time, solver, rtol, atol, mode=mode)

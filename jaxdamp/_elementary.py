@@ -8,9 +8,7 @@ Each has a custom derivative, and its value is differentiable too: where reverse
 stores the value and loses the custom derivative, so that second derivatives are those of the code of the value.
 """
 
-import functools
 import math
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +17,7 @@ from jaxtyping import ArrayLike, Float
 
 from jaxdamp._limits import Numbers, at_least
 from jaxdamp._types import ScalarLike
+from jaxdamp.configuration import target
 
 
 _MANTISSA_BITS = 52
@@ -87,7 +86,7 @@ def reciprocal_root(x: Float[ArrayLike, "..."]) -> Numbers:
 
 @jax.custom_jvp
 def _reciprocal_root(x: Numbers) -> Numbers:
-    return jax.lax.rsqrt(x) if _has_reciprocal_roots() else jnp.sqrt(x) / x
+    return jax.lax.rsqrt(x) if target().reciprocal_roots else jnp.sqrt(x) / x
 
 
 @_reciprocal_root.defjvp
@@ -95,10 +94,3 @@ def _reciprocal_root_slope(primals: tuple[Numbers], tangents: tuple[Numbers]) ->
     (x,), (change,) = primals, tangents
     root = _reciprocal_root(x)
     return root, (-0.5 * root * root * root) * change
-
-
-@functools.cache
-def _has_reciprocal_roots() -> bool:
-    """Whether the device has an instruction for many of them; XLA then starts from it."""
-    info = Path("/proc/cpuinfo")
-    return jax.default_backend() != "cpu" or (info.exists() and "avx512f" in info.read_text())

@@ -15,6 +15,8 @@ from jaxdamp._types import Number, Vector
 
 _WORDS = {  # abstract classes in words, and what to write
     "AbstractDamper": ("a damper law", "Write a law, such as `dampers.Linear(1500.0)`."),
+    "AbstractEngine": ("an engine", "Write an engine, such as `simulation.Adaptive()`."),
+    "AbstractLawEngine": ("an engine", "Write an engine, such as `simulation.Adaptive()`."),
     "AbstractRoad": ("a road", "Write a road, such as `roads.iso8608('C', speed=20.0, seed=1)`."),
     "AbstractVehicle": ("a vehicle", "Write a vehicle, such as `vehicles.presets.quarter_car_000()`."),
 }

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
 from jaxdamp._types import Scalar
-from jaxdamp.configuration import fuses_loops
+from jaxdamp.configuration import target
 
 
 def increasing_root(
@@ -83,7 +83,7 @@ def increasing_root(
             return count + 1, moved(w, after), (after, *rest)
 
         start = jnp.ones_like(w, bool)
-        for _ in range(likely if fuses_loops() else 0):  # written out they are fast, but take longer to compile
+        for _ in range(likely if target().fused_loops else 0):  # written out they are fast, but take longer to compile
             before, w = w, jnp.clip(newton(w)[2], low, high)
             start = moved(before, w)
         return jax.lax.while_loop(going, again, (0, start, (w, low, high, never, never)))[2][0]

@@ -1,5 +1,6 @@
 """`configure`: set up JAX for this work in one explicit call, before it starts."""
 
+import functools
 import os
 from pathlib import Path
 from typing import NamedTuple
@@ -83,7 +84,30 @@ def configure(
     return Configuration(x64, devices, fused_loops, folder)
 
 
-def fuses_loops() -> bool:
+class Target(NamedTuple):
+    """What this process compiles for.
+
+    Attributes:
+        fused_loops: XLA compiles loops over time as one function.
+        reciprocal_roots: the device has an instruction for many 1/√x at a time (AVX-512); XLA then starts from it.
+    """
+
+    fused_loops: bool
+    reciprocal_roots: bool
+
+
+@functools.cache
+def target() -> Target:
+    """Looked up once, which starts JAX.
+
+    From then on nothing of it can change, so that all functions compiled in this process agree on it.
+    """
+    on_cpu, info = jax.default_backend() == "cpu", Path("/proc/cpuinfo")
+    wide = info.exists() and "avx512f" in info.read_text()
+    return Target(_fuses_loops(), wide or not on_cpu)
+
+
+def _fuses_loops() -> bool:
     """Whether XLA has been told to compile loops over time as one function."""
     return _FUSED in os.environ.get("XLA_FLAGS", "")
 
@@ -113,7 +137,7 @@ def _refuse_change(devices: int, fused_loops: bool) -> None:
     """Devices and loops are fixed once JAX has started: refuse others than those in force."""
     now = max(_devices(), 1)
     wrong = [f"cpu_devices={devices} (now {now})"] * (devices != now)
-    wrong += [f"fused_loops={fused_loops} (now {fuses_loops()})"] * (fused_loops != fuses_loops())
+    wrong += [f"fused_loops={fused_loops} (now {_fuses_loops()})"] * (fused_loops != _fuses_loops())
     if wrong:
         raise RuntimeError(
             f"`jaxdamp.configure` comes too late: JAX has started, and {' and '.join(wrong)} cannot be changed any "

@@ -5,12 +5,14 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
+from diffrax import Tsit5
 
-from jaxdamp import Ride, bench, identify, respond, roads, simulate
+from jaxdamp import Ride, bench, identify, respond, roads, simulate, sweep
 from jaxdamp.bench import BenchSet, SineTest
 from jaxdamp.dampers import Bilinear, BoucWen, Lag, Spring
 from jaxdamp.rig import Rig
-from jaxdamp.vehicles.presets import half_car_002
+from jaxdamp.simulation import Adaptive, Exponential
+from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
 
 
 COMPILED = "/jax/core/compile/backend_compile_duration"
@@ -38,7 +40,13 @@ def in_calls(call, arguments):
     return counts
 
 
-ROAD = roads.delayed(roads.cosine_bump(0.03, start=0.0, duration=0.03), positions=[0.0, 0.2], speed=20.0)
+def swept(rate):
+    ride = Ride(quarter_car_000(Bilinear(rate, 900.0)), BUMP, duration=0.05, metrics=["rms_sprung_acceleration"])
+    return sweep(ride, {"rebound_rate": [rate, 2.0 * rate]}, gradients=True)["rms_sprung_acceleration"].values
+
+
+BUMP = roads.cosine_bump(0.03, start=0.0, duration=0.03)
+ROAD = roads.delayed(BUMP, positions=[0.0, 0.2], speed=20.0)
 TIME = 1e-3 * np.arange(101)
 CALLS = {
     "simulate": lambda rate: simulate(half_car_002(Lag(Bilinear(rate, 900.0), 4e-3)), ROAD, duration=0.05).motion,
@@ -46,6 +54,21 @@ CALLS = {
     "respond": lambda rate: respond(
         BoucWen(rate, 0.0, 300.0, 1e-3) + Spring(rate), TIME, 1e-5 * rate * np.sin(30 * TIME)
     ),
+    "simulate by an engine": lambda rate: (
+        simulate(quarter_car_000(Bilinear(rate, 900.0)), BUMP, duration=0.05, engine=Exponential(1e-3, 2)).motion
+    ),
+    "simulate by a solver": lambda rate: (
+        simulate(
+            quarter_car_000(Bilinear(rate, 900.0)), BUMP, duration=0.05, engine=Adaptive(Tsit5(), rtol=1e-4)
+        ).motion
+    ),
+    "Ride by a solver": lambda rate: Ride(
+        quarter_car_000(Bilinear(rate, 900.0)), BUMP, duration=0.05, metrics=["working_space_rms"], engine=Adaptive()
+    )(),
+    "respond by a solver": lambda rate: respond(
+        Lag(Bilinear(rate, 900.0), 4e-3), TIME, 1e-5 * rate * np.sin(30 * TIME), engine=Adaptive()
+    ),
+    "sweep": swept,
 }
 
 

@@ -13,6 +13,7 @@ import pytest
 
 PREPARE = """
 import json, sys
+import diffrax
 import numpy as np
 import jaxdamp
 from jaxdamp import bench, dampers, export, identify, metrics, plots
@@ -37,6 +38,10 @@ print(json.dumps(answers))
 
 ANSWERS = {  # call: words that its refusal holds
     "simulate(road, car)": ("`vehicle` must be a vehicle", "is an Iso8608", "`simulate(vehicle, road)`"),
+    "simulate(car, road, duration=1.0, engine='adaptive')": ("`engine` must be an engine", "'adaptive'", "Adaptive()`"),
+    "Ride(car, road, duration=1.0, engine=jaxdamp.simulation.Exponential)": ("`engine` must be", "Exponential(...)`"),
+    "respond(law, time, stroke, engine=diffrax.Tsit5())": ("`engine` must be an engine", "Tsit5", "Adaptive()`"),
+    "jaxdamp.simulation.Adaptive(mode='both')": ("`mode` must be one of", "'both'"),
     "simulate(car, 'iso:C')": ("`road` must be a road", "'iso:C'", "roads.iso8608("),
     "simulate(car, road, duration='10')": ("`duration` must be a number", "the text '10'"),
     "Ride(road, car)": ("`vehicle` must be a vehicle", "`Ride(vehicle, road)`"),

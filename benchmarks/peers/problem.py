@@ -16,6 +16,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import roads, simulate
 from jaxdamp.dampers import AbstractDamper, Besinger, BoucWen, Lag, SeriesSpring
+from jaxdamp.simulation import AbstractEngine, Adaptive
 from jaxdamp.vehicles import AbstractVehicle
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
 
@@ -113,22 +114,22 @@ def refined(heights: Heights, factor: int) -> Heights:
 
 
 def simulated(
-    case: str, parameters: Parameters, heights: Heights, dt: float, method: str = "exponential", rtol: float = 1e-8
+    case: str, parameters: Parameters, heights: Heights, dt: float, engine: AbstractEngine | None = None
 ) -> Results:
-    """The RMS by `jaxdamp.simulate`, one car after the other; `rtol` is for adaptive methods."""
+    """The RMS by `jaxdamp.simulate`, one car after the other."""
     road = roads.from_profile(np.arange(heights.shape[0]) * dt, heights)
     duration = (heights.shape[0] - 1) * dt
     found = []
     for row in parameters:
         car = vehicle(law(case, row), case)
-        response = simulate(car, road, duration=duration, dt=dt, method=method, rtol=rtol, atol=1e-2 * rtol)
+        response = simulate(car, road, duration=duration, dt=dt, engine=engine)
         found.append(np.sqrt(np.mean(np.square(response["sprung_acceleration"]))))
     return np.array(found)
 
 
 def reference(case: str, parameters: Parameters, heights: Heights, dt: float) -> Results:
     """The RMS to about eight digits, by adaptive integration from instant to instant; for a few cars."""
-    return simulated(case, parameters, heights, dt, "diffrax", 1e-10)
+    return simulated(case, parameters, heights, dt, Adaptive(rtol=1e-10, atol=1e-12))
 
 
 def errors(found: Results, exact: Results) -> Results:

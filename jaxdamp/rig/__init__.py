@@ -2,7 +2,7 @@
 
 from jaxdamp.rig.constant_velocity import QuasiStatic, quasi_static
 from jaxdamp.rig.machine import Readings, Rig
-from jaxdamp.rig.response import march, respond
+from jaxdamp.rig.response import AbstractLawEngine, march, respond, solve_law
 
 
-__all__ = ["QuasiStatic", "Readings", "Rig", "march", "quasi_static", "respond"]
+__all__ = ["AbstractLawEngine", "QuasiStatic", "Readings", "Rig", "march", "quasi_static", "respond", "solve_law"]

@@ -1,5 +1,7 @@
 """The force of a law under a prescribed stroke."""
 
+import warnings
+from abc import abstractmethod
 from typing import TYPE_CHECKING
 
 import equinox as eqx
@@ -10,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._jacobian import Mode
 from jaxdamp._types import Signal, SignalLike
 from jaxdamp.dampers import (
     AbstractDamper,
@@ -28,7 +31,15 @@ if TYPE_CHECKING:
     import diffrax
 
 
-_STIFF = "Stiff laws need an implicit solver, `diffrax.Kvaerno5()`, or their own steps, which `method='step'` takes."
+_STIFF = "Stiff laws need an implicit solver, `diffrax.Kvaerno5()`, or their own steps: leave `engine` out."
+
+
+class AbstractLawEngine(eqx.Module):
+    """What carries the states of a law over a prescribed stroke: every engine of `jaxdamp.simulation`."""
+
+    @abstractmethod
+    def respond(self, law: AbstractDamper, time: Signal, stroke: Signal, velocity: Signal) -> Signal:
+        """Force [N] of a law at uniform instants [s] of a stroke [m] and its velocity [m/s], without checks."""
 
 
 def respond(
@@ -38,7 +49,8 @@ def respond(
     velocity: SignalLike | None = None,
     *,
     substeps: int = 1,
-    method: "str | diffrax.AbstractSolver" = "step",
+    engine: AbstractLawEngine | None = None,
+    method: "str | diffrax.AbstractSolver | None" = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
 ) -> Signal:
@@ -57,11 +69,12 @@ def respond(
             differences, which is only good for a stroke without noise.
         substeps: steps from one instant to the next for laws with states, between which stroke and velocity are
             interpolated by cubics. The error of a step falls with its square.
-        method: `"step"`, the steps that the laws bring; or any adaptive diffrax solver of their rates, such as
-            `diffrax.Kvaerno5()`, as reference for stiff laws. Then the stroke between two instants is the cubic with
-            the velocities at its ends.
-        rtol: relative tolerance of a solver.
-        atol: absolute tolerance of a solver, in the units of the states.
+        engine: `simulation.Exponential(substeps=...)`, the steps that the laws bring, as when it is left out; or
+            `simulation.Adaptive(...)`, a diffrax solver of their rates, as reference for stiff laws. Then the stroke
+            between two instants is the cubic with the velocities at its ends.
+        method: deprecated: `"step"` or a diffrax solver. Pass `engine`.
+        rtol: deprecated: of a `method`.
+        atol: deprecated: of a `method`.
 
     Returns:
         Force [N], positive when it resists extension, shape (time,).
@@ -99,12 +112,19 @@ def respond(
     rate = jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else as_float(velocity)
     _refuse_strokes(law, stroke)
     fitted, law = law, without_fitted_ranges(law)
-    if isinstance(method, str) and method != "step":
-        _checks.refuse("method", "be 'step' or a diffrax solver", repr(method), "Pass `method=diffrax.Kvaerno5()`.")
-    if isinstance(method, str) or not law.initial_state().size:
-        force = march(law, dt, stroke, rate, substeps)
+    if method is not None:
+        _refuse_method(method, engine)
+    solver = None if isinstance(method, str) else method
+    if (engine is not None or solver is not None) and substeps != 1:
+        must = "be left out beside an engine, which has its own or chooses them"
+        _checks.refuse("substeps", must, substeps, "Write `engine=simulation.Exponential(substeps=...)`.")
+    if engine is not None:
+        check_module("engine", engine, (AbstractLawEngine,), "respond(law, time, stroke, engine=...)")
+        force = engine.respond(law, time, stroke, rate)
+    elif solver is not None:
+        force = solve_law(law, time, stroke, rate, solver, rtol, atol)
     else:
-        force = _solve(law, time, stroke, rate, substeps, method, rtol, atol)
+        force = march(law, dt, stroke, rate, substeps)
     require_finite_force(law, force, "over the whole motion")
     _warn_of_range(fitted, stroke, rate, force)
     return force
@@ -133,30 +153,39 @@ def _refuse_strokes(law: AbstractDamper, stroke: Signal) -> None:
             _checks.refuse("stroke", must, value, "The law's volumes are those at stroke zero: shift the stroke.")
 
 
-def _solve(
+def _refuse_method(method: "str | diffrax.AbstractSolver", engine: AbstractLawEngine | None) -> None:
+    """Warn of the deprecated argument, and refuse what it never was."""
+    if isinstance(method, str) and method != "step":
+        remedy = "Pass `engine=simulation.Adaptive(diffrax.Kvaerno5())`."
+        _checks.refuse("method", "be 'step' or a diffrax solver", repr(method), remedy)
+    if engine is not None:
+        _checks.refuse("engine", "be given without `method`", repr(engine))
+    instead = "`engine=simulation.Adaptive(solver, rtol=..., atol=...)`, or leave it out for the steps of the laws"
+    warnings.warn(f"`method` of `respond` is deprecated: pass {instead}.", DeprecationWarning, stacklevel=3)
+
+
+def solve_law(
     law: AbstractDamper,
     time: Signal,
     stroke: Signal,
     velocity: Signal,
-    substeps: int,
     solver: "diffrax.AbstractSolver",
     rtol: float,
     atol: float,
+    mode: Mode = "forward",
 ) -> Signal:
     """`march` by a solver of diffrax."""
-    import diffrax
+    from jaxdamp._driven import check_solver, driven_states, verdict
 
-    from jaxdamp._driven import driven_states
-
-    if substeps != 1:
-        _checks.refuse("substeps", "be left out for a solver, which chooses its own", substeps)
-    _checks.positive("rtol", rtol)
-    _checks.positive("atol", atol)
-    states, result = driven_states(law.state_rate, law.initial_state(), time, stroke, velocity, solver, rtol, atol)
+    start = law.initial_state()
+    if not start.size:
+        return jax.vmap(lambda x, v: law.force(x, v, start))(stroke, velocity)
+    check_solver(solver, rtol, atol)
+    states, result = driven_states(law.state_rate, start, time, stroke, velocity, solver, rtol, atol, mode)
     last = _checks.concrete(states[-1])
     if last is not None and not np.all(np.isfinite(last)):
-        said = diffrax.RESULTS[result] or "finished with states that are not finite"
-        _checks.refuse("method", "reach the end", f"{type(solver).__name__}, which says: {said}", _STIFF)
+        said = verdict(result) or "finished with states that are not finite"
+        _checks.refuse("engine", "reach the end", f"one with {type(solver).__name__}, which says: {said}", _STIFF)
     return jax.vmap(law.force)(stroke, velocity, states)
 
 

@@ -1,5 +1,13 @@
-"""A vehicle on a road: `simulate`, its two engines, the `Response`; and `Ride`, which keeps the metrics only."""
+"""A vehicle on a road: `simulate`, which gives a `Response`; `Ride`, which gathers its metrics only; and the engines.
 
+Engines are `Exponential` and `Adaptive`; one of your own derives from `AbstractFixedStep` (`docs/own_engine.md`).
+"""
+
+from jaxdamp.simulation.adaptive import Adaptive
+from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome
+from jaxdamp.simulation.equations import Equations, RoadInput, StepState
+from jaxdamp.simulation.exponential import Exponential
+from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
 from jaxdamp.simulation.range_notes import named_laws, range_sentences
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride
@@ -12,10 +20,20 @@ from jaxdamp.simulation.wheels import AxleTiming, moves_axles
 
 __all__ = [
     "DEVIATIONS",
+    "AbstractEngine",
+    "AbstractFixedStep",
+    "AbstractObserver",
+    "AbstractStepper",
+    "Adaptive",
     "AxleTiming",
     "CoarseStepWarning",
+    "Equations",
+    "Exponential",
+    "Outcome",
     "Response",
     "Ride",
+    "RoadInput",
+    "StepState",
     "comfort_table",
     "metrics_table",
     "moves_axles",

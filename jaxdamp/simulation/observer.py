@@ -1,7 +1,7 @@
 """The metrics of a run, observed step by step: channels, ISO weightings as extra states, accumulators of statistics."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, final
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,10 +9,10 @@ from jax.ad_checkpoint import checkpoint_name
 from jaxtyping import Array, Int
 
 from jaxdamp._types import Scalar, Signal
-from jaxdamp._vectors import Vector, scalars
+from jaxdamp._vectors import MemoryLayout, Vector, scalars
 from jaxdamp.metrics import Gathered, Metric, discrete_weighting
-from jaxdamp.simulation.stepper import FOR_REVERSE, RoadInput, StepState
-from jaxdamp.vehicles import System
+from jaxdamp.simulation.engine import AbstractObserver
+from jaxdamp.simulation.equations import FOR_REVERSE, Equations, RoadInput, StepState
 
 
 class Filter(NamedTuple):
@@ -53,30 +53,30 @@ class Accumulators(NamedTuple):
     instant: Int[Array, ""] | None  # number of it, where a metric has a window
 
 
-class MetricObserver:
-    """Which channels and weightings the metrics need, and how they are gathered.
+@final
+class MetricObserver(AbstractObserver):
+    """Gathers metrics: which channels and weightings they need, and the accumulators of their statistics.
 
     Arguments:
-        system: the vehicle.
+        equations: of the vehicle.
         metrics: of its channels.
         dt: interval of the instants [s].
         count: number of the instants.
-        apart: whether the engine takes numbers one by one.
     """
 
-    def __init__(self, system: System, metrics: Sequence[Metric], dt: float, count: int, *, apart: bool) -> None:
+    def __init__(self, equations: Equations, metrics: Sequence[Metric], dt: float, count: int) -> None:
         pairs = [name for m in metrics for name in (m.channel, m.by) if name]
         self.names, self.metrics, self.dt, self.count = list(dict.fromkeys(pairs)), metrics, dt, count
         self.from_rest = list(dict.fromkeys(m.channel for m in metrics if m.from_rest))
         self.windows = [m.samples(count, dt) for m in metrics]
-        outputs = system.channels(self.names)
-        self.outputs = outputs.scalars() if apart else outputs
+        outputs = equations.system.channels(self.names)
+        self.outputs = outputs if equations.layout is MemoryLayout.ARRAY else outputs.scalars()
         pairs = dict.fromkeys((m.channel, m.weighting) for m in metrics if m.weighting is not None)
         self.weighted = {pair: Filter(*discrete_weighting(pair[1], dt)) for pair in pairs}
 
-    def begin(self, now: StepState, ground: RoadInput) -> Accumulators:
+    def begin(self, now: StepState, road: RoadInput) -> Accumulators:
         """At the first instant, the vehicle in its static equilibrium and weightings at rest."""
-        values = self._values(now, ground)
+        values = self._values(now, road)
         still = tuple((jnp.zeros_like(values[0]),) * f.output.size for f in self.weighted.values())
         rest = tuple(values[self.names.index(name)] for name in self.from_rest)
         samples = self._samples(values, still, rest)
@@ -84,23 +84,29 @@ class MetricObserver:
         instant = jnp.zeros((), int) if any(m.window for m in self.metrics) else None
         return Accumulators(values, still, gathered, rest, self._saved(samples), instant)
 
-    def add(self, old: Accumulators, now: StepState, ground: RoadInput) -> Accumulators:
+    def add(self, gathered: Accumulators, now: StepState, road: RoadInput) -> Accumulators:
         """One instant more."""
-        values = self._values(now, ground)
-        inputs = [(old.channels[i], values[i]) for i in (self.names.index(name) for name, _ in self.weighted)]
-        states = tuple(f(s, *u) for f, s, u in zip(self.weighted.values(), old.weighting_states, inputs, strict=True))
-        samples = self._samples(values, states, old.rest)
-        instant = None if old.instant is None else old.instant + 1
-        parts = zip(self.metrics, self.windows, old.statistics, samples, strict=True)
-        gathered = tuple(_with_sample(*part, instant) for part in parts)
-        return Accumulators(values, states, gathered, old.rest, self._saved(samples), instant)
+        values = self._values(now, road)
+        inputs = [(gathered.channels[i], values[i]) for i in (self.names.index(name) for name, _ in self.weighted)]
+        states = tuple(
+            f(s, *u) for f, s, u in zip(self.weighted.values(), gathered.weighting_states, inputs, strict=True)
+        )
+        samples = self._samples(values, states, gathered.rest)
+        instant = None if gathered.instant is None else gathered.instant + 1
+        parts = zip(self.metrics, self.windows, gathered.statistics, samples, strict=True)
+        statistics = tuple(_with_sample(*part, instant) for part in parts)
+        return Accumulators(values, states, statistics, gathered.rest, self._saved(samples), instant)
+
+    def saved(self, now: StepState, gathered: Accumulators) -> tuple[Scalar, ...]:
+        """The samples of the metrics that need the whole record."""
+        return gathered.samples
 
     def end(self, gathered: Accumulators, records: Sequence[Signal]) -> dict[str, Scalar]:
         """The metrics of the run.
 
         Arguments:
             gathered: at the last instant.
-            records: `Accumulators.samples` of all instants.
+            records: what was saved of all instants.
         """
         found, saved = {}, iter(records)
         for m, (first, last), terms in zip(self.metrics, self.windows, gathered.statistics, strict=True):
@@ -110,9 +116,9 @@ class MetricObserver:
                 found[m.name] = m.statistic.end(terms, last - first + 1, self.dt)
         return found
 
-    def _values(self, now: StepState, ground: RoadInput) -> tuple[Scalar, ...]:
+    def _values(self, now: StepState, road: RoadInput) -> tuple[Scalar, ...]:
         """The channels."""
-        values = self.outputs(now.motion, now.force, ground.height, ground.rate)
+        values = self.outputs(now.motion, now.force, road.height, road.rate)
         return checkpoint_name(values if isinstance(values, tuple) else scalars(values), FOR_REVERSE)
 
     def _samples(

@@ -16,7 +16,7 @@ from jaxdamp._tables import Table, with_unit
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import Metric, MetricValues
-from jaxdamp.simulation.exponential import settled
+from jaxdamp.simulation.equations import settled
 from jaxdamp.simulation.notes import tyres_in_tension
 from jaxdamp.simulation.range_notes import range_sentences, range_uses
 from jaxdamp.simulation.tables import comfort_table, comfort_units, metrics_table

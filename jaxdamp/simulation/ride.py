@@ -2,38 +2,35 @@
 
 import functools
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias, final
+from typing import Any, final
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._jacobian import Mode
 from jaxdamp._many_points import outside_domains
-from jaxdamp._types import Scalar, Signal
-from jaxdamp._vectors import scalars
-from jaxdamp.configuration import fuses_loops
+from jaxdamp._types import Scalar
+from jaxdamp._vectors import MemoryLayout
+from jaxdamp.configuration import target
 from jaxdamp.dampers import RangeUse, has_fitted_range
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.parameters import match_paths, parameters, replace
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation.exponential import exponential_steps, settled
-from jaxdamp.simulation.observer import Accumulators, MetricObserver
+from jaxdamp.simulation.engine import AbstractEngine, chosen_engine
+from jaxdamp.simulation.equations import Equations, settled
+from jaxdamp.simulation.exponential import Exponential
+from jaxdamp.simulation.observer import MetricObserver
 from jaxdamp.simulation.range_notes import range_uses
+from jaxdamp.simulation.recorder import recorded
 from jaxdamp.simulation.run import half_sampled, sampled
 from jaxdamp.simulation.stationary import stationary_metrics, stationary_range_use
-from jaxdamp.simulation.step_size import checked_substeps
-from jaxdamp.simulation.stepper import FOR_REVERSE, RoadInput, Stepper, StepState
+from jaxdamp.simulation.step_size import RunCheck
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
 from jaxdamp.vehicles import AbstractVehicle, is_stationary
-
-
-Carry: TypeAlias = tuple[StepState, Accumulators, RoadInput, tuple[Array, Array]]
-FEW_STATES = 4  # up to which one car is best written number by number, if loops are fused
-BLOCK = 16_384  # instants, of which reverse derivatives keep what they need; longer runs are driven twice
 
 
 @final
@@ -49,7 +46,7 @@ class Ride(eqx.Module):
     its road is then computed anew.
 
     On a white road (`roads.white`) the same call gives the stationary ride of the linearised vehicle: the metrics that
-    follow from an RMS, without a run. `duration`, `dt` and `substeps` then mean nothing.
+    follow from an RMS, without a run. `duration`, `dt`, `substeps` and `engine` then mean nothing.
 
     Metrics are gathered, but for those that need the whole record (`percentile`, "max_transient_value", a function of
     your own): their channels are saved, so that memory grows with the run.
@@ -62,7 +59,8 @@ class Ride(eqx.Module):
         duration: as in `simulate`.
         dt: as in `simulate`; it is checked here, with the numbers of this vehicle. Points far from it, of a sweep for
             instance, are driven with the same steps unchecked.
-        substeps: of the engine between two instants; as many as the laws of this vehicle need if left out.
+        substeps: of the exponential engine between two instants; as many as the laws of this vehicle need if left out.
+        engine: as in `simulate`. One that is not `Exponential` may save the whole run.
 
     Raises:
         ValueError: an unknown metric or parameter; a metric that a white road does not give; what `simulate` refuses.
@@ -78,10 +76,10 @@ class Ride(eqx.Module):
     vehicle: AbstractVehicle
     heights: Float[Array, "time wheels"] | None  # of a road that is driven over
     road: AbstractRoad | WhiteRoad | None  # a white one, or where the delay of its axles follows from the vehicle
+    engine: AbstractEngine  # with as many substeps as this vehicle needs
+    layout: MemoryLayout
     dt: float = eqx.field(static=True)
-    substeps: int = eqx.field(static=True)
     metrics: tuple[Metric, ...] = eqx.field(static=True)
-    many: bool
 
     def __init__(
         self,
@@ -90,26 +88,35 @@ class Ride(eqx.Module):
         *,
         metrics: Sequence[str | Metric] | None = None,
         duration: float | None = None,
-        dt: float = 1e-3,
+        dt: float | None = None,
         substeps: int | None = None,
+        engine: AbstractEngine | None = None,
     ) -> None:
         check_module("vehicle", vehicle, (AbstractVehicle,), "Ride(vehicle, road)")
         check_module("road", road, (AbstractRoad, WhiteRoad), "Ride(vehicle, road)")
-        self.vehicle, self.dt, self.many = vehicle, dt, False
-        chosen = vehicle.chosen_metrics(metrics)
+        if engine is not None:
+            check_module("engine", engine, (AbstractEngine,), "Ride(vehicle, road, engine=...)")
+        chosen, self.vehicle = vehicle.chosen_metrics(metrics), vehicle
         if isinstance(road, WhiteRoad):
-            _refuse_run("duration", duration)
-            _refuse_run("substeps", substeps)
-            self.road, self.heights, self.substeps = road, None, 1
+            for name, value in (("duration", duration), ("substeps", substeps), ("engine", engine)):
+                _refuse_run(name, value)
+            self.road, self.heights, self.dt = road, None, 1e-3 if dt is None else dt
+            self.engine, self.layout = Exponential(), MemoryLayout.ARRAY
             self.metrics = _stationary(vehicle, chosen, all_of_them=metrics is None)
             return
-        _, self.heights = sampled(vehicle, road, duration, dt)
+        engine, self.dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
+        _, self.heights = sampled(vehicle, road, duration, self.dt)
         self.road = road if delays_by_itself(vehicle, road) else None
-        half = functools.partial(half_sampled, vehicle, road, self.heights.shape[0] - 1, dt)
-        self.substeps = checked_substeps(vehicle.system(), self.heights, half, dt, substeps=substeps, grid=road.grid)
+        half = functools.partial(half_sampled, vehicle, road, self.heights.shape[0] - 1, self.dt)
+        self.engine = engine.prepared(RunCheck(vehicle.system(), self.heights, half, self.dt, grid=road.grid))
+        self.layout = self.engine.layout(2 * len(vehicle.coordinates), side_by_side=False)
         self.metrics = tuple(chosen)
         for metric in self.metrics:
-            metric.samples(self.heights.shape[0], dt)  # a window that does not fit is refused here
+            metric.samples(self.heights.shape[0], self.dt)  # a window that does not fit is refused here
+
+    def __repr__(self) -> str:
+        on = repr(self.road) if isinstance(self.road, WhiteRoad) else f"by {self.engine}"
+        return f"Ride of a {type(self.vehicle).__name__}, {len(self.metrics)} metrics, {on}"
 
     @property
     def units(self) -> dict[str, str]:
@@ -122,7 +129,17 @@ class Ride(eqx.Module):
     @property
     def lanes(self) -> int:
         """How many cars a CPU core drives best side by side: if loops are fused, what stays in its nearest cache."""
-        return 128 if fuses_loops() else 2048
+        return 128 if target().fused_loops else 2048
+
+    @property
+    def derivatives(self) -> tuple[Mode, ...]:
+        """The modes of differentiation that pass in a sweep: those of the engine, both on a white road."""
+        return ("forward", "reverse") if isinstance(self.road, WhiteRoad) else self.engine.derivatives_in_sweeps
+
+    @property
+    def substeps(self) -> int:
+        """Steps of the engine between two instants."""
+        return self.engine.step_count
 
     def of_vehicle(self, vehicle: AbstractVehicle) -> "Ride":
         """The same ride of another vehicle, on the same heights under its wheels."""
@@ -138,7 +155,8 @@ class Ride(eqx.Module):
 
     def side_by_side(self) -> "Ride":
         """The same, compiled for many cars at a time: for `jax.vmap`. `sweep` does it itself."""
-        return eqx.tree_at(lambda ride: ride.many, self, True)
+        layout = self.engine.layout(2 * len(self.vehicle.coordinates), side_by_side=True)
+        return eqx.tree_at(lambda ride: ride.layout, self, layout)
 
     def range_use(self, point: Mapping[str, Any] | None = None) -> dict[str, list[RangeUse]]:
         """What each damper does at a point beside the range that its law was fitted to; only of laws that have one.
@@ -156,7 +174,7 @@ class Ride(eqx.Module):
         heights, step = self.on_axles_of(vehicle).heights, jnp.asarray(self.dt, dtype=float)
         assert heights is not None
         system = vehicle.system()
-        saved = exponential_steps(system, heights, step, None, self.substeps, 1)
+        saved, _ = recorded(self.engine, system, heights, step)
         return range_uses(vehicle, system.form, saved.motion, saved.road, saved.road_rate, saved.port_force)
 
     def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -169,7 +187,8 @@ class Ride(eqx.Module):
         for name, value in point.items():
             if np.shape(value) != ():
                 self._check_shape(name, np.shape(value))
-        return MetricValues.with_units(_drive(self, point), self.units)
+        with self.engine.naming_derivatives():
+            return MetricValues.with_units(_drive(self, point), self.units)
 
     def _check_shape(self, name: str, shape: tuple[int, ...]) -> None:
         """Refuse several numbers for one, which would be several cars."""
@@ -183,50 +202,18 @@ class Ride(eqx.Module):
 
 @eqx.filter_jit
 def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
-    """The loop over time; of a long run reverse derivatives keep the beginnings of blocks only."""
+    """The metrics of the vehicle at a point."""
     vehicle = replace(ride.vehicle, point)
     if isinstance(ride.road, WhiteRoad):
         return stationary_metrics(vehicle, ride.road, ride.metrics)
     if ride.road is not None and point and moves_axles(lambda point: replace(ride.vehicle, point), point):
         ride = ride.on_axles_of(vehicle)
-    heights, dt = ride.heights, ride.dt
+    heights = ride.heights
     assert heights is not None
-    instants = heights.shape[0]
-    system = vehicle.system()
-    apart = ride.many or (fuses_loops() and 2 * len(system.layout.coordinates) <= FEW_STATES)
-    stepper = Stepper(system, jnp.asarray(dt / ride.substeps, dtype=float), apart=apart, many=ride.many)
-    observer = MetricObserver(system, ride.metrics, dt, instants, apart=apart)
-    half_rate = jnp.asarray(0.5 / dt, dtype=heights.dtype)
-
-    def at(height: Array, rate: Array) -> RoadInput:
-        return RoadInput(scalars(height), scalars(rate)) if apart else RoadInput(height, rate)
-
-    def step(carry: Carry, ahead: Array) -> tuple[Carry, tuple[Scalar, ...]]:
-        """To the next instant, with the height of the one after it, from which the rate at its end follows."""
-        now, gathered, begin, (height, coming) = carry
-        end = at(coming, half_rate * (ahead - height))
-        after = stepper.over(now, begin, end, ride.substeps)
-        more = observer.add(gathered, after, end)
-        return (after, more, end, (coming, ahead)), more.samples
-
-    first = at(heights[0], 2.0 * half_rate * (heights[1] - heights[0]))
-    now = stepper.at_rest(settled(system, heights[0]), first)
-    carry = now, observer.begin(now, first), first, (heights[0], heights[1])
-    road = jnp.concatenate([heights[2:], 2.0 * heights[-1:] - heights[-2:-1]])  # it ends as straight as it came
-    lean = jax.checkpoint(step, policy=jax.checkpoint_policies.save_only_these_names(FOR_REVERSE), prevent_cse=False)
-
-    def drive(carry: Carry, road: Array) -> tuple[Carry, tuple[Signal, ...]]:
-        return jax.lax.scan(lean, carry, road)
-
-    saved = [tuple(y[None] for y in carry[1].samples)]
-    count = road.shape[0]
-    whole = count // BLOCK * BLOCK if count > BLOCK else 0
-    if whole:
-        carry, samples = jax.lax.scan(jax.checkpoint(drive), carry, road[:whole].reshape(-1, BLOCK, *road.shape[1:]))
-        saved.append(tuple(y.reshape(-1) for y in samples))
-    carry, samples = drive(carry, road[whole:])
-    records = [jnp.concatenate(parts) for parts in zip(*saved, samples, strict=True)]
-    return observer.end(carry[1], records)
+    equations = Equations(vehicle.system(), ride.layout)
+    observer = MetricObserver(equations, ride.metrics, ride.dt, heights.shape[0])
+    outcome = ride.engine.run(equations, heights, ride.dt, settled(equations.system, heights[0]), observer)
+    return observer.end(outcome.gathered, outcome.records)
 
 
 def _refuse_run(argument: str, value: Any) -> None:

@@ -1,6 +1,7 @@
 """`simulate`: a vehicle on a road."""
 
 import functools
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -13,10 +14,13 @@ from jaxdamp._field_types import check_module
 from jaxdamp._types import Signal
 from jaxdamp.dampers import coverage, warn_outside
 from jaxdamp.roads import AbstractRoad
-from jaxdamp.simulation.exponential import exponential_steps
+from jaxdamp.simulation.adaptive import Adaptive
+from jaxdamp.simulation.engine import AbstractEngine, chosen_engine
+from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.range_notes import range_sentences
+from jaxdamp.simulation.recorder import recorded
 from jaxdamp.simulation.response import Response
-from jaxdamp.simulation.step_size import checked_substeps
+from jaxdamp.simulation.step_size import RunCheck
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
 from jaxdamp.vehicles import AbstractVehicle, refuse_restless, static_equilibrium
 
@@ -30,13 +34,14 @@ def simulate(
     road: AbstractRoad,
     *,
     duration: float | None = None,
-    dt: float = 1e-3,
-    method: "str | diffrax.AbstractSolver" = "exponential",
-    rtol: float = 1e-8,
-    atol: float = 1e-10,
+    dt: float | None = None,
+    engine: AbstractEngine | None = None,
     start: Mapping[str, float] | None = None,
     substeps: int | None = None,
     every: int = 1,
+    method: "str | diffrax.AbstractSolver | None" = None,
+    rtol: float | None = None,
+    atol: float | None = None,
 ) -> Response:
     """Drive a vehicle over a road.
 
@@ -49,19 +54,20 @@ def simulate(
             after the other, delayed by `vehicle.axle_positions` and the road's speed; `roads.delayed` has other
             delays, `roads.in_phase` none. Motions over time alone have a column for each of `vehicle.wheel_names`.
         duration: length of the run [s]; the road's own if it has one and this is left out.
-        dt: spacing of the instants [s], for the exponential engine also its step (third order, second where laws
-            have kinks or states; 1 ms is right for cars). Where it is coarse a `CoarseStepWarning` states the
-            estimated error; what the vehicle cannot bear is refused.
-        method: `"exponential"`, the fixed-step engine; `"diffrax"`, adaptive Tsit5; or any diffrax solver, such as
-            `diffrax.Kvaerno5()` for a stiff law.
-        rtol: relative tolerance of the adaptive methods.
-        atol: absolute tolerance of the adaptive methods, in the units of the states.
+        dt: spacing of the instants [s], 1 ms if left out; for the exponential engine also its step (third order,
+            second where laws have kinks or states; 1 ms is right for cars). Where it is coarse a `CoarseStepWarning`
+            states the estimated error; what the vehicle cannot bear is refused.
+        engine: `simulation.Exponential()`, fixed steps, if left out; `simulation.Adaptive()`, a diffrax solver, such as
+            `simulation.Adaptive(diffrax.Kvaerno5())` for a stiff law; or one of your own (`docs/own_engine.md`).
+        start: coordinates [m, rad] at time zero that differ from the equilibrium, such as `{"pitch": 0.05}`; at rest.
         substeps: of the exponential engine between two instants; as many as the steepest law needs (friction at
             standstill, a bristle, oil) if left out, so that every step is stable. The road stays straight between
             instants.
-        start: coordinates [m, rad] at time zero that differ from the equilibrium, such as `{"pitch": 0.05}`; at rest.
         every: save every so many-th instant only, of long runs. The motion is the same, but metrics and the energy
             balance then know no more than what is saved; `Ride` gathers metrics at every instant and saves none.
+        method: deprecated: `"exponential"`, `"diffrax"` or a solver of diffrax. Pass `engine`.
+        rtol: deprecated: of a `method`.
+        atol: deprecated: of a `method`.
 
     A damper that leaves the range that its law was fitted to (`law.fitted_to`) gives an `OutsideFittedRangeWarning`
     and a sentence in `response.notes`; `response.range_use()` has the numbers.
@@ -82,37 +88,51 @@ def simulate(
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "simulate(vehicle, road)")
     check_module("road", road, (AbstractRoad,), "simulate(vehicle, road)")
+    if engine is not None:
+        check_module("engine", engine, (AbstractEngine,), "simulate(vehicle, road, engine=...)")
+    if method is not None or rtol is not None or atol is not None:
+        engine = _by_method(engine, method, rtol, atol, substeps)
+        substeps = None
+    engine, dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
     system = vehicle.system()
     time, heights = sampled(vehicle, road, duration, dt)
     _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)
-    fixed = method == "exponential"
     half = functools.partial(half_sampled, vehicle, road, time.size - 1, dt)
-    count = checked_substeps(
-        system, heights, half, dt, substeps=substeps, start=begin, grid=road.grid, exponential=fixed
-    )
-    if fixed:
-        saved = exponential_steps(system, heights, jnp.asarray(dt, dtype=float), begin, count, every)
-        remedy = f"Take a shorter step than {dt:g} s, or an implicit solver, `method=diffrax.Kvaerno5()`."
-    else:
-        import diffrax
-
-        from jaxdamp.simulation.adaptive import adaptive_steps
-
-        if isinstance(method, str):
-            _checks.one_of("method", method, ["exponential", "diffrax"])
-            method = diffrax.Tsit5()
-        saved, result = adaptive_steps(system, time, heights, method, rtol, atol, begin, every)
-        remedy = f"The solver says: {diffrax.RESULTS[result] or 'finished'} Fast laws need `method=diffrax.Kvaerno5()`."
+    engine = engine.prepared(RunCheck(system, heights, half, dt, begin, road.grid))
+    with engine.naming_derivatives():
+        saved, status = recorded(engine, system, heights, jnp.asarray(dt, dtype=float), begin, every)
     last = _checks.concrete(saved.motion[-1])
     if last is not None and not np.all(np.isfinite(last)):
         if not np.all(np.isfinite(np.asarray(saved.motion[0]))):
             refuse_restless(vehicle)
-        remedy = " ".join([*filter(None, map(coverage, system.laws)), remedy])
+        remedy = " ".join([*filter(None, map(coverage, system.laws)), engine.remedy(status, dt)])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
     response = Response(vehicle, system, time[::every], *saved, axle_timing(vehicle, road))
     warn_outside(range_sentences(response.range_use()))
     return response
+
+
+def _by_method(
+    engine: AbstractEngine | None,
+    method: "str | diffrax.AbstractSolver | None",
+    rtol: float | None,
+    atol: float | None,
+    substeps: int | None,
+) -> AbstractEngine:
+    """The engine that a deprecated `method` means."""
+    if engine is not None:
+        _checks.refuse("engine", "be given without `method`, `rtol` and `atol`", repr(engine))
+    if isinstance(method, str):
+        _checks.one_of("method", method, ["exponential", "diffrax"])
+    instead = "`engine=simulation.Adaptive(solver, rtol=..., atol=...)` or `engine=simulation.Exponential()`"
+    warnings.warn(
+        f"`method`, `rtol` and `atol` of `simulate` are deprecated: pass {instead}.", DeprecationWarning, stacklevel=3
+    )
+    if method is None or method == "exponential":
+        return Exponential(substeps=substeps)
+    solver = None if isinstance(method, str) else method
+    return Adaptive(solver, 1e-8 if rtol is None else rtol, 1e-10 if atol is None else atol)
 
 
 def _strides(count: int, every: int, dt: float) -> None:

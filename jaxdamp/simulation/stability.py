@@ -95,7 +95,7 @@ def step_need(system: System, slopes: Sequence[Slopes], dt: float, *, most: int 
 def _refuse_law(name: str, slopes: Slopes, dt: float, count: int) -> None:
     remedy = (
         f"Pass `dt={rounded_down(dt * MOST / count):g}` or less, widen the velocity over which its force changes "
-        "sign, or take an implicit solver, `method=diffrax.Kvaerno5()`."
+        "sign, or take an implicit solver, `engine=simulation.Adaptive(diffrax.Kvaerno5())`."
     )
     if dt * slopes.rate / HEUN > MOST:
         must, value = f"have states that {MOST} steps in {dt:g} s can follow", f"{slopes.rate:.3g} 1/s fast"

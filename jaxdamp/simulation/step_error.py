@@ -12,8 +12,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp._vectors import between
-from jaxdamp.simulation.exponential import road_rate, settled
-from jaxdamp.simulation.stepper import RoadInput, Stepper, StepState
+from jaxdamp.simulation.equations import Equations, RoadInput, StepState, road_rate, settled
 from jaxdamp.vehicles import System
 
 
@@ -99,8 +98,10 @@ def _driven(
     names: tuple[str, ...],
 ) -> Float[Array, "time channels"]:
     """Channels at the instants of a run, zero after its last step."""
+    from jaxdamp.simulation.exponential import ExponentialStepper  # which asks for this estimate itself
+
     (heights, count), parts = road, substeps.astype(dt.dtype)
-    outputs, stepper = system.channels(names), Stepper(system, dt / parts, apart=False)
+    outputs, stepper = system.channels(names), ExponentialStepper(Equations(system), dt / parts)
     slopes = road_rate(heights, dt)
 
     def ground(i: Array) -> RoadInput:
@@ -118,7 +119,7 @@ def _driven(
         return outputs(now.motion, now.force, at.height, at.rate)
 
     first = ground(jnp.zeros_like(count))
-    now = stepper.at_rest(start, first)
+    now = stepper.start(start, first)
     found = jnp.zeros((heights.shape[0], len(names)), heights.dtype).at[0].set(values(now, first))
     return jax.lax.fori_loop(0, count * substeps, step, (now, found))[1]
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp.simulation.stability import LARGEST, MOST, Need, law_slopes, rounded_down, step_need
+from jaxdamp.simulation.stability import LARGEST, MOST, Need, Slopes, law_slopes, rounded_down, step_need
 from jaxdamp.simulation.step_error import StepError, known, step_error
 from jaxdamp.vehicles import System
 
@@ -36,72 +36,83 @@ class FastestMode(NamedTuple):
     coordinate: str
 
 
-def checked_substeps(
-    system: System,
-    heights: Float[Array, "time wheels"],
-    half: Callable[[], Float[Array, "fine wheels"]],
-    dt: float,
-    *,
-    substeps: int | None = None,
-    start: Float[Array, " n"] | None = None,
-    grid: float | None = None,
-    exponential: bool = True,
-) -> int:
-    """Steps between two instants that a run takes, after all checks that a step must pass.
+class RunCheck(NamedTuple):
+    """A run before it is driven, and the checks that its steps must pass, on numbers that are known by then.
 
-    In this order, on numbers that are known before the run:
+    Where numbers are traced nothing is known of them, and what needs them is left out. Ordinary cars at 1 ms pass
+    without a run.
 
-    - the instants must give at least 5 points a period of the fastest mode that follows the road (wheel hop), or the
-      run is refused: the road is straight between instants, whatever steps the engine takes;
-    - the step is divided as the steepest law needs, up to 64 times, or the run is refused (`step_need`);
-    - with fewer than 30 points a period, or a law that is steep for the step, the error is estimated by a comparison
-      with half the step on a stretch of the run (`step_error`): above 1 % a warning states it, above 20 % the run is
-      refused.
-
-    Beside that a record of the road with fewer than 3 samples a period of that mode is warned of. An adaptive engine
-    chooses its own steps; what the instants miss of the road stays missed, and is judged alike. Ordinary cars at 1 ms
-    pass without a run. Where numbers are traced nothing is known of them, and what needs them is left out.
-
-    Arguments:
+    Attributes:
         system: the vehicle.
         heights: under its wheels at the instants [m].
         half: gives the heights at twice as many instants [m].
         dt: spacing of the instants [s].
-        substeps: steps between two instants if the caller chose them.
         start: the motion (q, q̇) at time zero, if it is not at rest on the road.
         grid: spacing of the samples that the road is made of [s], if it is not a formula.
-        exponential: whether the fixed-step engine drives; otherwise an adaptive one.
-
-    Raises:
-        ValueError: a step that the vehicle cannot bear, with the one to write.
     """
-    slopes = law_slopes(system, dt)
-    mode = fastest_mode(system, [s.at_rest for s in slopes])
-    per_period = np.inf if mode is None else 1.0 / (mode.frequency * dt)
-    if mode is not None and per_period < LEAST_PER_PERIOD:
-        _refuse_unresolved(mode, dt)
-    if mode is not None and grid is not None and SAMPLES * grid < dt * heights.shape[0]:
-        _warn_of_samples(mode, grid)
-    if exponential:
-        need = step_need(system, slopes, dt, most=MOST if substeps is None else np.inf)
-        count = need.substeps if substeps is None else _allowed(substeps, need, dt)
-        doubtful = per_period < ENOUGH_PER_PERIOD or need.by_travel > STEEP or count < need.substeps
-    else:
-        try:
-            count = min(4 * step_need(system, slopes, dt).substeps, MOST)  # so many that only the road differs
-        except ValueError:  # too steep for the engine that estimates the error
-            return 1
-        doubtful = per_period < ENOUGH_PER_PERIOD
-    track, begin = _checks.concrete(heights), None if start is None else _checks.concrete(start)
-    if doubtful and track is not None and known(system) and (start is None) == (begin is None):
-        _judge(step_error(system, track, half, dt, count, start), dt)
-    return count
+
+    system: System
+    heights: Float[Array, "time wheels"]
+    half: Callable[[], Float[Array, "fine wheels"]]
+    dt: float
+    start: Float[Array, " n"] | None = None
+    grid: float | None = None
+
+    def substeps(self, wanted: int | None) -> int:
+        """Steps of the exponential engine between two instants, as many as the caller wants or the laws need.
+
+        In this order:
+
+        - the instants must give at least 5 points a period of the fastest mode that follows the road (wheel hop), or
+          the run is refused: the road is straight between instants, whatever steps the engine takes;
+        - the step is divided as the steepest law needs, up to 64 times, or the run is refused (`step_need`);
+        - with fewer than 30 points a period, or a law that is steep for the step, the error is estimated by a
+          comparison with half the step on a stretch of the run (`step_error`): above 1 % a warning states it, above
+          20 % the run is refused.
+
+        Beside that a record of the road with fewer than 3 samples a period of that mode is warned of.
+
+        Raises:
+            ValueError: a step that the vehicle cannot bear, with the one to write.
+        """
+        slopes, per_period = self._per_period()
+        need = step_need(self.system, slopes, self.dt, most=MOST if wanted is None else np.inf)
+        count = need.substeps if wanted is None else _allowed(wanted, need, self.dt)
+        if per_period < ENOUGH_PER_PERIOD or need.by_travel > STEEP or count < need.substeps:
+            self._judge_error(count)
+        return count
+
+    def road(self) -> None:
+        """The same for engines that choose their own steps: what the instants miss of the road is judged alike."""
+        slopes, per_period = self._per_period()
+        if per_period < ENOUGH_PER_PERIOD:
+            try:  # so many steps that only the road differs
+                count = min(4 * step_need(self.system, slopes, self.dt).substeps, MOST)
+            except ValueError:  # too steep for the engine that estimates the error
+                return
+            self._judge_error(count)
+
+    def _per_period(self) -> tuple[list[Slopes], float]:
+        """The slopes of the laws, and the instants in a period of the fastest mode that follows the road."""
+        slopes = law_slopes(self.system, self.dt)
+        mode = fastest_mode(self.system, [s.at_rest for s in slopes])
+        if mode is None:
+            return slopes, np.inf
+        if 1.0 / (mode.frequency * self.dt) < LEAST_PER_PERIOD:
+            _refuse_unresolved(mode, self.dt)
+        if self.grid is not None and SAMPLES * self.grid < self.dt * self.heights.shape[0]:
+            _warn_of_samples(mode, self.grid)
+        return slopes, 1.0 / (mode.frequency * self.dt)
+
+    def _judge_error(self, count: int) -> None:
+        """Estimate the error, where all numbers are known, and judge it."""
+        track, begin = _checks.concrete(self.heights), None if self.start is None else _checks.concrete(self.start)
+        if track is not None and known(self.system) and (self.start is None) == (begin is None):
+            _judge(step_error(self.system, track, self.half, self.dt, count, self.start), self.dt)
 
 
 def _allowed(substeps: int, need: Need, dt: float) -> int:
     """The caller's number of substeps, refused where a law would blow up."""
-    if not isinstance(substeps, int | np.integer) or substeps < 1:
-        _checks.refuse("substeps", "be a whole number, 1 or more", repr(substeps))
     if substeps < LARGEST * need.substeps:  # stable up to a share of one
         remedy = f"The steepest law needs {need.substeps} in {dt:g} s: leave `substeps` out, or pass a shorter `dt`."
         _checks.refuse("substeps", "keep every law stable", substeps, remedy)

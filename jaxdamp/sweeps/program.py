@@ -21,6 +21,10 @@ from jaxdamp.sweeps.tracing import Traced, evaluate, number_type
 
 
 ON_CPU, ON_GPU = 256, 65536  # points side by side where nobody says how many
+# Reverse derivatives take one in so many of a run's lanes. A quarter car with a Besinger damper, 10 s at 1 kHz,
+# one core with 16 MB of the last cache, microseconds a car: 302 for 16 lanes, 201 for 32, 672 for 64, 1140 for 128,
+# where a run takes 99, 62, 43 and 62. So a sweep of any size costs what 32 lanes do (`python -m benchmarks.gradients`).
+REVERSE = 4
 BUFFER_POINTS = 2**15  # that one call can hand to one device
 BUFFER_BYTES = 2**28  # of their results
 SHARE = 0.5  # of the free memory that a sweep may take
@@ -104,10 +108,11 @@ def _side_by_side(traced: Traced, mesh: Mesh, lanes: int | None) -> int:
     if mesh.devices.flat[0].platform != "cpu":
         return ON_GPU
     lanes = lanes or ON_CPU
-    if traced.mode != "forward":
+    if traced.mode is None:
         return lanes
-    # tangents are lanes too, and what a core works on at a time must stay in its nearest cache
-    share = lanes // (1 + len(traced.axes))
+    # tangents are lanes too, and what a core works on at a time must stay in its nearest cache; reverse derivatives
+    # keep numbers of every instant beside it, of so few lanes that they stay in the last one
+    share = lanes // (1 + len(traced.axes)) if traced.mode == "forward" else lanes // REVERSE
     return min(lanes, max(2 ** max(share.bit_length() - 1, 0), 8))
 
 

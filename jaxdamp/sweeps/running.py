@@ -15,6 +15,7 @@ from jaxdamp._types import Scalar
 from jaxdamp.sweeps import processes
 from jaxdamp.sweeps.axes import AbstractPoints, as_points
 from jaxdamp.sweeps.file import SweepFile
+from jaxdamp.sweeps.function import HasDomain, HasLanes, HasSideBySide, HasUnits
 from jaxdamp.sweeps.program import Program, forget_errors, prepare, quiet, with_chunk
 from jaxdamp.sweeps.table import Table, extent
 from jaxdamp.sweeps.tracing import trace
@@ -51,10 +52,11 @@ def sweep(
     Arguments:
         function: a pure JAX function from a point, a mapping from the names of the axes to scalars, to results by name:
             numbers, or arrays of fixed shape. An equinox module that is called so is compiled once for all values of
-            its arrays; arrays that a plain function closes over are compiled in. If it has `units`, a mapping from
-            names of results and axes, they label the results; if it has `lanes`, so many points are computed side by
-            side on a CPU; what its `side_by_side()` gives is compiled in its place; and its
-            `out_of_domain(columns)` gives a text for each of many points, empty for those that can be computed.
+            its arrays; arrays that a plain function closes over are compiled in. It may say more of itself
+            (`sweeps.SweepFunction`): `units` of results and axes, which label the results; `lanes`, the number of
+            points that are computed side by side on a CPU; `derivatives`, the modes that pass; `side_by_side()`, a form
+            that is compiled in its place; `out_of_domain(columns)`, a text for each of many points, empty for those
+            that can be computed.
         over: values for each axis, whose every combination is taken (the last axis runs fastest); or
             `jaxdamp.sweeps.points`, `random` or `sobol`. The function gets them as floating numbers.
         chunk: points computed side by side on one device; chosen to fit into the memory if left out.
@@ -83,16 +85,17 @@ def sweep(
     if gradients not in (False, True, "forward", "reverse"):
         _checks.refuse("gradients", "be False, True, 'forward' or 'reverse'", repr(gradients))
     points = as_points(over)
-    function = getattr(function, "side_by_side", lambda: function)()
+    function = function.side_by_side() if isinstance(function, HasSideBySide) else function
     traced = trace(function, points.names, gradients)
-    table = Table.empty(points, traced, getattr(function, "units", None) or {})
+    table = Table.empty(points, traced, function.units if isinstance(function, HasUnits) else {})
     kept = None if file is None else SweepFile(file, table)
     if kept is not None:
         kept.resume()
     _leave_out(function, table)
     left = np.flatnonzero(~table.done)
+    lanes = function.lanes if isinstance(function, HasLanes) else None
     if left.size:
-        runner = _Runner(prepare(traced, len(left), chunk, devices, getattr(function, "lanes", None)), points)
+        runner = _Runner(prepare(traced, len(left), chunk, devices, lanes), points)
         with Progress("Sweeping") as shown, quiet():
             try:
                 for indices, results in runner.results(left):
@@ -110,11 +113,10 @@ def sweep(
 
 def _leave_out(function: Any, table: Table) -> None:
     """Mark the points that the function cannot take; refuse if that is all of them."""
-    judge = getattr(function, "out_of_domain", None)
-    if judge is None:
+    if not isinstance(function, HasDomain):
         return
     columns = table.points.columns(np.arange(table.points.count))
-    reasons = np.asarray(judge(columns), dtype=object)
+    reasons = np.asarray(function.out_of_domain(columns), dtype=object)
     if np.all(reasons != ""):
         remedy = "Sweep over values that it can have."
         must = f"hold a point that can be computed ({'; '.join(dict.fromkeys(reasons))})"

@@ -15,8 +15,9 @@ from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal
 from jaxtyping import Array
 
 from jaxdamp import _checks
-from jaxdamp._jacobian import Mode, choose_mode, value_and_jacobian
+from jaxdamp._jacobian import Mode, value_and_jacobian
 from jaxdamp.sweeps.axes import PARAMETER, POINT
+from jaxdamp.sweeps.function import chosen_mode
 
 
 RESERVED = (POINT, PARAMETER, "failed", "reason", "done")
@@ -101,9 +102,8 @@ def trace(function: Callable[[dict[str, Array]], Any], axes: list[str], gradient
     shapes = {name: shapes[name] for name in order}
     smooth = [name for name, s in shapes.items() if s.shape == () and jnp.issubdtype(s.dtype, jnp.floating)]
     slopes = {name: f"d_{name}" for name in smooth} if gradients else {}
-    mode = None if not gradients else gradients if gradients is not True else choose_mode(len(axes), len(slopes))
-    if gradients is True and mode == "reverse" and _loops_without_end(jaxpr):
-        mode = "forward"
+    reversible = gradients is not True or not _loops_without_end(jaxpr)
+    mode = chosen_mode(function, gradients, len(axes), len(slopes), reversible=reversible)
     results = {name: jax.ShapeDtypeStruct(s.shape, _stored(s.dtype)) for name, s in shapes.items()}
     for name, slope in slopes.items():
         if slope in results or slope in axes:

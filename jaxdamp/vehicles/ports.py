@@ -10,10 +10,11 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar, State
+from jaxdamp._vectors import MemoryLayout
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 
 
-# One array, or a tuple of scalars, as the caller chooses.
+# One array, or a tuple of scalars, as `MemoryLayout` says.
 if TYPE_CHECKING:
     AtPorts: TypeAlias = Any
 else:
@@ -41,22 +42,23 @@ class Ports(eqx.Module):
     Laws of the same kind are stacked and computed as one batch: four dampers of a car cost little more than one, and
     are compiled once. A single law is called directly.
 
-    Deflections [m], rates [m/s] and forces [N] are one array of shape (ports,); with `apart`, a tuple of scalars.
+    Deflections, rates and forces are one array or a tuple of scalars, as the layout says.
 
     Arguments:
         laws: the law at each port.
-        apart: call every law separately, without stacking.
+        layout: one array; with scalars or lanes every law is called by itself.
     """
 
     laws: tuple[AbstractDamper, ...]  # one of each kind, its arrays stacked where there are several
     members: tuple[tuple[int, ...], ...] = eqx.field(static=True)  # the ports of each kind
     smooth: tuple[bool, ...] = eqx.field(static=True)  # whether the states of each kind may be extrapolated
 
-    def __init__(self, laws: Sequence[AbstractDamper], *, apart: bool = False) -> None:
+    def __init__(self, laws: Sequence[AbstractDamper], layout: MemoryLayout = MemoryLayout.ARRAY) -> None:
         laws = [without_fitted_ranges(law) for law in laws]
         kinds: list[list[int]] = []
         for i, law in enumerate(laws):
-            same = None if apart else next((kind for kind in kinds if _alike(laws[kind[0]], law)), None)
+            alike = (kind for kind in kinds if layout is MemoryLayout.ARRAY and _alike(laws[kind[0]], law))
+            same = next(alike, None)
             if same is None:
                 kinds.append([i])
             else:

@@ -131,7 +131,9 @@ def test_a_field_that_is_no_plain_value():
 
 def test_two_laws_of_one_name():
     own = type("Linear", (AbstractMemoryless,), {"force_velocity": lambda self, v: v})
-    with pytest.raises(ValueError, match="must be of a class that can be found by its name, but is a Linear that differs"):
+    with pytest.raises(
+        ValueError, match="must be of a class that can be found by its name, but is a Linear that differs"
+    ):
         to_json(own())
     assert type(from_json(to_json(Linear(1.0)))) is Linear
 

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from jaxdamp import respond
 from jaxdamp.dampers import AbstractStateful, Bilinear, Dahl, Lag, Linear, PiecewiseLinear, SeriesSpring
 from jaxdamp.rig import quasi_static
+from jaxdamp.simulation import Adaptive, Exponential
 
 
 W = 2 * np.pi * 8.0
@@ -120,14 +121,15 @@ def test_refusals(change, message):
 def test_a_solver_finds_the_same_force():
     t, x, v = sine(1e-3)
     law = Lag(Linear(1500.0), 0.01) + SeriesSpring(Bilinear(2600.0, 1200.0, 0.02), 4e5)
-    found = respond(law, t, x, v, method=diffrax.Kvaerno5(), rtol=1e-9, atol=1e-12)
-    fine = np.asarray(respond(law, t, x, v, substeps=16))
+    found = respond(law, t, x, v, engine=Adaptive(diffrax.Kvaerno5(), 1e-9, 1e-12))
+    fine = np.asarray(respond(law, t, x, v, engine=Exponential(substeps=16)))
+    np.testing.assert_array_equal(fine, respond(law, t, x, v, substeps=16))
     np.testing.assert_allclose(found, fine, atol=1e-4 * np.max(np.abs(fine)))
 
 
 def test_a_solver_is_not_needed_without_states():
     t, x, v = sine(1e-3)
-    solved = respond(Bilinear(2600.0, 1200.0), t, x, v, method=diffrax.Tsit5())
+    solved = respond(Bilinear(2600.0, 1200.0), t, x, v, engine=Adaptive())
     np.testing.assert_array_equal(solved, respond(Bilinear(2600.0, 1200.0), t, x, v))
 
 
@@ -135,22 +137,33 @@ def test_a_solver_is_not_needed_without_states():
     ("options", "message"),
     [
         (
-            {"method": "implicit"},
-            r"`method` must be 'step' or a diffrax solver, but is 'implicit'. Pass `method=diffrax",
+            lambda: {"method": "implicit"},
+            r"`method` must be 'step' or a diffrax solver, but is 'implicit'. Pass `engine=simulation\.Adaptive",
         ),
-        ({"method": diffrax.Tsit5(), "substeps": 2}, "`substeps` must be left out for a solver"),
-        ({"method": diffrax.Tsit5(), "rtol": 0.0}, "`rtol` must be positive"),
-        ({"method": diffrax.Tsit5(), "atol": -1.0}, "`atol` must be positive"),
+        (lambda: {"engine": Adaptive(), "substeps": 2}, "`substeps` must be left out beside an engine"),
+        (lambda: {"engine": Adaptive(rtol=0.0)}, "`rtol` must be positive"),
+        (lambda: {"engine": Adaptive(atol=-1.0)}, "`atol` must be positive"),
+        (lambda: {"engine": Adaptive("Tsit5")}, "`solver` must be a solver of diffrax, but is"),
+        (lambda: {"engine": Exponential(dt=1e-3)}, "`engine` must have no step of its own on the rig"),
         (
-            {"method": diffrax.Tsit5()},
-            r"`method` must reach the end, but is Tsit5, which says: .*maximum number.*Kvaerno5",
+            lambda: {"engine": Adaptive()},
+            r"`engine` must reach the end, but is one with Tsit5, which says: .*maximum number.*Kvaerno5",
         ),
     ],
 )
-def test_a_solver_that_cannot_work_says_so(options, message):
+def test_an_engine_that_cannot_work_says_so(options, message):
     t, x, v = (a[:3] for a in sine(1e-3))
     with pytest.raises(ValueError, match=message):
-        respond(Lag(Linear(1.0), 1e-9), t, x, v, **options)
+        respond(Lag(Linear(1.0), 1e-9), t, x, v, **options())
+
+
+def test_the_method_of_before_works_with_a_warning():
+    t, x, v = sine(1e-3)
+    law = Lag(Linear(1500.0), 0.01)
+    for method, engine in (("step", None), (diffrax.Tsit5(), Adaptive())):
+        with pytest.warns(DeprecationWarning, match="pass `engine=simulation.Adaptive"):
+            found = respond(law, t, x, v, method=method)
+        np.testing.assert_array_equal(found, respond(law, t, x, v, engine=engine))
 
 
 # ---- constant velocity

@@ -7,7 +7,7 @@ import pytest
 
 from jaxdamp import Ride, dampers, metrics, roads, simulate, vehicles
 from jaxdamp.metrics import Metric
-from jaxdamp.simulation import ride as module
+from jaxdamp.simulation import fixed_step as module
 
 
 CAR = vehicles.presets.quarter_car_000()

@@ -11,7 +11,7 @@ import scipy.linalg
 
 from jaxdamp import Ride, dampers, metrics, roads, simulate, vehicles
 from jaxdamp.metrics.weighting import discrete_weighting
-from jaxdamp.simulation import ride as riding
+from jaxdamp.simulation import fixed_step
 from jaxdamp.simulation.observer import Filter
 from jaxdamp.vehicles import Body, Frame, Link, LumpedVehicle, Wheel
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
@@ -114,7 +114,7 @@ def test_derivatives_forward_reverse_and_by_differences():
 
 def test_a_run_of_several_blocks_is_the_same_run_and_has_the_same_derivatives(monkeypatch):
     """Reverse derivatives of long runs drive each block again from its beginning; the last one is shorter."""
-    monkeypatch.setattr(riding, "BLOCK", 64)
+    monkeypatch.setattr(fixed_step, "BLOCK", 64)
     car, metric = quarter_car_000(dampers.Lag(BESINGER, 0.004)), "rms_sprung_acceleration"
     ride = Ride(car, ROUGH, duration=0.73, metrics=[metric])
     level = lambda rate: ride({"damper.law.rebound_rate": rate})[metric]  # noqa: E731

@@ -7,7 +7,8 @@ import scipy.integrate
 
 from jaxdamp import dampers, metrics, roads, simulate
 from jaxdamp.parameters import replace
-from jaxdamp.simulation.exponential import exponential_steps
+from jaxdamp.simulation import Adaptive, Exponential
+from jaxdamp.simulation.recorder import recorded
 from jaxdamp.vehicles.presets import quarter_car_000
 
 
@@ -67,7 +68,7 @@ def test_energy_error_falls_with_the_square_of_the_step(name, tyre_damping):
 
 
 def test_the_two_engines_agree(run):
-    reference = simulate(run.vehicle, BUMP, duration=1.0, method="diffrax")
+    reference = simulate(run.vehicle, BUMP, duration=1.0, engine=Adaptive())
     for channel, share in (("sprung_acceleration", 6e-3), ("stroke", 1e-3), ("dynamic_tyre_load", 1e-3)):
         difference = np.abs(run[channel] - reference[channel]).max()
         assert difference < share * np.abs(reference[channel]).max(), channel
@@ -86,7 +87,7 @@ def test_the_error_falls_with_the_step(name):
 
 def test_tyre_damping_is_the_same_in_both_engines_and_in_the_channels():
     car = replace(quarter_car_000(), {"tyre_damping": 2000.0})
-    run, reference = (simulate(car, BUMP, duration=0.6, method=method) for method in ("exponential", "diffrax"))
+    run, reference = (simulate(car, BUMP, duration=0.6, engine=engine) for engine in (Exponential(), Adaptive()))
     np.testing.assert_allclose(run["stroke"], reference["stroke"], atol=3e-6)
     force = MS * run["sprung_acceleration"] + MU * run["unsprung_acceleration"]
     np.testing.assert_allclose(force, run["dynamic_tyre_load"], atol=1e-9 * KT * 0.06)
@@ -169,7 +170,8 @@ def test_batches_equal_loops_and_both_modes_of_differentiation_agree():
 
     @jax.jit
     def square(force):
-        run = exponential_steps(replace(car, {"damper.compression_force": force}).system(), heights, jnp.asarray(1e-3))
+        system = replace(car, {"damper.compression_force": force}).system()
+        run, _ = recorded(Exponential(), system, heights, jnp.asarray(1e-3))
         return jnp.mean(run.motion[:, 2] ** 2)
 
     np.testing.assert_allclose(jax.vmap(square)(forces), [square(f) for f in forces], rtol=1e-12)
@@ -252,11 +254,11 @@ def test_refuses_runs_that_make_no_sense(change, message):
         simulate(quarter_car_000(), **arguments)
 
 
-@pytest.mark.parametrize("method", ["exponential", "diffrax"])
-def test_a_run_saved_with_stride_is_every_so_many_th_instant_of_the_run(method):
+@pytest.mark.parametrize("engine", [Exponential(), Adaptive()], ids=["exponential", "adaptive"])
+def test_a_run_saved_with_stride_is_every_so_many_th_instant_of_the_run(engine):
     """Tyre damping included: what it hears of the road is the slope at the instant, not over the stride."""
     car = replace(quarter_car_000(LAWS["lag"]), {"tyre_damping": 300.0})
-    whole, tenth = (simulate(car, BUMP, duration=0.6, dt=2e-3, method=method, every=every) for every in (1, 10))
+    whole, tenth = (simulate(car, BUMP, duration=0.6, dt=2e-3, engine=engine, every=every) for every in (1, 10))
     assert tenth.time.shape == (31,) and float(tenth.time[-1]) == pytest.approx(0.6)
     for name, channel in whole.channels.items():
         size = float(jnp.max(jnp.abs(channel)))
@@ -289,14 +291,14 @@ def test_unknown_channel_suggests_the_nearest():
 def test_the_adaptive_engine_gives_up_where_it_would_take_for_ever():
     car = quarter_car_000(dampers.Linear(1e9))
     with pytest.raises(ValueError, match=r"must have a finite response.*maximum number of solver steps.*Kvaerno5"):
-        simulate(car, BUMP, duration=0.3, method="diffrax")
+        simulate(car, BUMP, duration=0.3, engine=Adaptive())
 
 
 @pytest.mark.slow
 def test_an_implicit_solver_takes_a_law_with_kinks_in_series_with_a_spring():
     car = quarter_car_000(dampers.SeriesSpring(LAWS["bilinear"], 5e6))
-    implicit = simulate(car, BUMP, duration=0.4, method=diffrax.Kvaerno3(), rtol=1e-6, atol=1e-8)
-    explicit = simulate(car, BUMP, duration=0.4, method="diffrax")
+    implicit = simulate(car, BUMP, duration=0.4, engine=Adaptive(diffrax.Kvaerno3(), 1e-6, 1e-8))
+    explicit = simulate(car, BUMP, duration=0.4, engine=Adaptive())
     np.testing.assert_allclose(implicit["stroke"], explicit["stroke"], atol=1e-6)
 
 

@@ -5,6 +5,8 @@ import pytest
 import jaxdamp
 from jaxdamp import roads, vehicles
 from jaxdamp.parameters import replace
+from jaxdamp.sweeps import SweepFunction
+from jaxdamp.sweeps.function import HasDerivatives, HasDomain, HasLanes, HasSideBySide, HasUnits
 
 
 @pytest.mark.slow
@@ -39,6 +41,15 @@ def test_a_ride_is_swept_with_its_units():
     backward = jaxdamp.sweep(ride, {"rate": [3000.0], "sprung_mass": [1400.0]}, gradients="reverse")
     forward = data["d_working_space_rms"].sel(rate=3000.0, sprung_mass=1400.0)
     np.testing.assert_allclose(forward, backward["d_working_space_rms"][0, 0], rtol=1e-9)
+
+
+def test_a_ride_says_all_that_a_sweep_asks():
+    function: SweepFunction = jaxdamp.Ride(
+        vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05), duration=0.1
+    )
+    asked = (HasUnits, HasLanes, HasDerivatives, HasSideBySide, HasDomain)
+    assert all(isinstance(function, protocol) for protocol in asked)
+    assert not any(isinstance(lambda point: point, protocol) for protocol in asked)
 
 
 def test_cars_that_cannot_exist_fail_with_a_reason():

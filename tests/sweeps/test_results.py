@@ -102,7 +102,7 @@ def test_a_chunk_that_does_not_fit_is_made_smaller(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("options", "chunk"), [({}, 32), ({"gradients": "forward"}, 8), ({"gradients": "reverse"}, 32), ({"chunk": 5}, 5)]
+    ("options", "chunk"), [({}, 32), ({"gradients": "forward"}, 8), ({"gradients": "reverse"}, 8), ({"chunk": 5}, 5)]
 )
 def test_the_function_says_how_many_lanes_it_likes(monkeypatch, options, chunk):
     chunks, start = set(), running.Program.start

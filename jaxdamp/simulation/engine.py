@@ -1,0 +1,156 @@
+"""What an engine is: an object that integrates the equations of a vehicle and shows every instant to an observer."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._jacobian import Mode
+from jaxdamp._types import ScalarLike, Signal
+from jaxdamp._vectors import MemoryLayout
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.rig import AbstractLawEngine
+from jaxdamp.simulation.equations import Equations, RoadInput, StepState
+from jaxdamp.simulation.step_size import RunCheck
+
+
+class AbstractObserver(ABC):
+    """What looks at a run while an engine drives it: it saves instants, or gathers numbers."""
+
+    every: int = 1  # it saves one in so many instants
+    saves_motion: bool = False  # it saves whole instants, so that the memory of a run grows with its length anyway
+
+    @abstractmethod
+    def begin(self, now: StepState, road: RoadInput) -> Any:
+        """What is gathered at the first instant."""
+
+    @abstractmethod
+    def add(self, gathered: Any, now: StepState, road: RoadInput) -> Any:
+        """What is gathered with one instant more."""
+
+    @abstractmethod
+    def saved(self, now: StepState, gathered: Any) -> Any:
+        """What is saved of an instant."""
+
+
+class Outcome(NamedTuple):
+    """What an engine gives back.
+
+    Attributes:
+        gathered: by the observer, up to the last instant.
+        records: what the observer saved, with the instants along the first axis.
+        states: of the elements at the end.
+        status: what the engine says of the run, for `AbstractEngine.remedy`.
+    """
+
+    gathered: Any
+    records: Any
+    states: list[Float[Array, " _state"]]
+    status: Any = None
+
+
+class AbstractEngine(AbstractLawEngine):
+    """How the equations of motion are integrated: `simulate(vehicle, road, engine=...)`, and the same for a `Ride`.
+
+    The library has `Exponential`, with fixed steps, and `Adaptive`, the solvers of diffrax. An engine of one's own with
+    fixed steps derives from `AbstractFixedStep` (`docs/own_engine.md`).
+    """
+
+    @property
+    @abstractmethod
+    def derivatives(self) -> tuple[Mode, ...]:
+        """The modes of differentiation that pass through a run, among "forward" and "reverse"."""
+
+    @abstractmethod
+    def run(
+        self,
+        equations: Equations,
+        heights: Float[Array, "time wheels"],
+        dt: ScalarLike,
+        start: Float[Array, " n"],
+        observer: AbstractObserver,
+    ) -> Outcome:
+        """Drive a run, inside a compiled function.
+
+        Arguments:
+            equations: of the vehicle, in the layout that `layout` chose.
+            heights: of the road under the wheels at uniform instants [m], straight between them.
+            dt: spacing of the instants [s].
+            start: the motion (q, q̇) at the first instant; the elements are at rest.
+            observer: sees every instant; one that saves one in `observer.every` need only see these.
+        """
+
+    @property
+    def derivatives_in_sweeps(self) -> tuple[Mode, ...]:
+        """The modes that pass in a `sweep`, which spreads its points over devices."""
+        return self.derivatives
+
+    @property
+    def spacing(self) -> float | None:
+        """The spacing of instants that this engine is made for [s]; None if it takes that of the run."""
+        return None
+
+    @property
+    def step_count(self) -> int:
+        """Steps from one instant to the next; 1 also where the engine chooses its own."""
+        return 1
+
+    def layout(self, states: int, *, side_by_side: bool) -> MemoryLayout:
+        """How the vectors of a vehicle lie in memory.
+
+        Arguments:
+            states: length of the motion (q, q̇).
+            side_by_side: many cars are driven at a time, by `jax.vmap`.
+        """
+        del states, side_by_side
+        return MemoryLayout.ARRAY
+
+    def prepared(self, check: RunCheck) -> "AbstractEngine":
+        """The engine for a run, after the checks that its steps must pass; open choices are made by the vehicle."""
+        check.road()
+        return self
+
+    def remedy(self, status: Any, dt: float) -> str:
+        """What to do about a run that diverged."""
+        del status
+        return f"Take shorter steps than {dt:g} s."
+
+    def respond(self, law: AbstractDamper, time: Signal, stroke: Signal, velocity: Signal) -> Signal:
+        """The force of a law under a prescribed stroke; refused by engines that drive vehicles only."""
+        del law, time, stroke, velocity
+        remedy = "Leave it out, or pass `simulation.Exponential(substeps=...)` or `simulation.Adaptive(...)`."
+        _checks.refuse("engine", "drive a law on the rig, too", repr(self), remedy)
+
+    @contextmanager
+    def naming_derivatives(self) -> Iterator[None]:
+        """Say in an error of JAX about forward derivatives which engine does not pass them."""
+        try:
+            yield
+        except TypeError as error:
+            if "forward" in self.derivatives or "jvp" not in str(error):
+                raise
+            message = f"{self} passes no forward derivatives (`jax.jvp`, `jax.jacfwd`). {BOTH_WAYS}"
+            raise TypeError(message) from error
+
+
+BOTH_WAYS = "Differentiate in reverse (`jax.grad`), or take `simulation.Exponential()`, which passes both."
+
+
+def chosen_engine(
+    engine: AbstractEngine | None, default: AbstractEngine, dt: float | None, substeps: int | None
+) -> tuple[AbstractEngine, float]:
+    """The engine of a run and the spacing of its instants [s], of what the caller gave and left out."""
+    if engine is None:
+        engine = default
+    elif substeps is not None:
+        remedy = "Write `engine=simulation.Exponential(substeps=...)`."
+        _checks.refuse("substeps", "be left out beside an engine, which has its own", substeps, remedy)
+    own = engine.spacing
+    if dt is None:
+        return engine, 1e-3 if own is None else own
+    if own is not None and own != dt:
+        _checks.refuse("dt", f"be left out, or be that of the engine, {own:g} s", dt)
+    return engine, dt

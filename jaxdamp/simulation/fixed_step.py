@@ -1,0 +1,138 @@
+"""The loop of all engines with fixed steps.
+
+XLA compiles a loop on a CPU into one function, ten times as fast, if its body touches few bytes: 1 kB unless told
+otherwise (`jaxdamp.configure`). A quarter car with most memoryless laws stays below that because a step is written in
+small arrays and carries no more than it must.
+"""
+
+from abc import abstractmethod
+from typing import Any, TypeAlias
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxdamp._jacobian import Mode
+from jaxdamp._types import Scalar, ScalarLike
+from jaxdamp._vectors import between, laid_out
+from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome
+from jaxdamp.simulation.equations import FOR_REVERSE, Equations, RoadInput, StepState
+
+
+Carry: TypeAlias = tuple[StepState, Any, RoadInput, tuple[Array, ...]]
+BLOCK = 16_384  # instants, of which reverse derivatives keep what they need; longer runs are driven twice
+
+
+class AbstractStepper(eqx.Module):
+    """What carries a vehicle over one step.
+
+    Attributes:
+        equations: of the vehicle.
+        dt: the step [s].
+    """
+
+    equations: eqx.AbstractVar[Equations]
+    dt: eqx.AbstractVar[Scalar]
+
+    @abstractmethod
+    def __call__(self, now: StepState, begin: RoadInput, end: RoadInput) -> StepState:
+        """The vehicle a step later, while the road goes straight from `begin` to `end`.
+
+        The rates in `begin` and `end` are means of the slopes before and after these instants, for elements that stand
+        on the road; None where there are none.
+        """
+
+    def start(self, motion: Float[Array, " n"], road: RoadInput) -> StepState:
+        """The vehicle at the first instant, its elements at rest."""
+        return self.equations.at_rest(motion, road)
+
+
+class AbstractFixedStep(AbstractEngine):
+    """An engine of equal steps: it has one method, `stepper`, and `step_count` where an interval takes several."""
+
+    @property
+    def derivatives(self) -> tuple[Mode, ...]:
+        """Both: the loop has a fixed length. A step with a loop of its own may say otherwise."""
+        return ("forward", "reverse")
+
+    @abstractmethod
+    def stepper(self, equations: Equations, dt: Scalar) -> AbstractStepper:
+        """What takes a step of dt [s], made once before the loop."""
+
+    def run(
+        self,
+        equations: Equations,
+        heights: Float[Array, "time wheels"],
+        dt: ScalarLike,
+        start: Float[Array, " n"],
+        observer: AbstractObserver,
+    ) -> Outcome:
+        """Step after step; of a long run reverse derivatives keep the beginnings of blocks only."""
+        stepper = self.stepper(equations, jnp.asarray(dt / self.step_count, dtype=float))
+        half_rate, layout = jnp.asarray(0.5 / dt, dtype=heights.dtype), equations.layout
+        rated = equations.road_deflection is not None or not observer.saves_motion
+
+        def at(height: Array, rate: Array) -> RoadInput:
+            return RoadInput(laid_out(height, layout), laid_out(rate, layout))
+
+        def step(carry: Carry, ahead: Array) -> Carry:
+            """To the next instant; where rates are needed, with the height of the one after it."""
+            now, gathered, begin, window = carry
+            if rated:
+                height, coming = window
+                end, window = at(coming, half_rate * (ahead - height)), (coming, ahead)
+            else:
+                end = RoadInput(laid_out(ahead, layout), None)
+            after = _over(stepper, now, begin, end, self.step_count)
+            return after, observer.add(gathered, after, end), end, window
+
+        policy = jax.checkpoint_policies.save_only_these_names(FOR_REVERSE)
+        lean = step if observer.saves_motion else jax.checkpoint(step, policy=policy, prevent_cse=False)
+
+        def stride(carry: Carry, ahead: Array) -> tuple[Carry, Any]:
+            if observer.every == 1:
+                carry = lean(carry, ahead)
+            else:
+                carry, _ = jax.lax.scan(lambda carry, ahead: (lean(carry, ahead), None), carry, ahead)
+            return carry, observer.saved(carry[0], carry[1])
+
+        def drive(carry: Carry, road: Array) -> tuple[Carry, Any]:
+            return jax.lax.scan(stride, carry, road)
+
+        first = RoadInput(laid_out(heights[0], layout), None)
+        window, road = (), heights[1:]
+        if rated:
+            first = at(heights[0], 2.0 * half_rate * (heights[1] - heights[0]))
+            window = heights[0], heights[1]
+            road = jnp.concatenate([heights[2:], 2.0 * heights[-1:] - heights[-2:-1]])  # it ends as straight as it came
+        now = stepper.start(start, first)
+        carry = now, observer.begin(now, first), first, window
+        parts = [jax.tree.map(lambda y: y[None], observer.saved(now, carry[1]))]
+        whole = 0 if observer.saves_motion or road.shape[0] <= BLOCK else road.shape[0] // BLOCK * BLOCK
+        if whole:
+            blocks = road[:whole].reshape(-1, BLOCK, *road.shape[1:])
+            carry, saved = jax.lax.scan(jax.checkpoint(drive), carry, blocks)
+            parts.append(jax.tree.map(lambda y: y.reshape(-1, *y.shape[2:]), saved))
+        rest = road[whole:]
+        if observer.every > 1:
+            rest = rest.reshape(-1, observer.every, *rest.shape[1:])
+        carry, saved = drive(carry, rest)
+        records = jax.tree.map(lambda *ys: jnp.concatenate(ys), *parts, saved)
+        return Outcome(carry[1], records, equations.ports.by_port(carry[0].states))
+
+
+def _over(stepper: AbstractStepper, now: StepState, begin: RoadInput, end: RoadInput, substeps: int) -> StepState:
+    """So many equal steps later, over which the road is straight."""
+    if substeps == 1:
+        return stepper(now, begin, end)
+
+    def at(share: Any) -> RoadInput:
+        rate = None if begin.rate is None or end.rate is None else between(begin.rate, end.rate, share)
+        return RoadInput(between(begin.height, end.height, share), rate)
+
+    def step(i: Any, now: StepState) -> StepState:
+        done = jnp.asarray(i, stepper.dt.dtype)
+        return stepper(now, at(done / substeps), at((done + 1.0) / substeps))
+
+    return jax.lax.fori_loop(0, substeps, step, now)
