@@ -114,7 +114,7 @@ class BenchSet:
 
     def process(self, **steps: Any) -> "BenchSet":
         """Every record with further steps of processing, see `BenchRun.process`."""
-        return BenchSet(run.process(**steps) for run in self.runs)
+        return BenchSet((run.process(**steps) for run in self.runs), self.left_out)
 
     def table(self) -> list[dict[str, Any]]:
         """One row of figures in SI per record: a list that `pandas.DataFrame` takes as it is."""

@@ -50,7 +50,7 @@ def run_bench(
         for sentence in found.sentences():
             screen.points([sentence], style=_COLOURS[sentence.split(",")[0]])
         runs = processing.apply(_sound(raw, found))
-        remarks = decisions(tuple(runs))
+        remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.heading("What was done to the records")
         screen.points(remarks)
         with screen.stage("Evaluating the records"):
@@ -87,8 +87,8 @@ def _velocities(text: str | None) -> list[float] | None:
 
 def _sound(runs: BenchSet, found: Preflight) -> BenchSet:
     """The records without an error."""
-    wrong = {finding.record for finding in found.of("error")}
-    sound = BenchSet(run for run in runs if run.name not in wrong)
+    wrong = {name for finding in found.of("error") for name in finding.records}
+    sound = BenchSet((run for run in runs if run.name not in wrong), runs.left_out)
     if not len(sound):
         raise ValueError(" ".join(f"{finding}" for finding in found.of("error")))
     return sound

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _REMEDY = "Take what `bench.evaluate(runs)` gives."
 _MOST_LABELLED = 14  # records in a legend
+_DISTINCT = 0.02  # difference of peak velocities, relative to the largest, below which records are repeats
 
 
 def evaluation(
@@ -114,12 +115,18 @@ def _closed(values: Float[np.ndarray, " points"]) -> Float[np.ndarray, " more"]:
 
 
 def _draw_forces(axes: "matplotlib.axes.Axes", evaluation: Evaluation, styles: Mapping[str, Mapping[str, Any]]) -> None:
-    """Forces at peak velocity of each setting joined by lines, and those at stated velocities."""
+    """Forces at peak velocity of each setting, and those at stated velocities.
+
+    Lines join the peaks of a setting whose velocities differ clearly; repeats of one velocity stand beside each other.
+    """
     for setting, runs in evaluation.settings.items():
         own = {(m.quantity, m.record): m.value for m in evaluation.measurements}
         for side in ("rebound", "compression"):
             pairs = sorted((own[f"{side} velocity", run.name], own[f"{side} force", run.name]) for run in runs)
-            axes.plot(*np.array(pairs).T, marker="o", markersize=4.5, markerfacecolor="white", **styles[setting])
+            velocity, force = np.array(pairs).T
+            joined = bool(np.all(np.diff(velocity) > _DISTINCT * np.abs(velocity).max()))
+            look = styles[setting] if joined else {**styles[setting], "linestyle": ""}
+            axes.plot(velocity, force, marker="o", markersize=4.5, markerfacecolor="white", **look)
         stated = [
             ((1 if m.quantity == "rebound force" else -1) * m.velocity, m.value)
             for m in evaluation.measurements

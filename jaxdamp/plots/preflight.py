@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp.bench import Preflight
+from jaxdamp.bench import Finding, Preflight
 from jaxdamp.plots import _style
 
 
@@ -17,19 +17,25 @@ _SHADES = {"error": "#D55E00", "warning": "#E69F00", "note": "#56B4E9"}
 
 
 def preflight(found: Preflight) -> "matplotlib.figure.Figure":
-    """A row for each record, a column for each kind of finding, coloured by severity, with its size."""
+    """A row for each record, a column for each kind of finding, coloured by severity, with its size.
+
+    Where a record has several findings of a kind, the largest is shown and their number stands in brackets.
+    """
     from matplotlib.patches import Patch, Rectangle
 
     _checks.instance("found", found, Preflight, "be a preflight", "Take what `bench.preflight(runs)` gives.")
     names = list(dict.fromkeys(finding.name for finding in found.findings))
     figure = _style.new_figure(4.5 + 1.0 * max(len(names), 2), 2.0 + 0.34 * len(found.records))
     axes = figure.subplots()
+    cells: dict[tuple[int, int], list[Finding]] = {}
     for finding in found.findings:
-        for record in (name for name in found.records if name in finding.record.split(", ")):
-            x, y = names.index(finding.name), found.records.index(record)
-            axes.add_patch(Rectangle((x - 0.46, y - 0.44), 0.92, 0.88, color=_SHADES[finding.severity], alpha=0.55))
-            text = "" if finding.size is None else f"{_style.short(finding.size)} {finding.unit}"
-            axes.text(x, y, text, ha="center", va="center", fontsize="small")
+        for record in finding.records:
+            cells.setdefault((names.index(finding.name), found.records.index(record)), []).append(finding)
+    for (x, y), findings in cells.items():
+        worst = max(findings, key=lambda finding: abs(finding.size or 0.0))
+        axes.add_patch(Rectangle((x - 0.46, y - 0.44), 0.92, 0.88, color=_SHADES[worst.severity], alpha=0.55))
+        text = "" if worst.size is None else f"{_style.short(worst.size)} {worst.unit}"
+        axes.text(x, y, text + f" ({len(findings)})" * (len(findings) > 1), ha="center", va="center", fontsize="small")
     axes.set_xticks(range(len(names)), names, rotation=30, ha="left")
     axes.set_yticks(range(len(found.records)), found.records)
     axes.xaxis.tick_top()

@@ -181,7 +181,7 @@ class _Deaf(AbstractMemoryless):
     rate: jax.Array = parameter("N s/m", "slope", positive)
 
     def force_velocity(self, v):
-        return 1000.0 * v
+        return jnp.asarray(1000.0 * v)
 
 
 @pytest.mark.parametrize(

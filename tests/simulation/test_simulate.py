@@ -273,7 +273,7 @@ class Driving(dampers.AbstractMemoryless):
     """A law that puts energy in."""
 
     def force_velocity(self, v):
-        return -1e5 * v
+        return jnp.asarray(-1e5 * v)
 
 
 def test_a_run_that_diverges_says_so():

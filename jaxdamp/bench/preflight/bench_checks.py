@@ -27,7 +27,7 @@ def mixed_settings(runs: Sequence[BenchRun]) -> list[Finding]:
             f"the same motion, but forces differ by {pair.difference:.3g} N, {100 * pair.share:.0f} % of their RMS"
         )
         remedy = "Were settings mixed (clicks, current, temperature)? State them as `command`, or fit apart."
-        names = f"{pair.first}, {pair.second}"
+        names = (pair.first, pair.second)
         found.append(Finding("warning", "contradiction", names, message, pair.difference, "N", None, remedy))
     return found
 
@@ -40,7 +40,7 @@ def turned_by_the_reader(runs: Sequence[BenchRun]) -> list[Finding]:
     fewer = turned if 2 * len(turned) <= len(runs) else [run for run in runs if run not in turned]
     message = f"the sign of the force in the file differs from that of the other {len(runs) - len(fewer)}"
     remedy = "It was made alike by the work per cycle; which direction is rebound it cannot tell: look at both."
-    return [Finding("warning", "sign unlike its bench", run.name, message, None, "", None, remedy) for run in fewer]
+    return [Finding("warning", "sign unlike its bench", (run.name,), message, None, "", None, remedy) for run in fewer]
 
 
 def turned_motion(runs: Sequence[BenchRun]) -> list[Finding]:
@@ -63,7 +63,7 @@ def turned_motion(runs: Sequence[BenchRun]) -> list[Finding]:
         if len(votes) > 1 and np.mean(votes) > 0.5:
             message = "its rebound is like the compression of the other records, and the other way round"
             remedy = 'Was it recorded with the other sign? Read it with sign="compression-positive".'
-            found.append(Finding("error", "sign unlike its bench", run.name, message, None, "", None, remedy))
+            found.append(Finding("error", "sign unlike its bench", (run.name,), message, None, "", None, remedy))
     return found
 
 

@@ -120,7 +120,7 @@ def preflight(runs: BenchRun | Iterable[BenchRun]) -> Preflight:
     """
     chosen = as_records(runs, "preflight(runs)")
     findings = [finding for run in chosen for finding in _of_record(run)]
-    wrong = {finding.record for finding in findings if finding.severity == "error"}
+    wrong = {name for finding in findings if finding.severity == "error" for name in finding.records}
     sound = [run for run in chosen if run.name not in wrong]
     findings += [finding for check in BENCH for finding in check(sound)]
     findings = bench_checks.hysteresis_or_delay(findings)

@@ -22,7 +22,7 @@ class Finding:
         severity: "error": nothing computed from the record can be trusted; "warning": results are wrong to some
             degree; "note": to know.
         name: of the artefact, such as "rest before".
-        record: name of the record; of several, joined by commas.
+        records: names of the records that it concerns, most often one.
         message: what was seen, in words.
         size: of the artefact in `unit`; None where it has none.
         unit: of the size, SI.
@@ -32,7 +32,7 @@ class Finding:
 
     severity: str
     name: str
-    record: str
+    records: tuple[str, ...]
     message: str
     size: float | None = None
     unit: str = ""
@@ -41,6 +41,11 @@ class Finding:
 
     def __post_init__(self) -> None:
         _checks.one_of("severity", self.severity, SEVERITIES)
+
+    @property
+    def record(self) -> str:
+        """The names of the records in words."""
+        return ", ".join(self.records)
 
     def __str__(self) -> str:
         return f"{self.severity}: {self.record}: {self.message}. {self.remedy}".rstrip()
@@ -92,7 +97,7 @@ class Examined:
         """One finding of this record; its place is given by the first and the last sample."""
         place = None if samples is None else (float(self.run.time[samples[0]]), float(self.run.time[samples[1]]))
         size = None if size is None else float(size)
-        return [Finding(severity, name, self.run.name, message, size, unit, place, remedy)]
+        return [Finding(severity, name, (self.run.name,), message, size, unit, place, remedy)]
 
 
 def step(values: Samples) -> float:
