@@ -1,8 +1,10 @@
 from pathlib import Path
 
 import numpy as np
+import pint
 import pytest
 
+from jaxdamp.bench import units
 from jaxdamp.bench.columns import Choice, role_of
 from jaxdamp.bench.columns import find_columns as find
 from jaxdamp.bench.raw import RawColumn, RawTable
@@ -139,3 +141,11 @@ def test_conversion_to_si(role, unit, value, si):
 )
 def test_what_is_no_unit(role, unit):
     assert conversion(role, unit) is None
+
+
+def test_the_factors_of_usual_units_are_those_of_pint():
+    registry = pint.UnitRegistry()
+    for role, factors in units._KNOWN.items():
+        for unit, factor in factors.items():
+            assert factor == pytest.approx(registry.Quantity(1.0, unit).to(units.SI[role]).magnitude, rel=1e-15)
+            assert [conversion(other, unit) for other in units.SI if other != role] == [None] * (len(units.SI) - 1)
