@@ -43,7 +43,8 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
     curve = quasi_static(law, velocity)
     if not curve.settled.any():
         remedy = "A table cannot represent such a law: use `respond` with the intended motion."
-        _checks.refuse("law", "have a force at constant velocity", f"{type(law).__name__}. {curve.note}", remedy)
+        what = f"{type(law).__name__}. {curve.note.removesuffix('.')}"
+        _checks.refuse("law", "have a force at constant velocity", what, remedy)
     header = [
         f"# law: {law!r}",
         "# velocity is positive in extension (rebound), force is positive when it resists extension",
