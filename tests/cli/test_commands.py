@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from jaxdamp import identify
+from jaxdamp import bench, identify
 from jaxdamp.bench import BenchSet
 from jaxdamp.cli import app
-from jaxdamp.cli.options import law_names
+from jaxdamp.cli.options import law_names, split
 from jaxdamp.cli.riding import presets
 from jaxdamp.dampers import Bilinear
 from jaxdamp.export import from_json
@@ -135,10 +135,11 @@ def test_laws_may_be_divided_by_commas() -> None:
 
 
 def test_records_are_held_out_by_pattern_or_by_file(records: Path, tmp_path: Path) -> None:
-    for number, word in enumerate(("*_4Hz", str(records / "10mm_4Hz.csv"), "10mm_4Hz.csv")):
-        out = tmp_path / str(number)
-        jaxdamp("fit", records, "--law", "linear", "--held-out", word, "--out", out)
-        assert [row["use"] for row in _rows(out / "tables" / "records.csv")] == ["fitted", "fitted", "held out"]
+    runs = bench.read(records, sign="rebound-positive")
+    for word in ("*_4Hz", str(records / "10mm_4Hz.csv"), "10mm_4Hz.csv"):
+        assert [run.name for run in split(runs, [word])[1]] == ["10mm_4Hz"]
+    jaxdamp("fit", records, "--law", "linear", "--held-out", word, "--out", tmp_path / "fit")
+    assert [row["use"] for row in _rows(tmp_path / "fit/tables/records.csv")] == ["fitted", "fitted", "held out"]
 
 
 # ---- fit: what is refused
