@@ -75,6 +75,6 @@ def test_rows_without_a_force_are_left_out_and_said(tmp_path):
 
 
 def test_a_law_without_any_settled_force_is_refused_in_few_words(tmp_path):
-    with pytest.raises(ValueError, match=r"must have a force at constant velocity.*velocity\. A table.*use `respond`") as error:
+    with pytest.raises(ValueError, match=r"constant velocity, but is Lag.*velocity\. A table.*use `respond`") as error:
         to_csv(Lag(Linear(1000.0), 1e4), tmp_path / "fv.csv", np.linspace(-1.0, 1.0, 500))
     assert len(str(error.value)) < 400 and not list(tmp_path.iterdir())
