@@ -4,18 +4,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from jaxdamp import bench
-from jaxdamp.bench import BenchSet, Evaluation, Preflight
+from jaxdamp.bench import Evaluation
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.fitting import write_table
 from jaxdamp.cli.options import ReadOptions, decisions
+from jaxdamp.cli.preflighting import checked
 from jaxdamp.cli.processing import ProcessOptions
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.wording import message
 from jaxdamp.report import Attempts, bench_report, records_table
-
-
-_COLOURS = {"error": "red", "warning": "yellow", "note": ""}
 
 
 def run_bench(
@@ -43,13 +41,9 @@ def run_bench(
     with results_folder(out, "bench", replace=replace) as results:
         with screen.stage("Reading the records"):
             raw = options.read(files)
-        with screen.stage("Looking the records over"):
-            found = bench.preflight(raw)
         screen.table(records_table(tuple(raw)))
-        screen.heading(found.summary())
-        for sentence in found.sentences():
-            screen.points([sentence], style=_COLOURS[sentence.split(",")[0]])
-        runs = processing.apply(_sound(raw, found))
+        sound, found = checked(screen, raw)
+        runs = processing.apply(sound)
         remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.heading("What was done to the records")
         screen.points(remarks)
@@ -83,15 +77,6 @@ def _velocities(text: str | None) -> list[float] | None:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise ValueError(f"Option --velocities must read like 0.052,0.131 [m/s], but is {text!r}.") from None
-
-
-def _sound(runs: BenchSet, found: Preflight) -> BenchSet:
-    """The records without an error."""
-    wrong = {name for finding in found.of("error") for name in finding.records}
-    sound = BenchSet((run for run in runs if run.name not in wrong), runs.left_out)
-    if not len(sound):
-        raise ValueError(" ".join(f"{finding}" for finding in found.of("error")))
-    return sound
 
 
 def _write_evaluation(folder: Path, evaluation: Evaluation) -> None:

@@ -10,6 +10,7 @@ from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.options import ReadOptions, decisions, law_names, split
+from jaxdamp.cli.preflighting import checked
 from jaxdamp.cli.processing import ProcessOptions
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.wording import message
@@ -54,7 +55,7 @@ def run_fit(
     out: Path,
     replace: bool = False,
 ) -> Comparison:
-    """Read records, fit laws, say how good they are, and write all of it into a folder.
+    """Read and check records, fit laws to those without an error, say how good they are, and write all into a folder.
 
     Laws and tables are in the folder before the first picture is drawn.
     """
@@ -63,16 +64,20 @@ def run_fit(
     attempts = Attempts(interrupt.check, message)
     with results_folder(out, "fit", replace=replace) as results:
         with screen.stage("Reading the records"):
-            runs = (processing or ProcessOptions()).apply(options.read(files))
+            raw = options.read(files)
+        sound, found = checked(screen, raw, notes=False)
+        runs = (processing or ProcessOptions()).apply(sound)
         fitted, held = split(runs, held_out)
         remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
+        remarks += found.sentences()
         screen.say()
         fits = fit_laws(screen, names, fitted, held, weighting)
         show(screen, fits)
         with interrupt.saving(), screen.stage("Laws and tables"):
             write_fits(results.draft, fits.comparison, runs, attempts)
+            write_table(results.draft, "preflight", found.table())
             results.publish(fits.missing)
         with screen.stage("Pictures and report"):
             places = {"folder": results.draft, "attempts": attempts}

@@ -53,6 +53,17 @@ def test_bench_prints_and_writes_preflight_evaluation_and_limits(folder: Path, t
     assert page.count("data:image/png;base64,") == 3 and "Forces at stated velocities" in page and "FAILED" in page
 
 
+def test_fit_leaves_out_records_with_an_error(folder: Path, tmp_path: Path) -> None:
+    text = " ".join(jaxdamp("fit", folder, "--law", "bilinear", "--out", tmp_path / "out").output.split())
+    assert "error, force clipped: clipped" in text and "left out, with an error: clipped" in text
+    assert "note, run-up" not in text
+    assert [row["record"] for row in rows(tmp_path / "out/tables/records.csv")] == ["10mm_1Hz", "10mm_2Hz", "10mm_4Hz"]
+    assert rows(tmp_path / "out/tables/preflight.csv")[0]["finding"] == "force clipped"
+    assert "force clipped" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    only = refused(tmp_path, "fit", folder / "clipped.csv", "--law", "linear", "--out", tmp_path / "none")
+    assert "the force is clipped at -150 N" in only
+
+
 def test_settings_stated_on_the_command_line(folder: Path, tmp_path: Path) -> None:
     words = ("--command", "*_1Hz=1,*_2Hz=2,*_4Hz=2,clipped=3", "--velocities", "0.03,0.05")
     text = jaxdamp("bench", folder, *words, "--keep-rest", "--out", tmp_path / "out").output
