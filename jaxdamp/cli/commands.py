@@ -162,6 +162,10 @@ def bench(
     velocities: Annotated[
         str | None, typer.Option(help="At which forces are stated [m/s]: 0.052,0.131; usual ones if left out.")
     ] = None,
+    group_by: Annotated[
+        str | None,
+        typer.Option(help="Setting of the manifest to compare records by, else the command."),
+    ] = None,
     limits: Annotated[
         Path | None, typer.Option(help="CSV of limits: quantity, minimum, maximum, velocity, setting, record.")
     ] = None,
@@ -186,6 +190,7 @@ def bench(
             benching.ReadOptions(*reading),
             processing=benching.ProcessOptions(cycles, between, low_pass, keep_rest),
             velocities=velocities,
+            group_by=group_by,
             limits=limits,
             out=out,
             replace=replace,

@@ -15,6 +15,7 @@ OPTIONS = (
     "duration",
     "force_sign",
     "gains",
+    "group_by",
     "held_out",
     "law",
     "limits",

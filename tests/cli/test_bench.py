@@ -72,6 +72,18 @@ def test_settings_stated_on_the_command_line(folder: Path, tmp_path: Path) -> No
     assert header == "quantity,unit,1,2,change [%]"
 
 
+def test_records_are_compared_by_a_setting_of_the_manifest(folder: Path, tmp_path: Path) -> None:
+    manifest = tmp_path / "bench.toml"
+    manifest.write_text('sign = "rebound-positive"\nsettings = "*mm_{speed}Hz"\n')
+    files = [folder / f"10mm_{speed}Hz.csv" for speed in (1, 2, 4)]
+    words = ("--manifest", manifest, "--group-by", "speed", "--velocities", "0.05", "--out", tmp_path / "out")
+    jaxdamp("bench", *files, *words)
+    (header, *_) = (tmp_path / "out" / "tables" / "velocities.csv").read_text().splitlines()
+    assert header.startswith("quantity,unit,1,2,4")
+    said = refused(tmp_path, "bench", *files, "--group-by", "clicks", "--out", tmp_path / "none")
+    assert "Option --group-by must name a setting that every record states" in said
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
