@@ -2,7 +2,6 @@
 
 from typing import final
 
-import jax
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -44,7 +43,7 @@ def effects_of(model: Model) -> tuple[str, ...]:
 
 def is_memoryless(model: Model) -> bool:
     """Whether the force depends on stroke and velocity of the instant alone."""
-    return jax.eval_shape(law_of(model).initial_state).size == 0 and not effects_of(model)
+    return law_of(model).initial_state().size == 0 and not effects_of(model)
 
 
 def with_range(model: Model, fitted_to: FittedRange) -> Model:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.identify.model import Model
+from jaxdamp.identify.model import Model, is_memoryless
 from jaxdamp.identify.traces import predict_by_record, used_samples
 
 
@@ -43,7 +43,7 @@ def error_shares(law: Model | Sequence[Model], runs: BenchRun | Iterable[BenchRu
     sums = np.zeros(3)
     laws, forces = predict_by_record(law, runs)
     for own, run, force in zip(laws, runs, forces, strict=True):
-        part = used_samples(own, run)
+        part = used_samples(own, run, is_memoryless(own))
         sums += _sums(run.velocity[part], run.stroke[part], force[part] - run.force[part])
     shape, hysteresis, rest = sums / max(sums.sum(), np.finfo(float).tiny)
     return ErrorShares(float(shape), float(hysteresis), float(rest))

@@ -13,7 +13,7 @@ from jaxdamp._tables import Table, plain, with_unit
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
-from jaxdamp.identify.model import Model, on_rig
+from jaxdamp.identify.model import Model, is_memoryless, on_rig
 from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.traces import predict_by_record, predict_runs, used_samples
 from jaxdamp.rig import Rig
@@ -68,7 +68,10 @@ def score(
 ) -> tuple[float, float, tuple[Score, ...]]:
     """Fit percent and RMSE [N] of a model, or of one for each record, over the records that count, and for each."""
     models, forces = predict_by_record(model, runs)
-    used = [used_samples(own, run) for own, run in zip(models, runs, strict=True)]
+    memoryless = {
+        id(own): is_memoryless(own) for own in {id(own): own for own in models}.values()
+    }  # most often one model for all records
+    used = [used_samples(own, run, memoryless[id(own)]) for own, run in zip(models, runs, strict=True)]
     measured = [run.force[k] for run, k in zip(runs, used, strict=True)]
     predicted = [force[k] for force, k in zip(forces, used, strict=True)]
     rows = []

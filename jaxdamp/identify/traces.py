@@ -129,10 +129,16 @@ def _block(run: BenchRun, samples_per_cycle: int | None) -> int:
 
 
 def _row(
-    run: BenchRun, sigma: float, samples_per_cycle: int | None, model: Model, channels: Sequence[str], number: int
+    run: BenchRun,
+    sigma: float,
+    samples_per_cycle: int | None,
+    model: Model,
+    warms_up: bool,
+    channels: Sequence[str],
+    number: int,
 ) -> _Row:
     dt, omega = 1.0 / run.sampling_rate, dominant_rate(run)
-    block, warms_up = _block(run, samples_per_cycle), not is_memoryless(model)
+    block = _block(run, samples_per_cycle)
     substeps = int(np.clip(np.ceil(omega * dt * block / STEP_ANGLE), 1, 8))
     warm_up = int(min(2 * np.pi / omega, run.duration) / (dt * block)) if warms_up else 0
     signals = [_averaged(values, block) for values in _with_warm_up(run, warm_up * block, channels)]
@@ -157,6 +163,7 @@ def _grouped(rows: Sequence[_Row]) -> list[list[int]]:
     for i, row in enumerate(rows):
         alike.setdefault((_round_up(len(row.weight)), row.substeps), []).append(i)
     groups = list(alike.values())
+
     while len(groups) > MOST_GROUPS:
         pairs = [(a, b) for a in range(len(groups)) for b in range(a)]
         a, b = min(pairs, key=lambda p: cost(groups[p[0]] + groups[p[1]]) - cost(groups[p[0]]) - cost(groups[p[1]]))
@@ -259,11 +266,12 @@ def batches(
     Returns:
         The batches, and for each record where it is.
     """
-    fixed, channels = _stated(model, runs), _channels(model, runs)
-    if is_memoryless(model) and not (fixed or per_record):
+    fixed, channels, warms_up = _stated(model, runs), _channels(model, runs), not is_memoryless(model)
+    if not (warms_up or fixed or per_record):
         return _memoryless_batch(runs, sigma, samples_per_cycle, channels)
     pairs = zip(runs, sigma, strict=True)
-    rows = [_row(run, s, samples_per_cycle, model, channels, number) for number, (run, s) in enumerate(pairs)]
+    how = (samples_per_cycle, model, warms_up, channels)
+    rows = [_row(run, s, *how, number) for number, (run, s) in enumerate(pairs)]
     groups = _grouped(rows)
     ranges: dict[int, SampleRange] = {}
     for number, group in enumerate(groups):
@@ -298,14 +306,17 @@ def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
 def predict_runs(model: Model, runs: Sequence[BenchRun]) -> list[np.ndarray]:
     """Force [N] of the model at every sample of every record."""
     model = without_fitted_ranges(model)
-    made, ranges = batches(model, runs, [1.0] * len(runs), None if is_memoryless(model) else PREDICTED_PER_CYCLE)
+    memoryless = is_memoryless(model)
+    made, ranges = batches(model, runs, [1.0] * len(runs), None if memoryless else PREDICTED_PER_CYCLE)
     forces = [np.asarray(_predict(batch, model)) for batch in made]
     spread = [
         _spread(forces[p.batch][p.row, p.start : p.stop], p.block, len(run))
         for p, run in zip(ranges, runs, strict=True)
     ]
     for run, force in zip(runs, spread, strict=True):
-        require_finite_force(law_of(model), force[used_samples(model, run)], f"over the record {run.name!r}")
+        require_finite_force(
+            law_of(model), force[used_samples(model, run, memoryless)], f"over the record {run.name!r}"
+        )
     return spread
 
 
@@ -316,9 +327,9 @@ def predict_by_record(model: Model | Sequence[Model], runs: Sequence[BenchRun]) 
     return [model] * len(runs), predict_runs(model, runs)
 
 
-def used_samples(model: Model, run: BenchRun) -> slice:
+def used_samples(model: Model, run: BenchRun, memoryless: bool) -> slice:
     """The samples of a record that a fit of this model uses: all, or those from settling to a blind end."""
-    if is_memoryless(model):
+    if memoryless:
         return slice(0, None)
     block = _block(run, PREDICTED_PER_CYCLE)
     blind = blind_end(model, block / run.sampling_rate) * block

@@ -69,7 +69,7 @@ def test_every_record_is_led_in_by_its_first_cycle(maxwell_runs):
         stroke, weight = (np.asarray(a)[place.row] for a in (batch.stroke, batch.weight))
         assert np.array_equal(stroke[place.start : place.stop], run.stroke)
         assert np.max(np.abs(np.diff(stroke[: place.stop], 2))) < 2.0 * np.max(np.abs(np.diff(run.stroke, 2)))
-        used = used_samples(law, run)
+        used = used_samples(law, run, memoryless=False)
         assert used.start == pytest.approx(200, abs=1)
         assert not weight[: place.start + used.start].any() and not weight[place.stop :].any()
         assert np.all(weight[place.start + used.start : place.stop] == 0.5)
