@@ -7,6 +7,7 @@ import pytest
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import Besinger, CoulombFriction, Lag, Linear, PiecewiseLinear, PowerLaw
 from jaxdamp.identify import fit
+from jaxdamp.identify.search import _Model
 from jaxdamp.parameters import free_parameters
 
 
@@ -150,3 +151,11 @@ def test_a_lag_that_is_not_there_ends_at_zero(sines):
     assert result.converged
     assert result["lag_time"].value < 1e-4 and result["lag_time"].note == "not identifiable"
     assert abs(result["law.rate"].value - 1500.0) < 4 * result["law.rate"].standard_error
+
+
+def test_a_singular_model_has_no_step():
+    """A column without any effect, once the damping has become zero: no step, which `search` reports, and no crash."""
+    wide = np.full(2, np.inf)
+    model = _Model(np.diag([1.0, 0.0]), np.array([1.0, 0.0]), np.ones(2), -wide, wide, np.zeros((0, 2)), np.zeros(0))
+    assert np.isfinite(model.step(1.0)).all()
+    assert np.isnan(model.step(np.inf)).any()
