@@ -48,13 +48,14 @@ class SearchEnd(NamedTuple):
 
     @property
     def squares(self) -> float:
-        """The sum of squares of the weighted residual."""
-        return float(self.residual @ self.residual)
+        """The sum of squares of the weighted residual, infinite where it is beyond the largest number."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(self.residual @ self.residual)
 
     @property
     def finite(self) -> bool:
-        """Whether residual and derivatives are finite."""
-        return bool(np.all(np.isfinite(self.residual)) and np.all(np.isfinite(self.jacobian)))
+        """Whether the sum of squares and the derivatives are finite."""
+        return bool(np.isfinite(self.squares) and np.all(np.isfinite(self.jacobian)))
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # points without finite forces are refused as steps

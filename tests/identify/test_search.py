@@ -159,3 +159,9 @@ def test_a_singular_model_has_no_step():
     model = _Model(np.diag([1.0, 0.0]), np.array([1.0, 0.0]), np.ones(2), -wide, wide, np.zeros((0, 2)), np.zeros(0))
     assert np.isfinite(model.step(1.0)).all()
     assert np.isnan(model.step(np.inf)).any()
+
+
+def test_a_start_whose_squares_overflow_is_refused(sines):
+    """In the words of the library, not as a warning of NumPy (which is an error here)."""
+    with pytest.raises(ValueError, match="give finite forces and derivatives"):
+        fit(PowerLaw(1e200, 0.6, 900.0, 1.3), sines(Linear(1000.0)), starts=1)
