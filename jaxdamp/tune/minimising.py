@@ -81,9 +81,8 @@ def minimise(
             left out.
 
     Returns:
-        The tuned vehicle, all metrics before and after, and warnings: about a search that did not converge, a limit
-            that
-        cannot be satisfied, and dampers used outside the fitted range of their laws.
+        The tuned vehicle, all metrics before and after, and warnings: about a search that did not converge, limits
+        that cannot be satisfied, and dampers used outside the fitted range of their laws.
 
     Raises:
         ValueError: unknown metrics or parameters; bounds of a wrong shape, of a parameter that is not free, given in
