@@ -31,7 +31,9 @@ from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.read import read
+from jaxdamp.bench.read_rides import read_rides
 from jaxdamp.bench.readers import READERS
+from jaxdamp.bench.ride_record import RideRecord
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sensors import Sensors
 from jaxdamp.bench.sets import BenchSet, as_runs
@@ -57,6 +59,7 @@ __all__ = [
     "RandomTest",
     "RawColumn",
     "RawTable",
+    "RideRecord",
     "Sensors",
     "SineTest",
     "Steps",
@@ -76,6 +79,7 @@ __all__ = [
     "programmes",
     "read",
     "read_limits",
+    "read_rides",
     "separate_gas_and_friction",
     "steady_cycles",
 ]

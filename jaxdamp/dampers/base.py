@@ -257,6 +257,8 @@ def laws_inside(tree: Any, prefix: str = "") -> list[tuple[str, AbstractDamper]]
     """All laws in a law, a vehicle or another module, each with the prefix of the paths of its parameters."""
     if isinstance(tree, tuple | list):
         return [entry for i, item in enumerate(tree) for entry in laws_inside(item, f"{prefix}{i}.")]
+    if isinstance(tree, dict):
+        return [entry for key, item in tree.items() for entry in laws_inside(item, f"{prefix}{key}.")]
     if not isinstance(tree, eqx.Module):
         return []
     own = [(prefix, tree)] if isinstance(tree, AbstractDamper) else []

@@ -14,24 +14,32 @@ from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.result import FitResult, Score, fit_percent
 from jaxdamp.identify.rungs import Failure, Rung
 from jaxdamp.identify.training import Training, train
+from jaxdamp.identify.vehicle_fitting import fit_vehicle
+from jaxdamp.identify.vehicle_model import InitialMotion, VehicleTest
+from jaxdamp.identify.vehicle_result import ChannelScore, VehicleFit
+from jaxdamp.identify.virtual_ride import virtual_ride
 
 
 __all__ = [
     "LAWS",
     "NAMED_LAWS",
     "AbstractResiduals",
+    "ChannelScore",
     "Comparison",
     "CrossValidation",
     "ErrorShares",
     "Estimate",
     "Failure",
     "FitResult",
+    "InitialMotion",
     "NamedLaw",
     "Problem",
     "Rung",
     "Score",
     "Status",
     "Training",
+    "VehicleFit",
+    "VehicleTest",
     "compare",
     "cross_validate",
     "default_ladder",
@@ -39,6 +47,7 @@ __all__ = [
     "fit",
     "fit_each",
     "fit_percent",
+    "fit_vehicle",
     "judge",
     "ladder_starts",
     "laws_table",
@@ -46,4 +55,5 @@ __all__ = [
     "rounded",
     "solve",
     "train",
+    "virtual_ride",
 ]

@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxdamp._tables import Cell, Column, Shown, Table, with_tied
-from jaxdamp.identify.model import Model
-from jaxdamp.parameters import free_parameters
+from jaxdamp.parameters import Module, free_parameters
 
 
 PLACES = 3  # decimal places of values in exponential form
@@ -53,7 +52,7 @@ def rounded(value: float, error: float) -> tuple[str, str]:
     return next(texts), next(texts)
 
 
-def parameter_table(title: str, estimates: Sequence[Estimate], truth: Model | None = None) -> Table:
+def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | None = None) -> Table:
     """Fitted values with standard errors, and the true values if they are known.
 
     Arguments:
@@ -76,7 +75,7 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: Model | No
     return Table(title, tuple(columns), tuple(rows))
 
 
-def _numbers(model: Model) -> dict[str, float]:
+def _numbers(model: Module) -> dict[str, float]:
     """Every number of a model by name."""
     free = free_parameters(model)
     return {name: float(value) for name, value in zip(free.names, free.values, strict=True)}

@@ -12,6 +12,7 @@ from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify._tall import triangle
+from jaxdamp.identify.front_door import also_of_vehicles
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.model import rig_of
 from jaxdamp.identify.preparing import prepare
@@ -28,6 +29,7 @@ from jaxdamp.rig import Rig
 NUMERICAL = (ValueError, ArithmeticError, eqx.EquinoxRuntimeError, jax.errors.JaxRuntimeError)
 
 
+@also_of_vehicles
 def fit(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],
@@ -43,7 +45,7 @@ def fit(
     starts: int | None = None,
     max_steps: int = 200,
 ) -> FitResult:
-    """Fit a damper law to bench records by least squares on the force.
+    """Fit a damper law to bench records by least squares on the force; a vehicle to its records, as `fit_vehicle` says.
 
     Minimises Σ ((F_law − F_measured)/σ)² over all samples of all records, with Levenberg-Marquardt inside the domains
     of the parameters, and Jacobians by forward-mode differentiation through the law and its states. Where the law is

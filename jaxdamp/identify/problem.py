@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper, Reach
+from jaxdamp.dampers import Reach
 from jaxdamp.parameters import Coordinates, FreeParameters
 
 
@@ -41,11 +41,12 @@ class Problem(NamedTuple):
         free: the free parameters of the model, with their start.
         residuals: what is minimised, as a sum of squares.
         level: size of the measured forces in the units of the residuals, root of the sum of squares.
-        runs: the records given.
-        sigma: standard deviation [N] by which the residuals of each record are divided, infinite for one left out.
-        owner: the number of the record that each sample of the residuals belongs to.
+        runs: the records given, of a bench (`BenchRun`) or of a vehicle (`RideRecord`).
+        sigma: standard deviation by which the residuals of each record are divided, infinite for one left out; of a
+            vehicle, those of each channel.
+        owner: the number of the record, or of the channel, that each sample of the residuals belongs to.
         reach: extent of the fitted records.
-        law: the model to start from, with one value for each parameter.
+        law: the law or the vehicle to start from, with one value for each parameter.
         per_record: paths of the parameters with a value for each record.
         each: whether every record has its own noise level.
     """
@@ -53,11 +54,11 @@ class Problem(NamedTuple):
     free: FreeParameters
     residuals: tuple[AbstractResiduals, ...]
     level: float
-    runs: tuple[BenchRun, ...]
+    runs: tuple[Any, ...]
     sigma: tuple[float, ...]
     owner: Int[np.ndarray, " samples"]
     reach: Reach
-    law: AbstractDamper
+    law: Any
     per_record: tuple[str, ...]
     each: bool
 

@@ -96,6 +96,9 @@ def modules_inside(tree: Any, prefix: str = "") -> Iterator[tuple[str, eqx.Modul
     if isinstance(tree, tuple | list):
         for index, item in enumerate(tree):
             yield from modules_inside(item, f"{prefix}{index}.")
+    elif isinstance(tree, dict):
+        for key, item in tree.items():
+            yield from modules_inside(item, f"{prefix}{key}.")
     elif isinstance(tree, eqx.Module):
         yield prefix, tree
         for field in dataclasses.fields(tree):
@@ -119,6 +122,9 @@ def parameters(tree: Any, prefix: str = "") -> list[Parameter]:
     if isinstance(tree, tuple | list):
         for index, item in enumerate(tree):
             found += parameters(item, f"{prefix}{index}.")
+    elif isinstance(tree, dict):
+        for key, item in tree.items():
+            found += parameters(item, f"{prefix}{key}.")
     elif isinstance(tree, eqx.Module):
         for field in dataclasses.fields(tree):
             value = getattr(tree, field.name)

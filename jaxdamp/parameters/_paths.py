@@ -18,7 +18,10 @@ Tree = TypeVar("Tree")
 def get(tree: Any, path: str) -> Any:
     """The value at a path such as `"damper.terms.0.rate"`."""
     for part in path.split(".") if path else []:
-        tree = tree[int(part)] if isinstance(tree, tuple | list) else getattr(tree, part)
+        if isinstance(tree, tuple | list):
+            tree = tree[int(part)]
+        else:
+            tree = tree[part] if isinstance(tree, dict) else getattr(tree, part)
     return tree
 
 

@@ -17,6 +17,7 @@ from jaxdamp.plots.rides import ride
 from jaxdamp.plots.roughness import roughness_by_segment
 from jaxdamp.plots.sweeps import sweep
 from jaxdamp.plots.validation import cross_validation
+from jaxdamp.plots.vehicle_fit import vehicle_fit
 
 
 __all__ = [
@@ -34,4 +35,5 @@ __all__ = [
     "sweep",
     "training_history",
     "tuning",
+    "vehicle_fit",
 ]

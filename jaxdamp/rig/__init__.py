@@ -3,6 +3,17 @@
 from jaxdamp.rig.constant_velocity import QuasiStatic, quasi_static
 from jaxdamp.rig.machine import Readings, Rig
 from jaxdamp.rig.response import AbstractLawEngine, march, respond, solve_law
+from jaxdamp.rig.sensor import Sensor
 
 
-__all__ = ["AbstractLawEngine", "QuasiStatic", "Readings", "Rig", "march", "quasi_static", "respond", "solve_law"]
+__all__ = [
+    "AbstractLawEngine",
+    "QuasiStatic",
+    "Readings",
+    "Rig",
+    "Sensor",
+    "march",
+    "quasi_static",
+    "respond",
+    "solve_law",
+]

@@ -5,15 +5,16 @@ Engines are `Exponential` and `Adaptive`; one of your own derives from `Abstract
 
 from jaxdamp.simulation.adaptive import Adaptive
 from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome
-from jaxdamp.simulation.equations import Equations, RoadInput, StepState
+from jaxdamp.simulation.equations import Equations, RoadInput, StepState, settled
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
 from jaxdamp.simulation.range_notes import named_laws, range_sentences
+from jaxdamp.simulation.recorder import recorded
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride
 from jaxdamp.simulation.run import simulate
 from jaxdamp.simulation.stationary import DEVIATIONS
-from jaxdamp.simulation.step_size import CoarseStepWarning
+from jaxdamp.simulation.step_size import CoarseStepWarning, RunCheck
 from jaxdamp.simulation.tables import comfort_table, metrics_table
 from jaxdamp.simulation.wheels import AxleTiming, moves_axles
 
@@ -33,11 +34,14 @@ __all__ = [
     "Response",
     "Ride",
     "RoadInput",
+    "RunCheck",
     "StepState",
     "comfort_table",
     "metrics_table",
     "moves_axles",
     "named_laws",
     "range_sentences",
+    "recorded",
+    "settled",
     "simulate",
 ]

@@ -20,6 +20,7 @@ from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position, static_
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
 from jaxdamp.vehicles.full_car import FullCar
+from jaxdamp.vehicles.guided import Guide, Guided
 from jaxdamp.vehicles.half_car import HalfCar
 from jaxdamp.vehicles.linear import LinearVehicle, linearise
 from jaxdamp.vehicles.modes import Modes, modes
@@ -53,6 +54,8 @@ __all__ = [
     "Element",
     "Frame",
     "FullCar",
+    "Guide",
+    "Guided",
     "HalfCar",
     "IndependentTandem",
     "Layout",

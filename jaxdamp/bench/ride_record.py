@@ -1,0 +1,143 @@
+"""One record of a vehicle on a rig or on a road: what moved it, and what its sensors measured."""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp import _checks
+from jaxdamp.bench import sampling
+
+
+RIDE_MARK = "# jaxdamp ride record: heights and accelerations up, travels positive in extension"
+RIDE_SETTINGS_MARK = "# settings: "
+ROAD = "road"
+
+
+@final
+@dataclass(frozen=True, repr=False, eq=False)
+class RideRecord:
+    """A vehicle on a road or on a rig: the heights under its wheels, and the measured channels.
+
+    Channels have the names of the vehicle's channels (`vehicle.units` lists them, `vehicle.descriptions` says which
+    direction is positive): `sprung_acceleration`, `stroke`, `z_unsprung`, `dynamic_tyre_load`. All are in SI; heights
+    and accelerations are positive up, travels and their rates in extension. Arrays are copies and read-only.
+
+    Arguments:
+        name: name of the record.
+        time: instants [s], uniform and increasing, shape (time,).
+        road: height of the road, or of the platform of a test rig, under each wheel [m], up positive, in the order of
+            `vehicle.wheel_names`, shape (time, wheels); one wheel may be given in one dimension. The rear axle's column
+            has its own heights at the same instants.
+        channels: the measured channels by name, each of shape (time,).
+        units: their SI units, as far as they are known; `fit` compares them with those of the vehicle.
+        settings: further facts about the record by name, such as payload or speed.
+        source: the file, or another origin.
+        notes: sentences on what was done to the data.
+
+    Raises:
+        ValueError: no channels, channels of different lengths, fewer than 20 samples, NaN, time that is not uniform, a
+            road that stands still.
+
+    >>> time = np.arange(500) / 500
+    >>> platform = 0.01 * np.sin(6 * np.pi * time)
+    >>> RideRecord("3 Hz", time, platform, {"stroke": 0.4 * platform}, units={"stroke": "m"})
+    RideRecord('3 Hz': 1 s at 500 Hz, 1 wheel moved by 20 mm, measured: stroke)
+    """
+
+    name: str
+    time: np.ndarray
+    road: np.ndarray
+    channels: Mapping[str, np.ndarray]
+    units: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, float | int | str] = field(default_factory=dict)
+    source: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        where = f"record {self.name!r}"
+        if not self.channels:
+            remedy = "Write `channels={'sprung_acceleration': values}`."
+            _checks.refuse("channels", "hold at least one measured channel", "empty", remedy)
+        time, road = np.array(self.time, np.float64), np.array(self.road, np.float64)
+        road = road[:, None] if road.ndim == 1 else road
+        sampling.check_count(len(time), where)
+        sampling.check_numbers(time, "time", where)
+        time, note = sampling.check_time(time, where)
+        channels = {name: np.array(values, np.float64) for name, values in self.channels.items()}
+        for name, values in {ROAD: road, **channels}.items():
+            if len(values) != len(time) or values.ndim != 1 + (name == ROAD):
+                _checks.refuse(name, f"have one sample for each of {len(time)} instants", f"of shape {values.shape}")
+            sampling.check_numbers(np.ravel(values), name, where)
+        if not np.any(np.ptp(road, axis=0) > 0):
+            remedy = "Free motion after a release has no input: give the heights while the vehicle is moved."
+            _checks.refuse(ROAD, "move", f"constant in {where}", remedy)
+        for values in (time, road, *channels.values()):
+            values.setflags(write=False)
+        unknown = [name for name in self.units if name not in channels]
+        if unknown:
+            _checks.one_of("units", unknown[0], channels)
+        notes = (*self.notes, *([note] if note else []))
+        for argument, value in {"time": time, ROAD: road, "channels": channels, "notes": notes}.items():
+            object.__setattr__(self, argument, value)
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.time)
+
+    def __getitem__(self, channel: str) -> Float[np.ndarray, " time"]:
+        """A measured channel."""
+        _checks.one_of("channel", channel, self.channels)
+        return self.channels[channel]
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s]."""
+        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+    @property
+    def wheels(self) -> int:
+        """Number of wheels that the road moves."""
+        return self.road.shape[1]
+
+    def between(self, start: float | int, stop: float | int) -> "RideRecord":
+        """The part of the record with start ≤ time < stop [s]."""
+        chosen = (self.time >= start) & (self.time < stop)
+        channels = {name: values[chosen] for name, values in self.channels.items()}
+        notes = (*self.notes, f"cut to {start:g} to {stop:g} s")
+        cut = self.time[chosen], self.road[chosen], channels, self.units, self.settings, self.source, notes
+        return RideRecord(self.name, *cut)
+
+    def to_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write the record with units in its header; `read_rides` gives back the same numbers to the last bit."""
+        for name in self.channels:
+            if not self.units.get(name):
+                remedy = f"Give it when the record is made: `units={{{name!r}: 'm/s^2'}}`."
+                _checks.refuse("units", "state the unit of each channel", f"without one for {name!r}", remedy)
+        roads = [ROAD] if self.wheels == 1 else [f"{ROAD} {i + 1}" for i in range(self.wheels)]
+        header = ["time [s]", *[f"{name} [m]" for name in roads]]
+        header += [f"{name} [{self.units[name]}]" for name in self.channels]
+        columns = np.column_stack([self.time, self.road, *self.channels.values()])
+        settings = [RIDE_SETTINGS_MARK + json.dumps(dict(self.settings))] if self.settings else []
+        rows = [",".join(map(repr, row)) for row in columns.tolist()]
+        path = Path(path)
+        path.write_text("\n".join([RIDE_MARK, *settings, ",".join(header), *rows]) + "\n", encoding="utf-8")
+        return path
+
+    def summary(self) -> dict[str, Any]:
+        """Length, rate and the standard deviation of each channel, in SI."""
+        levels = {f"standard deviation of {name}": float(np.std(values)) for name, values in self.channels.items()}
+        return {"name": self.name, "samples": len(self), "sampling_rate": 1.0 / self.dt, **levels}
+
+    def __repr__(self) -> str:
+        rate, moved = 1.0 / self.dt, 1e3 * float(np.max(np.ptp(self.road, axis=0)))
+        wheels = f"{self.wheels} wheel{'s' * (self.wheels > 1)}"
+        return (
+            f"RideRecord({self.name!r}: {len(self) * self.dt:.4g} s at {rate:.6g} Hz, {wheels} moved by {moved:.3g} mm,"
+            f" measured: {', '.join(self.channels)})"
+        )

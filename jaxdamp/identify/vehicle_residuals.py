@@ -1,0 +1,153 @@
+"""The residuals of a vehicle: its records, and bench records of its damper."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, final
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxdamp.bench import BenchRun, RideRecord
+from jaxdamp.identify.model import on_rig
+from jaxdamp.identify.problem import AbstractResiduals
+from jaxdamp.identify.traces import Batch, batches, owners
+from jaxdamp.identify.vehicle_model import VehicleTest
+from jaxdamp.parameters import get, with_values
+from jaxdamp.simulation import AbstractEngine, recorded, settled
+
+
+@final
+class RideBatch(AbstractResiduals):
+    """Records of equal length, sampling rate and channels, driven side by side.
+
+    Samples are in the order of records, channels, time.
+    """
+
+    heights: Float[Array, "records fine wheels"]
+    measured: Float[Array, "records channels time"]
+    weight: Float[Array, "records channels time"]
+    number: Int[Array, " records"]  # of each record among those given
+    engine: AbstractEngine
+    dt: float = eqx.field(static=True)  # of the simulation
+    finer: int = eqx.field(static=True)  # steps of the simulation in a sampling interval
+    channels: tuple[str, ...] = eqx.field(static=True)
+    per_record: tuple[str, ...] = eqx.field(static=True)  # paths where the model has a value for each record
+
+    def predict(self, model: VehicleTest) -> Float[Array, "records channels time"]:
+        """What the sensors show, in SI."""
+
+        def one(heights: Array, number: Array) -> Array:
+            own = with_values(model, {path: get(model, path)[number] for path in self.per_record})
+            system, dt = own.vehicle.system(), jnp.asarray(self.dt, heights.dtype)
+            start = settled(system, heights[0])
+            if own.starts:
+                motions = [jnp.concatenate([begin.position, begin.rate]) for begin in own.starts]
+                start = start + jnp.stack(motions)[number]
+            saved, _ = recorded(self.engine, system, heights, dt, start)
+            rows = system.channels(self.channels)
+            values = jax.vmap(rows)(saved.motion, saved.port_force, saved.road, saved.road_rate).T
+            sensors = [own.sensors.get(name) for name in self.channels]
+            shown = [v if sensor is None else sensor(v, dt) for sensor, v in zip(sensors, values, strict=True)]
+            return jnp.stack(shown)[:, :: self.finer]
+
+        if self.heights.shape[0] == 1:  # one loop over time is compiled to faster code than a batch of one
+            return one(self.heights[0], self.number[0])[None]
+        return jax.vmap(one)(self.heights, self.number)
+
+    def __call__(self, model: VehicleTest) -> Float[Array, " samples"]:
+        """Weighted difference between model and measurement."""
+        return jnp.ravel((self.predict(model) - self.measured) * self.weight)
+
+    def used(self) -> Bool[np.ndarray, " samples"]:
+        """Which samples count."""
+        return np.ravel(np.asarray(self.weight)) > 0
+
+    def total_weight(self) -> Float[Array, ""]:
+        """Sum of the squared weights."""
+        return jnp.sum(jnp.square(self.weight))
+
+
+@final
+class DamperOnBench(AbstractResiduals):
+    """Bench records of a law of the vehicle."""
+
+    batch: Batch
+    path: str = eqx.field(static=True)  # of the law in the vehicle
+
+    def __call__(self, model: VehicleTest) -> Float[Array, " samples"]:
+        """Weighted difference of the law's force from the measured one."""
+        return self.batch(on_rig(get(model.vehicle, self.path), model.rig))
+
+    def used(self) -> Bool[np.ndarray, " samples"]:
+        """Which samples count."""
+        return self.batch.used()
+
+    def total_weight(self) -> Float[Array, ""]:
+        """Sum of the squared weights."""
+        return self.batch.total_weight()
+
+
+class Drive(NamedTuple):
+    """How a record is simulated: heights at the instants of the simulation [m], its step [s] and engine."""
+
+    heights: Float[np.ndarray, "fine wheels"]
+    dt: float
+    finer: int
+    engine: AbstractEngine
+
+
+def finer_heights(record: RideRecord, finer: int) -> Float[np.ndarray, "fine wheels"]:
+    """The heights under the wheels at `finer` times as many instants, on a smooth curve through the samples."""
+    if finer == 1:
+        return record.road
+    from scipy.interpolate import CubicSpline  # few fits need it
+
+    numbers = np.arange(len(record))
+    return CubicSpline(numbers, record.road)(np.arange((len(record) - 1) * finer + 1) / finer)
+
+
+def ride_batches(
+    records: Sequence[RideRecord],
+    drives: Sequence[Drive],
+    sigma: Mapping[str, float],
+    settling: float,
+    per_record: tuple[str, ...],
+) -> list[RideBatch]:
+    """Records in groups that are driven together, in the order of their first members.
+
+    Arguments:
+        records: the records.
+        drives: how each is simulated.
+        sigma: standard deviation of each channel, by which its residuals are divided.
+        settling: time at the beginning of each record that is not compared [s].
+        per_record: paths where the model has a value for each record.
+    """
+    groups: dict[tuple, list[int]] = {}
+    for i, (record, drive) in enumerate(zip(records, drives, strict=True)):
+        alike = len(record), round(record.dt, 12), tuple(record.channels), drive.finer, drive.engine.step_count
+        groups.setdefault(alike, []).append(i)
+    made = []
+    for (length, dt, channels, finer, _), members in groups.items():
+        one = drives[members[0]]
+        weight = np.zeros((len(members), len(channels), length))
+        weight[:, :, int(np.ceil(settling / dt)) :] = (1.0 / np.array([sigma[c] for c in channels]))[None, :, None]
+        heights = np.stack([drives[i].heights for i in members])
+        measured = np.stack([np.stack(list(records[i].channels.values())) for i in members])
+        arrays = (jnp.asarray(a, float) for a in (heights, measured, weight))
+        made.append(RideBatch(*arrays, jnp.asarray(members, int), one.engine, dt / finer, finer, channels, per_record))
+    return made
+
+
+def bench_parts(
+    model: VehicleTest, benches: Mapping[str, Sequence[BenchRun]], sigma: Mapping[str, float], per_cycle: int | None
+) -> tuple[list[DamperOnBench], list[Int[np.ndarray, " samples"]]]:
+    """The residuals of bench records by the path of the law, and for each sample the number of its path."""
+    parts, numbers = [], []
+    for number, (path, runs) in enumerate(benches.items()):
+        law = on_rig(get(model.vehicle, path), model.rig)
+        made, ranges = batches(law, runs, [sigma[path]] * len(runs), per_cycle)
+        parts += [DamperOnBench(batch, path) for batch in made]
+        numbers.append(np.full(owners(made, ranges).size, number))
+    return parts, numbers

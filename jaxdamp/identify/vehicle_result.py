@@ -1,0 +1,189 @@
+"""The result of a fit of a vehicle."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp._status import Status
+from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp.bench import RideRecord
+from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.result import fit_percent
+from jaxdamp.identify.vehicle_model import VehicleTest
+from jaxdamp.identify.vehicle_residuals import RideBatch
+from jaxdamp.rig import Rig, Sensor
+from jaxdamp.vehicles import AbstractVehicle
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class ChannelScore(NamedTuple):
+    """How well the vehicle predicts a channel of a record."""
+
+    record: str
+    channel: str
+    unit: str
+    rmse: float  # in the unit
+    fit_percent: float
+    largest_error: float  # in the unit
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class VehicleFit:
+    """A vehicle fitted to records of its motion, with the uncertainty of its parameters.
+
+    Attributes:
+        vehicle: the fitted vehicle; parameters with a value for each record have their mean.
+        records: the records given.
+        parameters: an estimate for each free number, with unit, standard error and 95 % interval.
+        covariance: of the free numbers, in their units, in the order of `parameters`.
+        scores: errors of each channel of each record.
+        warnings: doubts about the result, in words.
+        status: how the search ended.
+        steps: steps of the last search.
+        inflation: factor on the standard errors because residuals are correlated from sample to sample; 1 if not.
+        sensors: the fitted sensors, by channel.
+        held: parameters that were held because the records do not show the scale.
+        scale_free: the parameters that may all be larger by one factor, which the records do not show.
+        rig: the fitted test machine of the bench records, if one was fitted.
+        problem: the least squares at the result.
+    """
+
+    vehicle: AbstractVehicle
+    records: tuple[RideRecord, ...]
+    parameters: tuple[Estimate, ...]
+    covariance: Float[np.ndarray, "free free"]
+    scores: tuple[ChannelScore, ...]
+    warnings: tuple[str, ...]
+    status: Status
+    steps: int
+    inflation: float
+    sensors: dict[str, Sensor]
+    held: tuple[str, ...]
+    scale_free: tuple[str, ...]
+    rig: Rig | None
+    problem: Problem
+
+    @property
+    def converged(self) -> bool:
+        """Whether the search ended by its tolerance."""
+        return self.status is Status.CONVERGED
+
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of that name, or of the only one whose name ends with it: "sprung_mass", "stroke.offset"."""
+        found = [e for e in self.parameters if e.name == name]
+        found = found or [e for e in self.parameters if e.name.endswith(f".{name}")]
+        if len(found) != 1:
+            what = f"{len(found)} parameters are" if found else "No parameter is"
+            raise KeyError(f"{what} named {name!r}; there are {', '.join(e.name for e in self.parameters)}.")
+        return found[0]
+
+    def predict(self) -> dict[str, dict[str, Float[np.ndarray, " time"]]]:
+        """What the sensors would show without noise, by the name of the record and the channel, in SI."""
+        model, channels = self.problem.free.tree, {}
+        for part in self.problem.residuals:
+            if isinstance(part, RideBatch):
+                for number, rows in zip(np.asarray(part.number), np.asarray(_predict(part, model)), strict=True):
+                    channels[int(number)] = dict(zip(part.channels, rows, strict=True))
+        return {record.name: channels[i] for i, record in enumerate(self.records)}
+
+    def table(self, truth: AbstractVehicle | None = None, *, sensors: dict[str, Sensor] | None = None) -> Table:
+        """The parameters with units, standard errors and meanings, compared with a true vehicle if one is given.
+
+        Arguments:
+            truth: the true vehicle.
+            sensors: its true sensors.
+        """
+        true = None if truth is None else VehicleTest(truth, sensors or {})
+        return parameter_table(f"Parameters of {type(self.vehicle).__name__}", self.parameters, true)
+
+    def scores_table(self) -> Table:
+        """The errors of each channel of each record."""
+        columns = [Column("record"), Column("channel"), Column("unit"), Column("RMSE", spec=".3g")]
+        columns += [Column("fit", "%", ".1f"), Column("largest error", spec=".3g")]
+        return Table("Channels", tuple(columns), tuple(tuple(score) for score in self.scores))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
+        return {
+            "vehicle": repr(self.vehicle),
+            "sensors": {name: repr(sensor) for name, sensor in self.sensors.items()},
+            "status": self.status.name.lower(),
+            "converged": self.converged,
+            "warnings": list(self.warnings),
+            "held": list(self.held),
+            "scale_free": list(self.scale_free),
+            "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
+            "covariance": plain(self.covariance),
+            "scores": [
+                {
+                    "record": s.record,
+                    "channel": s.channel,
+                    "rmse": with_unit(s.rmse, s.unit),
+                    "fit": with_unit(s.fit_percent, "%"),
+                    "largest_error": with_unit(s.largest_error, s.unit),
+                }
+                for s in self.scores
+            ],
+        }
+
+    def plot(self, record: str | None = None) -> "Figure":
+        """Measured and fitted channels of a record over time, with residuals (`plots.vehicle_fit`)."""
+        from jaxdamp.plots import vehicle_fit
+
+        return vehicle_fit(self, record)
+
+    def __repr__(self) -> str:
+        width = max(len(e.name) for e in self.parameters)
+        texts = [rounded(e.value, e.standard_error) for e in self.parameters]
+        percent = {s.channel: s.fit_percent for s in self.scores}
+        worst = min(percent, key=lambda name: percent[name])
+        lines = [
+            f"{type(self.vehicle).__name__} on {len(self.records)} record(s): worst channel {worst},"
+            f" {percent[worst]:.1f} %"
+        ]
+        for e, (value, error) in zip(self.parameters, texts, strict=True):
+            note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
+            lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
+        return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])
+
+
+@eqx.filter_jit
+def _predict(batch: RideBatch, model: VehicleTest) -> Array:
+    return batch.predict(model)
+
+
+def channel_scores(
+    problem: Problem, residual: Float[np.ndarray, " samples"], records: Sequence[RideRecord], channels: Sequence[str]
+) -> tuple[ChannelScore, ...]:
+    """Errors of each channel of each record over the samples that are compared.
+
+    Arguments:
+        problem: the least squares.
+        residual: at the minimum, weighted.
+        records: the records.
+        channels: all channels in the order of `problem.sigma`.
+    """
+    scores, end, units = {}, 0, problem.law.units
+    for part in problem.residuals:
+        if not isinstance(part, RideBatch):
+            continue
+        weight = np.asarray(part.weight)
+        begin, end = end, end + weight.size
+        used, errors = weight > 0, residual[begin:end].reshape(weight.shape)
+        for i, number in enumerate(np.asarray(part.number)):
+            for k, channel in enumerate(part.channels):
+                chosen = used[i, k]
+                error = errors[i, k][chosen] * problem.sigma[channels.index(channel)]
+                measured = records[number][channel][chosen]
+                rmse, most = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
+                percent = fit_percent([measured], [measured + error])
+                scores[number, k] = ChannelScore(records[number].name, channel, units[channel], rmse, percent, most)
+    return tuple(scores[key] for key in sorted(scores))

@@ -1,0 +1,82 @@
+"""A sensor of a vehicle: what it makes of a channel before that stands in a record."""
+
+from typing import Any, final
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._types import Number, ScalarLike, Signal
+from jaxdamp.parameters import Module, check_parameters, nonnegative, parameter, positive, readable
+from jaxdamp.rig.channel import delayed, lagged
+
+
+@final
+class Sensor(Module):
+    """A sensor with gain, zero error, lag, delay and high-pass: which of them are given is what it has.
+
+        shown(t) = gain · h(t − delay) + offset,  h = high-pass of the channel behind a first-order lag
+
+    The high-pass, of an accelerometer coupled by a capacitor for instance, is of first order. Both filters are settled
+    at the first sample.
+
+    In a fit (`identify.fit_vehicle`) the numbers given are free, with these values as start: `Sensor(offset=0.0,
+    lag=1e-3)` estimates a zero error and a lag. `freeze` holds known ones.
+
+    Arguments:
+        gain: factor on the channel.
+        offset: zero error, in the unit of the channel.
+        lag: time constant of a first-order lag [s].
+        delay: of the channel behind the road channel [s].
+        high_pass: corner frequency of a first-order high-pass [Hz].
+
+    >>> signal = jnp.ones(5)
+    >>> Sensor(gain=2.0, offset=0.5)(signal, 1e-3).tolist()
+    [2.5, 2.5, 2.5, 2.5, 2.5]
+    >>> Sensor(high_pass=0.5)(signal, 1e-3).tolist()
+    [0.0, 0.0, 0.0, 0.0, 0.0]
+    """
+
+    gain: Number = parameter("", "gain of the sensor", positive)
+    offset: Number = parameter("", "zero error of the sensor, in the unit of its channel")
+    lag: Number = parameter("s", "time constant of the sensor's first-order lag", nonnegative)
+    delay: Number = parameter("s", "delay of the channel behind the road channel")
+    high_pass: Number = parameter("Hz", "corner frequency of the sensor's high-pass", nonnegative)
+    given: tuple[str, ...] = eqx.field(static=True)
+
+    def __init__(
+        self,
+        *,
+        gain: Any = None,
+        offset: Any = None,
+        lag: Any = None,
+        delay: Any = None,
+        high_pass: Any = None,
+    ) -> None:
+        numbers = {"gain": gain, "offset": offset, "lag": lag, "delay": delay, "high_pass": high_pass}
+        for name, value in numbers.items():
+            setattr(self, name, (1.0 if name == "gain" else 0.0) if value is None else value)
+        self.given = tuple(name for name, value in numbers.items() if value is not None)
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
+
+    def __repr__(self) -> str:
+        return readable(self) if not self.given else f"Sensor({', '.join(self._words())})"
+
+    def _words(self) -> list[str]:
+        numbers = {name: _checks.concrete(getattr(self, name)) for name in self.given}
+        return [f"{name}={'traced' if value is None else value.tolist()}" for name, value in numbers.items()]
+
+    def __call__(self, values: Signal, dt: ScalarLike) -> Signal:
+        """What the sensor shows of a channel sampled every dt [s], in the unit of the channel, shape (time,)."""
+        if "lag" in self.given:
+            values = lagged(values, self.lag / dt)
+        if "high_pass" in self.given:
+            corner = 2.0 * np.pi * self.high_pass * dt  # in radians a sample
+            safe = jnp.where(corner > 0.0, corner, 1.0)
+            values = jnp.where(corner > 0.0, values - lagged(values, 1.0 / safe), values)
+        if "delay" in self.given:
+            values = delayed(values, self.delay / dt)
+        return self.gain * values + self.offset

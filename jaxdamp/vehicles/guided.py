@@ -1,0 +1,65 @@
+"""Guides and springs between a vehicle and the ground, as a test rig has them."""
+
+import dataclasses
+from typing import Any, final
+
+import equinox as eqx
+
+from jaxdamp._types import Number
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import nonnegative, parameter
+from jaxdamp.vehicles.base import AbstractVehicle
+from jaxdamp.vehicles.frame import Frame
+from jaxdamp.vehicles.parts import SPRUNG, AbstractPart, Element, Link
+
+
+@final
+class Guide(AbstractPart):
+    """What holds a body to the ground: friction of a linear guide, a spring of a cable, a dashpot.
+
+    Its channels begin with `{body}_guide`: `sprung_guide_stroke`, and the force `sprung_guide_friction_force` of the
+    law.
+
+    Arguments:
+        law: law of the height of the body above the ground, such as `dampers.CoulombFriction`.
+        body: name of the body.
+        ahead: of the centre of gravity of the body [m], for bodies that pitch.
+        stiffness: of a spring to the ground [N/m].
+        damping: of a dashpot to the ground [N s/m].
+    """
+
+    law: AbstractDamper | None = None
+    body: str = eqx.field(static=True, default=SPRUNG)
+    ahead: Any = None
+    stiffness: Number = parameter("N/m", "stiffness of the spring to the ground", nonnegative, default=0.0)
+    damping: Number = parameter("N s/m", "coefficient of the dashpot to the ground", nonnegative, default=0.0)
+
+    def link(self, frame: Frame) -> Link:
+        """The guide as a link from the ground to its body."""
+        elements = () if self.law is None else (Element("friction", self.law),)
+        point = frame.body(self.body).at(self.ahead)
+        return Link(f"{self.body}_guide", point, self.stiffness, self.damping, elements)
+
+
+@final
+class Guided(AbstractVehicle):
+    """A vehicle whose bodies run in guides, or are held to the ground: a quarter-car rig.
+
+    Arguments:
+        car: any vehicle.
+        guides: of its bodies, one for each.
+
+    >>> from jaxdamp.dampers import CoulombFriction
+    >>> from jaxdamp.vehicles import presets
+    >>> rig = Guided(presets.quarter_car_mathworks(), (Guide(CoulombFriction(30.0, 0.01)),))
+    >>> rig.layout.ports
+    ('damper', 'sprung_guide_friction')
+    """
+
+    car: AbstractVehicle
+    guides: tuple[Guide, ...]
+
+    def frame(self) -> Frame:
+        """The parts of the vehicle and the guides."""
+        frame = self.car.frame()
+        return dataclasses.replace(frame, links=(*frame.links, *[guide.link(frame) for guide in self.guides]))

@@ -1,0 +1,185 @@
+"""Vehicles from records of their motion."""
+
+import numpy as np
+import pytest
+
+from jaxdamp import bench, identify, roads
+from jaxdamp.dampers import Bilinear, CoulombFriction, Linear
+from jaxdamp.parameters import replace
+from jaxdamp.rig import Rig, Sensor
+from jaxdamp.vehicles import Guide, Guided, QuarterCar
+
+
+CAR = QuarterCar(300.0, 40.0, 20e3, 180e3, Linear(1500.0))
+FREE = ["sprung_mass", "unsprung_mass", "spring_rate", "tyre_stiffness", "damper.rate"]
+NOISE = {"sprung_acceleration": 0.05, "stroke": 2e-4}
+SENSORS = {"stroke": Sensor(offset=1e-3)}
+START = replace(CAR, {"spring_rate": 16e3, "tyre_stiffness": 210e3, "damper.rate": 1100.0, "unsprung_mass": 50.0})
+SWEEP = roads.sweep_sine(0.7, 14.0, duration=4.0, velocity_amplitude=0.15)
+ZERO = {"stroke": Sensor(offset=0.0)}
+
+
+@pytest.fixture(scope="module")
+def record():
+    return identify.virtual_ride(CAR, SWEEP, NOISE, sampling_rate=250.0, finer=4, sensors=SENSORS, name="sweep", seed=2)
+
+
+@pytest.fixture(scope="module")
+def motions(record):
+    """From motions only."""
+    return identify.fit(replace(START, {"sprung_mass": 330.0}), record, over=FREE, sensors=ZERO, dt=2e-3)
+
+
+def assert_recovered(result, vehicle, sensors=SENSORS):
+    away = {str(row[0]): float(str(row[5])) for row in result.table(vehicle, sensors=sensors).rows}
+    assert all(abs(a) < 3.5 for a in away.values()), away
+
+
+def test_motions_give_all_ratios_and_say_that_the_scale_is_free(motions):
+    assert isinstance(motions, identify.VehicleFit) and motions.converged
+    assert motions.held == ("vehicle.sprung_mass",) and len(motions.scale_free) == 5
+    assert len(motions.warnings) == 1 and "vehicle.sprung_mass was held at 330" in motions.warnings[0]
+    larger = {name: 1.1 * float(getattr(CAR, name)) for name in FREE[:-1]} | {"damper.rate": 1.1 * 1500.0}
+    assert_recovered(motions, replace(CAR, larger))
+
+
+def test_the_weights_are_the_noise_of_each_channel(motions):
+    assert {score.channel: score.rmse for score in motions.scores} == pytest.approx(NOISE, rel=0.06)
+    assert motions.inflation == 1.0
+
+
+def test_a_result_shows_itself(motions, record):
+    assert motions["stroke.offset"].unit == "m" and motions["damper.rate"].unit == "N s/m"
+    with pytest.raises(KeyError, match="No parameter is named 'sprung_mass'"):
+        motions["sprung_mass"]
+    told = motions.to_dict()
+    assert told["converged"] is True and told["scores"][0]["rmse"]["unit"] == "m/s^2"
+    assert "vehicle.damper.rate" in repr(motions) and "Channels" in str(motions.scores_table())
+    predicted = motions.predict()["sweep"]["stroke"]
+    assert np.std(predicted - record["stroke"]) == pytest.approx(2e-4, rel=0.05)
+    assert len(motions.plot().axes) == 4
+
+
+def test_a_measured_force_shows_the_scale():
+    noise = {**NOISE, "dynamic_tyre_load": 20.0}
+    loads = identify.virtual_ride(CAR, SWEEP, noise, sampling_rate=250.0, finer=4, sensors=SENSORS, seed=2)
+    result = identify.fit_vehicle(START, loads, over=FREE, sensors=ZERO, dt=2e-3)
+    assert not result.held and not result.warnings
+    assert_recovered(result, CAR)
+    assert result["sprung_mass"].standard_error < 3.0
+
+
+def test_a_known_mass_gives_the_scale(record, motions):
+    result = identify.fit_vehicle(START, record, over=FREE, sensors=ZERO, dt=2e-3, freeze=["sprung_mass"])
+    assert not result.warnings and not result.scale_free
+    assert_recovered(result, CAR)
+    assert result["damper.rate"].value == pytest.approx(motions["damper.rate"].value / 1.1, rel=1e-6)
+
+
+def wrong(**changed):
+    time = np.arange(100) / 250
+    given = {"name": "one", "time": time, "road": np.sin(time), "channels": {"stroke": np.sin(3 * time)}} | changed
+    return bench.RideRecord(**given)
+
+
+@pytest.mark.parametrize(
+    ("records", "options", "message"),
+    [
+        ([], {}, "`records` must hold at least one"),
+        ([wrong(channels={"strok": np.sin(np.arange(100.0))})], {}, "Did you mean 'stroke'"),
+        ([wrong(units={"stroke": "m/s"})], {}, "in the units of the vehicle, m, but is m/s for 'stroke'"),
+        ([wrong(road=np.ones((100, 2)) * np.arange(100.0)[:, None])], {}, "a column for each of 1 wheel"),
+        ([wrong(), wrong()], {}, "have names that differ"),
+        ([wrong()], {"sensors": {"sprung_acceleration": Sensor(offset=0.0)}}, "`sensors` must be one of 'stroke'"),
+        ([wrong()], {"bench": {"dampr": []}}, "name laws of the vehicle, which 'dampr' is not"),
+        ([wrong()], {"over": ["spring"]}, "No parameter is named 'spring'"),
+        ([wrong()], {"start": "moving"}, "`start` must be one of 'rest', 'free'"),
+        ([wrong()], {"per_record": ["sprung_mass"]}, "differ between several records"),
+        ([wrong()], {"noise": {"pitch": 1.0}}, "`noise` must be one of 'stroke'"),
+        ([wrong()], {"weighting": "runs"}, "weighting"),
+    ],
+)
+def test_wrong_calls_are_refused(records, options, message):
+    with pytest.raises((ValueError, TypeError), match=message):
+        identify.fit(CAR, records, **options)
+
+
+@pytest.mark.slow
+def test_bench_and_ride_records_together_beat_either_alone(record):
+    car = replace(CAR, {})
+    law = car.damper
+    runs = bench.VirtualDyno(law, force_noise=60.0, gas_force=-80.0, sampling_rate=200.0).run(
+        [bench.SineTest(0.02, 1.0), bench.SineTest(0.01, 3.0)]
+    )
+    start = Rig(gas_force=-50.0)
+    options = {"over": FREE, "sensors": ZERO, "dt": 2e-3}
+    alone = identify.fit(replace(START, {"sprung_mass": 320.0}), record, freeze=["sprung_mass"], **options)
+    on_bench = identify.fit(Linear(1100.0), runs, rig=start)
+    both = identify.fit(START, record, bench={"damper": runs}, rig=start, **options)
+    assert not both.held  # the force of the bench shows the scale
+    assert_recovered(both, CAR, SENSORS)
+    errors = [fit["damper.rate" if fit is alone else "rate"].standard_error for fit in (alone, on_bench)]
+    assert both["damper.rate"].standard_error < on_bench["law.rate"].standard_error
+    assert both["sprung_mass"].standard_error < 0.01 * 300.0, errors
+
+
+@pytest.mark.slow
+def test_a_rig_with_friction_in_its_guides_on_a_sweep_and_a_road():
+    car = QuarterCar(300.0, 40.0, 20e3, 180e3, Bilinear(1800.0, 900.0), tyre_damping=100.0)
+    rig = Guided(car, (Guide(CoulombFriction(40.0, 0.02)),))
+    noise = {"sprung_acceleration": 0.05, "unsprung_acceleration": 0.3, "stroke": 1e-4}
+    true = {
+        "sprung_acceleration": Sensor(offset=0.15, lag=2e-3),
+        "unsprung_acceleration": Sensor(offset=-0.3, lag=2e-3),
+        "stroke": Sensor(offset=1.5e-3, delay=1e-3),
+    }
+    road = roads.iso8608("C", speed=20.0, seed=4)
+    options = {"sensors": true, "finer": 2, "sampling_rate": 1000.0}
+    records = [
+        identify.virtual_ride(rig, SWEEP, noise, name="sweep", **options),
+        identify.virtual_ride(rig, road, noise, duration=4.0, name="road", **options),
+    ]
+    changed = {"unsprung_mass": 50.0, "spring_rate": 15e3, "rebound_rate": 1200.0, "compression_rate": 1200.0}
+    start = replace(rig, {**changed, "friction_force": 15.0, "tyre_stiffness": 220e3})
+    guess = {name: Sensor(**dict.fromkeys(sensor.given, 0.0)) for name, sensor in true.items()}
+    frozen = ["friction_velocity", "guides.0.stiffness", "guides.0.damping"]
+    result = identify.fit(start, records, sensors=guess, freeze=frozen)
+    assert result.held == ("vehicle.car.sprung_mass",)
+    assert_recovered(result, rig, true)
+
+
+@pytest.mark.slow
+def test_payload_and_offset_of_each_record_and_its_initial_motion():
+    loads, records = (300.0, 360.0), []
+    for mass, offset in zip(loads, (0.1, -0.2), strict=True):
+        sensors = {"sprung_acceleration": Sensor(offset=offset)}
+        car = replace(CAR, {"sprung_mass": mass})
+        ride = identify.virtual_ride(
+            car,
+            SWEEP,
+            NOISE,
+            sampling_rate=250.0,
+            finer=4,
+            sensors=sensors,
+            name=f"{mass:g} kg",
+            start={"z_sprung": 0.02},
+        )
+        records.append(ride)
+    result = identify.fit_vehicle(
+        START,
+        records,
+        over=FREE,
+        freeze=["spring_rate"],
+        sensors={"sprung_acceleration": Sensor(offset=0.0)},
+        per_record=["sprung_mass", "offset"],
+        start="free",
+        dt=2e-3,
+    )
+    scale = 16e3 / 20e3  # the rate that was frozen is wrong, and all masses follow it
+    for i, mass in enumerate(loads):
+        found = result[f"sprung_mass[{i}]"]
+        assert abs(found.value - scale * mass) < 3.5 * found.standard_error
+        assert f"{mass:g} kg" in found.meaning
+        begin = result[f"starts.{i}.position[0]"]
+        assert abs(begin.value - 0.02) < 3.5 * begin.standard_error
+    assert result["offset[1]"].value == pytest.approx(-0.2, abs=0.02)

@@ -1,0 +1,28 @@
+import numpy as np
+
+from jaxdamp import roads, simulate
+from jaxdamp.dampers import CoulombFriction, Linear
+from jaxdamp.vehicles import Guide, Guided, linearise, presets
+
+
+CAR = presets.quarter_car_mathworks()
+ROAD = roads.sine(0.01, frequency=1.5)
+
+
+def test_a_guide_with_a_dashpot_is_a_damper_to_the_ground():
+    guided = Guided(CAR, (Guide(stiffness=500.0, damping=80.0),))
+    free, held = (np.asarray(linearise(car).state_matrix) for car in (CAR, guided))
+    change = np.zeros((4, 4))
+    change[2, 0], change[2, 2] = -500.0 / 300.0, -80.0 / 300.0
+    np.testing.assert_allclose(held - free, change, atol=1e-9)
+
+
+def test_friction_of_guides_takes_energy_and_keeps_the_balance():
+    free, held = (
+        simulate(car, ROAD, duration=4.0)
+        for car in (CAR, Guided(CAR, (Guide(Linear(30.0) + CoulombFriction(60.0, 0.02)), Guide(body="unsprung"))))
+    )
+    assert float(np.max(held["z_sprung"])) < float(np.max(free["z_sprung"]))
+    energies = {name: float(value) for name, value in held.energy_balance().items()}
+    np.testing.assert_allclose(held["sprung_guide_stroke"], held["z_sprung"], atol=1e-12)
+    assert abs(energies["error"]) < 1e-3 * energies["road_work"]
