@@ -30,10 +30,10 @@ KNOWN = ["friction_velocity", "guides.0.stiffness", "guides.0.damping"]
 
 
 def records(seed: int) -> list[RideRecord]:
-    """A sweep of the platform and a road of its own, simulated at 2 kHz and sampled at 1 kHz."""
+    """A sweep of the platform and a road of its own, simulated at 4 kHz and sampled at 1 kHz."""
     sweep = roads.sweep_sine(0.7, 15.0, duration=5.0, velocity_amplitude=0.15)
     road = roads.iso8608("C", speed=20.0, seed=seed)
-    how = {"sensors": SENSORS, "sampling_rate": 1000.0, "seed": seed}
+    how = {"sensors": SENSORS, "sampling_rate": 1000.0, "seed": seed, "finer": 4}
     return [
         identify.virtual_ride(RIG, sweep, NOISE, name="sweep", **how),
         identify.virtual_ride(RIG, road, NOISE, name="road", duration=5.0, **how),

@@ -13,6 +13,7 @@ from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.result import FitResult, Score, fit_percent
 from jaxdamp.identify.rungs import Failure, Rung
+from jaxdamp.identify.targets import TargetFit, fit_targets
 from jaxdamp.identify.training import Training, train
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
 from jaxdamp.identify.vehicle_model import InitialMotion, VehicleTest
@@ -37,6 +38,7 @@ __all__ = [
     "Rung",
     "Score",
     "Status",
+    "TargetFit",
     "Training",
     "VehicleFit",
     "VehicleTest",
@@ -47,6 +49,7 @@ __all__ = [
     "fit",
     "fit_each",
     "fit_percent",
+    "fit_targets",
     "fit_vehicle",
     "judge",
     "ladder_starts",

@@ -85,7 +85,7 @@ def fit_vehicle(
         noise: standard deviation of channels in their SI unit, where it is known, also of a path of `bench` [N]. It
             sets the weights; standard errors follow from the residual.
         dt: longest step of the simulation [s], 1 ms if left out. Records with a longer sampling interval are simulated
-            with whole fractions of it, on a smooth curve through the measured heights.
+            in fractions of it. Between the samples the road is a smooth curve through the measured heights.
         samples_per_cycle: of bench records, as in `fit`.
         max_steps: largest number of steps of each search.
 

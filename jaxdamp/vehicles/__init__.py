@@ -24,6 +24,7 @@ from jaxdamp.vehicles.guided import Guide, Guided
 from jaxdamp.vehicles.half_car import HalfCar
 from jaxdamp.vehicles.linear import LinearVehicle, linearise
 from jaxdamp.vehicles.modes import Modes, modes
+from jaxdamp.vehicles.oscillations import Oscillations, oscillations
 from jaxdamp.vehicles.parts import Body, Element, Link, Place, Wheel, prefixed
 from jaxdamp.vehicles.points import Point
 from jaxdamp.vehicles.port_form import LinearMap, PortForm
@@ -64,6 +65,7 @@ __all__ = [
     "Link",
     "LumpedVehicle",
     "Modes",
+    "Oscillations",
     "PitchDecay",
     "Place",
     "Point",
@@ -84,6 +86,7 @@ __all__ = [
     "is_stationary",
     "linearise",
     "modes",
+    "oscillations",
     "prefixed",
     "presets",
     "refuse_restless",
