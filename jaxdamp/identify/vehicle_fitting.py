@@ -96,15 +96,7 @@ def fit_vehicle(
         ValueError: no records; a channel that the vehicle does not have, or of another unit; a road of other wheels;
             names that fit no parameter; a start outside its bounds.
 
-    >>> from jaxdamp import identify, roads, vehicles
-    >>> from jaxdamp.parameters import replace
-    >>> car = vehicles.presets.quarter_car_mathworks()
-    >>> sweep = roads.sweep_sine(0.5, 15.0, duration=4.0, velocity_amplitude=0.1)
-    >>> record = identify.virtual_ride(car, sweep, {"sprung_acceleration": 0.02, "stroke": 1e-4}, seed=1)
-    >>> guess = replace(car, {"damper.rate": 700.0, "spring_rate": 2e4})
-    >>> result = fit_vehicle(guess, record, over=["damper.rate", "spring_rate"])
-    >>> abs(result["damper.rate"].value - 1000.0) < 4 * result["damper.rate"].standard_error
-    True
+    `docs/vehicle_fits.md` shows an example.
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "fit_vehicle(vehicle, records)")
     rides = _checked(vehicle, records)

@@ -33,6 +33,7 @@ def paper_002(point):
     return numbers
 
 
+@pytest.mark.slow
 def test_the_linear_column_of_paper_002():
     """The damping, the delay of the rear axle and the window that the paper does not give."""
     start = {"rate": 1300.0, "delay": 0.09, "window": 2.2}

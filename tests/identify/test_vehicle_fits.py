@@ -55,11 +55,16 @@ def test_a_result_shows_itself(motions, record):
     told = motions.to_dict()
     assert told["converged"] is True and told["scores"][0]["rmse"]["unit"] == "m/s^2"
     assert "vehicle.damper.rate" in repr(motions) and "Channels" in str(motions.scores_table())
+
+
+@pytest.mark.slow
+def test_a_result_is_drawn_and_predicts_its_records(motions, record):
+    assert len(motions.plot().axes) == 4
     predicted = motions.predict()["sweep"]["stroke"]
     assert np.std(predicted - record["stroke"]) == pytest.approx(2e-4, rel=0.05)
-    assert len(motions.plot().axes) == 4
 
 
+@pytest.mark.slow
 def test_a_measured_force_shows_the_scale():
     noise = {**NOISE, "dynamic_tyre_load": 20.0}
     loads = identify.virtual_ride(CAR, SWEEP, noise, sampling_rate=250.0, finer=4, sensors=SENSORS, seed=2)
@@ -69,6 +74,7 @@ def test_a_measured_force_shows_the_scale():
     assert result["sprung_mass"].standard_error < 3.0
 
 
+@pytest.mark.slow
 def test_a_known_mass_gives_the_scale(record, motions):
     result = identify.fit_vehicle(START, record, over=FREE, sensors=ZERO, dt=2e-3, freeze=["sprung_mass"])
     assert not result.warnings and not result.scale_free
