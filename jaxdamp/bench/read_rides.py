@@ -17,7 +17,7 @@ from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.problems import Problems
 from jaxdamp.bench.raw import RawTable
 from jaxdamp.bench.readers import Reader, folder_suffixes, read_tables, with_own
-from jaxdamp.bench.ride_record import RIDE_MARK, RIDE_SETTINGS_MARK, ROAD, RideRecord
+from jaxdamp.bench.ride_record import RIDE_MARK, RIDE_SETTINGS_MARK, ROAD, ROAD_UNITS, RideRecord
 from jaxdamp.bench.units import ratio
 
 
@@ -46,7 +46,7 @@ def read_rides(
         columns: name of the channel of the vehicle to header or number (from 0) of its column, such as
             `{"sprung_acceleration": "acc body", "stroke": "LVDT FL"}`. Left out, every column is a channel of the name
             in its header.
-        road: headers or numbers of the columns with the height under each wheel, in the order of
+        road: headers or numbers of the columns with the height under each wheel, or the force on it, in the order of
             `vehicle.wheel_names`; left out, the column "road", or "road 1", "road 2" and so on.
         units: channel, "time" or "road" to its unit, where the header has none or a wrong one.
         reversed_channels: channels (or "road") that the file counts positive downwards or in compression.
@@ -120,13 +120,17 @@ def _record(table: RawTable, name: str, how: Mapping[str, Any]) -> RideRecord:
             _checks.one_of("channel", one, [*chosen, ROAD, "time"])
     time = _time(table, headers, clock, how)
     pairs = {channel: _values(table, i, channel, how) for channel, i in chosen.items()}
-    road = np.stack([_values(table, i, ROAD, how)[0] for i in roads], axis=1)
+    wheels = [_values(table, i, ROAD, how) for i in roads]
+    kinds = {unit for _, unit in wheels}
+    if len(kinds) > 1:
+        raise ValueError(f"{table.where}: the columns of the road must all be heights, or all forces on the wheels.")
+    road, driven_by = np.stack([values for values, _ in wheels], axis=1), "forces" if kinds == {"N"} else "heights"
     units = {channel: unit for channel, (_, unit) in pairs.items()}
     marks = [line.removeprefix(RIDE_SETTINGS_MARK) for line in table.preamble if line.startswith(RIDE_SETTINGS_MARK)]
     own = bool(table.preamble) and table.preamble[0].strip() == RIDE_MARK
     settings = json.loads(marks[0]) if own and marks else {}
     channels = {channel: values for channel, (values, _) in pairs.items()}
-    return RideRecord(name, time, road, channels, units, settings, str(table.file), table.notes)
+    return RideRecord(name, time, road, channels, units, driven_by, settings, str(table.file), table.notes)
 
 
 def _road_columns(table: RawTable, headers: Sequence[str], road: Any) -> list[str | int]:
@@ -165,7 +169,7 @@ def _values(table: RawTable, index: int, channel: str, how: Mapping[str, Any]) -
     written = (how["units"] or {}).get(channel) or raw.unit or split_header(raw.name)[1]
     if not written:
         raise ValueError(f"{where}: no unit. Write it into the header, or pass `units={{{channel!r}: 'm/s^2'}}`.")
-    wanted = ("m",) if channel == ROAD else SI_UNITS
+    wanted = tuple(ROAD_UNITS.values()) if channel == ROAD else SI_UNITS
     factor, unit = _to_si(written, wanted)
     if factor is None:
         raise ValueError(f"{where}: {written!r} is no unit of {channel!r}; it must be one of {', '.join(wanted)}.")

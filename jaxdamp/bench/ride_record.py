@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, final
 
@@ -17,6 +17,7 @@ from jaxdamp.bench import sampling
 RIDE_MARK = "# jaxdamp ride record: heights and accelerations up, travels positive in extension"
 RIDE_SETTINGS_MARK = "# settings: "
 ROAD = "road"
+ROAD_UNITS = {"heights": "m", "forces": "N"}
 
 
 @final
@@ -33,9 +34,11 @@ class RideRecord:
         time: instants [s], uniform and increasing, shape (time,).
         road: height of the road, or of the platform of a test rig, under each wheel [m], up positive, in the order of
             `vehicle.wheel_names`, shape (time, wheels); one wheel may be given in one dimension. The rear axle's column
-            has its own heights at the same instants.
+            has its own heights at the same instants. Or the measured force on each wheel [N], see `driven_by`.
         channels: the measured channels by name, each of shape (time,).
         units: their SI units, as far as they are known; `fit` compares them with those of the vehicle.
+        driven_by: what `road` is: "heights" [m], or "forces" [N] on the wheels minus the static loads, positive up, of
+            wheel force transducers; the tyres then have no part in the motion (`vehicles.ForceDriven`).
         settings: further facts about the record by name, such as payload or speed.
         source: the file, or another origin.
         notes: sentences on what was done to the data.
@@ -55,12 +58,14 @@ class RideRecord:
     road: np.ndarray
     channels: Mapping[str, np.ndarray]
     units: Mapping[str, str] = field(default_factory=dict)
+    driven_by: str = "heights"
     settings: Mapping[str, float | int | str] = field(default_factory=dict)
     source: str = ""
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         where = f"record {self.name!r}"
+        _checks.one_of("driven_by", self.driven_by, ROAD_UNITS)
         if not self.channels:
             remedy = "Write `channels={'sprung_acceleration': values}`."
             _checks.refuse("channels", "hold at least one measured channel", "empty", remedy)
@@ -110,8 +115,8 @@ class RideRecord:
         chosen = (self.time >= start) & (self.time < stop)
         channels = {name: values[chosen] for name, values in self.channels.items()}
         notes = (*self.notes, f"cut to {start:g} to {stop:g} s")
-        cut = self.time[chosen], self.road[chosen], channels, self.units, self.settings, self.source, notes
-        return RideRecord(self.name, *cut)
+        changed = {"time": self.time[chosen], "road": self.road[chosen], "channels": channels, "notes": notes}
+        return replace(self, **changed)
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the record with units in its header; `read_rides` gives back the same numbers to the last bit."""
@@ -120,7 +125,7 @@ class RideRecord:
                 remedy = f"Give it when the record is made: `units={{{name!r}: 'm/s^2'}}`."
                 _checks.refuse("units", "state the unit of each channel", f"without one for {name!r}", remedy)
         roads = [ROAD] if self.wheels == 1 else [f"{ROAD} {i + 1}" for i in range(self.wheels)]
-        header = ["time [s]", *[f"{name} [m]" for name in roads]]
+        header = ["time [s]", *[f"{name} [{ROAD_UNITS[self.driven_by]}]" for name in roads]]
         header += [f"{name} [{self.units[name]}]" for name in self.channels]
         columns = np.column_stack([self.time, self.road, *self.channels.values()])
         settings = [RIDE_SETTINGS_MARK + json.dumps(dict(self.settings))] if self.settings else []
@@ -135,9 +140,10 @@ class RideRecord:
         return {"name": self.name, "samples": len(self), "sampling_rate": 1.0 / self.dt, **levels}
 
     def __repr__(self) -> str:
-        rate, moved = 1.0 / self.dt, 1e3 * float(np.max(np.ptp(self.road, axis=0)))
+        rate, span = 1.0 / self.dt, float(np.max(np.ptp(self.road, axis=0)))
+        moved = f"{1e3 * span:.3g} mm" if self.driven_by == "heights" else f"{span:.3g} N"
         wheels = f"{self.wheels} wheel{'s' * (self.wheels > 1)}"
         return (
-            f"RideRecord({self.name!r}: {len(self) * self.dt:.4g} s at {rate:.6g} Hz, {wheels} moved by {moved:.3g} mm,"
+            f"RideRecord({self.name!r}: {len(self) * self.dt:.4g} s at {rate:.6g} Hz, {wheels} moved by {moved},"
             f" measured: {', '.join(self.channels)})"
         )

@@ -16,6 +16,7 @@ from jaxdamp.identify.traces import Batch, batches, owners
 from jaxdamp.identify.vehicle_model import VehicleTest
 from jaxdamp.parameters import get, with_values
 from jaxdamp.simulation import AbstractEngine, recorded, settled
+from jaxdamp.vehicles import AbstractVehicle, ForceDriven
 
 
 @final
@@ -34,13 +35,14 @@ class RideBatch(AbstractResiduals):
     finer: int = eqx.field(static=True)  # steps of the simulation in a sampling interval
     channels: tuple[str, ...] = eqx.field(static=True)
     per_record: tuple[str, ...] = eqx.field(static=True)  # paths where the model has a value for each record
+    by_forces: bool = eqx.field(static=True)  # the heights are forces on the wheels
 
     def predict(self, model: VehicleTest) -> Float[Array, "records channels time"]:
         """What the sensors show, in SI."""
 
         def one(heights: Array, number: Array) -> Array:
             own = with_values(model, {path: get(model, path)[number] for path in self.per_record})
-            system, dt = own.vehicle.system(), jnp.asarray(self.dt, heights.dtype)
+            system, dt = driven(own.vehicle, self.by_forces).system(), jnp.asarray(self.dt, heights.dtype)
             start = settled(system, heights[0])
             if own.starts:
                 motions = [jnp.concatenate([begin.position, begin.rate]) for begin in own.starts]
@@ -89,6 +91,11 @@ class DamperOnBench(AbstractResiduals):
         return self.batch.total_weight()
 
 
+def driven(vehicle: AbstractVehicle, by_forces: bool) -> AbstractVehicle:
+    """The vehicle, on measured forces if these drive it."""
+    return ForceDriven(vehicle) if by_forces else vehicle
+
+
 class Drive(NamedTuple):
     """How a record is simulated: heights at the instants of the simulation [m], its step [s] and engine."""
 
@@ -132,17 +139,20 @@ def ride_batches(
     """
     groups: dict[tuple, list[int]] = {}
     for i, (record, drive) in enumerate(zip(records, drives, strict=True)):
-        alike = len(record), round(record.dt, 12), tuple(record.channels), drive.finer, drive.engine.step_count
+        forces = record.driven_by == "forces"
+        steps = drive.finer, drive.engine.step_count
+        alike = len(record), round(record.dt, 12), tuple(record.channels), forces, *steps
         groups.setdefault(alike, []).append(i)
     made = []
-    for (length, dt, channels, finer, _), members in groups.items():
+    for (length, dt, channels, forces, finer, _), members in groups.items():
         one = drives[members[0]]
         weight = np.zeros((len(members), len(channels), length))
         weight[:, :, int(np.ceil(settling / dt)) :] = (1.0 / np.array([sigma[c] for c in channels]))[None, :, None]
         heights = np.stack([drives[i].heights for i in members])
         measured = np.stack([np.stack(list(records[i].channels.values())) for i in members])
-        arrays = (jnp.asarray(a, float) for a in (heights, measured, weight))
-        made.append(RideBatch(*arrays, jnp.asarray(members, int), one.engine, dt / finer, finer, channels, per_record))
+        road, channel, weights = (jnp.asarray(a, float) for a in (heights, measured, weight))
+        numbers, how = jnp.asarray(members, int), (dt / finer, finer, channels, per_record, forces)
+        made.append(RideBatch(road, channel, weights, numbers, one.engine, *how))
     return made
 
 

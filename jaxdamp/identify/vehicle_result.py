@@ -94,14 +94,21 @@ class VehicleFit:
                     channels[int(number)] = dict(zip(part.channels, rows, strict=True))
         return {record.name: channels[i] for i, record in enumerate(self.records)}
 
-    def table(self, truth: AbstractVehicle | None = None, *, sensors: dict[str, Sensor] | None = None) -> Table:
+    def table(
+        self,
+        truth: AbstractVehicle | None = None,
+        *,
+        sensors: dict[str, Sensor] | None = None,
+        true_rig: Rig | None = None,
+    ) -> Table:
         """The parameters with units, standard errors and meanings, compared with a true vehicle if one is given.
 
         Arguments:
             truth: the true vehicle.
             sensors: its true sensors.
+            true_rig: the true test machine of the bench records, if one was fitted.
         """
-        true = None if truth is None else VehicleTest(truth, sensors or {})
+        true = None if truth is None else VehicleTest(truth, sensors or {}, (), true_rig)
         return parameter_table(f"Parameters of {type(self.vehicle).__name__}", self.parameters, true)
 
     def scores_table(self) -> Table:
@@ -115,6 +122,7 @@ class VehicleFit:
         return {
             "vehicle": repr(self.vehicle),
             "sensors": {name: repr(sensor) for name, sensor in self.sensors.items()},
+            **({} if self.rig is None else {"rig": repr(self.rig)}),
             "status": self.status.name.lower(),
             "converged": self.converged,
             "warnings": list(self.warnings),

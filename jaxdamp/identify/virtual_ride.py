@@ -12,7 +12,7 @@ from jaxdamp.bench import RideRecord
 from jaxdamp.rig import Sensor
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import simulate
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.vehicles import AbstractVehicle, prefixed
 
 
 def virtual_ride(
@@ -24,6 +24,7 @@ def virtual_ride(
     sampling_rate: float | int = 500.0,
     sensors: Mapping[str, Sensor] | None = None,
     road_noise: float = 0.0,
+    driven_by: str = "heights",
     start: Mapping[str, float] | None = None,
     name: str = "virtual ride",
     seed: int = 0,
@@ -42,7 +43,8 @@ def virtual_ride(
         duration: as in `simulate`.
         sampling_rate: of the record [Hz].
         sensors: by channel, what the sensor adds.
-        road_noise: standard deviation of the noise of the heights [m].
+        road_noise: standard deviation of the noise of the heights [m], or of the wheel forces [N].
+        driven_by: what the record has of the road: "heights", or the "forces" on the wheels that it causes.
         start: as in `simulate`.
         name: name of the record; noise depends on it and on the seed only.
         seed: seed of the noise.
@@ -63,6 +65,7 @@ def virtual_ride(
     """
     _checks.positive("sampling_rate", sampling_rate)
     _checks.nonnegative("road_noise", road_noise)
+    _checks.one_of("driven_by", driven_by, ["heights", "forces"])
     for channel, deviation in channels.items():
         _checks.one_of("channels", channel, vehicle.units)
         _checks.nonnegative(f"channels[{channel!r}]", deviation)
@@ -76,9 +79,10 @@ def virtual_ride(
         values, sensor = response[channel], (sensors or {}).get(channel)
         clean = np.asarray(values if sensor is None else sensor(values, jnp.asarray(dt, values.dtype)))[::finer]
         shown[channel] = clean + deviation * rng.standard_normal(clean.shape)
-    heights = np.asarray(response.road)[::finer]
+    loads = [response[prefixed(wheel, "dynamic_tyre_load")] for wheel in vehicle.wheel_names]
+    heights = np.asarray(response.road if driven_by == "heights" else jnp.stack(loads, axis=1))[::finer]
     heights = heights + road_noise * rng.standard_normal(heights.shape)
     units = {channel: vehicle.units[channel] for channel in channels}
     time = np.arange(len(heights)) / sampling_rate
     note = f"simulated: {type(vehicle).__name__}, sensors {dict(sensors or {})}, noise {dict(channels)}, seed {seed}"
-    return RideRecord(name, time, heights, shown, units, {"seed": seed}, "virtual ride", (note,))
+    return RideRecord(name, time, heights, shown, units, driven_by, {"seed": seed}, "virtual ride", (note,))

@@ -17,6 +17,7 @@ from jaxdamp.vehicles.channels import Channel, ChannelKind
 from jaxdamp.vehicles.corner import Corner
 from jaxdamp.vehicles.cubic_spring import CubicSpring
 from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position, static_equilibrium
+from jaxdamp.vehicles.force_driven import ForceDriven
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
 from jaxdamp.vehicles.full_car import FullCar
@@ -53,6 +54,7 @@ __all__ = [
     "CubicSpring",
     "Earlier",
     "Element",
+    "ForceDriven",
     "Frame",
     "FullCar",
     "Guide",

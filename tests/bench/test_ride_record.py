@@ -43,6 +43,14 @@ def test_columns_of_a_file_get_names_units_and_signs(tmp_path):
     assert one.units == UNITS
 
 
+def test_forces_on_the_wheels_are_known_by_their_unit(tmp_path):
+    one = record(driven_by="forces", road=300.0 * WAVE)
+    again = read_rides(one.to_csv(tmp_path / "one.csv"))[0]
+    assert again.driven_by == "forces" and "moved by 600 N" in repr(again)
+    with pytest.raises(ValueError, match="Did you mean 'forces'"):
+        record(driven_by="force")
+
+
 def test_parts_and_figures():
     part = record().between(0.5, 1.5)
     assert len(part) == 100 and part.dt == pytest.approx(0.01) and part.notes[-1] == "cut to 0.5 to 1.5 s"

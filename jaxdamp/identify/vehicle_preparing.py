@@ -1,0 +1,202 @@
+"""Records and a vehicle as a least-squares problem."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from jaxdamp import _checks
+from jaxdamp._field_types import check_module
+from jaxdamp.bench import BenchRun, RideRecord, as_runs
+from jaxdamp.dampers import AbstractDamper, Reach, without_fitted_ranges
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.vehicle_model import InitialMotion, VehicleTest
+from jaxdamp.identify.vehicle_residuals import Drive, bench_parts, driven, finer_heights, ride_batches
+from jaxdamp.parameters import FreeParameters, get, match_paths, name_patterns, parameters
+from jaxdamp.rig import Rig, Sensor
+from jaxdamp.simulation import Exponential, RunCheck
+from jaxdamp.vehicles import AbstractVehicle
+
+
+FIRST_GUESS = 0.1  # noise of a channel at first, relative to its standard deviation
+LEAST_NOISE = 1e-4  # the same at the end, so that records without noise can be fitted
+EVERYWHERE = Reach(np.inf, np.inf)  # laws of a vehicle: no number is outside the records
+
+
+class VehicleData(NamedTuple):
+    """The records of a fit, made ready."""
+
+    model: VehicleTest
+    rides: tuple[RideRecord, ...]
+    drives: list[Drive]
+    benches: dict[str, tuple[BenchRun, ...]]
+    settling: float
+    per_record: tuple[str, ...]
+    samples_per_cycle: int | None
+
+    @property
+    def channels(self) -> list[str]:
+        """All measured channels, then the paths of the laws on a bench: the owners of residuals."""
+        return [*dict.fromkeys(name for ride in self.rides for name in ride.channels), *self.benches]
+
+    def first_noise(self) -> dict[str, float]:
+        """A share of the standard deviation of each channel."""
+        return {name: FIRST_GUESS * level for name, level in self.levels().items()}
+
+    def levels(self) -> dict[str, float]:
+        """The standard deviation of each channel over all records."""
+        rides = {
+            name: np.concatenate([r[name] - r[name].mean() for r in self.rides if name in r.channels])
+            for name in self.channels
+            if name not in self.benches
+        }
+        forces = {path: np.concatenate([run.force for run in runs]) for path, runs in self.benches.items()}
+        return {name: float(np.std(values)) for name, values in (rides | forces).items()}
+
+    def problem(self, free: FreeParameters, sigma: Mapping[str, float]) -> Problem:
+        """The least squares with residuals divided by the noise of each channel."""
+        rides = ride_batches(self.rides, self.drives, sigma, self.settling, self.per_record)
+        number = {name: i for i, name in enumerate(self.channels)}
+        owner = [np.broadcast_to(_column([number[c] for c in b.channels]), b.weight.shape).ravel() for b in rides]
+        forces, paths = bench_parts(self.model, self.benches, sigma, self.samples_per_cycle)
+        owner += [len(self.channels) - len(self.benches) + numbers for numbers in paths]
+        weighted = [np.ravel(b.measured * b.weight) for b in rides]
+        weighted += [np.ravel(part.batch.force * part.batch.weight) for part in forces]
+        level = float(np.sqrt(sum(np.sum(np.square(values)) for values in weighted)))
+        ordered = tuple(sigma[name] for name in self.channels)
+        parts, owners = (*rides, *forces), np.concatenate(owner)
+        return Problem(
+            free, parts, level, self.rides, ordered, owners, EVERYWHERE, self.model.vehicle, self.per_record, True
+        )
+
+    def noise_in(self, end: SearchEnd, problem: Problem, sigma: Mapping[str, float]) -> dict[str, float]:
+        """RMS of the residual of each channel, in its unit."""
+        used, levels, noise = problem.used, self.levels(), {}
+        for i, name in enumerate(self.channels):
+            own = end.residual[used & (problem.owner == i)]
+            noise[name] = max(sigma[name] * float(np.sqrt(np.mean(own**2))), LEAST_NOISE * levels[name])
+        return noise
+
+
+def _column(numbers: Sequence[int]) -> np.ndarray:
+    return np.array(numbers)[None, :, None]
+
+
+def checked_records(vehicle: AbstractVehicle, records: Any) -> tuple[RideRecord, ...]:
+    """The records, after a check that the vehicle has their channels and wheels."""
+    rides = (records,) if isinstance(records, RideRecord) else tuple(records)
+    if not rides:
+        _checks.refuse("records", "hold at least one record", "empty", "Read some with `bench.read_rides`.")
+    names = [ride.name for ride in rides if isinstance(ride, RideRecord)]
+    if len(set(names)) < len(names):
+        _checks.refuse("records", "have names that differ", ", ".join(names), "Results are listed by name.")
+    units, wheels = vehicle.units, vehicle.wheel_names
+    for ride in rides:
+        must = "be records of a vehicle"
+        _checks.instance("records", ride, RideRecord, must, "Bench records of its damper go to `bench={path: runs}`.")
+        for name in ride.channels:
+            _checks.one_of(f"channel of record {ride.name!r}", name, units)
+            if ride.units.get(name, units[name]) != units[name]:
+                value = f"{ride.units[name]} for {name!r} in record {ride.name!r}"
+                _checks.refuse("records", f"be in the units of the vehicle, {units[name]}", value)
+        if ride.wheels != len(wheels):
+            value = f"{ride.wheels} in record {ride.name!r}"
+            remedy = "Each wheel has a column, also those of the rear axle: delay the road yourself."
+            _checks.refuse("road", f"have a column for each of {len(wheels)} wheel(s) of the vehicle", value, remedy)
+    return rides
+
+
+def checked_benches(vehicle: AbstractVehicle, bench: Mapping[str, Any]) -> dict[str, tuple[BenchRun, ...]]:
+    """The bench records by the path of the law."""
+    for path in bench:
+        try:
+            law = get(vehicle, path)
+        except (AttributeError, IndexError, ValueError, KeyError, TypeError):
+            law = None
+        remedy = "Write the path of a damper law, such as 'damper' or 'front.damper'."
+        _checks.instance("bench", law, AbstractDamper, f"name laws of the vehicle, which {path!r} is not", remedy)
+    return {path: as_runs(runs, call="fit_vehicle(..., bench={'damper': runs})") for path, runs in bench.items()}
+
+
+def vehicle_test(
+    vehicle: AbstractVehicle,
+    rides: Sequence[RideRecord],
+    sensors: Mapping[str, Sensor],
+    start: str,
+    rig: Rig | None,
+) -> VehicleTest:
+    """The vehicle with its sensors and initial motions."""
+    _checks.one_of("start", start, ["rest", "free"])
+    for name, sensor in sensors.items():
+        _checks.one_of("sensors", name, list(dict.fromkeys(c for ride in rides for c in ride.channels)))
+        check_module(f"sensors[{name!r}]", sensor, (Sensor,), "fit_vehicle(..., sensors={'stroke': Sensor(offset=0)})")
+    count = len(vehicle.coordinates)
+    starts = [InitialMotion(jnp.zeros(count), jnp.zeros(count)) for _ in rides] if start == "free" else []
+    return VehicleTest(without_fitted_ranges(vehicle), dict(sensors), tuple(starts), rig)
+
+
+def frozen_paths(model: VehicleTest, over: Sequence[str] | None, freeze: Sequence[str]) -> list[str]:
+    """Paths that are held: those asked for, what `over` leaves out, what sensors and test machine do not have."""
+    known = [p.path for p in parameters(model)]
+    of_vehicle = [path for path in known if path.startswith("vehicle.")]
+    kept = of_vehicle if over is None else match_paths(of_vehicle, name_patterns("over", over))
+    held = [path for path in of_vehicle if path not in kept]
+    for name, sensor in model.sensors.items():
+        held += [f"sensors.{name}.{p.path}" for p in parameters(sensor) if p.path not in sensor.given]
+    if model.rig is not None:
+        pairs = zip(parameters(model.rig), parameters(Rig()), strict=True)
+        held += [f"rig.{p.path}" for p, default in pairs if p.value == default.value]
+    return [*held, *match_paths(known, name_patterns("freeze", freeze))]
+
+
+def per_record_paths(model: VehicleTest, names: Sequence[str], count: int) -> tuple[str, ...]:
+    """Paths of the parameters with a value for each record."""
+    by_path = {p.path: p for p in parameters(model) if not p.path.startswith(("rig.", "starts."))}
+    given = {f"sensors.{name}.{number}" for name, sensor in model.sensors.items() for number in sensor.given}
+    chosen = [p for p in by_path if p.startswith("vehicle.") or p in given]
+    paths = match_paths(chosen, name_patterns("per_record", names))
+    for path in paths:
+        if by_path[path].value.ndim or count < 2:
+            value = f"{path}, with {count} record(s)" if count < 2 else f"{path}, a vector"
+            _checks.refuse("per_record", "name single numbers that differ between several records", value)
+    return tuple(paths)
+
+
+def drives_of(vehicle: AbstractVehicle, rides: Sequence[RideRecord], dt: float | None) -> list[Drive]:
+    """How each record is simulated, with as many substeps as the laws need at the start."""
+    longest, drives = 1e-3 if dt is None else dt, []
+    _checks.positive("dt", longest)
+    for ride in rides:
+        finer = max(int(np.ceil(ride.dt / longest - 1e-6)), 1)
+        heights = finer_heights(ride, finer)
+
+        def half(ride: RideRecord = ride, finer: int = finer) -> Array:
+            return jnp.asarray(finer_heights(ride, 2 * finer), float)
+
+        system = driven(vehicle, ride.driven_by == "forces").system()
+        check = RunCheck(system, jnp.asarray(heights, float), half, ride.dt / finer)
+        drives.append(Drive(heights, ride.dt / finer, finer, Exponential().prepared(check)))
+    return drives
+
+
+def known_noise(data: VehicleData, noise: Mapping[str, float]) -> dict[str, float]:
+    """The noise that is given, checked."""
+    for name, value in noise.items():
+        _checks.one_of("noise", name, data.channels)
+        _checks.positive(f"noise[{name!r}]", value)
+    return {name: float(value) for name, value in noise.items()}
+
+
+def in_units(free: FreeParameters, units: Mapping[str, str]) -> FreeParameters:
+    """The same with the units of the channels for the offsets of their sensors."""
+    changed = []
+    for p in free.chosen:
+        kind, _, rest = p.path.partition(".")
+        channel, _, field = rest.partition(".")
+        unit = units[channel] if kind == "sensors" and field == "offset" else p.unit
+        changed.append(dataclasses.replace(p, unit=unit))
+    return FreeParameters(free.tree, tuple(changed), free.ties)
