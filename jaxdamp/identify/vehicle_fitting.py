@@ -14,6 +14,7 @@ from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.identify.several import Solution
+from jaxdamp.identify.vehicle_left_out import on_sensors
 from jaxdamp.identify.vehicle_preparing import (
     VehicleData,
     checked_benches,
@@ -149,6 +150,7 @@ def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScal
             " Fix one mass that is known, or measure a force."
         )
     notes += estimates.notes
+    notes += on_sensors(problem, end, data.rides, data.channels, model.sensors)
     if inflation > 1.0:
         notes.append(
             "Neighbouring residuals are alike: the vehicle or its sensors miss something systematic. The standard"

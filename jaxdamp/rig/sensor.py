@@ -31,6 +31,9 @@ class Sensor(Module):
         delay: of the channel behind the road channel [s].
         high_pass: corner frequency of a first-order high-pass [Hz].
 
+    Raises:
+        ValueError: a gain or a corner frequency that is not positive, a negative lag.
+
     >>> signal = jnp.ones(5)
     >>> Sensor(gain=2.0, offset=0.5)(signal, 1e-3).tolist()
     [2.5, 2.5, 2.5, 2.5, 2.5]
@@ -54,6 +57,8 @@ class Sensor(Module):
         delay: Any = None,
         high_pass: Any = None,
     ) -> None:
+        if high_pass is not None:
+            _checks.positive("high_pass", high_pass, "Leave it out for a sensor that shows slow motions too.")
         numbers = {"gain": gain, "offset": offset, "lag": lag, "delay": delay, "high_pass": high_pass}
         for name, value in numbers.items():
             setattr(self, name, (1.0 if name == "gain" else 0.0) if value is None else value)

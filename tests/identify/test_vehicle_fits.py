@@ -1,5 +1,7 @@
 """Vehicles from records of their motion."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -141,7 +143,7 @@ def test_a_rig_with_friction_in_its_guides_on_a_sweep_and_a_road():
     rig = Guided(car, (Guide(CoulombFriction(40.0, 0.02)),))
     noise = {"sprung_acceleration": 0.05, "unsprung_acceleration": 0.3, "stroke": 1e-4}
     true = {
-        "sprung_acceleration": Sensor(offset=0.15, lag=2e-3),
+        "sprung_acceleration": Sensor(offset=0.15, lag=2e-3, high_pass=0.4),
         "unsprung_acceleration": Sensor(offset=-0.3, lag=2e-3),
         "stroke": Sensor(offset=1.5e-3, delay=1e-3),
     }
@@ -153,11 +155,27 @@ def test_a_rig_with_friction_in_its_guides_on_a_sweep_and_a_road():
     ]
     changed = {"unsprung_mass": 50.0, "spring_rate": 15e3, "rebound_rate": 1200.0, "compression_rate": 1200.0}
     start = replace(rig, {**changed, "friction_force": 15.0, "tyre_stiffness": 220e3})
-    guess = {name: Sensor(**dict.fromkeys(sensor.given, 0.0)) for name, sensor in true.items()}
+    guess = {name: Sensor(offset=0.0, lag=0.0) for name in true} | {"stroke": Sensor(offset=0.0, delay=0.0)}
+    guess["sprung_acceleration"] = Sensor(offset=0.0, lag=0.0, high_pass=0.8)
     frozen = ["friction_velocity", "guides.0.stiffness", "guides.0.damping"]
     result = identify.fit(start, records, sensors=guess, freeze=frozen)
     assert result.held == ("vehicle.car.sprung_mass",)
     assert_recovered(result, rig, true)
+
+
+@pytest.mark.slow
+def test_what_sensors_add_and_the_fit_leaves_out_is_named_with_its_size():
+    true = {"sprung_acceleration": Sensor(lag=2e-3, offset=0.1), "stroke": Sensor(gain=1.05, delay=-1e-3)}
+    ride = identify.virtual_ride(CAR, SWEEP, NOISE, sampling_rate=250.0, finer=4, sensors=true, seed=2)
+    result = identify.fit(START, ride, over=FREE, freeze=["sprung_mass"], dt=2e-3)
+    told = " ".join(result.warnings)
+    for text in (
+        r"sprung_acceleration comes (1\.[6-9]|2\.[0-4])\d* ms too late",
+        r"a zero error of 0\.(09|10)\d* m/s\^2",
+    ):
+        assert re.search(text, told), told
+    for text in (r"stroke comes (0\.[7-9]|1\.[0-3])\d* ms too early", r"stroke has a gain of 1\.0[45]"):
+        assert re.search(text, told), told
 
 
 @pytest.mark.slow

@@ -39,3 +39,5 @@ def test_a_sensor_has_what_it_is_given():
     assert sensor.given == ("offset", "lag") and repr(sensor) == "Sensor(offset=0.0, lag=0.001)"
     with pytest.raises(ValueError, match="lag"):
         Sensor(lag=-1e-3)
+    with pytest.raises(ValueError, match="`high_pass` must be positive"):
+        Sensor(high_pass=0.0)

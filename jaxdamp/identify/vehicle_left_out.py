@@ -1,0 +1,107 @@
+"""What the residual of a vehicle says of its sensors: late channels, offsets and gains that were left out."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp.bench import RideRecord
+from jaxdamp.identify.noise import CORRELATED, correlation_time
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.vehicle_residuals import RideBatch
+from jaxdamp.rig import Sensor
+
+
+SURE = 6.0  # standard errors from which an effect is named
+NOTICEABLE = 0.01  # sampling intervals of a delay, and tenths of a channel, below which an effect does not matter
+OF_ITS_OWN = 1e-3  # share of an effect that no fitted number has, below which it cannot be told
+
+
+def on_sensors(
+    problem: Problem,
+    end: SearchEnd,
+    records: Sequence[RideRecord],
+    channels: Sequence[str],
+    sensors: Mapping[str, Sensor],
+) -> list[str]:
+    """A sentence on each sensor whose channel looks late, shifted or scaled, beside all fitted numbers.
+
+    The residual is regressed on what each sensor could add to first order (the slope of its channel, a constant, the
+    channel itself), after both are freed of what the fitted numbers can explain.
+
+    Arguments:
+        problem: the problem that was solved.
+        end: its minimum.
+        records: the records.
+        channels: all channels in the order of `problem.sigma`.
+        sensors: the fitted sensors.
+    """
+    effects, columns = [], []
+    for number, channel in enumerate(channels):
+        given = sensors[channel].given if channel in sensors else ()
+        for effect in ("delay", "offset", "gain"):
+            if effect not in given and not (effect == "delay" and "lag" in given):
+                column = _column(problem, end, records, number, channel, effect)
+                if column is not None:
+                    effects.append((channel, effect))
+                    columns.append(column)
+    if not columns:
+        return []
+    whole = np.stack([*columns, end.residual], axis=1)
+    basis, _ = np.linalg.qr(end.jacobian / np.linalg.norm(end.jacobian, axis=0).clip(1e-300))
+    rest = whole - basis @ (basis.T @ whole)
+    told = np.linalg.norm(rest[:, :-1], axis=0) > OF_ITS_OWN * np.linalg.norm(whole[:, :-1], axis=0)
+    inverse = np.linalg.pinv(rest[:, :-1][:, told])
+    sizes = inverse @ rest[:, -1]
+    errors = _noise(problem, rest[:, -1] - rest[:, :-1][:, told] @ sizes) * np.linalg.norm(inverse, axis=1)
+    chosen = [effect for effect, own in zip(effects, told, strict=True) if own]
+    sentences = []
+    for (channel, effect), size, error in zip(chosen, map(float, sizes), errors, strict=True):
+        values = np.concatenate([record[channel] for record in records if channel in record.channels])
+        unit = {"delay": records[0].dt, "offset": 0.1 * float(np.std(values)), "gain": 0.1}[effect]
+        if abs(size) > max(SURE * error, NOTICEABLE * unit):
+            sentences.append(_sentence(channel, effect, size, problem.law.units[channel]))
+    return sentences
+
+
+def _noise(problem: Problem, left: Float[np.ndarray, " samples"]) -> float:
+    """Standard deviation of what is left, with its correlation."""
+    used = problem.used
+    counted = correlation_time([left[used & (problem.owner == i)] for i in np.unique(problem.owner[used])])
+    return float(np.sqrt(np.mean(left[used] ** 2) * (counted if counted > CORRELATED else 1.0)))
+
+
+def _column(
+    problem: Problem, end: SearchEnd, records: Sequence[RideRecord], owner: int, channel: str, effect: str
+) -> Float[np.ndarray, " samples"] | None:
+    """Change of the weighted residual for each unit of an effect; None for a law on a bench."""
+    parts, begin, found = [], 0, False
+    for part in problem.residuals:
+        size = part.used().size
+        column = np.zeros(size)
+        if isinstance(part, RideBatch) and channel in part.channels:
+            weight = np.asarray(part.weight)
+            row, shaped, found = part.channels.index(channel), column.reshape(weight.shape), True
+            errors = end.residual[begin : begin + size].reshape(weight.shape)
+            for i, number in enumerate(np.asarray(part.number)):
+                expected = records[number][channel] + errors[i, row] * problem.sigma[owner]
+                slope = np.gradient(expected, records[number].dt)
+                by_effect = {"delay": slope, "offset": -np.ones_like(slope), "gain": -expected}
+                shaped[i, row] = weight[i, row] * by_effect[effect]
+        parts.append(column)
+        begin += size
+    return np.concatenate(parts) if found else None
+
+
+def _sentence(channel: str, effect: str, size: float, unit: str) -> str:
+    words = {
+        "delay": f"comes {1e3 * abs(size):.3g} ms too {'late' if size > 0 else 'early'}",
+        "offset": f"has a zero error of {size:.3g} {unit}",
+        "gain": f"has a gain of {1 + size:.4g}",
+    }
+    how = {"delay": "lag=0.0)` or `Sensor(delay=0.0", "offset": "offset=0.0", "gain": "gain=1.0"}[effect]
+    return (
+        f"By its residual, {channel} {words[effect]}, unless the vehicle misses something else:"
+        f" fit it with `Sensor({how})`."
+    )
