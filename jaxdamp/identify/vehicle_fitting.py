@@ -105,7 +105,9 @@ def fit_vehicle(
     if max_steps < 1:
         _checks.refuse("max_steps", "be 1 or more", max_steps)
     _checks.nonnegative("settling", settling)
-    benches = checked_benches(vehicle, bench or {})
+    if settling > 0.5 * min(len(ride) * ride.dt for ride in rides):
+        _checks.refuse("settling", "leave at least half of every record", settling)
+    benches = checked_benches(vehicle, bench or {}, rig)
     model = vehicle_test(vehicle, rides, sensors or {}, start, rig)
     own, frozen = per_record_paths(model, per_record, len(rides)), frozen_paths(model, over, freeze)
     spread = with_values(model, {path: jnp.full(len(rides), get(model, path)) for path in own})

@@ -1,7 +1,7 @@
 """Records and a vehicle as a least-squares problem."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -88,7 +88,7 @@ def _column(numbers: Sequence[int]) -> np.ndarray:
 
 def checked_records(vehicle: AbstractVehicle, records: Any) -> tuple[RideRecord, ...]:
     """The records, after a check that the vehicle has their channels and wheels."""
-    rides = (records,) if isinstance(records, RideRecord) else tuple(records)
+    rides = tuple(records) if isinstance(records, Iterable) else (records,)
     if not rides:
         _checks.refuse("records", "hold at least one record", "empty", "Read some with `bench.read_rides`.")
     names = [ride.name for ride in rides if isinstance(ride, RideRecord)]
@@ -110,8 +110,12 @@ def checked_records(vehicle: AbstractVehicle, records: Any) -> tuple[RideRecord,
     return rides
 
 
-def checked_benches(vehicle: AbstractVehicle, bench: Mapping[str, Any]) -> dict[str, tuple[BenchRun, ...]]:
+def checked_benches(
+    vehicle: AbstractVehicle, bench: Mapping[str, Any], rig: Rig | None
+) -> dict[str, tuple[BenchRun, ...]]:
     """The bench records by the path of the law."""
+    if rig is not None and not bench:
+        _checks.refuse("rig", "come with bench records", repr(rig), "Pass them as `bench={'damper': runs}`.")
     for path in bench:
         try:
             law = get(vehicle, path)

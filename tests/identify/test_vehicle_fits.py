@@ -130,6 +130,8 @@ def wrong(**changed):
         ([wrong()], {"per_record": ["sprung_mass"]}, "differ between several records"),
         ([wrong()], {"noise": {"pitch": 1.0}}, "`noise` must be one of 'stroke'"),
         ([wrong()], {"weighting": "runs"}, "weighting"),
+        ([wrong()], {"settling": 0.3}, "leave at least half"),
+        ([wrong()], {"rig": Rig(gas_force=-1.0)}, "come with bench records"),
     ],
 )
 def test_wrong_calls_are_refused(records, options, message):
