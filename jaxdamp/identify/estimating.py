@@ -142,7 +142,7 @@ def _together(estimates: Sequence[Estimate], directions: Sequence[np.ndarray]) -
         groups.append((members.union(*(group[0] for group in joined)), "" if joined else how))
     return [
         f"These records cannot distinguish {_listed([estimates[i].name for i in sorted(members)])}"
-        + f": {how} hardly changes the fit" * bool(how)
+        + f": {how} hardly changes the force" * bool(how)
         + ". Freeze all but one of them, or add records."
         for members, how in groups
     ]

@@ -10,11 +10,11 @@ from jaxdamp._field_types import check_module
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.estimating import estimate
-from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.identify.several import Solution
 from jaxdamp.identify.vehicle_left_out import on_sensors
+from jaxdamp.identify.vehicle_noise import channel_noise
 from jaxdamp.identify.vehicle_preparing import (
     VehicleData,
     checked_benches,
@@ -137,8 +137,8 @@ def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScal
     model = problem.free.started_at(end.values).tree
     held = () if scale.held is None else (problem.free.names[scale.held],)
     problem, end = without(problem.started_at(end.values), end, scale.held)
-    deviations, inflation = noise_of(problem, end, None)
-    estimates = estimate(problem, Solution(end, (end,), 1), deviations)
+    noise = channel_noise(problem, end.residual, end.values.size)
+    estimates = estimate(problem, Solution(end, (end,), 1), noise.sigma)
     own = {path: get(model, path) for path in data.per_record}
     model = with_values(model, {path: jnp.mean(values) for path, values in own.items()})
     notes = [f"The search did not converge: {end.status.sentence}"] * (not end.converged)
@@ -153,10 +153,10 @@ def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScal
         )
     notes += estimates.notes
     notes += on_sensors(problem, end, data.rides, data.channels, model.sensors)
-    if inflation > 1.0:
+    if noise.inflation > 1.0:
         notes.append(
             "Neighbouring residuals are alike: the vehicle or its sensors miss something systematic. The standard"
-            f" errors are {inflation:.3g} times those of independent noise."
+            f" errors are {noise.inflation:.3g} times those of independent noise."
         )
     return VehicleFit(
         vehicle=model.vehicle,
@@ -167,7 +167,7 @@ def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScal
         warnings=tuple(notes),
         status=end.status,
         steps=end.steps,
-        inflation=inflation,
+        inflation=noise.inflation,
         sensors=model.sensors,
         held=held,
         scale_free=scale.names,

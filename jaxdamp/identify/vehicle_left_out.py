@@ -6,16 +6,16 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp.bench import RideRecord
-from jaxdamp.identify.noise import CORRELATED, correlation_time
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.vehicle_noise import channel_noise
 from jaxdamp.identify.vehicle_residuals import RideBatch
 from jaxdamp.rig import Sensor
 
 
 SURE = 6.0  # standard errors from which an effect is named
 NOTICEABLE = 0.01  # sampling intervals of a delay, and tenths of a channel, below which an effect does not matter
-OF_ITS_OWN = 1e-3  # share of an effect that no fitted number has, below which it cannot be told
+OF_ITS_OWN = 1e-3  # share of an effect that no fitted number has, below which it cannot be shown
 
 
 def on_sensors(
@@ -51,11 +51,12 @@ def on_sensors(
     whole = np.stack([*columns, end.residual], axis=1)
     basis, _ = np.linalg.qr(end.jacobian / np.linalg.norm(end.jacobian, axis=0).clip(1e-300))
     rest = whole - basis @ (basis.T @ whole)
-    told = np.linalg.norm(rest[:, :-1], axis=0) > OF_ITS_OWN * np.linalg.norm(whole[:, :-1], axis=0)
-    inverse = np.linalg.pinv(rest[:, :-1][:, told])
+    shown = np.linalg.norm(rest[:, :-1], axis=0) > OF_ITS_OWN * np.linalg.norm(whole[:, :-1], axis=0)
+    inverse = np.linalg.pinv(rest[:, :-1][:, shown])
     sizes = inverse @ rest[:, -1]
-    errors = _noise(problem, rest[:, -1] - rest[:, :-1][:, told] @ sizes) * np.linalg.norm(inverse, axis=1)
-    chosen = [effect for effect, own in zip(effects, told, strict=True) if own]
+    left = channel_noise(problem, rest[:, -1] - rest[:, :-1][:, shown] @ sizes, end.values.size)
+    errors = np.linalg.norm(inverse * left.sigma, axis=1)
+    chosen = [effect for effect, own in zip(effects, shown, strict=True) if own]
     sentences = []
     for (channel, effect), size, error in zip(chosen, map(float, sizes), errors, strict=True):
         values = np.concatenate([record[channel] for record in records if channel in record.channels])
@@ -63,13 +64,6 @@ def on_sensors(
         if abs(size) > max(SURE * error, NOTICEABLE * unit):
             sentences.append(_sentence(channel, effect, size, problem.law.units[channel]))
     return sentences
-
-
-def _noise(problem: Problem, left: Float[np.ndarray, " samples"]) -> float:
-    """Standard deviation of what is left, with its correlation."""
-    used = problem.used
-    counted = correlation_time([left[used & (problem.owner == i)] for i in np.unique(problem.owner[used])])
-    return float(np.sqrt(np.mean(left[used] ** 2) * (counted if counted > CORRELATED else 1.0)))
 
 
 def _column(
