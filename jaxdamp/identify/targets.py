@@ -262,5 +262,5 @@ def _estimates(problem: Problem, end: SearchEnd) -> tuple[Estimate, ...]:
         note = "not identifiable" if not np.isfinite(error) else "at a bound" if sides[i] else ""
         reach = NORMAL * error
         limits = (max(value - reach, float(lower[i])), min(value + reach, float(upper[i])))
-        rows.append(Estimate(name, value, p.unit, error, limits, p.meaning, note, tied))
+        rows.append(Estimate(name, value, p.unit, error, limits, p.meaning, note, tied=tied))
     return tuple(rows)
