@@ -13,25 +13,22 @@ from jaxdamp.cli.vehicle_words import parse_vehicle
 from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.report import Attempts, Table, axles_sentence, notes_of, ride_report, ride_tables
-from jaxdamp.roads import AbstractRoad, WhiteRoad
+from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
 
 
 USUAL = 10.0  # s, a ride on a road without an end of its own
 
 
-def parse_road(text: str, *, speed: float, duration: float, seed: int, white: bool = False) -> AbstractRoad | WhiteRoad:
+def parse_road(text: str, *, speed: float, duration: float, seed: int, white: bool = False) -> AbstractRoad:
     """The road that a word on the command line means.
 
-    "iso:C" is an ISO 8608 class, "white:C" the same as white noise where that is of use, "bump:0.06:5" a cosine bump of
-    height and length in metres that begins after a second, anything else a file: OpenCRG (*.crg), or text with
-    positions [m] and heights [m].
+    "iso:C" is an ISO 8608 class, "bump:0.06:5" a cosine bump of height and length in metres that begins after a second,
+    anything else a file: OpenCRG (*.crg), or text with positions [m] and heights [m].
     """
     kind, _, rest = text.partition(":")
     if kind == "iso":
         road: AbstractRoad = roads.iso8608(rest, speed, duration, seed=seed)
-    elif kind == "white" and white:
-        return roads.white(rest, speed)
     elif kind == "bump":
         try:
             height, length = (float(number) for number in rest.split(":"))
@@ -42,8 +39,7 @@ def parse_road(text: str, *, speed: float, duration: float, seed: int, white: bo
         road = roads.read_crg(text, speed) if text.endswith(".crg") else roads.read_profile(text, speed)
     else:
         remedy = 'Examples: "iso:C", "bump:0.06:5", "profile.csv", "course.crg".'
-        also = "white:CLASS, " * white
-        _checks.refuse("road", f"be iso:CLASS, {also}bump:HEIGHT:LENGTH or a file that is there", repr(text), remedy)
+        _checks.refuse("road", "be iso:CLASS, bump:HEIGHT:LENGTH or a file that is there", repr(text), remedy)
     return road
 
 

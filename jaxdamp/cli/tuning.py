@@ -8,7 +8,7 @@ from typing import Any
 
 import equinox as eqx
 
-from jaxdamp import Ride, _checks, export, sweep, tune
+from jaxdamp import Ride, _checks, export, roads, sweep, tune
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.metric_words import axis_words, limit_words, metric_names, objective_word, pairs, span
@@ -43,16 +43,15 @@ class RoadOptions:
     def roads(self, count: int = 1) -> tuple[list[Any], dict[str, Any]]:
         """So many realisations of the road, and the options of a run over them."""
         _checks.positive("speed", self.speed)
-        length = self.duration or USUAL
-        made = [
-            parse_road(self.road, speed=self.speed, duration=length, seed=self.seed + i, white=True)
-            for i in range(count)
-        ]
-        if isinstance(made[0], WhiteRoad):
+        kind, _, rest = self.road.partition(":")
+        if kind == "white":
             if self.duration is not None:
                 _checks.refuse("duration", "be left out on a white road", self.duration)
-            return made, {}
-        own = length if self.duration or self.road.startswith("iso:") else made[0].duration or length
+            return [roads.white(rest, self.speed)] * count, {}
+        length = self.duration or USUAL
+        seeds = range(self.seed, self.seed + count)
+        made = [parse_road(self.road, speed=self.speed, duration=length, seed=seed) for seed in seeds]
+        own = length if self.duration or kind == "iso" else made[0].duration or length
         return made, {"duration": own, "dt": self.dt}
 
 

@@ -29,7 +29,7 @@ def sensitivity(result: Sensitivity, *, most: int = MOST) -> "matplotlib.figure.
     remedy = "The call is `plots.sensitivity(tune.sensitivity(...))`."
     _checks.instance("result", result, Sensitivity, "be the result of `tune.sensitivity`", remedy)
     metrics, dampers = list(result.values), list(result.curves)
-    names = [row[0] for row in result.table().rows][:most]
+    names = [str(row[0]) for row in result.table().rows][:most]
     heights = [3.4] * len(dampers) + [0.9 + 0.26 * len(names)]
     figure = _style.new_figure(1.5 + 4.3 * len(metrics), sum(heights))
     grid = figure.add_gridspec(len(heights), len(metrics), height_ratios=heights)

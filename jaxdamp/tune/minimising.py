@@ -141,12 +141,10 @@ def minimise(
     measured = Measurement(vehicle, road, objective, space.free, each=list(allowed), duration=duration, dt=dt)
     curves = ShapeNumbers(vehicle, [shape] if isinstance(shape, Shape) else shape)
     names = [*measured.names, *curves.names]
-    tolerance = tolerance_of(space.free)
-    if starts == 1:
-        alone = Evaluator(one_at_a_time(_joined(measured, curves), space.free, names), names, tolerance)
-    else:
-        desk = Desk(many_at_a_time(_joined(measured.side_by_side(), curves), space.free, names), starts)
-        alone = Evaluator(desk.alone, names, tolerance)
+    joined = _joined(measured if starts == 1 else measured.side_by_side(), curves)
+    desk = None if starts == 1 else Desk(many_at_a_time(joined, space.free, names), starts)
+    evaluate = one_at_a_time(joined, space.free, names) if desk is None else desk.alone
+    alone = Evaluator(evaluate, names, tolerance_of(space.free))
     before, _ = alone.at(space.start)
     _check_finite(before, objective)
     units = objective.units(vehicle)
@@ -158,7 +156,7 @@ def minimise(
     all_limits += curves.limits(before)
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {objective.name} {value:.5g}"))
-        if starts == 1:
+        if desk is None:
             ended, attempts = search(alone, space, objective.name, all_limits, max_steps, progress), ()
         else:
             points = start_points(space, starts, seed)
@@ -183,6 +181,7 @@ def _check_arguments(metric: Any, vehicle: Any, road: Any, max_steps: int, start
 
 
 def _joined(measured: Measurement, curves: ShapeNumbers) -> Measured:
+    """Metrics and numbers of curves of a vehicle."""
     return lambda vehicle: {**measured(vehicle), **curves(vehicle)}
 
 

@@ -150,18 +150,18 @@ def scenario_ride(
             first, steps = ride, ride.substeps
     assert first is not None
     rides = [checked_rides[id(scenario.road)] for scenario in scenarios]
-    shapes = {np.shape(ride.heights) for ride in rides}
-    if len(shapes) > 1:
-        lengths = ", ".join(sorted(f"{(shape[0] - 1) * first.dt:g} s" for shape in shapes))
+    counts = {0 if ride.heights is None else ride.heights.shape[0] for ride in rides}
+    if len(counts) > 1:
+        lengths = ", ".join(sorted(f"{(count - 1) * first.dt:g} s" for count in counts))
         _checks.refuse("roads", "be driven for the same time", lengths, "Pass `duration`.")
     found: Any = [ride.road if white else ride.heights for ride in rides]
     common = eqx.tree_at(lambda r: (r.vehicle, r.road), first, (vehicle, found[0] if white else None), is_leaf=_none)
     weights = jnp.asarray([scenario.weight for scenario in scenarios])
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *found)
-    arrays = ({path: jnp.stack(change) for path, change in changes.items()} for changes in (factors, offsets))
+    changes = [{path: jnp.stack(change) for path, change in side.items()} for side in (factors, offsets)]
     names = tuple(scenario.name for scenario in scenarios)
     delays = not white and any(ride.road is not None for ride in rides)
-    ride = ScenarioRide(common.side_by_side(), stacked, *arrays, weights, names, delays, risk)
+    ride = ScenarioRide(common.side_by_side(), stacked, changes[0], changes[1], weights, names, delays, risk)
     paths = {path: get(vehicle, path) for path in factors}
     if paths:
         ride.refuse_moved_axles("conditions", lambda values: with_values(vehicle, values), paths)

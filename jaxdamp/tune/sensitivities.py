@@ -79,8 +79,8 @@ def sensitivity(
     wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
     given = dict(quantities or {})
     _check(wanted, vehicle, road, given)
-    road_of = (lambda values: road(**values)) if given else (lambda values: road)  # type: ignore[operator, misc]
-    first = road_of(given)
+    make: Any = road
+    first = make(**given) if given else make
     white = first.white if isinstance(first, Scenarios) else isinstance(first, WhiteRoad)
     objective = _objective(wanted, vehicle, white)
     run = {"duration": duration, "dt": dt}
@@ -93,7 +93,7 @@ def sensitivity(
     own, free = _free(vehicle, hatted, over, freeze)
     point = np.array([*np.asarray(free.values, float), *given.values()])
     if given:
-        measured = _on_made_roads(hatted, road_of, list(given), objective, free, run)
+        measured = _on_made_roads(hatted, make, list(given), objective, free, run)
     else:
         fixed = Measurement(hatted, first, objective, free, **run)
         measured = lambda x: fixed(free.build(x))  # noqa: E731
@@ -185,7 +185,7 @@ def _free(
 
 def _on_made_roads(
     vehicle: AbstractVehicle,
-    road_of: Callable[[Mapping[str, Any]], Any],
+    make: Callable[..., Any],
     names: Sequence[str],
     objective: Objective,
     free: FreeParameters,
@@ -195,7 +195,7 @@ def _on_made_roads(
     count = free.values.size
 
     def measured(x: Any) -> Mapping[str, Any]:
-        road = road_of({name: x[count + i] for i, name in enumerate(names)})
+        road = make(**{name: x[count + i] for i, name in enumerate(names)})
         ride = Ride(vehicle, road, metrics=objective.metrics, **run)
         return objective.of(ride.on_axles_of(free.build(x[:count]))())
 

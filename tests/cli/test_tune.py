@@ -88,7 +88,7 @@ WRONG = [
     (["tune", "WRONG", "white:C"], "did you mean 'sprung_mass'"),
     (["tune", "NEGATIVE", "white:C"], "must be positive"),
     (["tune", "quarter_car_000", "white:K"], "must be one of 'A'"),
-    (["tune", "quarter_car_000", "grey:C"], "iso:CLASS, white:CLASS"),
+    (["tune", "quarter_car_000", "grey:C"], "Option --road must be iso:CLASS"),
     (["tune", "quarter_car_000", "bump:3"], "bump:HEIGHT:LENGTH"),
     (["tune", "quarter_car_000", "white:C", "--start", "none.json"], "There is no file"),
     (["tune", "quarter_car_000", "white:C", "--minimise", "confort"], "Did you mean 'comfort'?"),
