@@ -37,6 +37,19 @@ print(json.dumps(answers))
 """
 
 ANSWERS = {  # call: words that its refusal holds
+    "tune.Scenarios(road)": ("`roads` must be roads by name, or a sequence", "around one road"),
+    "tune.Scenarios([3.0])": ("`roads['road 1']`", "3.0"),
+    "tune.Scenarios([road], [{'rate': 1.0}])": ("`conditions['condition 1']` must be a `tune.Condition",),
+    "tune.Scenarios([road], tune.Condition())": ("`conditions` must be conditions by name", "around one condition"),
+    "tune.minimise('rms_stroke', car, road, limits=['rms_stroke'])": ("`limits` must be a mapping of metrics",),
+    "tune.minimise('rms_stroke', car, road, limits={'rms_stroke': 'low'})": ("`limits['rms_stroke']`", "Write 0.1"),
+    "tune.minimise('working_space_rms', car, road, shape=['monotone'])": ("`shape` must be made by `tune.slope`",),
+    "tune.Targets({'rms_stroke': 1.0})": ("`targets['rms_stroke']` must be a value and a positive tolerance",),
+    "tune.sensitivity(3.0, car, road)": ("`metric` must be metrics by name",),
+    "tune.sensitivity('working_space_rms', road, car)": ("`vehicle` must be a vehicle",),
+    "tune.sensitivity('working_space_rms', car, road, quantities={'speed': 1.0})": (
+        "`road` must be a function of speed",
+    ),
     "simulate(road, car)": ("`vehicle` must be a vehicle", "is an Iso8608", "`simulate(vehicle, road)`"),
     "simulate(car, road, duration=1.0, engine='adaptive')": ("`engine` must be an engine", "'adaptive'", "Adaptive()`"),
     "Ride(car, road, duration=1.0, engine=jaxdamp.simulation.Exponential)": ("`engine` must be", "Exponential(...)`"),

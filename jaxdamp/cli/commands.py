@@ -5,6 +5,33 @@ from typing import Annotated
 
 import typer
 
+from jaxdamp.cli.option_types import (
+    Between,
+    Columns,
+    Command,
+    Cycles,
+    Debug,
+    Delimiter,
+    Duration,
+    Files,
+    Filter,
+    ForceSign,
+    Gains,
+    KeepRest,
+    Manifest,
+    Replace,
+    Road,
+    SamplingRate,
+    Seed,
+    Sign,
+    SkipBad,
+    Speed,
+    Start,
+    Step,
+    Units,
+    Vehicle,
+)
+
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -19,14 +46,6 @@ Signs: stroke and velocity are positive in rebound (extension), force is positiv
 whose bench counts compression positive is read with --sign compression-positive. Nothing is guessed silently: what was
 decided is printed.""",
 )
-
-Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
-Replace = Annotated[
-    bool,
-    typer.Option(
-        "--replace", "--force", help="Write into --out although it is not empty: results of jaxdamp are replaced."
-    ),
-]
 
 
 def _say_version(asked: bool) -> bool:
@@ -45,47 +64,6 @@ def common(
     ] = False,
 ) -> None:
     """Options before a command. The help of the application stands above."""
-
-
-Files = Annotated[
-    list[Path],
-    typer.Argument(help="Files with records (CSV, XLSX, MATLAB, TDMS, MDF4, Parquet), patterns, or folders."),
-]
-Sign = Annotated[
-    str | None, typer.Option(help="Direction that the files count positive: rebound-positive or compression-positive.")
-]
-ForceSign = Annotated[
-    str | None,
-    typer.Option(
-        help='"same" if the files\' force is positive when it resists motion in their positive direction, '
-        'otherwise "opposite".'
-    ),
-]
-Columns = Annotated[
-    list[str], typer.Option(help="Headers or numbers (from 0) of columns: time=t_s,stroke=1,velocity=none.")
-]
-Units = Annotated[list[str], typer.Option(help="Units that the headers do not give: stroke=mm,force=kN.")]
-SamplingRate = Annotated[float | None, typer.Option(help="Samples per second [Hz], for files without a time column.")]
-Delimiter = Annotated[str | None, typer.Option(help="Character between columns, if it is not found.")]
-Gains = Annotated[
-    list[str], typer.Option(help="Gains of sensors, for columns in volts: force=500 N/V,stroke=10 mm/V - 2 mm.")
-]
-Manifest = Annotated[
-    Path | None,
-    typer.Option(help="TOML file that says how to read the files; jaxdamp.toml in a folder is taken by itself."),
-]
-SkipBad = Annotated[bool, typer.Option("--skip-bad", help="Leave out files that cannot be read.")]
-Command = Annotated[
-    list[str], typer.Option(help="What was set on the damper, by name or pattern: '*_0.5A=0.5,*_1A=1'.")
-]
-Cycles = Annotated[str | None, typer.Option(help="Full cycles to keep: 3 or last:3, or skip:2.")]
-Between = Annotated[str | None, typer.Option(help="Part of the records to keep, start:end [s].")]
-Filter = Annotated[
-    float | None, typer.Option("--filter", help="Zero-phase low-pass of stroke, velocity and force [Hz].")
-]
-KeepRest = Annotated[
-    bool, typer.Option("--keep-rest", help="Keep the rest before and after the motion, which is cut off otherwise.")
-]
 
 
 @app.command()
@@ -222,7 +200,9 @@ def demo(
 @app.command()
 def ride(
     law: Annotated[Path, typer.Argument(help="A law as JSON, such as best_law.json of jaxdamp fit.")],
-    vehicle: Annotated[str, typer.Option(help='A published vehicle, see "jaxdamp vehicles".')] = "quarter_car_000",
+    vehicle: Annotated[
+        str, typer.Option(help='A published vehicle, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.')
+    ] = "quarter_car_000",
     road: Annotated[
         str, typer.Option(help="iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.")
     ] = "iso:C",
@@ -249,11 +229,88 @@ def ride(
         riding.run_ride(console.Screen(), law, baseline=baseline, out=out, replace=replace, **options)
 
 
+@app.command(name="tune")
+def tune_command(
+    vehicle: Vehicle,
+    road: Road,
+    start: Start = None,
+    minimise: Annotated[str, typer.Option(help="comfort, travel, grip, or the name of a ride metric.")] = "comfort",
+    limit: Annotated[list[str], typer.Option(help="Hard limits [SI]: travel=0.1,grip=900, or NAME=LOWER:UPPER.")] = [],  # noqa: B006
+    over: Annotated[
+        list[str], typer.Option(help='Parameters to tune, by path or pattern, such as "damper.*_rate".')
+    ] = ["*damper*"],  # noqa: B006
+    freeze: Annotated[list[str], typer.Option(help="Parameters among these to hold.")] = [],  # noqa: B006
+    bound: Annotated[
+        list[str], typer.Option(help="Bounds: rate=1000:4000; a third to three times the start if left out.")
+    ] = [],  # noqa: B006
+    tie: Annotated[
+        list[str], typer.Option(help="Parameters with the value of others: front.damper.*=rear.damper.*")
+    ] = [],  # noqa: B006
+    roads: Annotated[
+        int, typer.Option(help="Realisations of an iso road, driven side by side; their mean counts.")
+    ] = 1,
+    starts: Annotated[int, typer.Option(help="Searches side by side, from inside the bounds.")] = 1,
+    max_steps: Annotated[int, typer.Option(help="Of the search.")] = 100,
+    speed: Speed = 20.0,
+    duration: Duration = None,
+    dt: Step = 1e-3,
+    seed: Seed = 0,
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-tune"),
+    replace: Replace = False,
+    debug: Debug = False,
+) -> None:
+    """Tune the dampers of a vehicle for a ride metric within limits.
+
+    Writes the law, the vehicle, tables, pictures and a page. Ends with exit code 1 if a limit is not met.
+    """
+    from jaxdamp.cli import console, tuning
+
+    with console.plain_errors(debug):
+        console.prepare()
+        result = tuning.run_tune(
+            console.Screen(),
+            tuning.RoadOptions(vehicle, road, start, speed, duration, dt, seed),
+            tuning.TuneOptions(
+                minimise, tuple(limit), tuple(over), tuple(freeze), tuple(bound), tuple(tie), roads, starts, max_steps
+            ),
+            out=out,
+            replace=replace,
+        )
+    if not tuning.meets_limits(result):
+        raise typer.Exit(1)
+
+
+@app.command(name="sweep")
+def sweep_command(
+    vehicle: Vehicle,
+    road: Road,
+    over: Annotated[list[str], typer.Option(help="Axes: damper.rate=1000:8000:15 or sprung_mass=1000;1200.")],
+    start: Start = None,
+    metric: Annotated[
+        str, typer.Option(help="comfort, travel, grip, or names of ride metrics.")
+    ] = "comfort,travel,grip",
+    speed: Speed = 20.0,
+    duration: Duration = None,
+    dt: Step = 1e-3,
+    seed: Seed = 0,
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-sweep"),
+    replace: Replace = False,
+    debug: Debug = False,
+) -> None:
+    """Compute ride metrics over a grid of parameters: curves, maps and a table."""
+    from jaxdamp.cli import console, tuning
+
+    with console.plain_errors(debug):
+        console.prepare()
+        on = tuning.RoadOptions(vehicle, road, start, speed, duration, dt, seed)
+        tuning.run_sweep(console.Screen(), on, over=over, metrics=metric, out=out, replace=replace)
+
+
 @app.command(name="vehicles")
 def list_vehicles() -> None:
     """List the vehicles that a law can be put into."""
     from jaxdamp.cli.console import Screen
-    from jaxdamp.cli.riding import vehicles_table
+    from jaxdamp.cli.vehicle_words import vehicles_table
 
     Screen().table(vehicles_table())
 

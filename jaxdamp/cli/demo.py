@@ -169,6 +169,7 @@ def improve(
             _roads(scenario)[ISO],
             over=["damper.*rate"],
             limits=limits(before, scenario.tyre_load),
+            fresh_roads=0,  # the demo takes more of them itself
             duration=scenario.duration,
             progress=lambda step, metric: advance(f"step {step}: {metric:.4f} m/s²", step),
         )

@@ -1,39 +1,26 @@
 """`jaxdamp ride`: a law in a vehicle on a road, beside a baseline."""
 
-import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
-from jaxdamp import _checks, export, roads, simulate, vehicles
+from jaxdamp import _checks, export, roads, simulate
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.run_warnings import with_step_warnings, without_range_warnings
 from jaxdamp.cli.unusual import unusual
+from jaxdamp.cli.vehicle_words import parse_vehicle
 from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.report import Attempts, Column, Table, axles_sentence, notes_of, ride_report, ride_tables
+from jaxdamp.report import Attempts, Table, axles_sentence, notes_of, ride_report, ride_tables
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
-from jaxdamp.vehicles import AbstractVehicle
 
 
 USUAL = 10.0  # s, a ride on a road without an end of its own
 
 
-def presets() -> dict[str, Callable[..., AbstractVehicle]]:
-    """The published vehicles that take a damper, by name."""
-    functions = inspect.getmembers(vehicles.presets, inspect.isfunction)
-    return {name: make for name, make in functions if "damper" in inspect.signature(make).parameters}
-
-
-def vehicles_table() -> Table:
-    """The published vehicles that take a damper, with a line of meaning."""
-    rows = tuple((name, (inspect.getdoc(make) or "").partition("\n")[0]) for name, make in presets().items())
-    return Table("Vehicles", (Column("vehicle"), Column("what it is")), rows)
-
-
-def parse_road(text: str, *, speed: float, duration: float, seed: int) -> AbstractRoad:
+def parse_road(text: str, *, speed: float, duration: float, seed: int, white: bool = False) -> AbstractRoad:
     """The road that a word on the command line means.
 
     "iso:C" is an ISO 8608 class, "bump:0.06:5" a cosine bump of height and length in metres that begins after a second,
@@ -71,9 +58,9 @@ def run_ride(
     replace: bool = False,
 ) -> dict[str, Response]:
     """Ride on a law and a baseline, compare their metrics, and write tables, then pictures, into a folder."""
-    _checks.one_of("vehicle", vehicle, presets())
+    make = parse_vehicle(vehicle)
     _checks.positive("speed", speed)
-    make, files = presets()[vehicle], ({} if baseline is None else {"baseline": baseline}) | {"law": law}
+    files = ({} if baseline is None else {"baseline": baseline}) | {"law": law}
     laws = {name: export.from_json(path) for name, path in files.items()}
     screen.points(unusual(road, speed), style="yellow")
     attempts = Attempts(interrupt.check, message)
@@ -83,7 +70,7 @@ def run_ride(
         with screen.stage("Driving", total=len(laws)) as advance:
             for done, (name, damper) in enumerate(laws.items()):
                 advance(name, done)
-                car = make(damper=damper)
+                car = make(damper)
                 under = parse_road(road, speed=speed, duration=duration or USUAL, seed=seed)
                 length = duration or under.duration or USUAL
                 with without_range_warnings():

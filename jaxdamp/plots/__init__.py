@@ -15,6 +15,7 @@ from jaxdamp.plots.loops import fit_loops
 from jaxdamp.plots.preflight import preflight
 from jaxdamp.plots.rides import ride
 from jaxdamp.plots.roughness import roughness_by_segment
+from jaxdamp.plots.sensitivities import sensitivity
 from jaxdamp.plots.sweeps import sweep
 from jaxdamp.plots.validation import cross_validation
 from jaxdamp.plots.vehicle_fit import vehicle_fit
@@ -32,6 +33,7 @@ __all__ = [
     "preflight",
     "ride",
     "roughness_by_segment",
+    "sensitivity",
     "sweep",
     "training_history",
     "tuning",

@@ -1,4 +1,4 @@
-"""A tuning: the law before and after, the change of every ride metric, and the course of the search."""
+"""A tuning: laws and spectra before and after, the change of every ride metric, and the course of the search."""
 
 import textwrap
 from typing import TYPE_CHECKING
@@ -11,8 +11,9 @@ from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp._types import VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style, fitted_range
+from jaxdamp.plots.rides import default_channels
 from jaxdamp.rig import quasi_static
-from jaxdamp.tune import TuneResult
+from jaxdamp.tune import Spectrum, TuneResult
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplotlib.figure.Figure":
-    """Force over velocity before and after, the change of each ride metric, and the metric over the search.
+    """Force over velocity and response spectra before and after, the change of each ride metric, and the search.
 
     Arguments:
         result: a tuning.
@@ -36,9 +37,16 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
         reach = 1.1 * max(peaks) or 1.0
         velocities = np.linspace(-reach, reach, 401)
     pairs = _changed(result)
-    figure = _style.new_figure(12.0, max(6.0, 0.38 * len(result.before)))  # a line of text for each metric
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.0), height_ratios=(1.8, 1.0))
+    spectra = result.spectra(default_channels(result.start.layout))
+    height = max(6.0, 0.38 * len(result.before))  # a line of text for each metric
+    figure = _style.new_figure(12.0, height + 3.0 * bool(spectra))
+    rows = figure.add_gridspec(1 + bool(spectra), 1, height_ratios=(height, 3.0)[: 1 + bool(spectra)])
+    grid = rows[0].subgridspec(2, 2, width_ratios=(1.0, 1.0), height_ratios=(1.8, 1.0))
     curves, bars, search = (figure.add_subplot(at) for at in (grid[:, 0], grid[0, 1], grid[1, 1]))
+    if spectra:
+        below = rows[1].subgridspec(1, len(spectra))
+        for place, (channel, pair) in enumerate(spectra.items()):
+            _spectrum(figure.add_subplot(below[place]), channel, result.start.units[channel], pair)
     points = np.asarray(velocities, dtype=float)
     gaps = []
     for number, (name, pair) in enumerate(pairs.items()):
@@ -102,6 +110,17 @@ def _bars(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
     _style.dress(axes, "change [%]", "", "Ride metrics")
     axes.grid(False, axis="y")
     _style.cross(axes, horizontal=False)
+
+
+def _spectrum(axes: "matplotlib.axes.Axes", channel: str, unit: str, pair: tuple[Spectrum, Spectrum]) -> None:
+    """The power spectral density of a channel before and after."""
+    styles = ({"linestyle": "--", "color": _style.BLACK}, {"color": _style.COLOURS[0], "linewidth": 1.8})
+    for spectrum, style, label in zip(pair, styles, ("before", "after"), strict=True):
+        axes.loglog(spectrum.frequency, spectrum.density, label=label, **style)
+    title = f"Spectrum of the {channel.replace('_', ' ')}"
+    _style.dress(axes, "frequency [Hz]", f"[({typeset_unit(unit)})²/Hz]", title)
+    axes.set_xlim(pair[0].frequency[0], pair[0].frequency[-1])
+    axes.legend(frameon=False)
 
 
 def _search(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:

@@ -10,7 +10,7 @@ from jaxdamp import _checks, metrics
 from jaxdamp._tables import typeset_unit
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.simulation import Response
-from jaxdamp.vehicles import ChannelKind
+from jaxdamp.vehicles import ChannelKind, Layout
 
 
 if TYPE_CHECKING:
@@ -117,7 +117,11 @@ def _line_styles(names: Iterable[str], reference: str | None) -> dict[str, dict[
 
 def ride_channels(response: Response) -> tuple[str, ...]:
     """The default channels: body acceleration, first stroke, first dynamic tyre load."""
-    layout = response.system.layout
+    return default_channels(response.system.layout)
+
+
+def default_channels(layout: Layout) -> tuple[str, ...]:
+    """Body acceleration, first stroke, first dynamic tyre load of a vehicle."""
     acceleration = next(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting is not None)
     kinds = ChannelKind.STROKE, ChannelKind.TYRE_LOAD
     rest = [next((c.name for c in layout.channels if c.kind is kind), None) for kind in kinds]

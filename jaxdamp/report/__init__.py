@@ -20,6 +20,7 @@ from jaxdamp.report.fits import (
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import fitted_range_table, range_use_table
 from jaxdamp.report.rides import axles_sentence, notes_of, ride_report, ride_tables
+from jaxdamp.report.sweeps import sweep_report
 from jaxdamp.report.tunings import add_tuning, tuning_report
 
 
@@ -42,5 +43,6 @@ __all__ = [
     "records_table",
     "ride_report",
     "ride_tables",
+    "sweep_report",
     "tuning_report",
 ]

@@ -41,6 +41,11 @@ class AbstractOnOneRoad(AbstractRoad):
         """That of the road [s]."""
         return self.road.span
 
+    def reseeded(self, seed: int) -> AbstractRoad | None:
+        """The same view of the reseeded road."""
+        other = self.road.reseeded(seed)
+        return None if other is None else eqx.tree_at(lambda own: own.road, self, other)
+
 
 class AbstractOnSeveralRoads(AbstractRoad):
     """A road that uses several others at the same time."""
@@ -68,6 +73,14 @@ class AbstractOnSeveralRoads(AbstractRoad):
         first, last = zip(*(road.span for road in self.roads), strict=True)
         begin = jnp.max(jnp.stack([jnp.asarray(time, float) for time in first]))
         return begin, jnp.min(jnp.stack([jnp.asarray(time, float) for time in last]))
+
+    def reseeded(self, seed: int) -> AbstractRoad | None:
+        """The same combination of the reseeded roads; tracks of one surface stay as coherent as they are."""
+        others = [road.reseeded(seed) for road in self.roads]
+        if all(other is None for other in others):
+            return None
+        chosen = tuple(road if other is None else other for road, other in zip(self.roads, others, strict=True))
+        return eqx.tree_at(lambda own: own.roads, self, chosen)
 
 
 def least(times: Sequence[float | None]) -> float | None:

@@ -76,3 +76,8 @@ class AbstractRoad(eqx.Module):
     def span(self) -> tuple[Scalar | float, Scalar | float]:
         """The first and the last time [s] at which the road has a height; infinite where it has no such end."""
         return -math.inf, math.inf
+
+    def reseeded(self, seed: int) -> "AbstractRoad | None":
+        """The same kind of road with other random numbers; `None` if nothing in it is random or can be drawn again."""
+        del seed
+        return None

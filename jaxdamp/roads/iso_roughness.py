@@ -66,6 +66,11 @@ class Iso8608(AbstractRoad):
         speed = _checks.concrete(self.speed)
         return None if speed is None else self.length / float(speed)
 
+    def reseeded(self, seed: int) -> "Iso8608":
+        """Another realisation: each phase is shifted by a random angle, the same for each track of a surface."""
+        shift = uniform(seed, self.phase.shape, 2.0 * math.pi)
+        return eqx.tree_at(lambda road: road.phase, self, (self.phase + shift) % (2.0 * math.pi))
+
 
 def iso8608(
     road_class: str | ScalarLike,

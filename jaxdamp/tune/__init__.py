@@ -1,9 +1,62 @@
-"""Tuning of parameters for ride metrics: `minimise`, and `rescore` on other roads."""
+"""Tuning of vehicles for ride metrics.
+
+- `minimise`: the best free parameters, within bounds, limits and shape constraints; `rescore` on other roads.
+- `robust`: a tuning over scenarios, with the cost of tolerances; `tolerance_effects` of any vehicle.
+- `sensitivity`: which parameters, and which velocities of the damper curve, a metric comes from.
+- `Scenarios`: roads and conditions of the vehicle, in place of one road.
+- `Targets`, `smooth_peak`, `smooth_settling`: objectives.
+- `slope`, `monotone`, `ratio`, `knee`: constraints on the shape of the force-velocity curve.
+"""
 
 from jaxdamp._status import Status
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.rescoring import Rescore, rescore
-from jaxdamp.tune.result import Change, TuneResult
+from jaxdamp.tune.result import Change, ScenarioValues, TuneResult
+from jaxdamp.tune.risk import CVaR
+from jaxdamp.tune.robust_tuning import RobustResult, robust
+from jaxdamp.tune.scenario_ride import ScenarioRide
+from jaxdamp.tune.scenarios import Condition, Scenario, Scenarios, samples, tolerances
+from jaxdamp.tune.sensitivities import sensitivity
+from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
+from jaxdamp.tune.shape import Shape, damper_paths, knee, monotone, ratio, slope
+from jaxdamp.tune.smooth import smooth_peak, smooth_settling
+from jaxdamp.tune.spectra import Spectrum
+from jaxdamp.tune.starts import Attempt
+from jaxdamp.tune.targets import Targets
+from jaxdamp.tune.tolerance import ToleranceEffect, tolerance_effects
 
 
-__all__ = ["Change", "Rescore", "Status", "TuneResult", "minimise", "rescore"]
+__all__ = [
+    "Attempt",
+    "CVaR",
+    "Change",
+    "Condition",
+    "CurveSensitivity",
+    "Rescore",
+    "RobustResult",
+    "Scenario",
+    "ScenarioRide",
+    "ScenarioValues",
+    "Scenarios",
+    "Sensitivity",
+    "Shape",
+    "Spectrum",
+    "Status",
+    "Targets",
+    "ToleranceEffect",
+    "TuneResult",
+    "damper_paths",
+    "knee",
+    "minimise",
+    "monotone",
+    "ratio",
+    "rescore",
+    "robust",
+    "samples",
+    "sensitivity",
+    "slope",
+    "smooth_peak",
+    "smooth_settling",
+    "tolerance_effects",
+    "tolerances",
+]

@@ -10,31 +10,59 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
-from jaxdamp.metrics import Metric, MetricValues, current_name
-from jaxdamp.parameters import FreeParameters
+from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import Ride, moves_axles
-from jaxdamp.tune.objective import Function, objective_of
+from jaxdamp.tune.limits import Limit, scaled, spans
+from jaxdamp.tune.measuring import Measurement
+from jaxdamp.tune.objective import Function, Objective, objective_of
 from jaxdamp.tune.range_notes import range_notes
-from jaxdamp.tune.ranges import search_range
-from jaxdamp.tune.result import TuneResult, V
-from jaxdamp.tune.searching import Evaluator, Measured, active, limits_of, search
+from jaxdamp.tune.ranges import SearchRange, search_range
+from jaxdamp.tune.rescoring import other_roads, rescored
+from jaxdamp.tune.result import Drive, ScenarioValues, TuneResult, V
+from jaxdamp.tune.scenarios import Road, Scenarios
+from jaxdamp.tune.searching import (
+    Ended,
+    Evaluator,
+    Measured,
+    active,
+    many_at_a_time,
+    missed,
+    one_at_a_time,
+    search,
+    tolerance_of,
+)
+from jaxdamp.tune.shape import Shape, ShapeNumbers
+from jaxdamp.tune.starts import Attempt, Desk, best_of, search_together, start_points
 from jaxdamp.tune.step_notes import step_notes
-from jaxdamp.tune.wording import bound_notes, changes_of, early_end
+from jaxdamp.tune.targets import Targets
+from jaxdamp.tune.wording import (
+    active_words,
+    bound_notes,
+    changes_of,
+    early_end,
+    fresh_notes,
+    missed_notes,
+    start_notes,
+    true_value_notes,
+)
 from jaxdamp.vehicles import AbstractVehicle
 
 
 def minimise(
     metric: str | Metric | Function,
     vehicle: V,
-    road: AbstractRoad | WhiteRoad,
+    road: Road | Scenarios,
     *,
     over: Sequence[str] | Mapping[str, Any] = ("damper*",),
     freeze: Sequence[str] = (),
     bounds: Mapping[str, Any] | None = None,
     tie: Mapping[str, str] | None = None,
-    limits: Mapping[str, float] | None = None,
+    limits: Mapping[Any, Any] | None = None,
+    shape: Sequence[Shape] | Shape = (),
     metrics: Sequence[str | Metric] = (),
+    starts: int = 1,
+    seed: int = 0,
+    fresh_roads: int = 3,
     duration: float | None = None,
     dt: float = 1e-3,
     max_steps: int = 100,
@@ -43,8 +71,9 @@ def minimise(
     """Minimise a ride metric of a vehicle over its free parameters.
 
     Sequential quadratic programming with exact first derivatives, computed in forward mode through the simulation for
-    all parameters at once. It finds a local optimum, so start from a reasonable vehicle. The search itself is in double
-    precision; a vehicle in single precision (see `jaxdamp.configure`) is tuned to about 0.1 % of its parameters.
+    all parameters at once. It finds a local optimum, so start from a reasonable vehicle, or from several `starts`. The
+    search itself is in double precision; a vehicle in single precision (see `jaxdamp.configure`) is tuned to about
+    0.1 % of its parameters.
 
     Every parameter has bounds, so that the result stays near a damper that can be built. The default bounds are:
 
@@ -59,10 +88,10 @@ def minimise(
     Arguments:
         metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`; a `metrics.Metric` of any
             channel; or a differentiable function of the metrics by name, such as
-            `lambda m: m["rms_sprung_acceleration"] / 1.5 + m["dynamic_load_coefficient"] / 0.2`.
+            `lambda m: m["rms_sprung_acceleration"] / 1.5 + m["dynamic_load_coefficient"] / 0.2`, or `Targets(...)`.
         vehicle: the vehicle to start from.
-        road: a road for the simulation, the same in every step; or `roads.white(...)` for the stationary response of
-            the linearised vehicle, which has no peaks.
+        road: a road for the simulation, the same in every step; `roads.white(...)` for the stationary response of the
+            linearised vehicle, which has no peaks; or `Scenarios(...)`, whose metrics are joined by their risk.
         over: the parameters to change, by path, last part or pattern; all of the damper by default. A mapping
             `{parameter: (lower, upper)}` gives their bounds too, as `bounds` does.
         freeze: parameters among these to hold at their start.
@@ -71,9 +100,14 @@ def minimise(
             remain. If two names match a parameter, the later one counts.
         tie: parameters that take the values of others, such as `{"front.damper.*": "rear.damper.*"}`: one free value
             for each group (see `jaxdamp.parameters.free_parameters`).
-        limits: hard limits `{metric: largest value}` in the metric's unit, such as
-            `{"working_space_peak_to_peak": 0.1}`.
+        limits: hard limits `{metric: largest value}` or `{metric: (smallest, largest)}` in the metric's unit, such as
+            `{"working_space_peak_to_peak": 0.1}`, with a name or a `metrics.Metric`; in every scenario.
+        shape: constraints on the force-velocity curve: `slope`, `monotone`, `ratio`, `knee`.
         metrics: further metrics, which the function and the limits can use by name.
+        starts: number of searches, side by side; the first from the vehicle, the others from inside the bounds.
+        seed: of the other starts.
+        fresh_roads: number of other realisations of a random road, or of those of the scenarios, on which the result is
+            computed again; 0 for none.
         duration: length of the run [s], as in `simulate`.
         dt: step [s], as in `simulate`.
         max_steps: largest number of steps of the search.
@@ -82,7 +116,8 @@ def minimise(
 
     Returns:
         The tuned vehicle, all metrics before and after, and warnings: about a search that did not converge, limits
-        that cannot be satisfied, and dampers used outside the fitted range of their laws.
+        that cannot be satisfied, an improvement that is lost on fresh roads, and dampers used outside the fitted range
+        of their laws.
 
     Raises:
         ValueError: unknown metrics or parameters; bounds of a wrong shape, of a parameter that is not free, given in
@@ -96,71 +131,159 @@ def minimise(
     >>> bounded.parameters[0].note
     'at its upper bound'
     """
+    _check_arguments(metric, vehicle, road, max_steps, starts, fresh_roads)
+    known = [m.name for m in (*vehicle.ride_metrics, *(m for m in metrics if isinstance(m, Metric)))]
+    allowed, limited = spans(limits, known)
+    more = [*metrics, *limited, *(metric.metrics if isinstance(metric, Targets) else [])]
+    white = road.white if isinstance(road, Scenarios) else isinstance(road, WhiteRoad)
+    objective = objective_of(metric, vehicle, more, list(allowed), white=white)
+    space = search_range(vehicle, over, freeze, bounds, tie)
+    measured = Measurement(vehicle, road, objective, space.free, each=list(allowed), duration=duration, dt=dt)
+    curves = ShapeNumbers(vehicle, [shape] if isinstance(shape, Shape) else shape)
+    names = [*measured.names, *curves.names]
+    joined = _joined(measured if starts == 1 else measured.side_by_side(), curves)
+    desk = None if starts == 1 else Desk(many_at_a_time(joined, space.free, names), starts)
+    evaluate = one_at_a_time(joined, space.free, names) if desk is None else desk.alone
+    alone = Evaluator(evaluate, names, tolerance_of(space.free))
+    before, _ = alone.at(space.start)
+    _check_finite(before, objective)
+    units = objective.units(vehicle)
+    all_limits = [
+        Limit(entry, name, *span, scaled(*span, before[entry]), units[name])
+        for name, span in allowed.items()
+        for entry in measured.entries(name)
+    ]
+    all_limits += curves.limits(before)
+    with Progress("Tuning") as shown:
+        progress = progress or (lambda step, value: shown(f"step {step}, {objective.name} {value:.5g}"))
+        if desk is None:
+            ended, attempts = search(alone, space, objective.name, all_limits, max_steps, progress), ()
+        else:
+            points = start_points(space, starts, seed)
+            several = search_together(desk, alone, points, space, objective.name, all_limits, max_steps, progress)
+            ended, attempts = _chosen(several, alone, points, objective.name, all_limits)
+    return _result(
+        vehicle, space, measured, alone, ended, attempts, all_limits, allowed, max_steps, (duration, dt), fresh_roads
+    )
+
+
+def _check_arguments(metric: Any, vehicle: Any, road: Any, max_steps: int, starts: int, fresh_roads: int) -> None:
     call = "minimise(metric, vehicle, road)"
     if not isinstance(metric, str | Metric) and not callable(metric):
         must = "be the name of a ride metric, a Metric, or a function of the metrics"
         _checks.refuse("metric", must, _checks.described(metric), f"The call is `{call}`.")
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
-    check_module("road", road, (AbstractRoad, WhiteRoad), call)
-    if max_steps < 1:
-        _checks.refuse("max_steps", "be 1 or more", max_steps)
-    names = [m.name for m in (*vehicle.ride_metrics, *(m for m in metrics if isinstance(m, Metric)))]
-    limits = {current_name(name, names): top for name, top in (limits or {}).items()}
-    objective = objective_of(metric, vehicle, road, metrics, list(limits))
-    white, name = isinstance(road, WhiteRoad), objective.name
-    space = search_range(vehicle, over, freeze, bounds, tie)
+    if not isinstance(road, Scenarios):
+        check_module("road", road, (AbstractRoad, WhiteRoad), call)
+    for name, count, least in (("max_steps", max_steps, 1), ("starts", starts, 1), ("fresh_roads", fresh_roads, 0)):
+        if count < least:
+            _checks.refuse(name, f"be {least} or more", count)
 
-    def ride_of(vehicle: AbstractVehicle) -> Ride:
-        return Ride(vehicle, road, metrics=objective.metrics, duration=duration, dt=dt)
 
-    measured = driven(ride_of(vehicle), space.free)
-    evaluator = Evaluator(lambda vehicle: objective.of(measured(vehicle)), space.free, list(objective.units(vehicle)))
-    before, _ = evaluator.at(space.start)
-    if not np.all(np.isfinite(list(before.values()))):
+def _joined(measured: Measurement, curves: ShapeNumbers) -> Measured:
+    """Metrics and numbers of curves of a vehicle."""
+    return lambda vehicle: {**measured(vehicle), **curves(vehicle)}
+
+
+def _check_finite(before: Mapping[str, float], objective: Objective) -> None:
+    """Refuse a start without finite metrics; a true peak or settling time beside a smooth one may be infinite."""
+    exact = {m.name for m in objective.beside}
+    if not np.all(np.isfinite([value for name, value in before.items() if name not in exact])):
         remedy = "Call `simulate` with this road; its error messages explain the cause."
-        _checks.refuse("vehicle", "have finite metrics to start from", f"{name} = {before[name]}", remedy)
-    with Progress("Tuning") as shown:
-        progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
-        scaled = limits_of(limits, before)
-        ended = search(evaluator, space, name, scaled, max_steps, progress)
-    after, _ = evaluator.at(ended.values)
-    reached = active(scaled, after, evaluator.tolerance)
-    missed = [name for name in reached if scaled[name].margin(after[name]) < -evaluator.tolerance.limit]
+        value = f"{objective.name} = {before[objective.name]}"
+        _checks.refuse("vehicle", "have finite metrics to start from", value, remedy)
+
+
+def _chosen(
+    ended: Sequence[Ended], evaluator: Evaluator, points: np.ndarray, metric: str, limits: Sequence[Limit]
+) -> tuple[Ended, tuple[Attempt, ...]]:
+    """The best of several searches, and all of them."""
+    best, values = best_of(ended, evaluator, metric, limits)
+    attempts = (
+        Attempt(
+            start,
+            one.values,
+            value,
+            not missed(limits, evaluator.at(one.values)[0], evaluator.tolerance),
+            one.slope_left < evaluator.tolerance.slope,
+        )
+        for start, one, value in zip(points, ended, values, strict=True)
+    )
+    return ended[best], tuple(attempts)
+
+
+def _result(
+    vehicle: V,
+    space: SearchRange,
+    measured: Measurement,
+    evaluator: Evaluator,
+    ended: Ended,
+    attempts: tuple[Attempt, ...],
+    limits: Sequence[Limit],
+    allowed: Mapping[str, tuple[float, float]],
+    max_steps: int,
+    run: tuple[float | None, float],
+    fresh_roads: int,
+) -> TuneResult[V]:
+    """The result of a tuning, judged: what holds it, what it misses, and what it is worth on fresh roads."""
+    objective, road = measured.objective, measured.road
+    before, after = evaluator.at(space.start)[0], evaluator.at(ended.values)[0]
+    short = missed(limits, after, evaluator.tolerance)
     changes = changes_of(space, ended.values)
-    if missed:
+    if short:
         status = Status.LIMIT_NOT_MET
     elif ended.slope_left < evaluator.tolerance.slope:
         status = Status.CONVERGED
     else:
         status = Status.STEP_LIMIT if ended.out_of_steps else Status.NO_BETTER_STEP
-    notes = [f"The limit {n} <= {limits[n]:.4g} is not met: {after[n]:.4g}. Relax it, or free more." for n in missed]
-    notes += bound_notes(space, changes)
+    held = active(limits, after, evaluator.tolerance)
+    notes = missed_notes(short, after, changes) + true_value_notes(objective, after, allowed)
+    notes += bound_notes(space, changes) + start_notes(attempts, objective.name)
     if status in (Status.STEP_LIMIT, Status.NO_BETTER_STEP):
         notes.append(early_end(ended, max_steps))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
-    coarse = [] if white else step_notes(vehicle, tuned, ride_of)
-    notes += coarse
-    if not any("does not bear" in note for note in coarse):
-        notes += range_notes(vehicle, tuned, ride_of)
+    notes += _notes_on_runs(vehicle, tuned, measured)
     units = objective.units(vehicle)
+    reported = [{name: values[name] for name in units} for values in (before, after)]
+    fresh = None
+    others = other_roads(road, fresh_roads)
+    if others:
+        duration, dt = run
+        cars = (vehicle, tuned)
+        fresh = rescored(cars, others, objective.metrics, objective, units, objective.name, duration=duration, dt=dt)
+        notes += fresh_notes(fresh, reported, allowed)
+    each = None
+    if measured.scenario_names:
+        sides = [{name: np.asarray(x, float) for name, x in measured.each(car).items()} for car in (vehicle, tuned)]
+        each = ScenarioValues(measured.scenario_names, *sides)
     return TuneResult(
         vehicle=tuned,
         start=vehicle,
-        metric=name,
+        metric=objective.name,
         parameters=changes,
-        before=MetricValues.with_units(before, units),
-        after=MetricValues.with_units(after, units),
+        before=MetricValues.with_units(reported[0], units),
+        after=MetricValues.with_units(reported[1], units),
         units=units,
-        limits=limits,
-        active_limits=reached,
-        warnings=tuple(notes),
+        limits={name: span[1] if np.isinf(span[0]) else span for name, span in allowed.items()},
+        active_limits=tuple(dict.fromkeys(limit.of for limit in held if not limit.is_shape)),
+        warnings=tuple(dict.fromkeys(notes)),
         status=status,
         history=ended.history,
         objective=objective,
+        active=active_words(held, after, changes, space, ended.values),
+        fresh=fresh,
+        starts=attempts,
+        scenarios=each,
+        drive=Drive(road.scenarios[0].road if isinstance(road, Scenarios) else road, *run),
     )
 
 
-def driven(ride: Ride, free: FreeParameters) -> Measured:
-    """A ride as a function of its vehicle; the road is sampled once, or again if parameters move the axles."""
-    follows = ride.road is not None and moves_axles(free.build, free.values)
-    return lambda vehicle: (ride.on_axles_of(vehicle) if follows else ride.of_vehicle(vehicle))()
+def _notes_on_runs(vehicle: AbstractVehicle, tuned: AbstractVehicle, measured: Measurement) -> list[str]:
+    """What is to be said of the step and of the fitted ranges, on every road."""
+    notes = []
+    for ride_of in measured.rides_of():
+        coarse = [] if measured.white else step_notes(vehicle, tuned, ride_of)
+        notes += coarse
+        if not any("does not bear" in note for note in coarse):
+            notes += range_notes(vehicle, tuned, ride_of)
+    return notes

@@ -3,13 +3,15 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias, final
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric, MetricValues, current_name
-from jaxdamp.roads import AbstractRoad, WhiteRoad
+from jaxdamp.tune.smooth import exact_counterpart
 from jaxdamp.vehicles import AbstractVehicle, is_stationary
 
 
@@ -23,15 +25,21 @@ class Objective(NamedTuple):
         name: of the metric or the function.
         function: of the metrics by name; None for a metric.
         metrics: all metrics of the tuning, those for information included.
+        beside: the true peaks and settling times that are shown beside smooth ones.
     """
 
     name: str
     function: Function | None
     metrics: tuple[Metric, ...]
+    beside: tuple[Metric, ...] = ()
 
     def of(self, values: Mapping[str, Scalar]) -> dict[str, Scalar]:
         """The metrics, and the value of the function."""
         return dict(values) if self.function is None else {**values, self.name: self.function(MetricValues(values))}
+
+    def of_each(self, values: Mapping[str, Array]) -> dict[str, Array]:
+        """The same of several vehicles or scenarios, along the first axis of each value."""
+        return jax.vmap(self.of)(dict(values))
 
     def units(self, vehicle: AbstractVehicle) -> dict[str, str]:
         """Unit of each metric; that of a function is unknown."""
@@ -61,18 +69,19 @@ class _Asked(Mapping[str, Scalar]):
 def objective_of(
     wanted: str | Metric | Function,
     vehicle: AbstractVehicle,
-    road: AbstractRoad | WhiteRoad,
     more: Sequence[str | Metric],
     limited: Sequence[str],
+    *,
+    white: bool,
 ) -> Objective:
     """The objective of a tuning on a road.
 
     Arguments:
         wanted: name of a ride metric, a metric, or a function of metrics by name.
         vehicle: the vehicle to tune.
-        road: the road of the tuning.
         more: further metrics, which the function or limits can use.
         limited: names of the metrics with limits.
+        white: whether roads are white, so that only metrics that follow from an RMS are available.
 
     Raises:
         ValueError: an unknown metric, one that is not available on this kind of road, or one without a derivative; a
@@ -80,7 +89,10 @@ def objective_of(
     """
     extra = vehicle.chosen_metrics(list(more), "metrics") if more else []
     extra += vehicle.chosen_metrics([wanted], "metric") if isinstance(wanted, Metric) else []
-    known = {m.name: m for m in (*_given(vehicle, road, (*vehicle.ride_metrics, *extra)),)}
+    beside = tuple(exact for exact in map(exact_counterpart, extra) if exact is not None)
+    extra += beside
+    all_metrics = (*vehicle.ride_metrics, *extra)
+    known = {m.name: m for m in all_metrics if not white or is_stationary(m, vehicle.layout.by_name)}
     asked = [m.name for m in extra]
     function = None
     if isinstance(wanted, str | Metric):
@@ -95,15 +107,13 @@ def objective_of(
     for one in asked:
         _checks.one_of("metric", one, known)
         if not known[one].statistic.differentiable:
-            _checks.refuse("metric", "have a slope", f"{one!r}, a count", "Tune on the dynamic load coefficient.")
+            remedy = (
+                "Tune on the dynamic load coefficient; limit `Metric('relative_tyre_load', 'minimum')` to (-1, None)."
+            )
+            _checks.refuse("metric", "have a slope", f"{one!r}, a count", remedy)
     # Further metrics for information: those without weightings, counts and means, which may be negative.
     chosen = [m for m in known.values() if m.name in asked or _for_information(m)]
-    return Objective(name, function, tuple(chosen))
-
-
-def _given(vehicle: AbstractVehicle, road: AbstractRoad | WhiteRoad, metrics: Sequence[Metric]) -> list[Metric]:
-    """The metrics that are available on a road; on a white road those that follow from an RMS."""
-    return [m for m in metrics if not isinstance(road, WhiteRoad) or is_stationary(m, vehicle.layout.by_name)]
+    return Objective(name, function, tuple(chosen), beside)
 
 
 def _for_information(metric: Metric) -> bool:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from jaxtyping import Float
@@ -10,10 +10,18 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
 from jaxdamp._types import Scalar
+from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Ride
-from jaxdamp.tune.result import TuneResult
+from jaxdamp.tune.objective import Objective
+from jaxdamp.tune.scenarios import Scenarios
 from jaxdamp.vehicles import AbstractVehicle
+
+
+if TYPE_CHECKING:
+    from jaxdamp.tune.result import TuneResult
+
+FIRST_SEED = 4711  # of fresh roads, which are thereby others than those of usual small seeds
 
 
 @final
@@ -80,16 +88,21 @@ class Rescore:
 
 
 def rescore(
-    result: TuneResult[Any], roads: Sequence[AbstractRoad], *, duration: float | None = None, dt: float = 1e-3
+    result: "TuneResult[Any]",
+    roads: Sequence[AbstractRoad | Scenarios],
+    *,
+    duration: float | None = None,
+    dt: float = 1e-3,
 ) -> Rescore:
     """Compute all ride metrics of the original and the tuned vehicle on other roads.
 
     A tuning uses a single road. Other roads, such as the same class with another seed, show whether the improvement is
     general. Runs of a few seconds contain only few periods of the slow body motion, so their results scatter.
+    `minimise` does it by itself for random roads (`result.fresh`).
 
     Arguments:
         result: result of `minimise`.
-        roads: one or more roads.
+        roads: one or more roads, or scenarios, whose metrics are then those of their risk.
         duration: length of each run [s], as in `simulate`.
         dt: step [s], as in `simulate`.
 
@@ -108,13 +121,44 @@ def rescore(
     known, objective = list(result.start.ride_metrics), result.objective
     known += [m for m in (objective.metrics if objective else ()) if m not in known]
     units = {m.name: m.unit(result.start.units) for m in known} | (objective.units(result.start) if objective else {})
+    cars = (result.start, result.vehicle)
+    return rescored(cars, roads, known, objective, units, result.metric, duration=duration, dt=dt)
 
-    def drive(car: AbstractVehicle, road: AbstractRoad) -> Mapping[str, Scalar]:
-        values = Ride(car, road, metrics=known, duration=duration, dt=dt)()
+
+def rescored(
+    cars: tuple[AbstractVehicle, AbstractVehicle],
+    roads: Sequence[Any],
+    metrics: Sequence[Metric],
+    objective: Objective | None,
+    units: dict[str, str],
+    metric: str,
+    *,
+    duration: float | None,
+    dt: float,
+) -> Rescore:
+    """The metrics of the vehicle before and after on roads or in scenarios."""
+
+    def drive(car: AbstractVehicle, road: Any) -> Mapping[str, Scalar]:
+        if isinstance(road, Scenarios):
+            ride = road.ride(car, metrics=metrics, duration=duration, dt=dt)
+            each = objective.of_each(ride.each()) if objective else ride.each()
+            return {name: ride.risk(values, ride.weights) for name, values in each.items()}
+        values = Ride(car, road, metrics=metrics, duration=duration, dt=dt)()
         return objective.of(values) if objective else values
 
-    before, after = ([drive(car, road) for road in roads] for car in (result.start, result.vehicle))
+    before, after = ([drive(car, road) for road in roads] for car in cars)
     before, after = (
         {name: np.array([float(values[name]) for values in runs]) for name in units} for runs in (before, after)
     )
-    return Rescore(before, after, units, result.metric)
+    return Rescore(before, after, units, metric)
+
+
+def other_roads(road: Any, count: int) -> list[Any]:
+    """So many other realisations of a random road, or of scenarios on random roads; none of others."""
+    if isinstance(road, Scenarios):
+        found = [road.on_other_roads(FIRST_SEED + i) for i in range(count)]
+    elif isinstance(road, AbstractRoad):
+        found = [road.reseeded(FIRST_SEED + i) for i in range(count)]
+    else:
+        found = []
+    return [other for other in found if other is not None]

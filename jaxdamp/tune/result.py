@@ -1,11 +1,23 @@
 """The result of a tuning."""
 
 import dataclasses
+import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_tied, with_unit
+from jaxdamp.tune.limits import written
 from jaxdamp.tune.objective import Objective
+from jaxdamp.tune.rescoring import Rescore
+from jaxdamp.tune.scenarios import Road
+from jaxdamp.tune.spectra import Spectrum, spectra
+from jaxdamp.tune.starts import Attempt
+from jaxdamp.tune.targets import Targets
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -34,6 +46,28 @@ class Change(NamedTuple):
         return with_tied(self.note, self.tied)
 
 
+class ScenarioValues(NamedTuple):
+    """All metrics in every scenario.
+
+    Attributes:
+        names: of the scenarios.
+        before: metrics of the start, shape (scenarios,).
+        after: metrics of the tuned vehicle.
+    """
+
+    names: tuple[str, ...]
+    before: dict[str, Float[np.ndarray, " scenarios"]]
+    after: dict[str, Float[np.ndarray, " scenarios"]]
+
+
+class Drive(NamedTuple):
+    """What a tuning drove over: a road, that of the first scenario, for so long [s] with this step [s]."""
+
+    road: Road
+    duration: float | None
+    dt: float
+
+
 @dataclasses.dataclass(frozen=True, repr=False)
 class TuneResult(Generic[V]):
     """A tuned vehicle and the vehicle before the tuning.
@@ -46,12 +80,17 @@ class TuneResult(Generic[V]):
         before: all ride metrics of the start.
         after: all ride metrics of the tuned vehicle.
         units: unit of each metric.
-        limits: largest allowed values of metrics.
+        limits: largest allowed value of metrics, or the smallest and the largest one.
         active_limits: names of the metrics at their limit or beyond.
         warnings: doubts about the result, in words.
         status: how the search ended; `CONVERGED` only if the gradient condition of an optimum is satisfied.
         history: the metric after each step of the search.
         objective: the objective with all metrics of the tuning.
+        active: the constraints that hold the search, in words: limits, shapes, bounds.
+        fresh: all metrics on other realisations of a random road; None if there is no random road.
+        starts: the searches from several starts.
+        scenarios: all metrics in every scenario; None for a tuning on one road.
+        drive: what was driven over.
     """
 
     vehicle: V
@@ -61,12 +100,17 @@ class TuneResult(Generic[V]):
     before: dict[str, float]
     after: dict[str, float]
     units: dict[str, str]
-    limits: dict[str, float]
+    limits: dict[str, float | tuple[float, float]]
     active_limits: tuple[str, ...]
     warnings: tuple[str, ...]
     status: Status
     history: tuple[float, ...]
     objective: Objective | None = None
+    active: tuple[str, ...] = ()
+    fresh: Rescore | None = None
+    starts: tuple[Attempt, ...] = ()
+    scenarios: ScenarioValues | None = None
+    drive: Drive | None = None
 
     @property
     def converged(self) -> bool:
@@ -93,13 +137,60 @@ class TuneResult(Generic[V]):
 
     def table(self) -> Table:
         """The ride metrics before and after, with notes on the minimised metric and on limits."""
-        notes = {n: f"limit {top:.4g}{', reached' * (n in self.active_limits)}" for n, top in self.limits.items()}
-        notes[self.metric] = "minimised"
-        rows = [
-            Compared(name, self.units[name], (before, after), percent_change(before, after), (notes.get(name, ""),))
-            for (name, before), after in zip(self.before.items(), self.after.values(), strict=True)
-        ]
-        return comparison_table("Ride metrics", "metric", ("before", "after"), rows, (Column("note"),))
+        rows = []
+        for (name, before), after in zip(self.before.items(), self.after.values(), strict=True):
+            on_fresh = () if self.fresh is None else (_mean_change(self.fresh, name),)
+            more = (*on_fresh, self._note(name))
+            rows.append(Compared(name, self.units[name], (before, after), percent_change(before, after), more))
+        fresh = () if self.fresh is None else (Column("on fresh roads", "%", "+.1f"),)
+        return comparison_table("Ride metrics", "metric", ("before", "after"), rows, (*fresh, Column("note")))
+
+    def _note(self, name: str) -> str:
+        """What a metric is to the tuning, in words."""
+        if name == self.metric:
+            return "minimised"
+        function = self.objective.function if self.objective else None
+        target = function.note(name, self.after[name]) if isinstance(function, Targets) else ""
+        if name not in self.limits:
+            return target
+        span = self.limits[name]
+        text = written(span if isinstance(span, tuple) else (-math.inf, span))
+        return "; ".join(filter(None, (f"{text}{', reached' * (name in self.active_limits)}", target)))
+
+    def scenario_table(self, metrics: Sequence[str] | None = None) -> Table:
+        """Metrics in every scenario before and after.
+
+        Arguments:
+            metrics: their names; the minimised metric and those with limits if left out.
+
+        Raises:
+            ValueError: a tuning on one road, an unknown metric.
+        """
+        if self.scenarios is None:
+            _checks.refuse("result", "be of a tuning with `tune.Scenarios`", "of one road")
+        names = list(dict.fromkeys([self.metric, *self.limits])) if metrics is None else list(metrics)
+        each, rows = self.scenarios, []
+        for name in names:
+            _checks.one_of("metrics", name, each.after)
+            pairs = zip(each.names, each.before[name].tolist(), each.after[name].tolist(), strict=True)
+            rows += [
+                Compared(name, self.units[name], pair, percent_change(*pair), (scenario,)) for scenario, *pair in pairs
+            ]
+        return comparison_table("In every scenario", "metric", ("before", "after"), rows, (Column("scenario"),))
+
+    def spectra(self, channels: Sequence[str]) -> dict[str, tuple[Spectrum, Spectrum]]:
+        """The power spectral density of channels before and after; in scenarios, on the first road.
+
+        Arguments:
+            channels: of the vehicle.
+
+        Returns:
+            For each channel the spectra before and after: frequencies [Hz] and densities [unit²/Hz].
+        """
+        if self.drive is None:
+            return {}
+        sides = [spectra(car, self.drive.road, channels, *self.drive[1:]) for car in (self.start, self.vehicle)]
+        return {channel: (sides[0][channel], sides[1][channel]) for channel in channels}
 
     def parameter_table(self) -> Table:
         """The free numbers before and after, with the bounds of the search."""
@@ -128,10 +219,21 @@ class TuneResult(Generic[V]):
             "parameters": [plain(change._asdict()) for change in self.parameters],
             "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
             "active_limits": list(self.active_limits),
+            "active": list(self.active),
+            "fresh": None if self.fresh is None else self.fresh.to_dict(),
+            "scenarios": None if self.scenarios is None else plain(self.scenarios._asdict()),
+            "starts": [plain(attempt._asdict()) for attempt in self.starts],
             "history": plain(self.history),
             "warnings": list(self.warnings),
         }
 
     def __repr__(self) -> str:
         tables = [self.table().to_text(), self.parameter_table().to_text()]
+        tables += [] if self.scenarios is None else [self.scenario_table().to_text()]
         return "\n".join([self.summary, *tables, *(f"warning: {warning}" for warning in self.warnings)])
+
+
+def _mean_change(fresh: Rescore, name: str) -> float | None:
+    """Mean change of a metric on fresh roads [%]; none from zero."""
+    change = fresh.change(name)
+    return 100.0 * float(np.mean(change)) if np.all(np.isfinite(change)) else None

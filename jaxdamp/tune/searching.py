@@ -9,8 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp._jacobian import value_and_jacobian
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters
+from jaxdamp.tune.limits import Limit, margin_slopes, margins
 from jaxdamp.tune.ranges import SearchRange
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -23,22 +25,8 @@ class Tolerance(NamedTuple):
 
 
 DOUBLE, SINGLE = Tolerance(1e-4, 1e-6), Tolerance(1e-2, 1e-4)
-
-
-class Limit(NamedTuple):
-    """Largest allowed value of a metric, which may be negative or zero, and the scale of distances to it."""
-
-    top: float
-    scale: float
-
-    def margin(self, value: float) -> float:
-        """Relative distance to the limit, negative beyond it."""
-        return (self.top - value) / self.scale
-
-
-Limits = Mapping[str, Limit]
-Measured = Callable[[AbstractVehicle], dict[str, Scalar]]
-Slopes = Mapping[str, np.ndarray]
+Measured = Callable[[AbstractVehicle], Mapping[str, Scalar]]
+Evaluate = Callable[[np.ndarray], tuple[Array | np.ndarray, Array | np.ndarray]]
 OUT_OF_STEPS = 9  # SLSQP's own code
 RESTARTS = 2  # with a new estimate of the curvature, if the search ends before an optimum
 
@@ -56,22 +44,8 @@ class Ended(NamedTuple):
 class Evaluator:
     """Metrics and their derivatives, computed together and cached for the last point."""
 
-    def __init__(self, ride: Measured, free: FreeParameters, names: Sequence[str]) -> None:
-        self.names = list(names)
-        dtype = free.values.dtype
-        self.tolerance = DOUBLE if dtype == np.float64 else SINGLE
-
-        @eqx.filter_jit
-        def evaluate(free: FreeParameters, values: Array) -> tuple[Array, Array]:
-            def measured(values: Array) -> tuple[Array, Array]:
-                found = ride(free.build(values))
-                stacked = jnp.stack([found[name] for name in self.names])
-                return stacked, stacked
-
-            slopes, found = jax.jacfwd(measured, has_aux=True)(values)
-            return found, slopes
-
-        self._evaluate = lambda values: evaluate(free, jnp.asarray(values, dtype))
+    def __init__(self, evaluate: Evaluate, names: Sequence[str], tolerance: Tolerance) -> None:
+        self.names, self.tolerance, self._evaluate = list(names), tolerance, evaluate
         self._last: tuple[bytes, dict[str, float], dict[str, np.ndarray]] = (b"", {}, {})
 
     def at(self, values: Float[np.ndarray, " free"]) -> tuple[dict[str, float], dict[str, np.ndarray]]:
@@ -86,13 +60,53 @@ class Evaluator:
         return self._last[1], self._last[2]
 
 
+def tolerance_of(free: FreeParameters) -> Tolerance:
+    """The tolerance that the precision of the parameters permits."""
+    return DOUBLE if free.values.dtype == np.float64 else SINGLE
+
+
+def one_at_a_time(measured: Measured, free: FreeParameters, names: Sequence[str]) -> Evaluate:
+    """The metrics, shape (names,), and derivatives, shape (names, free), of one vector of values, compiled."""
+
+    @eqx.filter_jit
+    def evaluate(free: FreeParameters, values: Array) -> tuple[Array, Array]:
+        def stacked(values: Array) -> tuple[Array, Array]:
+            found = measured(free.build(values))
+            stacked = jnp.stack([found[name] for name in names])
+            return stacked, stacked
+
+        slopes, found = jax.jacfwd(stacked, has_aux=True)(values)
+        return found, slopes
+
+    return lambda values: evaluate(free, jnp.asarray(values, free.values.dtype))
+
+
+def many_at_a_time(measured: Measured, free: FreeParameters, names: Sequence[str]) -> Evaluate:
+    """The same of several vectors side by side, with a first axis of that many, compiled."""
+    entries = [str(i) for i in range(free.values.size)]
+
+    @eqx.filter_jit
+    def evaluate(free: FreeParameters, values: Array) -> tuple[Array, Array]:
+        def one(point: dict[str, Array]) -> dict[str, Array]:
+            found = measured(free.build(jnp.stack([point[entry] for entry in entries])))
+            return {name: found[name] for name in names}
+
+        point = {entry: values[:, i] for i, entry in enumerate(entries)}
+        found, slopes = value_and_jacobian(jax.vmap(one), point)
+        rows = [jnp.stack([slopes[name][entry] for entry in entries], axis=-1) for name in names]
+        return jnp.stack([found[name] for name in names], axis=1), jnp.stack(rows, axis=1)
+
+    return lambda values: evaluate(free, jnp.asarray(values, free.values.dtype))
+
+
 def search(
     evaluator: Evaluator,
     space: SearchRange,
     metric: str,
-    limits: Limits,
+    limits: Sequence[Limit],
     max_steps: int,
     progress: Callable[[int, float], None],
+    start: np.ndarray | None = None,
 ) -> Ended:
     """SLSQP in coordinates, the objective divided by its start.
 
@@ -101,7 +115,8 @@ def search(
     import scipy.optimize
 
     unit = space.unit
-    level = abs(evaluator.at(space.start)[0][metric]) or 1.0
+    start = space.start if start is None else start
+    level = abs(evaluator.at(start)[0][metric]) or 1.0
     history: list[float] = []
 
     def note(u: np.ndarray) -> None:
@@ -123,7 +138,7 @@ def search(
         left = _slope_left(evaluator, space, values, metric, limits)
         return Ended(values, tuple(history), solved.status == OUT_OF_STEPS, left)
 
-    ended = attempt(space.start / unit)
+    ended = attempt(start / unit)
     for _ in range(RESTARTS):
         if ended.slope_left < evaluator.tolerance.slope or len(history) >= max_steps:
             break
@@ -131,38 +146,38 @@ def search(
     return ended
 
 
-def active(limits: Limits, values: Mapping[str, float], tolerance: Tolerance) -> tuple[str, ...]:
+def active(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tolerance) -> list[Limit]:
     """The active or violated limits."""
-    return tuple(name for name, limit in limits.items() if limit.margin(values[name]) < tolerance.limit)
+    return [limit for limit in limits if limit.margin(values[limit.name]) < tolerance.limit]
 
 
-def limits_of(tops: Mapping[str, float], start: Mapping[str, float]) -> dict[str, Limit]:
-    """The limits with their scales: their own magnitude, or that of the metric at the start if a limit is zero."""
-    return {name: Limit(top, abs(top) or abs(start[name]) or 1.0) for name, top in tops.items()}
+def missed(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tolerance) -> list[Limit]:
+    """The violated limits."""
+    return [limit for limit in limits if not limit.margin(values[limit.name]) >= -tolerance.limit]
 
 
-def _constraints(evaluator: Evaluator, space: SearchRange, limits: Limits) -> list[dict]:
-    """Constraints: metrics below their limits, and increasing vectors."""
+def _constraints(evaluator: Evaluator, space: SearchRange, limits: Sequence[Limit]) -> list[dict]:
+    """Constraints: numbers inside their limits, and increasing vectors."""
     unit = space.unit
-    below = [
-        {
-            "type": "ineq",
-            "fun": lambda u, n=name, limit=limit: limit.margin(evaluator.at(u * unit)[0][n]),
-            "jac": lambda u, n=name, limit=limit: -evaluator.at(u * unit)[1][n] * unit / limit.scale,
-        }
-        for name, limit in limits.items()
-    ]
+    inside = {
+        "type": "ineq",
+        "fun": lambda u: margins(limits, evaluator.at(u * unit)[0]),
+        "jac": lambda u: margin_slopes(limits, evaluator.at(u * unit)[1]) * unit,
+    }
     rows, gaps = space.coordinates.order()
-    return below + [{"type": "ineq", "fun": lambda u: rows @ u - gaps, "jac": lambda u: rows}] * bool(gaps.size)
+    ordered = {"type": "ineq", "fun": lambda u: rows @ u - gaps, "jac": lambda u: rows}
+    return [inside] * bool(limits) + [ordered] * bool(gaps.size)
 
 
-def _slope_left(evaluator: Evaluator, space: SearchRange, values: np.ndarray, metric: str, limits: Limits) -> float:
+def _slope_left(
+    evaluator: Evaluator, space: SearchRange, values: np.ndarray, metric: str, limits: Sequence[Limit]
+) -> float:
     """Length of the scaled gradient after projection on bounds and active limits, relative to the metric."""
     found, slopes = evaluator.at(values)
     unbound = np.array([not side for side in space.side(values)])
     gradient = (slopes[metric] * space.unit)[unbound]
     tight = active(limits, found, evaluator.tolerance)
     if tight and gradient.size:
-        walls = np.stack([(slopes[name] * space.unit)[unbound] for name in tight], axis=1)
+        walls = np.stack([(slopes[limit.name] * space.unit)[unbound] for limit in tight], axis=1)
         gradient = gradient - walls @ np.linalg.lstsq(walls, gradient, rcond=None)[0]
     return float(np.linalg.norm(gradient)) / max(abs(found[metric]), 1e-300)

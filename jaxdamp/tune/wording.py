@@ -1,11 +1,23 @@
 """The changes and the end of a tuning, as records and in words."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from jaxdamp._status import Status
+from jaxdamp._tables import percent_change
+from jaxdamp.tune.limits import Limit, Span
+from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.ranges import FACTOR, SearchRange
+from jaxdamp.tune.rescoring import Rescore
 from jaxdamp.tune.result import Change
 from jaxdamp.tune.searching import Ended
+from jaxdamp.tune.smooth import exact_counterpart
+from jaxdamp.tune.starts import Attempt
+
+
+LOST = 0.5  # share of an improvement: if less is left on fresh roads, that is said
+ALIKE = 1e-3  # relative difference of metrics at ends that count as one optimum
 
 
 def changes_of(space: SearchRange, values: np.ndarray) -> tuple[Change, ...]:
@@ -47,3 +59,90 @@ def early_end(ended: Ended, max_steps: int) -> str:
         f"{Status.NO_BETTER_STEP.sentence.rstrip('.')}: {slope}. A peak has a kink where another instant becomes the "
         "largest. Compare with a tuning from another start."
     )
+
+
+def missed_notes(short: Sequence[Limit], values: Mapping[str, float], changes: Sequence[Change]) -> list[str]:
+    """A sentence for each metric or shape that violates its limit, at its worst place, with what binds it."""
+    worst: dict[str, Limit] = {}
+    for limit in sorted(short, key=lambda limit: limit.margin(values[limit.name])):
+        worst.setdefault(limit.of, limit)
+    bounds = [change.name for change in changes if change.note]
+    bound = f" The search is held by the bounds of {', '.join(bounds)}." if bounds else ""
+    together = f" Not met together: {', '.join(worst)}." if len(worst) > 1 else ""
+    return [
+        f"The limit {limit.name} {limit.nearer(values[limit.name])} is not met: {values[limit.name]:.4g}. Relax it, or "
+        f"free more.{together}{bound}"
+        for limit in worst.values()
+    ]
+
+
+def true_value_notes(objective: Objective, values: Mapping[str, float], allowed: Mapping[str, Span]) -> list[str]:
+    """A sentence for each limit on a smooth metric that the true one does not meet."""
+    notes = []
+    for metric in objective.metrics:
+        exact = exact_counterpart(metric)
+        if exact is not None and metric.name in allowed:
+            lower, upper = allowed[metric.name]
+            if not lower <= values[exact.name] <= upper:
+                beyond = f"the true {exact.name} is {values[exact.name]:.4g}, beyond the limit"
+                notes.append(f"{metric.name} is limited, but {beyond}.")
+    return notes
+
+
+def active_words(
+    held: Sequence[Limit],
+    values: Mapping[str, float],
+    changes: Sequence[Change],
+    space: SearchRange,
+    ended: np.ndarray,
+) -> tuple[str, ...]:
+    """What holds the search, in words: limits, shapes, bounds, and neighbours in ordered vectors."""
+    groups: dict[str, list[str]] = {}
+    for limit in held:
+        text = f"{limit.of} {limit.nearer(values[limit.name])}"
+        groups.setdefault(text, []).append(limit.name.removeprefix(limit.of))
+    words = []
+    for text, (first, *others) in groups.items():
+        more = f" and {len(others)} more places" if others else ""
+        words.append(f"{text},{first}{more}" if first else text)
+    words += [
+        f"{change.name} {change.note}, {change.after:.4g} {change.unit}".rstrip() for change in changes if change.note
+    ]
+    rows, gaps = space.coordinates.order()
+    touching = np.abs(rows @ (ended / space.unit) - gaps) < 1e-9 if gaps.size else np.zeros(0, bool)
+    pairs = (np.array(space.free.names)[row != 0] for row in rows[touching])
+    return (*words, *(f"{' = '.join(pair)}, which must increase" for pair in pairs))
+
+
+def start_notes(attempts: Sequence[Attempt], metric: str) -> list[str]:
+    """How many searches ended at the best optimum, if not all did."""
+    if not attempts:
+        return []
+    allowed = [a.metric for a in attempts if a.meets_limits] or [a.metric for a in attempts]
+    best, furthest = min(allowed), max(allowed)
+    alike = sum(value - best <= ALIKE * abs(best) for value in allowed)
+    if alike == len(attempts):
+        return []
+    rest = f", the worst at {furthest:.5g}" if furthest - best > ALIKE * abs(best) else ""
+    unmet = len(attempts) - len(allowed)
+    failed = f", and {unmet} met no limits" if unmet and unmet < len(attempts) else ""
+    return [f"{alike} of {len(attempts)} starts ended at the best {metric}, {best:.5g}{rest}{failed}."]
+
+
+def fresh_notes(fresh: Rescore, sides: Sequence[Mapping[str, float]], allowed: Mapping[str, Span]) -> list[str]:
+    """What does not hold on fresh roads: the improvement, or the limits."""
+    before, after = (side[fresh.metric] for side in sides)
+    gained, left = percent_change(before, after), 100.0 * float(np.mean(fresh.change(fresh.metric)))
+    notes = []
+    if gained is not None and gained < 0.0 and not left < LOST * gained:
+        notes.append(
+            f"On {fresh.roads} fresh roads {fresh.metric} changes by {left:+.1f} % on average, on the road of the "
+            f"tuning by {gained:+.1f} %: tune on longer or several roads (`tune.Scenarios`)."
+        )
+    for name, (lower, upper) in allowed.items():
+        values = fresh.after[name]
+        beyond = int(np.sum((values > upper) | (values < lower)))
+        if beyond:
+            furthest = float(values.max() if np.any(values > upper) else values.min())
+            notes.append(f"On {beyond} of {fresh.roads} fresh roads {name} is beyond its limit, up to {furthest:.4g}.")
+    return notes

@@ -10,7 +10,7 @@ from jaxdamp import bench, identify
 from jaxdamp.bench import BenchSet
 from jaxdamp.cli import app
 from jaxdamp.cli.options import law_names, split
-from jaxdamp.cli.riding import presets
+from jaxdamp.cli.vehicle_words import presets
 from jaxdamp.dampers import Bilinear
 from jaxdamp.export import from_json
 

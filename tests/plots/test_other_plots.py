@@ -166,7 +166,8 @@ def test_other_channels_get_a_label_with_their_unit(responses: dict[str, Respons
 def test_tuning_draws_laws_metrics_and_search(tuned: TuneResult) -> None:
     velocity = np.linspace(-0.3, 0.3, 7)
     figure = plots.tuning(tuned, velocity)
-    curves, bars, search = figure.axes
+    curves, bars, search, *spectra = figure.axes
+    assert len(spectra) == 3 and "sprung acceleration" in spectra[0].get_title(loc="left")
     after = tuned.parameters[0].after
     np.testing.assert_allclose(_line(curves, "before")[:, 1], 2500.0 * velocity, atol=1e-9)
     np.testing.assert_allclose(_line(curves, "after")[:, 1], after * velocity, atol=1e-9)

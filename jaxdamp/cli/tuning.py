@@ -1,0 +1,184 @@
+"""`jaxdamp tune`: the free parameters of a vehicle for a ride metric, with limits; and `jaxdamp sweep`."""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+
+from jaxdamp import Ride, _checks, export, roads, sweep, tune
+from jaxdamp.cli import interrupt
+from jaxdamp.cli.console import Screen
+from jaxdamp.cli.metric_words import axis_words, limit_words, metric_names, objective_word, pairs, span
+from jaxdamp.cli.results import results_folder
+from jaxdamp.cli.riding import USUAL, parse_road
+from jaxdamp.cli.unusual import unusual
+from jaxdamp.cli.vehicle_words import damper_places, parse_vehicle
+from jaxdamp.cli.wording import message
+from jaxdamp.parameters import get
+from jaxdamp.report import Attempts, sweep_report, tuning_report
+from jaxdamp.roads import WhiteRoad
+from jaxdamp.tune import Status, TuneResult
+from jaxdamp.vehicles import AbstractVehicle
+
+
+@dataclass(frozen=True)
+class RoadOptions:
+    """A vehicle with its law on a road, as the command line says it."""
+
+    vehicle: str
+    road: str
+    start: Path | None = None
+    speed: float = 20.0
+    duration: float | None = None
+    dt: float = 1e-3
+    seed: int = 0
+
+    def car(self) -> AbstractVehicle:
+        """The vehicle, with the law at each damper if one is given."""
+        return parse_vehicle(self.vehicle)(None if self.start is None else export.from_json(self.start))
+
+    def roads(self, count: int = 1) -> tuple[list[Any], dict[str, Any]]:
+        """So many realisations of the road, and the options of a run over them."""
+        _checks.positive("speed", self.speed)
+        kind, _, rest = self.road.partition(":")
+        if kind == "white":
+            if self.duration is not None:
+                _checks.refuse("duration", "be left out on a white road", self.duration)
+            return [roads.white(rest, self.speed)] * count, {}
+        length = self.duration or USUAL
+        seeds = range(self.seed, self.seed + count)
+        made = [parse_road(self.road, speed=self.speed, duration=length, seed=seed) for seed in seeds]
+        own = length if self.duration or kind == "iso" else made[0].duration or length
+        return made, {"duration": own, "dt": self.dt}
+
+
+@dataclass(frozen=True)
+class TuneOptions:
+    """What is tuned, as the command line says it."""
+
+    minimise: str = "comfort"
+    limit: tuple[str, ...] = ()
+    over: tuple[str, ...] = ("*damper*",)
+    freeze: tuple[str, ...] = ()
+    bound: tuple[str, ...] = ()
+    tie: tuple[str, ...] = ()
+    roads: int = 1
+    starts: int = 1
+    max_steps: int = 100
+
+
+def run_tune(
+    screen: Screen, on: RoadOptions, options: TuneOptions, *, out: Path, replace: bool = False
+) -> TuneResult[Any]:
+    """Tune a vehicle, and write the law, the vehicle, tables, then pictures and a page."""
+    if options.roads < 1:
+        _checks.refuse("roads", "be 1 or more", options.roads)
+    car = on.car()
+    made, run = on.roads(options.roads)
+    white = isinstance(made[0], WhiteRoad)
+    if options.roads > 1 and (white or not on.road.startswith("iso:")):
+        _checks.refuse("roads", "be 1 for a road that is not random", options.roads, "Take iso:CLASS.")
+    objective = objective_word(options.minimise, car, white=white)
+    limits = limit_words(options.limit, car, white=white)
+    bounds = {name: span("bound", value) for name, value in pairs("bound", options.bound)}
+    screen.points(unusual(on.road, on.speed), style="yellow")
+    attempts = Attempts(interrupt.check, message)
+    with results_folder(out, "tune", replace=replace) as results:
+        with screen.stage("Tuning") as advance:
+            result = tune.minimise(
+                objective,
+                car,
+                made[0] if len(made) == 1 else tune.Scenarios(made),
+                over=options.over,
+                freeze=options.freeze,
+                bounds=bounds,
+                tie=dict(pairs("tie", options.tie)),
+                limits=limits,
+                starts=options.starts,
+                max_steps=options.max_steps,
+                progress=lambda step, value: advance(f"step {step}: {value:.5g}", step),
+                **run,
+            )
+        for table in (result.parameter_table(), result.table()):
+            screen.table(table)
+        screen.say(result.summary)
+        screen.points([*result.active, *result.warnings], style="yellow")
+        interrupt.keep()
+        with interrupt.saving(), screen.stage("Law, vehicle and tables"):
+            _write(results.draft, result)
+            results.publish("the pictures and the report")
+        with screen.stage("Pictures and report"):
+            page = tuning_report(result, rescored=result.fresh, folder=results.draft, attempts=attempts)
+            page.write(results.draft / "report.html")
+    screen.files(out, results.published)
+    screen.points(attempts.troubles, style="yellow")
+    return result
+
+
+def meets_limits(result: TuneResult[Any]) -> bool:
+    """Whether all limits are met."""
+    return result.status is not Status.LIMIT_NOT_MET
+
+
+def _write(folder: Path, result: TuneResult[Any]) -> None:
+    """The tuned laws, the vehicle, tables, and all of it as JSON."""
+    import json
+
+    laws = {path: get(result.vehicle, path) for path in damper_places(result.vehicle)}
+    first = next(iter(laws.values()))
+    if all(bool(eqx.tree_equal(first, law)) for law in laws.values()):
+        laws = {"law": first}
+    for path, law in laws.items():
+        export.to_json(law, folder / f"{path.replace('.', '_')}.json")
+    export.to_json(result.vehicle, folder / "vehicle.json")
+    tables = {"parameters": result.parameter_table(), "metrics": result.table()}
+    if result.scenarios is not None:
+        tables["scenarios"] = result.scenario_table()
+    if result.fresh is not None:
+        tables["fresh_roads"] = result.fresh.table()
+    for name, table in tables.items():
+        (folder / f"{name}.csv").write_text(table.to_csv(), encoding="utf-8")
+    text = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
+    (folder / "tuning.json").write_text(text, encoding="utf-8")
+
+
+def run_sweep(
+    screen: Screen,
+    on: RoadOptions,
+    *,
+    over: Sequence[str],
+    metrics: str,
+    out: Path,
+    replace: bool = False,
+) -> Any:
+    """Ride metrics over a grid of parameters: a table, a netCDF file, pictures and a page."""
+    car = on.car()
+    (road,), run = on.roads()
+    white = isinstance(road, WhiteRoad)
+    words = [word.strip() for word in metrics.split(",")]
+    names = list(dict.fromkeys(n for word in words for n in metric_names("metric", word, car, white=white)))
+    axes = axis_words(over)
+    ride = Ride(car, road, metrics=names, **run)
+    ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})
+    screen.points(unusual(on.road, on.speed), style="yellow")
+    attempts = Attempts(interrupt.check, message)
+    with results_folder(out, "sweep", replace=replace) as results:
+        with screen.stage("Driving") as advance, warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            data = sweep(ride, axes, progress=lambda done, total: advance(f"{done} of {total} points", done))
+        remarks = [str(warning.message) for warning in caught]
+        screen.table(data.jaxdamp.table())
+        screen.points(remarks, style="yellow")
+        with interrupt.saving(), screen.stage("Tables"):
+            (results.draft / "sweep.csv").write_text(data.jaxdamp.table().to_csv(), encoding="utf-8")
+            data.to_netcdf(results.draft / "sweep.nc", engine="scipy")
+            results.publish("the pictures and the report")
+        with screen.stage("Pictures and report"):
+            page = sweep_report(data, remarks=remarks, folder=results.draft, attempts=attempts)
+            page.write(results.draft / "report.html")
+    screen.files(out, results.published)
+    screen.points(attempts.troubles, style="yellow")
+    return data

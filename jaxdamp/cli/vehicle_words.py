@@ -1,0 +1,103 @@
+"""What a vehicle is called on the command line: a published one, or a file of one's own."""
+
+import inspect
+import tomllib
+from collections.abc import Callable, Mapping
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+
+from jaxdamp import _checks, export, vehicles
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import get, replace
+from jaxdamp.report import Column, Table
+from jaxdamp.tune import damper_paths
+from jaxdamp.vehicles import AbstractVehicle
+
+
+MakeCar = Callable[[AbstractDamper | None], AbstractVehicle]
+EXAMPLE = 'Write for example preset = "quarter_car_000" and, below [parameters], sprung_mass = 1300.0.'
+
+
+def presets() -> dict[str, Callable[..., AbstractVehicle]]:
+    """The published vehicles that take a damper, by name."""
+    functions = inspect.getmembers(vehicles.presets, inspect.isfunction)
+    return {name: make for name, make in functions if "damper" in inspect.signature(make).parameters}
+
+
+def vehicles_table() -> Table:
+    """The published vehicles that take a damper, with a line of meaning."""
+    rows = tuple((name, (inspect.getdoc(make) or "").partition("\n")[0]) for name, make in presets().items())
+    return Table("Vehicles", (Column("vehicle"), Column("what it is")), rows)
+
+
+def parse_vehicle(word: str) -> MakeCar:
+    """The vehicle that a word means, as a function of a law for all its dampers, or of None for its own.
+
+    A name out of `jaxdamp vehicles`; a JSON file of `export.to_json`; or a TOML file with a preset and other values:
+
+        preset = "quarter_car_000"
+
+        [parameters]
+        sprung_mass = 1300.0
+
+    Raises:
+        ValueError: an unknown name, a file that is not there or holds no vehicle, parameters that the preset has not.
+    """
+    path = Path(word).expanduser()
+    if path.suffix not in (".json", ".toml"):
+        _checks.one_of("vehicle", word, presets())
+        return lambda law: presets()[word](damper=law)
+    if not path.is_file():
+        _checks.refuse("vehicle", "be a file that is there", repr(word), 'Or a name, see "jaxdamp vehicles".')
+    if path.suffix == ".json":
+        car = export.from_json(path)
+        remedy = "`export.to_json(vehicle)` writes it."
+        _checks.instance("vehicle", car, AbstractVehicle, "be a file with a vehicle", remedy)
+        return lambda law: car if law is None else with_law(car, law)
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"Option --vehicle: {word} is not TOML: {error}.") from error
+    return _preset(word, document)
+
+
+def _preset(word: str, document: Mapping[str, Any]) -> MakeCar:
+    extra = [key for key in document if key not in ("preset", "parameters")]
+    name, values = document.get("preset"), document.get("parameters", {})
+    if extra or not isinstance(name, str) or not isinstance(values, dict):
+        _checks.refuse("vehicle", "be a TOML file of preset and [parameters]", f"one of {', '.join(document)}", EXAMPLE)
+    _checks.one_of(f"preset in {word}", name, presets())
+    numbers = dict(_flat(values))
+    return lambda law: replace(presets()[name](damper=law), numbers)
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    """Tables inside a table as paths: `[parameters.front] spring_rate = 2e4` is front.spring_rate."""
+    found = []
+    for key, value in values.items():
+        found += _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else [(prefix + key, value)]
+    return found
+
+
+def with_law(vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
+    """The vehicle with a law at each of its dampers, the laws whose path ends with "damper".
+
+    Raises:
+        ValueError: a vehicle without such a law.
+    """
+    for path in damper_places(vehicle):
+        vehicle = eqx.tree_at(lambda car, path=path: get(car, path), vehicle, law)
+    return vehicle
+
+
+def damper_places(vehicle: AbstractVehicle) -> list[str]:
+    """The paths of the dampers of a vehicle."""
+    known = damper_paths(vehicle)
+    places = [path for path in known if fnmatchcase(path, "*damper")]
+    if not places:
+        remedy = "Leave the law out, to take those of the vehicle."
+        _checks.refuse("vehicle", "have a law whose path ends with 'damper'", ", ".join(known) or "none", remedy)
+    return places

@@ -1,0 +1,83 @@
+"""Sensitivities: damper curves coloured by their effect on a metric, and the effects of parameters."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.plots import _style
+from jaxdamp.tune import Sensitivity
+
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+
+
+MOST = 12  # parameters that are drawn
+
+
+def sensitivity(result: Sensitivity, *, most: int = MOST) -> "matplotlib.figure.Figure":
+    """The curve of each damper as a band coloured by its effect on each metric, above the effects of the parameters.
+
+    Red: more force at this velocity, or more of this parameter, raises the metric; blue: lowers it.
+
+    Arguments:
+        result: of `tune.sensitivity`.
+        most: number of parameters to draw, the most effective first.
+    """
+    remedy = "The call is `plots.sensitivity(tune.sensitivity(...))`."
+    _checks.instance("result", result, Sensitivity, "be the result of `tune.sensitivity`", remedy)
+    metrics, dampers = list(result.values), list(result.curves)
+    names = [str(row[0]) for row in result.table().rows][:most]
+    heights = [3.4] * len(dampers) + [0.9 + 0.26 * len(names)]
+    figure = _style.new_figure(1.5 + 4.3 * len(metrics), sum(heights))
+    grid = figure.add_gridspec(len(heights), len(metrics), height_ratios=heights)
+    for column, metric in enumerate(metrics):
+        for row, damper in enumerate(dampers):
+            _band(figure, figure.add_subplot(grid[row, column]), result, damper, metric)
+        axes = figure.add_subplot(grid[-1, column])
+        values = [np.nan_to_num(result.elasticities(metric)[name]) for name in names]
+        colours = [_style.COLOURS[1] if value > 0 else _style.COLOURS[0] for value in values]
+        axes.barh(np.arange(len(names)), values, 0.65, color=colours)
+        axes.set_yticks(np.arange(len(names)), names if column == 0 else [""] * len(names))
+        axes.invert_yaxis()
+        _style.dress(axes, "change for +1 % [%]", "", metric.replace("_", " "))
+        axes.grid(False, axis="y")
+        _style.cross(axes, horizontal=False)
+    return figure
+
+
+def _band(
+    figure: "matplotlib.figure.Figure",
+    axes: "matplotlib.axes.Axes",
+    result: Sensitivity,
+    damper: str,
+    metric: str,
+) -> None:
+    """One curve as a band, coloured by the effect of the force at each velocity."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import Normalize
+
+    curve = result.curves[damper]
+    middle = len(curve.velocity) // 2
+    at_rest = (np.insert(a, middle, 0.0) for a in (curve.velocity, curve.force, result.curve_effects(damper)[metric]))
+    velocity, force, effect = at_rest
+    force[middle] = np.interp(0.0, curve.velocity, curve.force)
+    half = 0.06 * float(np.ptp(force) or 1.0)
+    fine = np.linspace(velocity[0], velocity[-1], 301)
+    low, high = np.interp(fine, velocity, force) - half, np.interp(fine, velocity, force) + half
+    cells = [
+        [(fine[i], low[i]), (fine[i + 1], low[i + 1]), (fine[i + 1], high[i + 1]), (fine[i], high[i])]
+        for i in range(len(fine) - 1)
+    ]
+    largest = float(np.nanmax(np.abs(effect))) or 1.0
+    band = PolyCollection(cells, cmap="RdBu_r", norm=Normalize(-largest, largest), edgecolors="face", linewidths=0.2)
+    band.set_array(np.interp(0.5 * (fine[1:] + fine[:-1]), velocity, effect))
+    axes.add_collection(band)
+    axes.plot(velocity, force, color=_style.BLACK, linewidth=1.0)
+    axes.set_xlim(velocity[0], velocity[-1])
+    axes.autoscale(axis="y")
+    figure.colorbar(band, ax=axes, label="change for +100 N (upwards) [%]")
+    _style.dress(axes, _style.VELOCITY, _style.FORCE, f"{damper}: {metric.replace('_', ' ')}")
+    _style.cross(axes)

@@ -1,0 +1,121 @@
+"""`robust`: a tuning over scenarios, and what the scatter of its parameters costs."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Generic, final
+
+from jaxdamp import _checks
+from jaxdamp._field_types import check_module
+from jaxdamp._tables import Table, plain
+from jaxdamp.metrics import Metric
+from jaxdamp.tune.minimising import minimise
+from jaxdamp.tune.objective import Function
+from jaxdamp.tune.result import TuneResult, V
+from jaxdamp.tune.risk import Risk
+from jaxdamp.tune.scenarios import Scenarios
+from jaxdamp.tune.tolerance import ToleranceEffect, tolerance_effects, tolerance_table
+from jaxdamp.vehicles import AbstractVehicle
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@final
+@dataclasses.dataclass(frozen=True, repr=False)
+class RobustResult(Generic[V]):
+    """A tuning over scenarios with the effects of tolerances.
+
+    Attributes:
+        tuning: the result of `minimise` over the scenarios.
+        tolerances: the effect of the scatter of each parameter on the metric, at the tuned vehicle.
+    """
+
+    tuning: TuneResult[V]
+    tolerances: tuple[ToleranceEffect, ...]
+
+    @property
+    def vehicle(self) -> V:
+        """The tuned vehicle."""
+        return self.tuning.vehicle
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The effects of the tolerances in words, the largest first."""
+        return tuple(effect.sentence(self.tuning.metric) for effect in self.tolerances)
+
+    @property
+    def summary(self) -> str:
+        """The improvement, and the scenario in which the metric is largest, in a sentence."""
+        each = self.tuning.scenarios
+        assert each is not None
+        values = each.after[self.tuning.metric]
+        worst = f"Largest in {each.names[int(values.argmax())]!r}, {values.max():.4g}; smallest {values.min():.4g}."
+        return f"{self.tuning.summary} {worst}"
+
+    def table(self) -> Table:
+        """Metrics in every scenario, before and after."""
+        return self.tuning.scenario_table()
+
+    def tolerance_table(self) -> Table:
+        """The effects of the tolerances."""
+        return tolerance_table(self.tolerances, self.tuning.metric)
+
+    def plot(self, **options: Any) -> "Figure":
+        """The tuning, as of `minimise`."""
+        return self.tuning.plot(**options)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The tuning and the tolerances as plain data, ready for JSON."""
+        effects = [plain(effect._asdict()) for effect in self.tolerances]
+        return self.tuning.to_dict() | {"summary": self.summary, "tolerances": effects}
+
+    def __repr__(self) -> str:
+        return "\n".join([self.summary, repr(self.tuning), *self.sentences])
+
+
+def robust(
+    metric: str | Metric | Function,
+    vehicle: V,
+    scenarios: Scenarios,
+    *,
+    risk: str | Risk | None = None,
+    scatter: Mapping[str, float] | None = None,
+    duration: float | None = None,
+    dt: float = 1e-3,
+    **options: Any,
+) -> RobustResult[V]:
+    """Minimise a metric over scenarios by its mean, its worst case or the mean of its worst share.
+
+    Arguments:
+        metric: as in `minimise`.
+        vehicle: to start from.
+        scenarios: roads and conditions; `tolerances(...)` makes conditions of a production scatter.
+        risk: `"mean"`, `"worst"` or `CVaR(share)`, in place of that of the scenarios.
+        scatter: standard deviations, relative to the values, of parameters whose cost is stated at the result, such as
+            `{"damper.*_rate": 0.1}`; none if left out.
+        duration: as in `simulate`.
+        dt: as in `simulate`.
+        options: further arguments of `minimise`: `over`, `limits`, `shape`, `starts`, ...
+
+    Raises:
+        ValueError: what `minimise` refuses.
+
+    >>> from jaxdamp import roads, vehicles
+    >>> from jaxdamp.tune import Condition
+    >>> loads = {"empty": Condition(), "laden": Condition({"sprung_mass": 1500.0})}
+    >>> scenarios = Scenarios([roads.white("C", 20.0)], loads)
+    >>> result = robust("rms_dynamic_tyre_load", vehicles.presets.quarter_car_000(), scenarios, risk="worst")
+    >>> result.tuning.converged
+    True
+    """
+    call = "robust(metric, vehicle, scenarios)"
+    check_module("vehicle", vehicle, (AbstractVehicle,), call)
+    remedy = "Write `tune.Scenarios([road, ...], conditions)`; on one road call `minimise`."
+    _checks.instance("scenarios", scenarios, Scenarios, "be made by `tune.Scenarios`", remedy)
+    scenarios = scenarios if risk is None else scenarios.with_risk(risk)
+    tuning = minimise(metric, vehicle, scenarios, duration=duration, dt=dt, **options)
+    effects: tuple[ToleranceEffect, ...] = ()
+    if scatter:
+        effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, duration=duration, dt=dt)
+    return RobustResult(tuning, effects)

@@ -1,0 +1,240 @@
+"""Scenarios: the roads of a tuning and the conditions of the vehicle on them, such as payload, wear and tolerance."""
+
+import dataclasses
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._field_types import check_module
+from jaxdamp.metrics import Metric
+from jaxdamp.roads import AbstractRoad, WhiteRoad
+from jaxdamp.simulation import AbstractEngine
+from jaxdamp.tune.risk import Risk, risk_of
+from jaxdamp.tune.scenario_ride import ScenarioRide, scenario_ride
+from jaxdamp.vehicles import AbstractVehicle
+
+
+Road = AbstractRoad | WhiteRoad
+
+
+class Condition(NamedTuple):
+    """A condition of the vehicle: other values of parameters or settings, or factors on them.
+
+    Attributes:
+        values: by path, last part or pattern, in SI units: `{"sprung_mass": 1500.0}` is a payload,
+            `{"damper.temperature": 350.0}` a hot damper.
+        factors: on the values of the vehicle, whatever these are: `{"damper.*_rate": 0.85}` is a worn damper. What is
+            tuned can have factors, but no values.
+        weight: relative to the other conditions.
+    """
+
+    values: Mapping[str, Any] = {}
+    factors: Mapping[str, Any] = {}
+    weight: float = 1.0
+
+
+class Scenario(NamedTuple):
+    """One road under one condition of the vehicle."""
+
+    name: str
+    road: Road
+    condition: Condition
+    weight: float
+
+
+@final
+@dataclasses.dataclass(frozen=True, init=False, repr=False)
+class Scenarios:
+    """Roads and conditions, each with each: takes the place of the road in `minimise`, `sensitivity` and `robust`.
+
+    All scenarios are driven side by side in one batch. A metric is then one number for all of them, by `risk`; a limit
+    applies in each of them.
+
+    Arguments:
+        roads: by name, or a sequence: several classes, seeds and speeds. All of them are driven for the same time; or
+            all are white.
+        conditions: of the vehicle, by name or as a sequence; only as it is, if left out. `tolerances` and `samples`
+            make them.
+        weights: of the roads, relative to each other, in their order or by name; all equal if left out.
+        risk: `"mean"`; `"worst"`, a smooth maximum; or `CVaR(share)`, the mean of the worst share.
+
+    Raises:
+        ValueError: no road; driven and white roads together; weights that are negative, or not one for each road.
+
+    >>> from jaxdamp import roads, vehicles
+    >>> ways = {"C, 20 m/s": roads.white("C", 20.0), "D, 10 m/s": roads.white("D", 10.0)}
+    >>> loads = {"empty": Condition(), "laden": Condition({"sprung_mass": 1500.0}, weight=0.5)}
+    >>> scenarios = Scenarios(ways, loads)
+    >>> scenarios
+    Scenarios: 4 (2 roads, 2 conditions), mean
+    >>> ride = scenarios.ride(vehicles.presets.quarter_car_000(), metrics=["rms_sprung_acceleration"])
+    >>> {name: round(float(value), 3) for name, value in ride({"damper.rate": 3000.0}).items()}
+    {'rms_sprung_acceleration': 1.044}
+    """
+
+    scenarios: tuple[Scenario, ...]
+    risk: Risk
+    _counts: tuple[int, int]
+
+    def __init__(
+        self,
+        roads: Mapping[str, Road] | Sequence[Road],
+        conditions: Mapping[str, Condition] | Sequence[Condition] = (),
+        *,
+        weights: Mapping[str, float] | Sequence[float] | None = None,
+        risk: str | Risk = "mean",
+    ) -> None:
+        roads = _named("roads", roads, "road")
+        conditions = _named("conditions", conditions, "condition") or {"": Condition()}
+        if not roads:
+            _checks.refuse("roads", "hold one or more", "empty", "Write `[roads.iso8608('C', 20.0, seed=1)]`.")
+        for name, road in roads.items():
+            check_module(f"roads[{name!r}]", road, (AbstractRoad, WhiteRoad), "Scenarios(roads)")
+        if len({isinstance(road, WhiteRoad) for road in roads.values()}) > 1:
+            remedy = "Drive over all of them, or take `roads.white` for all of them."
+            _checks.refuse("roads", "be all white or all driven over", "a mixture", remedy)
+        for name, condition in conditions.items():
+            must = "be a `tune.Condition(values, factors)`"
+            _checks.instance(f"conditions[{name!r}]", condition, Condition, must)
+        of_roads = _weights(roads, weights)
+        pairs = list(itertools.product(roads.items(), conditions.items()))
+        shares = np.array([of_roads[road] * condition.weight for (road, _), (_, condition) in pairs])
+        if not np.all(np.isfinite(shares)) or np.any(shares < 0) or not np.any(shares > 0):
+            _checks.refuse("weights", "be 0 or more, some of them positive", shares.tolist())
+        object.__setattr__(self, "risk", risk_of(risk))
+        object.__setattr__(self, "_counts", (len(roads), len(conditions)))
+        made = (
+            Scenario(", ".join(filter(None, (road_name, name))), road, condition, float(share))
+            for ((road_name, road), (name, condition)), share in zip(pairs, shares / shares.sum(), strict=True)
+        )
+        object.__setattr__(self, "scenarios", tuple(made))
+
+    def __len__(self) -> int:
+        return len(self.scenarios)
+
+    def __repr__(self) -> str:
+        names = (f"{n} {word}{'s' * (n > 1)}" for n, word in zip(self._counts, ("road", "condition"), strict=True))
+        risk = getattr(self.risk, "__name__", self.risk)
+        return f"Scenarios: {len(self)} ({', '.join(names)}), {risk}"
+
+    @property
+    def white(self) -> bool:
+        """Whether the roads are white."""
+        return isinstance(self.scenarios[0].road, WhiteRoad)
+
+    def on_other_roads(self, seed: int) -> "Scenarios | None":
+        """The same scenarios on other realisations of their random roads; `None` if no road is random."""
+        originals = {id(s.road): s.road for s in self.scenarios if isinstance(s.road, AbstractRoad)}
+        others = {key: road.reseeded(seed) for key, road in originals.items()}
+        if all(other is None for other in others.values()):
+            return None
+        return self._with("scenarios", tuple(s._replace(road=others.get(id(s.road)) or s.road) for s in self.scenarios))
+
+    def with_risk(self, risk: str | Risk) -> "Scenarios":
+        """The same scenarios with another risk."""
+        return self._with("risk", risk_of(risk))
+
+    def _with(self, name: str, value: Any) -> "Scenarios":
+        other = object.__new__(Scenarios)
+        for field in dataclasses.fields(self):
+            object.__setattr__(other, field.name, value if field.name == name else getattr(self, field.name))
+        return other
+
+    def ride(
+        self,
+        vehicle: AbstractVehicle,
+        *,
+        metrics: Sequence[str | Metric] | None = None,
+        duration: float | None = None,
+        dt: float | None = None,
+        engine: AbstractEngine | None = None,
+    ) -> ScenarioRide:
+        """The metrics of a vehicle over all scenarios, called as a `Ride`; the arguments are those of a `Ride`.
+
+        Raises:
+            ValueError: what `Ride` refuses on one of the roads, and paths that the vehicle does not have.
+        """
+        return scenario_ride(
+            vehicle, self.scenarios, self.risk, metrics=metrics, duration=duration, dt=dt, engine=engine
+        )
+
+
+def tolerances(scatter: Mapping[str, float], count: int, *, seed: int = 0) -> dict[str, Condition]:
+    """Conditions of `count` dampers or vehicles from one production, whose parameters scatter independently.
+
+    Arguments:
+        scatter: standard deviation of each parameter relative to its value, such as `{"damper.*_rate": 0.05}`; all
+            that a pattern names have one factor in each sample. Factors are normally distributed, within ±3 standard
+            deviations.
+        count: number of samples.
+        seed: the same seed draws the same samples.
+
+    Raises:
+        ValueError: no parameter, a scatter that is not above 0 and below 1/3, a count below one.
+
+    >>> list(tolerances({"damper.rate": 0.1}, 2)["sample 1"].factors)
+    ['damper.rate']
+    """
+    from scipy.stats import qmc, truncnorm
+
+    if not scatter:
+        _checks.refuse("scatter", "name one or more parameters", scatter, "Write `{'damper.*_rate': 0.05}`.")
+    for name, deviation in scatter.items():
+        if not 0.0 < deviation < 1.0 / 3.0:
+            remedy = "It is a standard deviation relative to the value: 0.05 is 5 %."
+            _checks.refuse(f"scatter[{name!r}]", "be above 0 and below 1/3", deviation, remedy)
+    if count < 1:
+        _checks.refuse("count", "be one or more", count)
+    options: Any = {"seed": np.random.default_rng(seed)}  # SciPy 1.15 calls it `rng`, and still takes this name
+    unit = qmc.Sobol(len(scatter), **options).random_base2((count - 1).bit_length())[:count]
+    factors = 1.0 + truncnorm.ppf(unit, -3.0, 3.0) * np.array(list(scatter.values()))
+    return {
+        f"sample {i + 1}": Condition(factors=dict(zip(scatter, map(float, row), strict=True)))
+        for i, row in enumerate(factors)
+    }
+
+
+def samples(values: Mapping[str, Any]) -> dict[str, Condition]:
+    """Conditions of given values, one for each sample: those of a fitted law from its posterior, for instance.
+
+    Arguments:
+        values: for each parameter its value in each sample, equally many for all; of a vector, shape (samples, size).
+
+    Raises:
+        ValueError: no value, or different numbers of samples.
+
+    >>> samples({"damper.rate": [2400.0, 2600.0]})["sample 2"].values
+    {'damper.rate': 2600.0}
+    """
+    columns = {name: np.asarray(column, float) for name, column in values.items()}
+    counts = {name: np.shape(column)[0] if np.ndim(column) else 0 for name, column in columns.items()}
+    if not counts or len(set(counts.values())) != 1 or 0 in counts.values():
+        _checks.refuse("values", "have equally many samples of each parameter, one or more", counts)
+    rows = range(next(iter(counts.values())))
+    return {
+        f"sample {i + 1}": Condition({name: c[i] if c.ndim > 1 else float(c[i]) for name, c in columns.items()})
+        for i in rows
+    }
+
+
+def _named(argument: str, given: Any, word: str) -> dict[str, Any]:
+    """Roads or conditions by name: those of a sequence are numbered."""
+    if isinstance(given, Mapping):
+        return {str(name): one for name, one in given.items()}
+    if not isinstance(given, Sequence) or isinstance(given, str | Condition):
+        must = f"be {word}s by name, or a sequence"
+        _checks.refuse(argument, must, _checks.described(given), f"Write `[...]` around one {word}.")
+    return {f"{word} {i + 1}": one for i, one in enumerate(given)}
+
+
+def _weights(roads: Mapping[str, Road], weights: Any) -> dict[str, float]:
+    """The weight of each road."""
+    if weights is None:
+        return dict.fromkeys(roads, 1.0)
+    by_name = dict(weights) if isinstance(weights, Mapping) else dict(zip(roads, weights, strict=False))
+    if len(weights) != len(roads) or set(by_name) != set(roads):
+        _checks.refuse("weights", f"be one for each road ({', '.join(roads)})", weights)
+    return by_name

@@ -1,0 +1,249 @@
+"""`sensitivity`: which parameters, and which velocities of the damper curve, a ride metric comes from."""
+
+from collections.abc import Callable, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._field_types import check_module
+from jaxdamp.metrics import Metric
+from jaxdamp.parameters import FreeParameters, free_parameters, get, match_paths, name_patterns, parameters
+from jaxdamp.roads import AbstractRoad, WhiteRoad
+from jaxdamp.simulation import Ride
+from jaxdamp.tune.hats import is_hat, with_hats
+from jaxdamp.tune.measuring import Measurement
+from jaxdamp.tune.objective import Function, Objective, objective_of
+from jaxdamp.tune.scenarios import Road, Scenarios
+from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
+from jaxdamp.tune.shape import damper_paths, held_force
+from jaxdamp.vehicles import AbstractVehicle, ChannelKind
+
+
+REACH = 3.0  # RMS values of the damper velocity up to which the curve is looked at
+HATS = 12  # on each side
+
+
+def sensitivity(
+    metric: str | Metric | Function | Sequence[str | Metric],
+    vehicle: AbstractVehicle,
+    road: Road | Scenarios | Callable[..., Road],
+    *,
+    over: Sequence[str] = ("*",),
+    freeze: Sequence[str] = (),
+    quantities: Mapping[str, float] | None = None,
+    dampers: str | None = "*damper",
+    reach: float | None = None,
+    hats: int = HATS,
+    second_order: bool = False,
+    duration: float | None = None,
+    dt: float = 1e-3,
+) -> Sensitivity:
+    """Exact derivatives of ride metrics by parameters, and by the force at each velocity of the damper curves.
+
+    All derivatives are computed in one simulation, in forward mode. Those by the force at a velocity are derivatives by
+    the height of a hat function that is added to the curve there: where on the curve comfort, travel and tyre load come
+    from.
+
+    Arguments:
+        metric: one ride metric or several, by name or as a `metrics.Metric`; or a function of metrics, as in
+            `minimise`.
+        vehicle: where the derivatives are taken.
+        road: a road, `roads.white(...)`, or `Scenarios`, whose metrics are joined by their risk; with `quantities` a
+            function of these that makes a road: `lambda speed: roads.iso8608("C", speed, seed=1)`.
+        over: the parameters, by path, last part or pattern: masses, stiffnesses and laws; all if left out.
+        freeze: parameters among these to leave out.
+        quantities: of the road by name, such as `{"speed": 20.0}`.
+        dampers: the laws whose curves are looked at, by path or pattern; None for none. On a white road there are none,
+            since the linearised vehicle has no curves.
+        reach: largest velocity of the curves [m/s]; three times the largest RMS of a damper velocity if left out.
+        hats: number of velocities on each side.
+        second_order: also the second derivatives by the parameters: how flat an optimum is.
+        duration: as in `simulate`.
+        dt: as in `simulate`.
+
+    Raises:
+        ValueError: unknown metrics, parameters or dampers; metrics without derivative; quantities of a road that is no
+            function of them.
+
+    >>> from jaxdamp import roads, vehicles
+    >>> car = vehicles.presets.quarter_car_000()
+    >>> found = sensitivity("rms_sprung_acceleration", car, roads.white("C", 20.0), over=["damper.rate", "sprung_mass"])
+    >>> {name: round(float(value), 3) for name, value in found.elasticities("rms_sprung_acceleration").items()}
+    {'sprung_mass': -0.86, 'damper.rate': -0.276}
+    """
+    wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
+    given = dict(quantities or {})
+    _check(wanted, vehicle, road, given)
+    make: Any = road
+    first = make(**given) if given else make
+    white = first.white if isinstance(first, Scenarios) else isinstance(first, WhiteRoad)
+    objective = _objective(wanted, vehicle, white)
+    run = {"duration": duration, "dt": dt}
+    paths = [] if dampers is None or white else _curves(vehicle, dampers)
+    hatted = vehicle
+    if paths:
+        reach = reach or _reach(vehicle, first, run)
+        for path in paths:
+            hatted = with_hats(hatted, path, reach, hats)
+    own, free = _free(vehicle, hatted, over, freeze)
+    point = np.array([*np.asarray(free.values, float), *given.values()])
+    if given:
+        measured = _on_made_roads(hatted, make, list(given), objective, free, run)
+    else:
+        fixed = Measurement(hatted, first, objective, free, **run)
+        measured = lambda x: fixed(free.build(x))  # noqa: E731
+    names = [m for m in objective.units(vehicle) if _is_wanted(m, wanted, objective)]
+    values, slopes = _derivatives(measured, names, point)
+    parts = [*zip(free.owners, free.names, strict=True)]
+    is_curve = np.array([is_hat(p.path, hatted) for p, _ in parts] + [False] * len(given), bool)
+    own_names = iter([(name, p.unit) for p, name in zip(own.owners, own.names, strict=True)])
+    columns = [next(own_names) for (p, _) in parts if not is_hat(p.path, hatted)]
+    columns += [(name, "m/s" if name == "speed" else "") for name in given]
+    chosen = np.flatnonzero(~is_curve)
+    hessian = None
+    if second_order:
+        hessian = dict(zip(names, _second(measured, names, point, chosen), strict=True))
+    return Sensitivity(
+        values=dict(zip(names, values.tolist(), strict=True)),
+        units={name: objective.units(vehicle)[name] for name in names},
+        parameters=tuple(name for name, _ in columns),
+        parameter_units=tuple(unit for _, unit in columns),
+        point=point[chosen],
+        gradient=dict(zip(names, slopes[:, chosen], strict=True)),
+        curves=_curve_parts(vehicle, hatted, paths, names, slopes[:, is_curve]),
+        hessian=hessian,
+    )
+
+
+def _check(wanted: Sequence[Any], vehicle: Any, road: Any, quantities: Mapping[str, float]) -> None:
+    call = "sensitivity(metric, vehicle, road)"
+    functions = [one for one in wanted if not isinstance(one, str | Metric)]
+    if not wanted or (functions and (len(wanted) > 1 or not callable(functions[0]))):
+        must = "be metrics by name, `Metric`s, or one function of metrics"
+        _checks.refuse("metric", must, _checks.described(wanted[0] if len(wanted) == 1 else wanted))
+    check_module("vehicle", vehicle, (AbstractVehicle,), call)
+    if quantities:
+        if not callable(road):
+            remedy = "Write `lambda speed: roads.iso8608('C', speed, seed=1)`."
+            _checks.refuse("road", f"be a function of {', '.join(quantities)}", _checks.described(road), remedy)
+        _checks.finite("quantities", list(quantities.values()))
+    elif not isinstance(road, Scenarios):
+        check_module("road", road, (AbstractRoad, WhiteRoad), call)
+
+
+def _objective(wanted: Sequence[Any], vehicle: AbstractVehicle, white: bool) -> Objective:
+    """The metrics that are wanted, and no others."""
+    objective = objective_of(wanted[0], vehicle, wanted[1:], [], white=white)
+    if objective.function is not None:
+        return objective
+    return objective._replace(metrics=tuple(m for m in objective.metrics if _is_wanted(m.name, wanted, objective)))
+
+
+def _is_wanted(name: str, wanted: Sequence[Any], objective: Objective) -> bool:
+    names = {one.name if isinstance(one, Metric) else one for one in wanted[1:]} | {objective.name}
+    return name in names
+
+
+def _curves(vehicle: AbstractVehicle, pattern: str) -> list[str]:
+    """The laws whose curves are looked at."""
+    known = damper_paths(vehicle)
+    chosen = [path for path in known if fnmatchcase(path, pattern)]
+    if not chosen:
+        _checks.refuse("dampers", f"name a law of the vehicle ({', '.join(known)})", repr(pattern), "None for none.")
+    return chosen
+
+
+def _reach(vehicle: AbstractVehicle, road: Any, run: Mapping[str, Any]) -> float:
+    """Three times the largest RMS of a damper velocity [m/s]."""
+    layout = vehicle.layout
+    velocities = {m.channel for m in layout.metrics if layout.by_name[m.channel].kind is ChannelKind.DAMPER_VELOCITY}
+    metrics = [Metric(channel, "rms") for channel in sorted(velocities)]
+    if isinstance(road, Scenarios):
+        found = road.with_risk("worst").ride(vehicle, metrics=metrics, **run)()
+    else:
+        found = Ride(vehicle, road, metrics=metrics, **run)()
+    return REACH * max(float(value) for value in found.values())
+
+
+def _free(
+    vehicle: AbstractVehicle, hatted: AbstractVehicle, over: Sequence[str], freeze: Sequence[str]
+) -> tuple[FreeParameters, FreeParameters]:
+    """The parameters of the vehicle, and the same of the vehicle with hats, with the forces of the hats."""
+    own = free_parameters(vehicle, over=name_patterns("over", over), freeze=freeze)
+    known = [p.path for p in parameters(vehicle)]
+    moved = [p.path for p in parameters(hatted)]
+    hats = [path for path in moved if is_hat(path, hatted)]
+    places = dict(zip(known, [path for path in moved if path not in hats], strict=True))
+    exact = [places[path] for path in match_paths(known, [p.path for p in own.chosen])]
+    return own, free_parameters(hatted, over=[*exact, *hats])
+
+
+def _on_made_roads(
+    vehicle: AbstractVehicle,
+    make: Callable[..., Any],
+    names: Sequence[str],
+    objective: Objective,
+    free: FreeParameters,
+    run: Mapping[str, Any],
+) -> Callable[[Any], Mapping[str, Any]]:
+    """The metrics as a function of the parameters and of the quantities that a road is made from."""
+    count = free.values.size
+
+    def measured(x: Any) -> Mapping[str, Any]:
+        road = make(**{name: x[count + i] for i, name in enumerate(names)})
+        ride = Ride(vehicle, road, metrics=objective.metrics, **run)
+        return objective.of(ride.on_axles_of(free.build(x[:count]))())
+
+    return measured
+
+
+def _derivatives(
+    measured: Callable[[Any], Any], names: Sequence[str], point: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The metrics, shape (names,), and their derivatives, shape (names, numbers)."""
+
+    @eqx.filter_jit
+    def both(x: jax.Array) -> tuple[jax.Array, jax.Array]:
+        def stacked(x: jax.Array) -> tuple[jax.Array, jax.Array]:
+            found = measured(x)
+            values = jnp.stack([found[name] for name in names])
+            return values, values
+
+        return jax.jacfwd(stacked, has_aux=True)(x)
+
+    slopes, values = both(jnp.asarray(point))
+    return np.asarray(values, float), np.asarray(slopes, float)
+
+
+def _second(measured: Callable[[Any], Any], names: Sequence[str], point: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Second derivatives by some of the numbers, shape (names, chosen, chosen)."""
+
+    @eqx.filter_jit
+    def twice(x: jax.Array) -> jax.Array:
+        def stacked(part: jax.Array) -> jax.Array:
+            found = measured(x.at[chosen].set(part))
+            return jnp.stack([found[name] for name in names])
+
+        return jax.jacfwd(jax.jacfwd(stacked))(x[chosen])
+
+    return np.asarray(twice(jnp.asarray(point)), float)
+
+
+def _curve_parts(
+    vehicle: AbstractVehicle, hatted: AbstractVehicle, paths: Sequence[str], names: Sequence[str], slopes: np.ndarray
+) -> dict[str, CurveSensitivity]:
+    """The derivatives by the forces of each curve."""
+    found, begin = {}, 0
+    for path in sorted(paths, key=damper_paths(vehicle).index):
+        hats = get(hatted, path).terms[-1]
+        end = begin + hats.forces.size
+        velocities = np.asarray(hats.velocities, float)
+        force = np.asarray(held_force(get(vehicle, path), jnp.asarray(velocities)), float)
+        found[path] = CurveSensitivity(velocities, force, dict(zip(names, slopes[:, begin:end], strict=True)))
+        begin = end
+    return found

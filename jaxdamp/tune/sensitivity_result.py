@@ -1,0 +1,153 @@
+"""The result of `sensitivity`: tables, sentences on the flatness of an optimum, and a picture."""
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, NamedTuple, final
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp import _checks
+from jaxdamp._tables import Column, Table, plain, typeset_unit
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+FORCE_STEP = 100.0  # N, for which effects of the curve are stated
+COST = 0.01  # of the metric, for which flat directions are stated
+
+
+class CurveSensitivity(NamedTuple):
+    """Derivatives by the force at each velocity of one damper curve.
+
+    Attributes:
+        velocity: where the hats are [m/s], shape (points,).
+        force: of the curve there [N], with settled states.
+        gradient: for each metric its derivative by the height of each hat [unit of the metric per N].
+    """
+
+    velocity: Float[np.ndarray, " points"]
+    force: Float[np.ndarray, " points"]
+    gradient: dict[str, Float[np.ndarray, " points"]]
+
+
+@final
+@dataclasses.dataclass(frozen=True, repr=False)
+class Sensitivity:
+    """Derivatives of ride metrics.
+
+    Attributes:
+        values: the metrics.
+        units: unit of each metric.
+        parameters: name of each number.
+        parameter_units: unit of each number.
+        point: the numbers where the derivatives are taken.
+        gradient: for each metric its derivative by each number, in their units.
+        curves: derivatives by the force at each velocity, for each damper by its path.
+        hessian: for each metric its second derivatives by the numbers; None if they were not asked for.
+    """
+
+    values: dict[str, float]
+    units: dict[str, str]
+    parameters: tuple[str, ...]
+    parameter_units: tuple[str, ...]
+    point: Float[np.ndarray, " numbers"]
+    gradient: dict[str, Float[np.ndarray, " numbers"]]
+    curves: dict[str, CurveSensitivity]
+    hessian: dict[str, Float[np.ndarray, "numbers numbers"]] | None = None
+
+    def elasticities(self, metric: str) -> dict[str, float]:
+        """Change of a metric in percent for each percent of a number; NaN for a number, or a metric, that is zero."""
+        _checks.one_of("metric", metric, self.values)
+        scaled = self.gradient[metric] * self.point / (self.values[metric] or np.nan)
+        return dict(zip(self.parameters, np.where(self.point == 0.0, np.nan, scaled).tolist(), strict=True))
+
+    def table(self) -> Table:
+        """A row for each number, the most effective for the first metric first: percent for each percent."""
+        by_metric = {name: self.elasticities(name) for name in self.values}
+        first = by_metric[next(iter(self.values))]
+        order = sorted(range(len(self.parameters)), key=lambda i: -abs(np.nan_to_num(first[self.parameters[i]])))
+        columns = (Column("parameter"), Column("value"), Column("unit"), *(Column(n, "%/%", "+.3f") for n in by_metric))
+        rows = []
+        for i in order:
+            name = self.parameters[i]
+            cells = (None if np.isnan(found[name]) else found[name] for found in by_metric.values())
+            rows.append((name, float(self.point[i]), typeset_unit(self.parameter_units[i], "–"), *cells))
+        return Table("Change of the metrics for 1 % of each parameter", columns, tuple(rows))
+
+    def curve_table(self, damper: str | None = None) -> Table:
+        """A row for each velocity of the curve of a damper: percent for 100 N in a hat around it.
+
+        Arguments:
+            damper: path of the damper; the first if left out.
+
+        Raises:
+            ValueError: no curves, an unknown damper.
+        """
+        if not self.curves:
+            _checks.refuse("result", "have curves", "one of none", "Drive over a road that is not white.")
+        damper = next(iter(self.curves)) if damper is None else damper
+        _checks.one_of("damper", damper, self.curves)
+        curve, effects = self.curves[damper], self.curve_effects(damper)
+        columns = (Column("velocity", "m/s"), Column("force", "N", ".0f"), *(Column(n, "%", "+.3f") for n in effects))
+        rows = zip(curve.velocity.tolist(), curve.force.tolist(), *(e.tolist() for e in effects.values()), strict=True)
+        return Table(f"Change of the metrics for {FORCE_STEP:g} N at each velocity of {damper}", columns, tuple(rows))
+
+    def curve_effects(self, damper: str) -> dict[str, Float[np.ndarray, " points"]]:
+        """Change of each metric in percent for 100 N at each velocity of a damper."""
+        gradients = self.curves[damper].gradient
+        return {name: 100.0 * FORCE_STEP * g / (self.values[name] or np.nan) for name, g in gradients.items()}
+
+    def flatness(self, metric: str) -> tuple[str, ...]:
+        """How far each principal direction of the parameters can go for 1 % of the metric, in sentences.
+
+        The directions are the eigenvectors of the second derivatives by relative changes. Along a direction of negative
+        curvature the point is no minimum. A slope that is left is said first.
+
+        Raises:
+            ValueError: no second derivatives, an unknown metric.
+        """
+        if self.hessian is None:
+            _checks.refuse("result", "have second derivatives", "one of none", "Pass `second_order=True`.")
+        _checks.one_of("metric", metric, self.hessian)
+        chosen = np.flatnonzero(self.point != 0.0)
+        scale = self.point[chosen]
+        relative = self.hessian[metric][np.ix_(chosen, chosen)] * np.outer(scale, scale) / self.values[metric]
+        slope = self.gradient[metric][chosen] * scale / self.values[metric]
+        curvature, directions = np.linalg.eigh(relative)
+        sentences = []
+        if np.linalg.norm(slope) > COST:
+            steepest = self.parameters[chosen[int(np.argmax(np.abs(slope)))]]
+            sentences.append(
+                f"{metric} has a slope here, {np.linalg.norm(slope):.2g} % for 1 %, most along {steepest}: no optimum."
+            )
+        for value, direction in zip(curvature, directions.T, strict=True):
+            direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
+            words = " ".join(
+                f"{share:+.2f} {self.parameters[i]}"
+                for i, share in zip(chosen, direction, strict=True)
+                if abs(share) > 0.1
+            )
+            if value <= 0.0:
+                sentences.append(f"{metric} is curved downwards along {words}.")
+            else:
+                far = 100.0 * np.sqrt(2.0 * COST / value)
+                sentences.append(f"{metric} rises by {100 * COST:g} % at ±{far:.3g} % along {words}.")
+        return tuple(sentences)
+
+    def plot(self, **options: Any) -> "Figure":
+        """Damper curves coloured by their effect on each metric, and the effects of the parameters."""
+        from jaxdamp.plots import sensitivity
+
+        return sensitivity(self, **options)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All derivatives as plain data, ready for JSON; numbers that are not finite are None."""
+        data = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        curves = {path: curve._asdict() for path, curve in self.curves.items()}
+        return plain(data | {"curves": curves, "elasticities": {name: self.elasticities(name) for name in self.values}})
+
+    def __repr__(self) -> str:
+        flat = [] if self.hessian is None else [s for name in self.values for s in self.flatness(name)]
+        return "\n".join([self.table().to_text(), *flat])

@@ -1,0 +1,189 @@
+"""Constraints on the shape of the force-velocity curve of the dampers of a vehicle."""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from fnmatch import fnmatchcase
+from typing import Any, final
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._types import Scalar
+from jaxdamp.dampers import AbstractDamper, laws_inside
+from jaxdamp.parameters import get
+from jaxdamp.tune.limits import Limit, scaled
+from jaxdamp.vehicles import AbstractVehicle
+
+
+Curve = Float[Array, " points"]
+HOLD = 1000  # steps of 1 ms at constant velocity, after which the states of a law count as settled
+POINTS = 24  # slopes along a curve
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class Shape:
+    """A constraint on the force-velocity curve at constant velocity; made by `slope`, `monotone`, `knee`, `ratio`.
+
+    Attributes:
+        name: in words, such as "slope".
+        unit: of the numbers that are limited.
+        span: their smallest and largest allowed value.
+        velocities: at which the force is computed [m/s].
+        numbers: those that are limited, from velocities and forces.
+        places: of the numbers, in words; empty for a single one.
+        dampers: the laws, by their path in the vehicle or a pattern.
+    """
+
+    name: str
+    unit: str
+    span: tuple[float, float]
+    velocities: tuple[float, ...]
+    numbers: Callable[[Curve, Curve], Array]
+    places: tuple[str, ...] = ("",)
+    dampers: str = "*"
+
+    def at(self, dampers: str) -> "Shape":
+        """The same for some of the dampers of the vehicle only, such as `"front.*"`."""
+        return dataclasses.replace(self, dampers=dampers)
+
+
+def slope(lower: float | None = None, upper: float | None = None, *, reach: float = 1.0) -> Shape:
+    """Limits of the slope of the curve [N s/m].
+
+    Arguments:
+        lower: smallest slope; none if left out.
+        upper: largest slope; none if left out.
+        reach: the curve is looked at from −reach to reach [m/s], between points that are denser at low velocity.
+    """
+    _checks.positive("reach", reach)
+    half = np.linspace(0.0, 1.0, POINTS // 2 + 1) ** 1.5 * reach
+    velocities = np.concatenate([-half[:0:-1], half])
+    places = tuple(f" at {0.5 * (a + b):.2g} m/s" for a, b in itertools.pairwise(velocities))
+    span = _span(lower, upper)
+    return Shape("slope", "N s/m", span, tuple(velocities), lambda v, f: jnp.diff(f) / jnp.diff(v), places)
+
+
+def monotone(*, reach: float = 1.0) -> Shape:
+    """A force that never falls as the velocity grows: a slope of zero or more."""
+    return slope(0.0, reach=reach)
+
+
+def ratio(lower: float | None = None, upper: float | None = None, *, velocity: float) -> Shape:
+    """Limits of the rebound force over the compression force at a velocity, both measured from standstill.
+
+    Arguments:
+        lower: smallest ratio; none if left out.
+        upper: largest ratio; none if left out.
+        velocity: at which the forces are compared [m/s].
+    """
+    _checks.positive("velocity", velocity)
+
+    def of_forces(v: Curve, f: Curve) -> Array:
+        return ((f[2] - f[1]) / (f[1] - f[0]))[None]
+
+    name = f"rebound/compression ratio at {velocity:g} m/s"
+    return Shape(name, "", _span(lower, upper), (-velocity, 0.0, velocity), of_forces)
+
+
+def knee(lower: float | None = None, upper: float | None = None, *, side: str = "rebound", reach: float = 1.0) -> Shape:
+    """Limits of the velocity of the knee [m/s], positive on both sides.
+
+    The knee is the mean velocity at which the slope changes, each change weighted by its size: of a curve with one
+    knee that is the knee itself, but for half the distance of the points, a fiftieth of the reach.
+
+    Arguments:
+        lower: smallest velocity; none if left out.
+        upper: largest velocity; none if left out.
+        side: `"rebound"` or `"compression"`.
+        reach: up to which velocity the curve is looked at [m/s].
+    """
+    _checks.one_of("side", side, ["rebound", "compression"])
+    _checks.positive("reach", reach)
+    sign = 1.0 if side == "rebound" else -1.0
+    velocities = sign * np.linspace(0.0, reach, 2 * POINTS + 1)
+
+    def mean_bend(v: Curve, f: Curve) -> Array:
+        bends = jnp.abs(jnp.diff(jnp.diff(f) / jnp.diff(v)))
+        total = jnp.sum(bends)
+        return (jnp.sum(bends * jnp.abs(v[1:-1])) / jnp.where(total > 0.0, total, 1.0))[None]
+
+    return Shape(f"{side} knee", "m/s", _span(lower, upper), tuple(velocities), mean_bend)
+
+
+@final
+class ShapeNumbers:
+    """The numbers that shape constraints limit, as a function of the vehicle."""
+
+    def __init__(self, vehicle: AbstractVehicle, shapes: Sequence[Shape]) -> None:
+        paths = damper_paths(vehicle)
+        self._pairs: list[tuple[Shape, str]] = []
+        for shape in shapes:
+            _checks.instance("shape", shape, Shape, "be made by `tune.slope`, `monotone`, `knee` or `ratio`")
+            chosen = [path for path in paths if fnmatchcase(path, shape.dampers)]
+            if not chosen:
+                _checks.refuse("shape", f"name a damper of the vehicle ({', '.join(paths)})", repr(shape.dampers))
+            self._pairs += [(shape, path) for path in chosen]
+
+    def __call__(self, vehicle: AbstractVehicle) -> dict[str, Scalar]:
+        """The numbers by name."""
+        found = {}
+        for shape, path in self._pairs:
+            velocities = jnp.asarray(shape.velocities)
+            numbers = shape.numbers(velocities, held_force(get(vehicle, path), velocities))
+            found |= dict(zip(_names(shape, path), numbers, strict=True))
+        return found
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the numbers."""
+        return [name for shape, path in self._pairs for name in _names(shape, path)]
+
+    def limits(self, start: dict[str, float]) -> list[Limit]:
+        """The limits of the numbers; their distances are scaled by the largest number of the curve at the start."""
+        found = []
+        for shape, path in self._pairs:
+            names = _names(shape, path)
+            size = scaled(*shape.span, max(abs(start[name]) for name in names))
+            of = f"{shape.name} of {path}"
+            found += [Limit(name, of, *shape.span, size, shape.unit, is_shape=True) for name in names]
+        return found
+
+
+def damper_paths(vehicle: AbstractVehicle) -> list[str]:
+    """The paths of the outermost laws of a vehicle."""
+    found: list[str] = []
+    for prefix, _ in laws_inside(vehicle):
+        if not any(prefix.startswith(f"{path}.") for path in found):
+            found.append(prefix.removesuffix("."))
+    return found
+
+
+def held_force(law: AbstractDamper, velocities: Curve) -> Curve:
+    """Force [N] at constant velocities after one second at stroke zero; differentiable in the law."""
+    state = law.initial_state()
+    if not state.size:
+        return jax.vmap(lambda v: law.force(0.0, v, state))(velocities)
+    zero, dt = jnp.zeros(()), jnp.asarray(1e-3)
+
+    def settled(v: Scalar) -> Scalar:
+        end = jax.lax.fori_loop(0, HOLD, lambda _, s: law.advance(zero, v, zero, v, s, dt), state)
+        return law.force(zero, v, end)
+
+    return jax.vmap(settled)(velocities)
+
+
+def _names(shape: Shape, path: str) -> list[str]:
+    return [f"{shape.name} of {path}{place}" for place in shape.places]
+
+
+def _span(lower: Any, upper: Any) -> tuple[float, float]:
+    span = (-math.inf if lower is None else float(lower), math.inf if upper is None else float(upper))
+    if not span[0] < span[1] or span == (-math.inf, math.inf):
+        _checks.refuse("lower", "be below `upper`, one of them given", f"{lower}, {upper}")
+    return span

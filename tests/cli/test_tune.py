@@ -1,0 +1,130 @@
+"""`jaxdamp tune` and `jaxdamp sweep`: results in a folder, vehicles from files, refusals that leave nothing behind."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from jaxdamp import vehicles
+from jaxdamp.cli.metric_words import metric_names
+from jaxdamp.cli.vehicle_words import parse_vehicle
+from jaxdamp.dampers import Bilinear, Linear
+from jaxdamp.export import from_json, to_json
+
+from .invoking import jaxdamp, refused
+
+
+BEST = 60e3 * (1325.0 / 220e3) ** 0.5
+
+
+@pytest.fixture
+def law(tmp_path: Path) -> Path:
+    to_json(Linear(2000.0), tmp_path / "law.json")
+    return tmp_path / "law.json"
+
+
+def _toml(folder: Path, text: str) -> Path:
+    (folder / "car.toml").write_text(text)
+    return folder / "car.toml"
+
+
+def test_tune_writes_a_better_law(law: Path, tmp_path: Path) -> None:
+    out = tmp_path / "tuned"
+    words = ["--start", law, "--minimise", "rms_sprung_acceleration", "--limit", "grip=1400,travel=0.02"]
+    text = jaxdamp("tune", "quarter_car_000", "white:C", *words, "--out", out).output
+    assert "an optimum" in text
+    assert float(from_json(out / "law.json").rate) == pytest.approx(BEST, rel=1e-4)
+    assert float(from_json(out / "vehicle.json").damper.rate) == pytest.approx(BEST, rel=1e-4)
+    rows = {row["metric"]: row for row in csv.DictReader((out / "metrics.csv").read_text().splitlines())}
+    assert rows["rms_dynamic_tyre_load"]["note"] == "limit 1400" and float(rows["working_space_rms"]["after"]) < 0.02
+    assert json.loads((out / "tuning.json").read_text())["converged"] is True
+    assert {file.name for file in out.iterdir()} == {
+        "law.json", "vehicle.json", "parameters.csv", "metrics.csv", "tuning.json", "tuning.png", "report.html",
+        "manifest.json",
+    }  # fmt: skip
+
+
+def test_a_limit_that_is_not_met_ends_with_an_exit_code(tmp_path: Path) -> None:
+    words = ["--limit", "travel=0.001", "--out", tmp_path / "tuned"]
+    assert "is not met" in jaxdamp("tune", "quarter_car_000", "white:C", *words, code=1).output
+
+
+def test_sweep_of_a_vehicle_from_a_file_writes_a_table_and_pictures(tmp_path: Path) -> None:
+    to_json(vehicles.presets.half_car_002(), tmp_path / "car.json")
+    words = ["--over", "front.damper.rate=1000:2000:2", "--over", "rear.damper.rate=800;1600", "--metric", "comfort"]
+    out = tmp_path / "swept"
+    jaxdamp("sweep", tmp_path / "car.json", "white:C", *words, "--out", out)
+    rows = list(csv.DictReader((out / "sweep.csv").read_text().splitlines()))
+    assert len(rows) == 4 and "weighted_rms_sprung_acceleration [m/s²]" in rows[0]
+    assert (out / "weighted_rms_sprung_acceleration.png").is_file() and (out / "sweep.nc").is_file()
+
+
+def test_vehicles_from_files_take_a_law(tmp_path: Path) -> None:
+    file = _toml(tmp_path, 'preset = "half_car_002"\n[parameters]\nsprung_mass = 600.0\nfront.spring_rate = 2e4\n')
+    car = parse_vehicle(str(file))(Bilinear(2000.0, 1000.0))
+    assert float(car.sprung_mass) == 600.0 and float(car.front.spring_rate) == 2e4
+    assert isinstance(car.rear.damper, Bilinear)
+    to_json(car, tmp_path / "car.json")
+    again = parse_vehicle(str(tmp_path / "car.json"))
+    assert isinstance(again(None).front.damper, Bilinear)
+    assert all(isinstance(corner.damper, Linear) for corner in (again(Linear(1.0)).front, again(Linear(1.0)).rear))
+
+
+def test_words_for_metrics() -> None:
+    car = vehicles.presets.full_car_jazar()
+    assert metric_names("limit", "comfort", car, white=False) == ["weighted_rms_sprung_acceleration"]
+    assert len(metric_names("limit", "travel", car, white=False)) == 4
+    assert len(metric_names("limit", "grip", car, white=False)) == 4
+
+
+WRONG = [
+    (["tune", "quarter_car_00", "white:C"], "Did you mean 'quarter_car_000'?"),
+    (["tune", "car.json", "white:C"], "Option --vehicle must be a file that is there"),
+    (["tune", "LAW", "white:C"], "be a file with a vehicle"),
+    (["tune", "BAD", "white:C"], "is not TOML"),
+    (["tune", "ODD", "white:C"], "be a TOML file of preset and [parameters]"),
+    (["tune", "UNKNOWN", "white:C"], "must be one of"),
+    (["tune", "WRONG", "white:C"], "did you mean 'sprung_mass'"),
+    (["tune", "NEGATIVE", "white:C"], "must be positive"),
+    (["tune", "quarter_car_000", "white:K"], "must be one of 'A'"),
+    (["tune", "quarter_car_000", "grey:C"], "Option --road must be iso:CLASS"),
+    (["tune", "quarter_car_000", "bump:3"], "bump:HEIGHT:LENGTH"),
+    (["tune", "quarter_car_000", "white:C", "--start", "none.json"], "There is no file"),
+    (["tune", "quarter_car_000", "white:C", "--minimise", "confort"], "Did you mean 'comfort'?"),
+    (["tune", "quarter_car_000", "white:C", "--limit", "travel"], "Option --limit must read like NAME=VALUE"),
+    (["tune", "quarter_car_000", "white:C", "--limit", "trawel=0.1"], "Did you mean 'travel'?"),
+    (["tune", "quarter_car_000", "white:C", "--limit", "travel=low"], "Option --limit must be a number, or two"),
+    (["tune", "quarter_car_000", "white:C", "--limit", "travel=2:1"], "in increasing order"),
+    (["tune", "quarter_car_000", "white:C", "--limit", "travel=1,travel=2"], "name each thing once"),
+    (["tune", "quarter_car_000", "white:C", "--over", "damper.rat"], "did you mean 'damper.rate'"),
+    (["tune", "quarter_car_000", "white:C", "--bound", "rate"], "Option --bound must read like NAME=VALUE"),
+    (["tune", "quarter_car_000", "white:C", "--bound", "rate=3000:4000"], "must start between 3000 and 4000"),
+    (["tune", "quarter_car_000", "white:C", "--bound", "sprung_mass=1:2"], "bound a parameter that is free"),
+    (["tune", "quarter_car_000", "white:C", "--freeze", "*"], "nothing is left to change"),
+    (["tune", "quarter_car_000", "white:C", "--tie", "damper.rate"], "Option --tie must read like NAME=VALUE"),
+    (["tune", "quarter_car_000", "white:C", "--starts", "0"], "Option --starts must be 1 or more"),
+    (["tune", "quarter_car_000", "white:C", "--max-steps", "0"], "Option --max-steps must be 1 or more"),
+    (["tune", "quarter_car_000", "white:C", "--roads", "0"], "Option --roads must be 1 or more"),
+    (["tune", "quarter_car_000", "white:C", "--roads", "2"], "Option --roads must be 1 for a road that is not random"),
+    (["tune", "quarter_car_000", "white:C", "--speed", "-1"], "Option --speed must be positive"),
+    (["tune", "quarter_car_000", "white:C", "--duration", "3"], "Option --duration must be left out on a white road"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1:2"], "NAME=FIRST:LAST:COUNT"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1:2:x"], "NAME=FIRST:LAST:COUNT"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1:2:0"], "have one value or more"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rat=1;2"], "did you mean 'rate'"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--metric", "confort"], "Did you mean 'comfort'?"),
+]
+FILES = {
+    "BAD": "preset = ",
+    "ODD": 'prset = "quarter_car_000"',
+    "UNKNOWN": 'preset = "quarter_car_0"',
+    "WRONG": 'preset = "quarter_car_000"\n[parameters]\nsprung_mas = 1.0',
+    "NEGATIVE": 'preset = "quarter_car_000"\n[parameters]\nsprung_mass = -1.0',
+}
+
+
+@pytest.mark.parametrize(("words", "message"), WRONG, ids=[" ".join(words[1:]) for words, _ in WRONG])
+def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], message: str) -> None:
+    files = {"LAW": law} | {word: _toml(tmp_path, FILES[word]) for word in words if word in FILES}
+    assert message in refused(tmp_path, *(files.get(word, word) for word in words), "--out", tmp_path / "out")

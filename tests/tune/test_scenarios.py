@@ -1,0 +1,147 @@
+"""Scenarios: many roads and conditions as one ride, and tunings over them."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxdamp import Ride, dampers, parameters, roads, sweep, tune, vehicles
+from jaxdamp.metrics import Metric
+
+
+LAW = dampers.TemperatureScaled(dampers.Bilinear(2500.0, 1500.0), temperature=293.15)
+CAR = vehicles.presets.quarter_car_000(LAW)
+ACCELERATION, TYRE = "rms_sprung_acceleration", "dynamic_load_coefficient"
+DRIVEN = {"C": roads.iso8608("C", 20.0, seed=1), "bump": roads.cosine_bump(0.05, start=0.1, duration=0.2)}
+HOT = tune.Condition({"temperature": 350.0, "sprung_mass": 1500.0}, {"damper.*_rate": 0.8}, weight=3.0)
+WHITE = {"C": roads.white("C", 20.0), "D": roads.white("D", 10.0)}
+LINEAR = vehicles.presets.quarter_car_000()
+
+
+def test_each_scenario_is_the_ride_of_that_vehicle_on_that_road() -> None:
+    scenarios = tune.Scenarios(DRIVEN, {"cold": tune.Condition(), "hot": HOT}, weights={"bump": 1.0, "C": 2.0})
+    ride = scenarios.ride(CAR, metrics=[ACCELERATION, TYRE], duration=0.5)
+    assert ride.names == ("C, cold", "C, hot", "bump, cold", "bump, hot")
+    np.testing.assert_allclose(ride.weights, np.array([2.0, 6.0, 1.0, 3.0]) / 12.0)
+    warm = dampers.TemperatureScaled(dampers.Bilinear(2000.0, 1200.0), temperature=350.0)
+    hot = parameters.replace(vehicles.presets.quarter_car_000(warm), {"sprung_mass": 1500.0})
+    pairs = [(car, road) for road in DRIVEN.values() for car in (CAR, hot)]
+    alone = [Ride(car, road, metrics=[ACCELERATION, TYRE], duration=0.5)() for car, road in pairs]
+    each, joined = ride.each(), ride()
+    for name in (ACCELERATION, TYRE):
+        np.testing.assert_allclose(each[name], [run[name] for run in alone], rtol=1e-12)
+        assert float(joined[name]) == pytest.approx(float(np.sum(ride.weights * each[name])))
+
+
+def test_scenarios_are_swept_and_differentiated_as_a_ride() -> None:
+    ride = tune.Scenarios(WHITE, [tune.Condition(), tune.Condition(factors={"rate": 0.9})]).ride(
+        LINEAR, metrics=[ACCELERATION]
+    )
+    data = sweep(ride, {"damper.rate": [2000.0, 3000.0]}, gradients=True)
+    value = lambda rate: ride({"damper.rate": rate})[ACCELERATION]  # noqa: E731
+    assert float(data[ACCELERATION][0]) == pytest.approx(float(value(2000.0)), rel=1e-12)
+    difference = (value(3000.1) - value(2999.9)) / 0.2
+    assert float(data[f"d_{ACCELERATION}"][1, 0]) == pytest.approx(float(difference), rel=1e-6)
+    assert data[ACCELERATION].attrs["units"] == "m/s^2"
+
+
+def test_risks_join_values() -> None:
+    values, weights = jnp.array([1.0, 4.0, 2.0, 3.0]), jnp.array([0.4, 0.1, 0.3, 0.2])
+    tail = tune.CVaR(0.2)
+    assert float(tail(values, weights)) == pytest.approx((0.1 * 4.0 + 0.1 * 3.0) / 0.2)
+    np.testing.assert_allclose(jax.grad(tail)(values, weights), [0.0, 0.5, 0.0, 0.5])
+    assert float(tune.CVaR(1.0)(values, weights)) == pytest.approx(float(jnp.sum(values * weights)))
+    smooth = tune.Scenarios(WHITE, risk="worst").risk(values, weights)
+    assert 4.0 <= float(smooth) < 4.0 * (1.0 + np.log(4) / 100)
+
+
+def test_the_mean_over_white_roads_has_the_closed_form_optimum_and_the_worst_case_that_of_its_road() -> None:
+    """The mean of RMS values on roads of one spectrum is proportional to one of them: the same c* = k sqrt(M/k_t)."""
+    best = 60e3 * np.sqrt(1325.0 / 220e3)
+    for risk in ("mean", "worst"):
+        result = tune.minimise(ACCELERATION, LINEAR, tune.Scenarios(WHITE, risk=risk))
+        assert result.parameters[0].after == pytest.approx(best, rel=1e-5), risk
+    assert result.scenarios is not None and result.scenarios.names == ("C", "D")
+    assert result.scenario_table().records()[1]["scenario"] == "D"
+
+
+def test_limits_hold_in_every_scenario() -> None:
+    laden = tune.Condition({"sprung_mass": 1500.0})
+    scenarios = tune.Scenarios(WHITE, {"empty": tune.Condition(), "laden": laden})
+    result = tune.minimise("rms_dynamic_tyre_load", LINEAR, scenarios, limits={ACCELERATION: 1.204})
+    assert result.converged and result.active_limits == (ACCELERATION,)
+    assert result.scenarios is not None
+    assert np.max(result.scenarios.after[ACCELERATION]) == pytest.approx(1.204, rel=1e-5)
+    (held,) = result.active
+    assert held == "rms_sprung_acceleration <= 1.204 m/s², in 'D, empty'"
+
+
+def test_tolerances_and_samples_are_conditions() -> None:
+    made = tune.tolerances({"damper.rate": 0.1, "sprung_mass": 0.02}, 256, seed=3)
+    factors = np.array([list(condition.factors.values()) for condition in made.values()])
+    np.testing.assert_allclose(factors.mean(axis=0), 1.0, atol=2e-3)
+    np.testing.assert_allclose(factors.std(axis=0), [0.1, 0.02], rtol=0.03)
+    assert abs(np.corrcoef(factors.T)[0, 1]) < 0.1
+    values = tune.samples({"rate": [2400.0, 2600.0], "slopes": np.ones((2, 3))})
+    assert values["sample 2"].values["rate"] == 2600.0 and values["sample 1"].values["slopes"].shape == (3,)
+
+
+WRONG_SCENARIOS = [
+    (lambda: tune.Scenarios([]), "`roads` must hold one or more"),
+    (lambda: tune.Scenarios([*WHITE.values(), DRIVEN["C"]]), "must be all white or all driven over"),
+    (lambda: tune.Scenarios(WHITE, weights=[1.0]), "be one for each road"),
+    (lambda: tune.Scenarios(WHITE, weights=[1.0, -1.0]), "be 0 or more"),
+    (lambda: tune.Scenarios(WHITE, risk="median"), "`risk` must be one of 'mean', 'worst'"),
+    (lambda: tune.CVaR(0.0), "`share` must be above 0"),
+    (lambda: tune.tolerances({}, 2), "name one or more parameters"),
+    (lambda: tune.tolerances({"rate": 5.0}, 2), "0.05 is 5 %"),
+    (lambda: tune.tolerances({"rate": 0.1}, 0), "`count` must be one or more"),
+    (lambda: tune.samples({"rate": [1.0], "mass": [1.0, 2.0]}), "equally many samples"),
+    (lambda: tune.Scenarios(WHITE, [tune.Condition({"rat": 1.0})]).ride(LINEAR), "did you mean 'rate'"),
+    (lambda: tune.Scenarios(WHITE, [tune.Condition({"rate": -1.0})]).ride(LINEAR), "must be positive"),
+    (lambda: tune.Scenarios(WHITE, [tune.Condition({"rate": 1.0}, {"rate": 2.0})]).ride(LINEAR), "a value or a factor"),
+    (
+        lambda: tune.minimise(ACCELERATION, LINEAR, tune.Scenarios(WHITE, [tune.Condition({"rate": 2e3})])),
+        "must not free damper.rate, which a condition of the scenarios sets",
+    ),
+    (
+        lambda: tune.Scenarios([roads.iso8608("C", 20.0, seed=1)], [tune.Condition({"front_distance": 1.1})]).ride(
+            vehicles.presets.half_car_002(), duration=0.1
+        ),
+        "must not move an axle in scenarios",
+    ),
+    (lambda: tune.minimise(ACCELERATION, LINEAR, WHITE["C"], limits={TYRE: (2.0, 1.0)}), "in increasing order"),
+    (lambda: tune.minimise(ACCELERATION, LINEAR, WHITE["C"], starts=0), "`starts` must be 1 or more"),
+    (lambda: tune.minimise(ACCELERATION, LINEAR, WHITE["C"], fresh_roads=-1), "`fresh_roads` must be 0 or more"),
+    (
+        lambda: tune.minimise(ACCELERATION, LINEAR, WHITE["C"], shape=tune.monotone().at("rear.*")),
+        r"name a damper of the vehicle \(damper\)",
+    ),
+    (lambda: tune.slope(), "one of them given"),
+    (lambda: tune.slope(2.0, 1.0), "be below `upper`"),
+    (lambda: tune.ratio(1.0, velocity=0.0), "`velocity` must be positive"),
+    (lambda: tune.knee(0.1, side="up"), "`side` must be one of 'rebound', 'compression'"),
+    (lambda: tune.Targets({}), "one or more metrics to a value and a tolerance"),
+    (lambda: tune.minimise(Metric(ACCELERATION, "rms"), LINEAR, WHITE["C"]), "channel of metric"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), WRONG_SCENARIOS, ids=[message[:30] for _, message in WRONG_SCENARIOS])
+def test_wrong_uses_are_refused(call, message) -> None:
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def test_fresh_roads_keep_the_spectrum_and_the_coherence_of_tracks() -> None:
+    road = roads.iso8608("C", 20.0, seed=1)
+    other = road.reseeded(5)
+    np.testing.assert_allclose(other.amplitude, road.amplitude)
+    assert not np.allclose(other.phase, road.phase)
+    tracks = roads.two_track(road, track_width=1.5, seed=2)
+    again = tracks.reseeded(5)
+    for one in (tracks, again):
+        shift = (one.roads[1].phase - one.roads[0].phase) % (2 * np.pi)
+        np.testing.assert_allclose(shift, (tracks.roads[1].phase - tracks.roads[0].phase) % (2 * np.pi), atol=1e-9)
+    assert DRIVEN["bump"].reseeded(1) is None
+    assert eqx.tree_equal(tune.Scenarios(DRIVEN).on_other_roads(3).scenarios[1].road, DRIVEN["bump"])

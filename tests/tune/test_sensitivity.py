@@ -1,0 +1,164 @@
+"""Sensitivities against differences and closed forms, the cost of tolerances, and robust tunings."""
+
+import json
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxdamp import Ride, bench, dampers, identify, parameters, plots, roads, tune, vehicles
+from jaxdamp.tune.hats import ForceHats, with_hats
+from jaxdamp.tune.sensitivities import sensitivity
+
+
+METRICS = ["rms_sprung_acceleration", "rms_dynamic_tyre_load"]
+BUMP = roads.cosine_bump(0.05, start=0.02, duration=0.15)
+CAR = vehicles.presets.quarter_car_000(dampers.Bilinear(2600.0, 1400.0, knee_width=0.02))
+WHITE, LINEAR = roads.white("C", 20.0), vehicles.presets.quarter_car_000()
+RUN = {"duration": 0.4, "dt": 2e-3}
+BEST = 60e3 * np.sqrt(1325.0 / 220e3)
+
+
+def _central(function, at: float, step: float) -> float:
+    far, near = (float(function(at + s) - function(at - s)) / (2 * s) for s in (2 * step, step))
+    return (4 * near - far) / 3
+
+
+@pytest.fixture(scope="module")
+def found() -> tune.Sensitivity:
+    road = lambda speed: roads.cosine_bump(0.05, start=0.02, length=3.0, speed=speed)  # noqa: E731
+    return tune.sensitivity(METRICS, CAR, road, quantities={"speed": 20.0}, reach=0.6, hats=3, **RUN)
+
+
+def test_derivatives_by_parameters_and_speed_agree_with_differences(found) -> None:
+    ride = Ride(CAR, BUMP, metrics=METRICS, **RUN)
+    for name in METRICS:
+        assert found.values[name] == pytest.approx(float(ride()[name]), rel=1e-9)
+        for parameter, value in zip(found.parameters, found.point, strict=True):
+            slope = found.gradient[name][found.parameters.index(parameter)]
+            if parameter == "speed":
+                run = lambda v, name=name: Ride(  # noqa: E731
+                    CAR, roads.cosine_bump(0.05, start=0.02, length=3.0, speed=v), metrics=METRICS, **RUN
+                )()[name]
+            else:
+                run = lambda x, p=parameter, name=name: ride({p: x})[name]  # noqa: E731
+            if value:
+                assert slope == pytest.approx(
+                    _central(run, value, 1e-3 * value), rel=2e-3 if parameter == "speed" else 2e-5
+                ), parameter
+    assert set(found.parameters) == {p.path for p in parameters.parameters(CAR)} | {"speed"}
+
+
+def test_derivatives_by_the_curve_agree_with_differences(found) -> None:
+    hatted = with_hats(CAR, "damper", 0.6, 3)
+    ride = Ride(hatted, BUMP, metrics=METRICS, **RUN)
+    curve = found.curves["damper"]
+    np.testing.assert_allclose(curve.velocity, [-0.6, -0.4, -0.2, 0.2, 0.4, 0.6])
+    for i in (2, 3):
+        run = lambda force, i=i: ride({"damper.terms.1.forces": jnp.zeros(6).at[i].set(force)})[METRICS[0]]  # noqa: E731
+        assert curve.gradient[METRICS[0]][i] == pytest.approx(_central(run, 0.0, 2.0), rel=1e-5)
+
+
+def test_a_line_through_the_hats_is_a_damping_rate() -> None:
+    """Hats whose forces are their velocities add a rate of one: their derivatives add up to that by the rate."""
+    found = tune.sensitivity(METRICS[0], LINEAR, BUMP, over=["rate"], reach=2.0, hats=2, **RUN)
+    curve = found.curves["damper"]
+    along = float(np.sum(curve.gradient[METRICS[0]] * curve.velocity))
+    assert along == pytest.approx(float(found.gradient[METRICS[0]][0]), rel=1e-9)
+    law = ForceHats(0.1, np.array([-3.0, -1.0, 2.0, 4.0]))
+    forces = [float(law.force_velocity(v)) for v in (-0.5, -0.15, -0.05, 0.0, 0.1, 0.15, 0.3)]
+    np.testing.assert_allclose(forces, [-3.0, -2.0, -0.5, 0.0, 2.0, 3.0, 4.0], atol=1e-12)
+
+
+def test_second_derivatives_say_how_flat_an_optimum_is() -> None:
+    """Closed form: the variance is a/c + b c, so that the RMS rises by 1 % where (r + 1/r)/2 = 1.01²."""
+    best = vehicles.presets.quarter_car_000(dampers.Linear(BEST))
+    found = tune.sensitivity(METRICS[0], best, WHITE, over=["rate"], second_order=True)
+    assert found.elasticities(METRICS[0])["damper.rate"] == pytest.approx(0.0, abs=1e-9)
+    scaled = found.hessian[METRICS[0]][0, 0] * BEST**2 / found.values[METRICS[0]]
+    assert scaled == pytest.approx(0.5, rel=1e-6)
+    (sentence,) = found.flatness(METRICS[0])
+    assert sentence == "rms_sprung_acceleration rises by 1 % at ±20 % along +1.00 damper.rate."
+    aside = tune.sensitivity(METRICS[0], LINEAR, WHITE, over=["rate"], second_order=True)
+    assert "has a slope here, 0.28 % for 1 %" in aside.flatness(METRICS[0])[0]
+
+
+def test_results_show_themselves(found) -> None:
+    rows = found.table().records()
+    assert rows[0]["parameter"] == "sprung_mass" and rows[-1][METRICS[0]] is None  # tyre damping is zero
+    assert found.curve_table().columns[2].name == METRICS[0]
+    data = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert data["curves"]["damper"]["velocity"][0] == pytest.approx(-0.6) and data["elasticities"]
+    figure = plots.sensitivity(found)
+    assert figure.axes[0].get_title(loc="left") == "damper: rms sprung acceleration"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"metric": "rms_acceleration"}, "did you mean|Did you mean"),
+        ({"metric": []}, "`metric` must be metrics by name"),
+        ({"over": ["rat"]}, "did you mean 'rate'"),
+        ({"dampers": "rear.*"}, r"`dampers` must name a law of the vehicle \(damper\)"),
+        ({"metric": "lift_off_fraction"}, "must have a slope"),
+    ],
+)
+def test_wrong_uses_are_refused(change, message) -> None:
+    arguments = {"metric": METRICS[0], "vehicle": LINEAR, "road": BUMP} | RUN | change
+    with pytest.raises(ValueError, match=message):
+        sensitivity(**arguments)
+    plain = tune.sensitivity(METRICS[0], LINEAR, WHITE, over=["rate"])
+    with pytest.raises(ValueError, match="have second derivatives"):
+        plain.flatness(METRICS[0])
+    with pytest.raises(ValueError, match="must have curves"):
+        plain.curve_table()
+
+
+def test_tolerances_cost_what_a_sample_says() -> None:
+    scatter = 0.05
+    (effect,) = tune.tolerance_effects(METRICS[0], LINEAR, WHITE, {"damper.rate": scatter})
+    normal = np.random.default_rng(0).normal(size=200_000)
+    rates = 2500.0 * (1.0 + scatter * normal)
+    acceleration = np.sqrt(BEST / rates + rates / BEST)  # up to a factor
+    nominal = np.sqrt(BEST / 2500.0 + 2500.0 / BEST)
+    assert effect.mean == pytest.approx(acceleration.mean() / nominal - 1.0, rel=0.15)
+    assert effect.deviation == pytest.approx(acceleration.std() / nominal, rel=0.02)
+    assert effect.sentence("comfort").startswith("A 5 % scatter of damper.rate costs 0.08")
+
+
+def test_a_robust_tuning_meets_the_worst_case_better() -> None:
+    """Two payloads want different rates; the tuning for the worst case has the smaller largest value."""
+    loads = {"empty": tune.Condition(), "laden": tune.Condition({"sprung_mass": 1800.0})}
+    scenarios = tune.Scenarios([WHITE], loads)
+    results = [
+        tune.robust("rms_dynamic_tyre_load", LINEAR, scenarios, risk=risk, scatter={"rate": 0.1})
+        for risk in ("mean", "worst")
+    ]
+    largest = [max(r.tuning.scenarios.after["rms_dynamic_tyre_load"]) for r in results]
+    assert largest[1] <= largest[0] * (1 + 1e-9)
+    assert "Largest in 'road 1, laden'" in results[1].summary
+    assert results[1].sentences[0].startswith("A 10 % scatter of damper.rate costs")
+    assert json.dumps(results[1].to_dict(), allow_nan=False) and results[1].tolerance_table().rows
+
+
+def test_the_gradient_passes_from_bench_samples_through_a_fit_to_a_metric() -> None:
+    """Least squares of a bilinear law to forces, put into a car on a bump: against differences of the forces."""
+    velocity = jnp.linspace(-0.5, 0.5, 21)
+    force = jnp.where(velocity > 0, 2600.0, 1400.0) * velocity
+    shape = jnp.sin(7.0 * velocity)
+    ride = Ride(CAR, BUMP, metrics=METRICS[:1], **RUN)
+
+    def metric(size):
+        noisy = force + size * shape
+        rates = [
+            jnp.sum(jnp.where(side, velocity * noisy, 0.0)) / jnp.sum(jnp.where(side, velocity**2, 0.0))
+            for side in (velocity > 0, velocity < 0)
+        ]
+        return ride({"rebound_rate": rates[0], "compression_rate": rates[1]})[METRICS[0]]
+
+    slope = float(jax.grad(metric)(jnp.asarray(20.0)))
+    assert slope == pytest.approx(_central(metric, 20.0, 5.0), rel=1e-6)
+    run = bench.VirtualDyno(dampers.Bilinear(2600.0, 1400.0), sampling_rate=200.0).run([bench.SineTest(0.01, 4.0)])
+    law = identify.fit(dampers.Bilinear, run).law
+    assert float(law.rebound_rate) == pytest.approx(2600.0, rel=1e-3)

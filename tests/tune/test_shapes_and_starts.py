@@ -1,0 +1,126 @@
+"""Shape constraints, several starts, smooth metrics, targets and fresh roads of a tuning."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxdamp import dampers, metrics, roads, tune, vehicles
+from jaxdamp.metrics import Metric
+from jaxdamp.tune.ranges import search_range
+from jaxdamp.tune.shape import held_force
+from jaxdamp.tune.smooth import exact_counterpart
+from jaxdamp.tune.starts import start_points
+
+
+KNOTS, SLOPES = np.array([-0.3, 0.1, 0.3]), np.array([1500.0, 2500.0, 2500.0, 1500.0])
+CAR = vehicles.presets.quarter_car_000(dampers.PiecewiseLinear(KNOTS, SLOPES))
+ROAD = roads.iso8608("C", 20.0, seed=1)
+RUN = {"duration": 0.6, "dt": 2e-3}
+
+
+def test_shapes_hold_and_are_named() -> None:
+    shape = [tune.slope(1600.0, 2900.0), tune.ratio(1.2, 3.0, velocity=0.5)]
+    result = tune.minimise("rms_sprung_acceleration", CAR, ROAD, freeze=["*knots"], shape=shape, fresh_roads=1, **RUN)
+    assert result.status is not tune.Status.LIMIT_NOT_MET
+    slopes = np.asarray(result.vehicle.damper.slopes)
+    assert slopes.min() >= 1600.0 * (1 - 1e-5) and slopes.max() <= 2900.0 * (1 + 1e-5)
+    back, rest, out = np.asarray(held_force(result.vehicle.damper, jnp.array([-0.5, 0.0, 0.5])))
+    assert 1.2 * (1 - 1e-5) <= (out - rest) / (rest - back) <= 3.0 * (1 + 1e-5)
+    assert any(words.startswith("slope of damper") for words in result.active)
+    assert result.fresh is not None and result.fresh.roads == 1
+    assert "on fresh roads" in [column.name for column in result.table().columns]
+
+
+def test_shapes_that_contradict_each_other_are_named() -> None:
+    shape = [tune.slope(3000.0, 3100.0), tune.ratio(1.5, velocity=0.5)]
+    road = roads.white("C", 20.0)
+    result = tune.minimise("rms_sprung_acceleration", CAR, road, freeze=["*knots"], shape=shape)
+    assert result.status is tune.Status.LIMIT_NOT_MET
+    assert any("Not met together: " in w and "slope of damper" in w and "ratio" in w for w in result.warnings)
+
+
+def test_numbers_of_curves() -> None:
+    law = dampers.PiecewiseLinear(np.array([-0.2, 0.0, 0.3]), np.array([1000.0, 2000.0, 4000.0, 1000.0]))
+    for shape, expected in (
+        (tune.knee(0.1, 0.4), 0.3),
+        (tune.knee(0.1, side="compression"), 0.2),
+        (tune.ratio(1.0, velocity=0.1), 2.0),
+    ):
+        velocities = jnp.array(shape.velocities)
+        (number,) = np.asarray(shape.numbers(velocities, held_force(law, velocities)))
+        assert number == pytest.approx(expected, abs=0.011), shape.name
+    lagged = dampers.Lag(law, lag_time=0.01)
+    np.testing.assert_allclose(held_force(lagged, velocities), held_force(law, velocities), rtol=1e-9)
+
+
+def test_several_starts_find_the_same_optimum_as_one() -> None:
+    car, road = vehicles.presets.quarter_car_000(dampers.Linear(600.0)), roads.white("C", 20.0)
+    seen = []
+    result = tune.minimise(
+        "rms_sprung_acceleration",
+        car,
+        road,
+        bounds={"rate": (100.0, 2e4)},
+        starts=3,
+        progress=lambda step, value: seen.append((step, value)),
+    )
+    assert result.parameters[0].after == pytest.approx(60e3 * np.sqrt(1325.0 / 220e3), rel=1e-6)
+    assert len(result.starts) == 3 and all(attempt.converged for attempt in result.starts)
+    assert not result.warnings and [step for step, _ in seen] == list(range(1, len(seen) + 1))
+    assert min(value for _, value in seen) == pytest.approx(result.after["rms_sprung_acceleration"])
+
+
+def test_starts_lie_inside_the_bounds_and_in_order() -> None:
+    space = search_range(CAR, ["damper.*"], [], None)
+    points = start_points(space, 9, seed=1)
+    assert points.shape == (9, 7) and np.array_equal(points[0], space.start)
+    assert np.all(points >= space.lower) and np.all(points <= space.upper)
+    assert np.all(np.diff(points[:, :3], axis=1) >= 0)
+
+
+def test_an_error_inside_a_search_reaches_the_user() -> None:
+    def stop(step: int, value: float) -> None:
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        tune.minimise(
+            "rms_sprung_acceleration", CAR, roads.white("C", 20.0), freeze=["*knots"], starts=2, progress=stop
+        )
+
+
+def test_smooth_metrics_stay_close_to_the_true_ones() -> None:
+    time = jnp.arange(4000.0) * 1e-3
+    peak = tune.smooth_peak("stroke", window=(0.0, 1.0))
+    for record in (jnp.sin(20.0 * time), -3.0 * jnp.exp(-((time - 1.0) ** 2) / 0.01)):
+        smooth, true = (float(m.statistic.of(record, 1e-3)) for m in (peak, exact_counterpart(peak)))
+        assert 0.98 * true < smooth <= true * (1 + 1e-12) and true == pytest.approx(np.abs(record).max())
+    assert float(peak.statistic.of(jnp.zeros(5), 1e-3)) == 0.0
+    assert exact_counterpart(peak).name == "peak_stroke_0_to_1_s"
+    named = tune.smooth_settling("stroke", from_rest=True, name="quiet")
+    assert exact_counterpart(named).name == "exact_quiet" and exact_counterpart(named).from_rest
+    assert exact_counterpart(Metric("stroke", "rms")) is None
+    assert metrics.Metric("stroke", "peak").statistic is exact_counterpart(peak).statistic
+
+
+def test_the_true_peak_stands_beside_the_smooth_one() -> None:
+    bump = roads.cosine_bump(0.05, start=0.1, duration=0.2)
+    smooth = tune.smooth_peak("sprung_acceleration", window=(0.1, 0.5))
+    result = tune.minimise("rms_sprung_acceleration", CAR, bump, freeze=["*knots"], limits={smooth: 3.0}, **RUN)
+    true = result.after["peak_sprung_acceleration_0.1_to_0.5_s"]
+    assert result.fresh is None and result.after[smooth.name] <= 3.0 * (1 + 1e-5)
+    said = any("the true peak_sprung_acceleration_0.1_to_0.5_s is" in w for w in result.warnings)
+    assert said == (true > 3.0)
+
+
+def test_targets_are_met_and_noted() -> None:
+    """Two targets of one car at 3000 N s/m are found again from another start."""
+    road = roads.white("C", 20.0)
+    names = ("rms_sprung_acceleration", "rms_dynamic_tyre_load")
+    from jaxdamp import Ride
+
+    car = vehicles.presets.quarter_car_000(dampers.Linear(3000.0))
+    wanted = {name: (float(value), 0.01 * float(value)) for name, value in Ride(car, road, metrics=names)().items()}
+    result = tune.minimise(tune.Targets(wanted), vehicles.presets.quarter_car_000(dampers.Linear(2000.0)), road)
+    assert result.parameters[0].after == pytest.approx(3000.0, rel=1e-3)
+    notes = {row["metric"]: row["note"] for row in result.table().records()}
+    assert notes["targets"] == "minimised" and all(notes[name].endswith(", met") for name in names)
