@@ -1,0 +1,64 @@
+"""The jaxprs of JAX: the only file that knows how JAX holds a traced function."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import numpy as np
+from jax.extend import core
+
+
+Inner = Any  # a jaxpr, open or closed
+
+
+@dataclass(frozen=True)
+class Equation:
+    """One primitive with its parameters; shapes and types are those of its results."""
+
+    name: str
+    parameters: dict[str, Any]
+    shapes: list[tuple[int, ...]]
+    dtypes: list[str]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the only result."""
+        return self.shapes[0]
+
+    @property
+    def dtype(self) -> str:
+        """The type of the only result."""
+        return self.dtypes[0]
+
+    def called(self) -> Inner:
+        """The program that a call consists of: its first parameter that is one."""
+        return next(value for value in self.parameters.values() if hasattr(value, "eqns") or hasattr(value, "jaxpr"))
+
+
+def traced(function: Callable[..., Any], inputs: list[tuple[tuple[int, ...], str]]) -> Inner:
+    """The jaxpr of a function of arrays, given by their shapes and types; in double precision if one of them is."""
+    with jax.enable_x64(any(dtype.endswith("64") for _, dtype in inputs)):
+        return jax.make_jaxpr(function)(*(jax.ShapeDtypeStruct(*each) for each in inputs))
+
+
+def opened(inner: Inner) -> tuple[Any, list[np.ndarray]]:
+    """A jaxpr and the values of its constants."""
+    jaxpr = inner.jaxpr if hasattr(inner, "consts") else inner
+    return jaxpr, [np.asarray(value) for value in getattr(inner, "consts", [])]
+
+
+def equations(jaxpr: Any) -> Iterator[tuple[Equation, list[Any], list[Any]]]:
+    """Each equation with its operands and its results."""
+    for e in jaxpr.eqns:
+        shapes = [tuple(v.aval.shape) for v in e.outvars]
+        dtypes = [v.aval.dtype.name for v in e.outvars]
+        yield Equation(e.primitive.name, dict(e.params), shapes, dtypes), e.invars, e.outvars
+
+
+def literal(operand: Any) -> np.ndarray | None:
+    """The value of an operand that is written as a number; `None` of a variable."""
+    if not isinstance(operand, core.Literal):
+        return None
+    kind: Any = operand.aval
+    return np.asarray(operand.val, kind.dtype)
