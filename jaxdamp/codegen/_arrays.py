@@ -146,7 +146,8 @@ def _split(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[At
 
 
 def _unstack(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
-    return list(np.moveaxis(operands[0], equation.parameters["axis"], 0))
+    rows = np.moveaxis(operands[0], equation.parameters["axis"], 0)
+    return [rows[k : k + 1].reshape(shape) for k, shape in enumerate(equation.shapes)]
 
 
 RULES: dict[str, Rule] = {

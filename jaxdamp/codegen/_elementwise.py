@@ -81,6 +81,31 @@ def _logistic(writer: Writer, equation: Equation, operands: list[Atoms]) -> list
     return each(logistic, equation, operands)
 
 
+def _one_minus_square(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
+    """1 − x² of JAX 0.12, (1 + x) (1 − x) as there."""
+    dtype = equation.dtype
+    one = constant(1, dtype)
+
+    def one_minus_square(a: Atom) -> Atom:
+        factors = writer.define("add", (one, a), dtype), writer.define("sub", (one, a), dtype)
+        return writer.define("mul", factors, dtype)
+
+    return each(one_minus_square, equation, operands)
+
+
+def _polynomial(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
+    """A polynomial of JAX 0.12, the lowest coefficient first, by Horner's rule."""
+    dtype = equation.dtype
+
+    def polynomial(a: Atom, *coefficients: Atom) -> Atom:
+        *lower, result = coefficients
+        for coefficient in reversed(lower):
+            result = writer.define("add", (writer.define("mul", (result, a), dtype), coefficient), dtype)
+        return result
+
+    return each(polynomial, equation, operands)
+
+
 def _select(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
     """`select_n(which, case 0, case 1, ...)`, of which most have two cases."""
 
@@ -123,6 +148,8 @@ RULES: dict[str, Rule] = {
     "integer_pow": _integer_power,
     "rsqrt": _reciprocal_root,
     "logistic": _logistic,
+    "one_minus_square": _one_minus_square,
+    "polynomial": _polynomial,
     "select_n": _select,
     "clamp": _clamp,
     "convert_element_type": _convert,

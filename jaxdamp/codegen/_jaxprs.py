@@ -32,14 +32,20 @@ class Equation:
         return self.dtypes[0]
 
     def called(self) -> Inner:
-        """The program that a call consists of: its first parameter that is one."""
+        """The program that a call consists of."""
+        function = self.parameters.get("_prim")
+        if function is not None:  # from JAX 0.12, such as `custom_root`
+
+            def expanded(*flat: Any) -> list[Any]:
+                return jax.tree.leaves(function.expand(*jax.tree.unflatten(function.in_tree, flat)))
+
+            return jax.make_jaxpr(expanded)(*function.in_avals_flat)
         return next(value for value in self.parameters.values() if hasattr(value, "eqns") or hasattr(value, "jaxpr"))
 
 
 def traced(function: Callable[..., Any], inputs: list[tuple[tuple[int, ...], str]]) -> Inner:
-    """The jaxpr of a function of arrays, given by their shapes and types; in double precision if one of them is."""
-    with jax.enable_x64(any(dtype.endswith("64") for _, dtype in inputs)):
-        return jax.make_jaxpr(function)(*(jax.ShapeDtypeStruct(*each) for each in inputs))
+    """The jaxpr of a function of arrays, given by their shapes and types."""
+    return jax.make_jaxpr(function)(*(jax.ShapeDtypeStruct(*each) for each in inputs))
 
 
 def opened(inner: Inner) -> tuple[Any, list[np.ndarray]]:

@@ -69,10 +69,10 @@ def lower(function: Callable[..., Any], *arguments: Any) -> Program:
         structure.append(shape)
         return results
 
-    with compiling_for(_SCALAR):
-        jaxpr = traced(flat, [(leaf.names.shape, leaf.dtype) for leaf in inputs])
     writer = Writer()
-    results = evaluated(writer, jaxpr, [_atoms(leaf) for leaf in inputs])
+    with compiling_for(_SCALAR), jax.enable_x64(any(leaf.dtype.endswith("64") for leaf in inputs)):
+        jaxpr = traced(flat, [(leaf.names.shape, leaf.dtype) for leaf in inputs])
+        results = evaluated(writer, jaxpr, [_atoms(leaf) for leaf in inputs])
     needed = {atom.name for array in results for atom in array.ravel() if isinstance(atom, Variable)}
     return Program(pruned(writer.statements, needed), jax.tree.unflatten(structure[-1], results))
 
