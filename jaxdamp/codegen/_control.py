@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxdamp.codegen._jaxprs import Equation, Inner
+from jaxdamp.codegen._jaxprs import Equation, Inner, scan_sizes
 from jaxdamp.codegen._program import Assign, Atom, Atoms, Branch, Leave, Loop, Writer, constant
 
 
@@ -44,10 +44,11 @@ def _cond(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: E
 
 def _scan(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: Evaluate) -> list[Atoms]:
     p = equation.parameters
-    length, first, second = p["length"], p["num_consts"], p["num_consts"] + p["num_carry"]
+    length, (first, carried) = p["length"], scan_sizes(equation, operands)
+    second = first + carried
     rows = [_tables(writer, array, length) for array in operands[second:]]
     now = _declared(writer, equation, operands[first:second])
-    each_step = list(zip(equation.shapes, equation.dtypes, strict=True))[p["num_carry"] :]
+    each_step = list(zip(equation.shapes, equation.dtypes, strict=True))[carried:]
     saved = [_arrays(writer, shape[1:], dtype, length) for shape, dtype in each_step]
     count = writer.declare(COUNTER, constant(0, COUNTER))
     with writer.block() as body:
@@ -55,11 +56,11 @@ def _scan(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: E
         place = writer.define("sub", (constant(length - 1, COUNTER), count), COUNTER) if p["reverse"] else count
         here = [_entries(writer, tables, place) for tables in rows]
         after = evaluate(writer, p["jaxpr"], [*operands[:first], *now, *here])
-        for arrays, values in zip(saved, after[p["num_carry"] :], strict=True):
+        for arrays, values in zip(saved, after[carried:], strict=True):
             for array, value in zip(arrays.ravel(), values.ravel(), strict=True):
                 writer.put(Assign(array, value, place))
         following = writer.define("add", (count, constant(1, COUNTER)), COUNTER)
-        _assign(writer, [*now, np.array(count)], [*after[: p["num_carry"]], np.array(following)])
+        _assign(writer, [*now, np.array(count)], [*after[:carried], np.array(following)])
     writer.put(Loop(body))
     return [*now, *(_read(writer, arrays, length) for arrays in saved)]
 

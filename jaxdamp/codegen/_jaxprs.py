@@ -43,6 +43,17 @@ class Equation:
         return next(value for value in self.parameters.values() if hasattr(value, "eqns") or hasattr(value, "jaxpr"))
 
 
+def scan_sizes(equation: Equation, operands: list[np.ndarray]) -> tuple[int, int]:
+    """How many operands of a scan are the same in all steps, and how many are carried from step to step.
+
+    By the ranks, which those over the steps lose inside: JAX 0.12 names the parameters otherwise than 0.10.
+    """
+    jaxpr, _ = opened(equation.parameters["jaxpr"])
+    carried = sum(len(shape) == v.aval.ndim for shape, v in zip(equation.shapes, jaxpr.outvars, strict=True))
+    rows = sum(operand.ndim != v.aval.ndim for operand, v in zip(operands, jaxpr.invars, strict=True))
+    return len(operands) - rows - carried, carried
+
+
 def traced(function: Callable[..., Any], inputs: list[tuple[tuple[int, ...], str]]) -> Inner:
     """The jaxpr of a function of arrays, given by their shapes and types."""
     return jax.make_jaxpr(function)(*(jax.ShapeDtypeStruct(*each) for each in inputs))

@@ -17,7 +17,7 @@ from jaxdamp.export._write import write_whole
 
 
 _LANGUAGE = C()
-_PREAMBLE = """\
+INCLUDES = """\
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -60,7 +60,7 @@ def to_c(
     program, name = LawProgram(law, precision), source.stem
     texts = {
         source.with_suffix(".h"): header(program, name, derivatives),
-        source: f'#include "{name}.h"\n\n{_PREAMBLE}\n{functions(program, name, derivatives)}',
+        source: f'#include "{name}.h"\n\n{INCLUDES}\n{functions(program, name, derivatives)}',
         source.with_name(f"{name}_test.c"): self_test(program, name),
     }
     return [write_whole(file, text) for file, text in texts.items()]
