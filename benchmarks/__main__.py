@@ -15,6 +15,7 @@ QUESTIONS = (
     ["memory"],
     ["work_precision"],
     ["fit"],
+    ["printed"],
 )
 
 

@@ -2,6 +2,9 @@
 
 import functools
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import NamedTuple
 
@@ -85,19 +88,40 @@ def configure(
 
 
 class Target(NamedTuple):
-    """What this process compiles for.
+    """What functions are compiled for.
 
     Attributes:
         fused_loops: XLA compiles loops over time as one function.
         reciprocal_roots: the device has an instruction for many 1/√x at a time (AVX-512); XLA then starts from it.
+        library_functions: exponentials and logarithms are those of the compiler's own library, one number at a time,
+            as in printed C (`jaxdamp.codegen`).
     """
 
     fused_loops: bool
     reciprocal_roots: bool
+    library_functions: bool = False
+
+
+_OTHER_TARGET: ContextVar[Target | None] = ContextVar("other_target", default=None)
+
+
+@contextmanager
+def compiling_for(other: Target) -> Iterator[None]:
+    """Functions traced inside are for another target than XLA in this process."""
+    token = _OTHER_TARGET.set(other)
+    try:
+        yield
+    finally:
+        _OTHER_TARGET.reset(token)
+
+
+def target() -> Target:
+    """What the function that is being traced is compiled for; by default this process, see `_this_process`."""
+    return _OTHER_TARGET.get() or _this_process()
 
 
 @functools.cache
-def target() -> Target:
+def _this_process() -> Target:
     """Looked up once, which starts JAX.
 
     From then on nothing of it can change, so that all functions compiled in this process agree on it.

@@ -1,4 +1,4 @@
-"""The command line: `jaxdamp fit`, `bench`, `demo`, `ride`, `tune` and `sweep`, the jobs that need no code, and lists of laws and vehicles."""
+"""The command line: the jobs that need no code, and lists of laws and vehicles."""
 
 import signal
 from typing import TYPE_CHECKING, Any

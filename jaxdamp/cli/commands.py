@@ -306,6 +306,25 @@ def sweep_command(
         tuning.run_sweep(console.Screen(), on, over=over, metrics=metric, out=out, replace=replace)
 
 
+@app.command()
+def export(
+    law: Annotated[Path, typer.Argument(help="A law as JSON, such as best_law.json of jaxdamp fit.")],
+    to: Annotated[str, typer.Option(help="adams, assetto-corsa, c, carsim, csv, fmu or matlab.")],
+    out: Annotated[Path | None, typer.Option(help="File to write; the name of the law with another ending.")] = None,
+    velocities: Annotated[
+        str | None, typer.Option(help="Of a table, FROM:TO:POINTS [m/s]; those the law was fitted to, or -1:1:41.")
+    ] = None,
+    replace: Replace = False,
+    debug: Debug = False,
+) -> None:
+    """Write a law as C, as FMU or as the table of a simulator."""
+    from jaxdamp.cli import console, exporting
+
+    with console.plain_errors(debug):
+        console.prepare()
+        exporting.run_export(console.Screen(), law, to, out=out, velocities=velocities, replace=replace)
+
+
 @app.command(name="vehicles")
 def list_vehicles() -> None:
     """List the vehicles that a law can be put into."""

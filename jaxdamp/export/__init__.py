@@ -1,7 +1,20 @@
-"""Laws, vehicles and roads written to files and read back."""
+"""Laws, vehicles and roads written to files and read back; laws as C, as FMU and as tables of simulators."""
 
+from jaxdamp.export.c_source import to_c
+from jaxdamp.export.fmu import to_fmu
 from jaxdamp.export.force_velocity import to_csv
 from jaxdamp.export.module_file import from_json, to_json
+from jaxdamp.export.simulator_tables import to_adams, to_assetto_corsa, to_carsim, to_matlab
 
 
-__all__ = ["from_json", "to_csv", "to_json"]
+__all__ = [
+    "from_json",
+    "to_adams",
+    "to_assetto_corsa",
+    "to_c",
+    "to_carsim",
+    "to_csv",
+    "to_fmu",
+    "to_json",
+    "to_matlab",
+]

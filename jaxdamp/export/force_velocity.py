@@ -3,6 +3,7 @@
 import os
 import warnings
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,7 +36,33 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
         ValueError: velocities that do not increase, a folder that does not exist, a law without a settled force at any
             of the velocities.
     """
-    check_module("law", law, (AbstractDamper,), "to_csv(law, path, velocities)")
+    table = settled_table(law, velocities, "to_csv(law, path, velocities)")
+    rows = [f"{float(v)!r},{float(f)!r}" for v, f in zip(table.velocity, table.force, strict=True)]
+    comments = [f"# {line}" for line in table.comments]
+    written = write_whole(path, "\n".join([*comments, "velocity [m/s],force [N]", *rows]) + "\n")
+    warn_of_rows(written, table)
+    return written
+
+
+class SettledTable(NamedTuple):
+    """The force of a law over velocity, and what a reader of the table must know.
+
+    Attributes:
+        velocity: [m/s], positive in rebound, shape (points,).
+        force: [N], positive when it resists extension, shape (points,).
+        comments: lines of text.
+        left_out: the rows that were left out and why; empty if there are none.
+    """
+
+    velocity: np.ndarray
+    force: np.ndarray
+    comments: list[str]
+    left_out: str
+
+
+def settled_table(law: AbstractDamper, velocities: VectorLike, call: str) -> SettledTable:
+    """The force at constant velocity once the states have settled, as `to_csv` writes it."""
+    check_module("law", law, (AbstractDamper,), call)
     velocity = np.asarray(velocities, dtype=float)
     _checks.finite("velocities", velocity)
     if velocity.ndim != 1 or velocity.size == 0 or np.any(np.diff(velocity) <= 0):
@@ -45,35 +72,36 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
         remedy = "A table cannot represent such a law: use `respond` with the intended motion."
         what = f"{type(law).__name__}. {curve.note.removesuffix('.')}"
         _checks.refuse("law", "have a force at constant velocity", what, remedy)
-    header = [
-        f"# law: {law!r}",
-        "# velocity is positive in extension (rebound), force is positive when it resists extension",
+    comments = [
+        f"law: {law!r}",
+        "velocity is positive in extension (rebound), force is positive when it resists extension",
     ]
     states = law.initial_state().size
     if states:
-        header.append(
-            f"# quasi-static: force at constant velocity; the hysteresis of the law's {states} state(s) is not in here"
+        comments.append(
+            f"quasi-static: force at constant velocity; the hysteresis of the law's {states} state(s) is not in here"
         )
     if curve.note:
-        header.append(f"# rows left out: {curve.note}")
-    header += _range_lines(law, velocity[curve.settled])
-    force = np.asarray(curve.force)
-    pairs = zip(velocity[curve.settled], force[curve.settled], strict=True)
-    rows = [f"{float(v)!r},{float(f)!r}" for v, f in pairs]
-    written = write_whole(path, "\n".join([*header, "velocity [m/s],force [N]", *rows]) + "\n")
-    if curve.note:
-        warnings.warn(f"{written.name}: rows left out. {curve.note}", stacklevel=2)
-    return written
+        comments.append(f"rows left out: {curve.note}")
+    settled = velocity[curve.settled]
+    comments += _range_lines(law, settled)
+    return SettledTable(settled, np.asarray(curve.force)[curve.settled], comments, curve.note)
+
+
+def warn_of_rows(written: Path, table: SettledTable) -> None:
+    """A Python warning of rows that are not in the file."""
+    if table.left_out:
+        warnings.warn(f"{written.name}: rows left out. {table.left_out}", stacklevel=3)
 
 
 def _range_lines(law: AbstractDamper, velocity: np.ndarray) -> list[str]:
     """Comments on the fitted range of the law and on the rows outside it."""
-    lines = [] if law.fitted_to is None else [f"# fitted to: {law.fitted_to.words()}"]
+    lines = [] if law.fitted_to is None else [f"fitted to: {law.fitted_to.words()}"]
     outside = extrapolated(law, velocity)
     if not outside.any():
         return lines
     if outside.all():
-        return [*lines, "# extrapolated: all rows lie beyond the velocities that the law was fitted to"]
+        return [*lines, "extrapolated: all rows lie beyond the velocities that the law was fitted to"]
     measured = velocity[~outside]
     where = f"rows below {measured[0]:.6g} m/s and above {measured[-1]:.6g} m/s"
-    return [*lines, f"# extrapolated: {where}, {np.count_nonzero(outside)} of {velocity.size}, beyond all records"]
+    return [*lines, f"extrapolated: {where}, {np.count_nonzero(outside)} of {velocity.size}, beyond all records"]

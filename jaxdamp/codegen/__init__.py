@@ -1,0 +1,17 @@
+"""JAX functions of numbers and small arrays as text in other languages: C99 (also C++) and JavaScript.
+
+`lower` traces a function and translates it into scalar statements, which a language prints:
+
+    program = lower(function, symbols("x"), symbols("state", (2,)))
+    C().function(PrintedFunction("void f(...)", ["x", "state"], program.statements, outputs))
+
+Arrays become names of scalars while printing, so that slicing and reshaping cost nothing. Loops (`lax.while_loop`,
+`lax.scan`) stay loops, branches stay branches, calls and functions with custom derivatives are written out. Elementary
+functions are those of the language's own library. A primitive that cannot be printed is refused by its name.
+"""
+
+from jaxdamp.codegen._languages import AbstractLanguage, C, JavaScript, PrintedFunction
+from jaxdamp.codegen._lowering import Program, Symbols, lower, symbols
+
+
+__all__ = ["AbstractLanguage", "C", "JavaScript", "PrintedFunction", "Program", "Symbols", "lower", "symbols"]

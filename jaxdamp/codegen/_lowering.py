@@ -1,0 +1,114 @@
+"""JAX functions of numbers and small arrays as programs of scalars."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import numpy as np
+
+from jaxdamp.codegen import _arrays, _control, _elementwise
+from jaxdamp.codegen._jaxprs import Inner, equations, literal, opened, traced
+from jaxdamp.codegen._program import Atoms, Statement, Variable, Writer, pruned
+from jaxdamp.configuration import Target, compiling_for
+
+
+# One car on a processor of any kind, with the elementary functions of the C library.
+_SCALAR = Target(fused_loops=False, reciprocal_roots=False, library_functions=True)
+
+
+@dataclass(frozen=True)
+class Symbols:
+    """An input of a printed function: the text of each of its numbers.
+
+    Attributes:
+        names: an array of texts such as `"p->rate"`, of the shape of the input.
+        dtype: the type of the numbers.
+    """
+
+    names: np.ndarray
+    dtype: str = "float64"
+
+
+def symbols(name: str, shape: tuple[int, ...] = (), dtype: str = "float64") -> Symbols:
+    """An input by its name: `x`, or `x[0]`, `x[1]`, ... in the order of memory."""
+    names = np.empty(shape, object)
+    for place, index in enumerate(np.ndindex(*shape)):
+        names[index] = f"{name}[{place}]" if shape else name
+    return Symbols(names, dtype)
+
+
+@dataclass(frozen=True)
+class Program:
+    """A JAX function as scalar statements.
+
+    Attributes:
+        statements: in the order of execution, without those that no result needs.
+        results: the result of the function, with arrays of atoms in place of arrays of numbers.
+    """
+
+    statements: list[Statement]
+    results: Any
+
+
+def lower(function: Callable[..., Any], *arguments: Any) -> Program:
+    """Translate a function of trees of arrays into scalar statements.
+
+    Arguments:
+        function: any function that JAX can trace, of arrays whose sizes are known.
+        arguments: trees with `Symbols` in place of arrays.
+
+    Raises:
+        NotImplementedError: a primitive that cannot be printed; the message names it.
+    """
+    inputs, tree = jax.tree.flatten(arguments, is_leaf=lambda leaf: isinstance(leaf, Symbols))
+    structure: list[Any] = []
+
+    def flat(*values: Any) -> list[Any]:
+        results, shape = jax.tree.flatten(function(*jax.tree.unflatten(tree, values)))
+        structure.append(shape)
+        return results
+
+    writer = Writer()
+    with compiling_for(_SCALAR), jax.enable_x64(any(leaf.dtype.endswith("64") for leaf in inputs)):
+        jaxpr = traced(flat, [(leaf.names.shape, leaf.dtype) for leaf in inputs])
+        results = evaluated(writer, jaxpr, [_atoms(leaf) for leaf in inputs])
+    needed = {atom.name for array in results for atom in array.ravel() if isinstance(atom, Variable)}
+    return Program(pruned(writer.statements, needed), jax.tree.unflatten(structure[-1], results))
+
+
+def _atoms(leaf: Symbols) -> Atoms:
+    result = np.empty(leaf.names.shape, object)
+    for index in np.ndindex(*leaf.names.shape):
+        result[index] = Variable(str(leaf.names[index]), leaf.dtype)
+    return result
+
+
+def evaluated(writer: Writer, inner: Inner, operands: list[Atoms]) -> list[Atoms]:
+    """The results of a jaxpr on arrays of atoms; what they take is written."""
+    jaxpr, values = opened(inner)
+    known: dict[Any, Atoms] = dict(zip(jaxpr.constvars, map(_arrays.constants, values), strict=True))
+    known |= zip(jaxpr.invars, operands, strict=True)
+
+    def read(operand: Any) -> Atoms:
+        number = literal(operand)
+        return known[operand] if number is None else _arrays.constants(number)
+
+    for equation, reads, writes in equations(jaxpr):
+        atoms = [read(operand) for operand in reads]
+        if equation.name in _control.RULES:
+            results = _control.RULES[equation.name](writer, equation, atoms, evaluated)
+        else:
+            results = _rule(equation.name)(writer, equation, atoms)
+        known |= zip(writes, results, strict=True)
+    return [read(operand) for operand in jaxpr.outvars]
+
+
+def _rule(name: str) -> _elementwise.Rule:
+    rule = _elementwise.RULES.get(name) or _arrays.RULES.get(name)
+    if rule is None:
+        raise NotImplementedError(
+            f"The primitive {name!r} of JAX cannot be printed. Write the function with others, such as "
+            "`jnp.where`, arithmetic and elementary functions."
+        )
+    return rule

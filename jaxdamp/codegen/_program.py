@@ -1,0 +1,214 @@
+"""Programs of scalar statements: what a JAX function is translated to, and what a language prints."""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from jaxdamp.codegen._folding import folded
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A scalar or an array of the program by its name in the printed text."""
+
+    name: str
+    dtype: str
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number, held as Python writes it: 0.0 and −0.0 differ."""
+
+    text: str
+    dtype: str
+
+
+Atom: TypeAlias = Variable | Constant
+Atoms: TypeAlias = npt.NDArray[np.object_]  # an array of JAX: one atom for each number
+
+
+def constant(value: Any, dtype: str) -> Constant:
+    """A number of a type."""
+    number = np.dtype(dtype).type(value)
+    return Constant(repr(number.item()) if dtype != "float32" else str(number), dtype)
+
+
+@dataclass(frozen=True)
+class Define:
+    """A value that does not change: the result of an operation."""
+
+    target: Variable
+    operation: str
+    operands: tuple[Atom, ...]
+
+
+@dataclass(frozen=True)
+class Declare:
+    """A variable that is assigned later; an array if it has a size."""
+
+    target: Variable
+    start: Atom | None = None
+    size: int | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """An array of given entries."""
+
+    target: Variable
+    entries: tuple[Atom, ...]
+
+
+@dataclass(frozen=True)
+class Assign:
+    """A new value of a declared variable, or of one entry of it."""
+
+    target: Variable
+    value: Atom
+    index: Atom | None = None
+
+
+@dataclass(frozen=True)
+class Leave:
+    """The end of a loop as soon as a condition does not hold."""
+
+    unless: Atom
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Statements repeated until `Leave`."""
+
+    body: "list[Statement]"
+
+
+@dataclass(frozen=True)
+class Branch:
+    """The statements of one of several cases, numbered from zero."""
+
+    case: Atom
+    bodies: "list[list[Statement]]"
+
+
+Statement: TypeAlias = Define | Declare | Table | Assign | Leave | Loop | Branch
+
+
+@dataclass
+class Writer:
+    """Collects statements; an operation with the same operands is computed once in a block."""
+
+    statements: list[Statement] = field(default_factory=list)
+    _known: list[dict[tuple, Variable]] = field(default_factory=lambda: [{}])
+    _count: int = 0
+
+    def new(self, dtype: str, letter: str = "t") -> Variable:
+        """A variable with a new name."""
+        self._count += 1
+        return Variable(f"{letter}{self._count}", dtype)
+
+    def put(self, statement: Statement) -> None:
+        """Add a statement to the present block."""
+        self.statements.append(statement)
+
+    def define(self, operation: str, operands: tuple[Atom, ...], dtype: str) -> Atom:
+        """The result of an operation, computed now if all operands are numbers."""
+        known_numbers = [_number(operand) for operand in operands if isinstance(operand, Constant)]
+        if len(known_numbers) == len(operands):
+            value = folded(operation, known_numbers, dtype)
+            if value is not None:
+                return constant(value, dtype)
+        key = operation, operands, dtype
+        for known in reversed(self._known):
+            if key in known:
+                return known[key]
+        target = self._known[-1][key] = self.new(dtype)
+        self.put(Define(target, operation, operands))
+        return target
+
+    def declare(self, dtype: str, start: Atom | None = None, size: int | None = None) -> Variable:
+        """A variable to be assigned."""
+        target = self.new(dtype, "u")
+        self.put(Declare(target, start, size))
+        return target
+
+    def table(self, entries: Iterable[Atom], dtype: str) -> Variable:
+        """An array of these entries."""
+        target = self.new(dtype, "table")
+        self.put(Table(target, tuple(entries)))
+        return target
+
+    def assign(self, pairs: Iterable[tuple[Variable, Atom]]) -> None:
+        """Assign all at once: values are read before any variable changes."""
+        pairs = [(target, value) for target, value in pairs if target != value]
+        targets = {target for target, _ in pairs}
+        before = [(target, self._copy(value) if value in targets else value) for target, value in pairs]
+        for target, value in before:
+            self.put(Assign(target, value))
+
+    def _copy(self, value: Atom) -> Variable:
+        target = self.new(value.dtype)
+        self.put(Define(target, "copy", (value,)))
+        return target
+
+    @contextmanager
+    def block(self) -> Iterator[list[Statement]]:
+        """Statements written inside go into a list of their own."""
+        outer, inner = self.statements, []
+        self.statements = inner
+        self._known.append({})
+        yield inner
+        self._known.pop()
+        self.statements = outer
+
+
+def _number(atom: Constant) -> Any:
+    kind = np.dtype(atom.dtype).type
+    if atom.dtype == "bool":
+        return kind(atom.text == "True")
+    return kind(float(atom.text) if atom.dtype.startswith("float") else int(atom.text))
+
+
+def pruned(statements: list[Statement], needed: set[str]) -> list[Statement]:
+    """Without what nothing uses; `needed` are the names used afterwards, and the names used here are added to it."""
+    kept: list[Statement] = []
+    for statement in reversed(statements):
+        used = _pruned_statement(statement, needed)
+        if used is not None:
+            kept.append(used)
+    return kept[::-1]
+
+
+def _pruned_statement(statement: Statement, needed: set[str]) -> Statement | None:
+    if isinstance(statement, Loop):
+        while True:  # what an earlier statement of the body uses may come from a later one, a round before
+            before = len(needed)
+            body = pruned(statement.body, needed)
+            if len(needed) == before:
+                return Loop(body)
+    if isinstance(statement, Branch):
+        needed |= names([statement.case])
+        return Branch(statement.case, [pruned(body, needed) for body in statement.bodies])
+    if not isinstance(statement, Leave) and statement.target.name not in needed:
+        return None
+    needed |= names(operands_of(statement))
+    return statement
+
+
+def operands_of(statement: Define | Declare | Table | Assign | Leave) -> list[Atom | None]:
+    """What a statement reads."""
+    if isinstance(statement, Define):
+        return list(statement.operands)
+    if isinstance(statement, Declare):
+        return [statement.start]
+    if isinstance(statement, Table):
+        return list(statement.entries)
+    return [statement.unless] if isinstance(statement, Leave) else [statement.value, statement.index]
+
+
+def names(atoms: Iterable[Atom | None]) -> set[str]:
+    """The names of the variables among them."""
+    return {atom.name for atom in atoms if isinstance(atom, Variable)}

@@ -1,0 +1,173 @@
+"""A law as functions of its numbers, which are printed in other languages."""
+
+import dataclasses
+import re
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.codegen import Program, Symbols, lower, symbols
+from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
+from jaxdamp.parameters import domain_of, modules_inside, with_values
+
+
+# Words that C, C++ and JavaScript keep for themselves and that a field could have as its name.
+_RESERVED = frozenset(
+    "auto bool case catch char class const default delete do double else enum export extern float for function goto if "
+    "import inline int let long new operator private register return short signed sizeof static struct switch template "
+    "this throw true typedef typeof union unsigned using var void volatile while".split()
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class LawNumber:
+    """A parameter or a setting of a law.
+
+    Attributes:
+        path: as in `jaxdamp.parameters`.
+        name: the path as an identifier of C and JavaScript.
+        unit: SI unit.
+        meaning: one line.
+        domain: the allowed values in words.
+        lower: lower limit of every number, minus infinity without one.
+        upper: upper limit.
+        value: the numbers of the law.
+        kind: "parameter", "setting", or "command", which is set from outside.
+    """
+
+    path: str
+    name: str
+    unit: str
+    meaning: str
+    domain: str
+    lower: float
+    upper: float
+    value: np.ndarray
+    kind: str
+
+
+def law_numbers(law: AbstractDamper) -> list[LawNumber]:
+    """All parameters and settings of a law but empty ones, those of the law before those of laws inside."""
+    found = []
+    for prefix, module in modules_inside(law):
+        for field in dataclasses.fields(module):
+            declared = field.metadata.get("parameter") or field.metadata.get("setting")
+            if declared is None:
+                continue
+            value = _checks.concrete(getattr(module, field.name))
+            path, domain = prefix + field.name, domain_of(declared, module)
+            if value is None:
+                _checks.refuse("law", "have known values", f"traced in {path}", "Export it outside `jax.jit`.")
+            _checks.finite(path, value)
+            if not value.size:
+                continue
+            kind = "command" if declared.get("command") else "setting" if "setting" in field.metadata else "parameter"
+            about = declared["unit"], declared["meaning"], domain.name, domain.lower, domain.upper
+            found.append(LawNumber(path, identifier(path), *about, np.asarray(value, float), kind))
+    return found
+
+
+def identifier(path: str) -> str:
+    """A path or a class as an identifier.
+
+    >>> identifier("law.terms.0.rate"), identifier("default")
+    ('law_terms_0_rate', 'default_')
+    """
+    name = re.sub(r"\W", "_", path, flags=re.ASCII)
+    return f"{name}_" if name in _RESERVED or not name else f"_{name}" if name[0].isdigit() else name
+
+
+class LawProgram:
+    """A law whose functions can be printed.
+
+    Attributes:
+        law: the law, without the range that it was fitted to.
+        numbers: its parameters and settings.
+        states: the number of its states.
+        dtype: the type of all numbers, "float64" or "float32".
+    """
+
+    def __init__(self, law: AbstractDamper, dtype: str = "float64") -> None:
+        _checks.one_of("precision", dtype, ("float64", "float32"))
+        self.law = without_fitted_ranges(law)
+        self.numbers = law_numbers(self.law)
+        self.states = int(law.initial_state().size)
+        self.dtype = dtype
+
+    @cached_property
+    def force(self) -> Program:
+        """`force(p, x, v, state)`."""
+        return lower(self._force, *self._point())
+
+    @cached_property
+    def advance(self) -> Program:
+        """`advance(p, x0, v0, x1, v1, dt, state)`: the states after the step."""
+        return lower(self._advance, *self._step())
+
+    @cached_property
+    def state_rate(self) -> Program:
+        """`state_rate(p, x, v, state)`."""
+        return lower(self._state_rate, *self._point())
+
+    @cached_property
+    def initial_state(self) -> Program:
+        """`initial_state(p)`."""
+        return lower(lambda values: self._with(values).initial_state(), self._values("p->"))
+
+    @cached_property
+    def force_derivative(self) -> Program:
+        """The change of the force for changes `dp->...`, `dx`, `dv`, `dstate` of its arguments."""
+        return self._derivative(self._force, self._point(), self._point("d"))
+
+    @cached_property
+    def advance_derivative(self) -> Program:
+        """The change of the states after a step for changes of its arguments but the duration."""
+        arguments, changes = self._step(), self._step("d")
+        arguments, changes = (arguments[:-2], arguments[-1]), (changes[:-2], changes[-1])
+
+        def derivative(point: tuple[Any, ...], change: tuple[Any, ...], dt: Any) -> Any:
+            def after(first: tuple[Any, ...], state: Any) -> Any:
+                values, x0, v0, x1, v1 = first
+                return self._advance(values, x0, v0, x1, v1, dt, state)
+
+            return jax.jvp(after, point, change)[1]
+
+        return lower(derivative, arguments, changes, self._symbols("dt"))
+
+    def _derivative(self, function: Callable, arguments: tuple, changes: tuple) -> Program:
+        return lower(lambda point, change: jax.jvp(function, point, change)[1], arguments, changes)
+
+    def _with(self, values: list[Any]) -> AbstractDamper:
+        law = jax.tree.map(lambda a: jnp.asarray(a, self.dtype) if eqx.is_inexact_array(a) else a, self.law)
+        return with_values(law, {n.path: value for n, value in zip(self.numbers, values, strict=True)})
+
+    def _force(self, values: list[Any], x: Any, v: Any, state: Any) -> Any:
+        return self._with(values).force(x, v, state)
+
+    def _state_rate(self, values: list[Any], x: Any, v: Any, state: Any) -> Any:
+        return self._with(values).state_rate(x, v, state)
+
+    def _advance(self, values: list[Any], x0: Any, v0: Any, x1: Any, v1: Any, dt: Any, state: Any) -> Any:
+        return self._with(values).advance(x0, v0, x1, v1, state, dt)
+
+    def _point(self, d: str = "") -> tuple[Any, ...]:
+        return self._values(f"{d}p->"), self._symbols(f"{d}x"), self._symbols(f"{d}v"), self._state(d)
+
+    def _step(self, d: str = "") -> tuple[Any, ...]:
+        names = (f"{d}{name}" for name in ("x0", "v0", "x1", "v1"))
+        return self._values(f"{d}p->"), *map(self._symbols, names), self._symbols("dt"), self._state(d)
+
+    def _values(self, prefix: str) -> list[Symbols]:
+        return [symbols(f"{prefix}{n.name}", n.value.shape, self.dtype) for n in self.numbers]
+
+    def _state(self, d: str) -> Symbols:
+        return symbols(f"{d}state", (self.states,), self.dtype)
+
+    def _symbols(self, name: str) -> Symbols:
+        return symbols(name, (), self.dtype)

@@ -1,0 +1,231 @@
+"""A law as the table of a vehicle simulator, in its units and with its sign."""
+
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._types import VectorLike
+from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
+from jaxdamp.export._write import write_whole
+from jaxdamp.export.force_velocity import SettledTable, settled_table, warn_of_rows
+from jaxdamp.rig import respond
+
+
+_FREQUENCIES = (1.5, 12.0)  # Hz, near the natural frequencies of body and wheel
+_CYCLES, _SAMPLES = 3, 200  # cycles of a sine, samples of each
+
+
+def to_adams(law: AbstractDamper, path: str | os.PathLike[str], velocities: VectorLike) -> Path:
+    """Write a law as damper property file (TeimOrbit format, `.dpr`) for Adams/Car, MotionView or SIMPACK.
+
+    Columns are the velocity [mm/s], positive in extension, and the force [N], positive when it resists extension. The
+    importing program interpolates and extrapolates by its own rules (MotionView and Adams/Car by Akima splines), so let
+    the velocities cover those of the simulation.
+
+    A table holds one force for each velocity: the comments of the file state its range and what it leaves out of a law
+    with states or a force over stroke, computed for sines of 1.5 Hz and 12 Hz.
+
+    Arguments:
+        law: the law.
+        path: the file to write; an existing one is replaced, and never left half-written.
+        velocities: strictly increasing velocities [m/s], positive in rebound, shape (points,).
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        ValueError: as `to_csv`.
+    """
+    table = _table(law, velocities, "to_adams(law, path, velocities)")
+    lines = [
+        *_section("MDI_HEADER"),
+        " FILE_TYPE     =  'dpr'",
+        " FILE_VERSION  =  4.0",
+        " FILE_FORMAT   =  'ASCII'",
+        *(f"$ {line}" for line in table.comments),
+        *_section("UNITS"),
+        " LENGTH  =  'mm'",
+        " ANGLE   =  'degrees'",
+        " FORCE   =  'newton'",
+        " MASS    =  'kg'",
+        " TIME    =  'second'",
+        *_section("CURVE"),
+        "{  vel          force}",
+        *(f"{1e3 * v:14.6f}  {f:14.6f}" for v, f in zip(table.velocity, table.force, strict=True)),
+    ]
+    return _written(path, lines, table)
+
+
+def to_carsim(law: AbstractDamper, path: str | os.PathLike[str], velocities: VectorLike) -> Path:
+    """Write a law as table of force [N] over compression rate [mm/s] for CarSim and TruckSim, both positive in jounce.
+
+    The file is a Parsfile with the table of the shock absorber, `FD_TABLE`, interpolated and extrapolated linearly. Its
+    rows can also be pasted into the table on the shock absorber screen. The comments are those of `to_adams`.
+
+    Arguments:
+        law: the law.
+        path: the file to write; an existing one is replaced, and never left half-written.
+        velocities: strictly increasing velocities [m/s], positive in rebound, shape (points,).
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        ValueError: as `to_csv`.
+    """
+    table = _table(law, velocities, "to_carsim(law, path, velocities)")
+    pairs = zip(-1e3 * table.velocity[::-1], -table.force[::-1], strict=True)
+    lines = [
+        "PARSFILE",
+        *(f"! {line}" for line in table.comments),
+        "! in this file compression rate [mm/s] and force [N] are positive in compression (jounce)",
+        "FD_TABLE LINEAR",
+        *(f"{rate:.6f}, {force:.6f}" for rate, force in pairs),
+        "ENDTABLE",
+        "END",
+    ]
+    return _written(path, lines, table)
+
+
+def to_matlab(law: AbstractDamper, path: str | os.PathLike[str], velocities: VectorLike) -> Path:
+    """Write a law as MATLAB file (`.mat`) for a 1-D Lookup Table of Simulink or a table of Simscape.
+
+    The variables are `velocity` [m/s], positive in extension, `force` [N], positive when it resists extension, both as
+    columns, and `about`, the comments of `to_adams` as a text. Simulink extrapolates by the setting of the block.
+
+    Arguments:
+        law: the law.
+        path: the file to write; an existing one is replaced, and never left half-written.
+        velocities: strictly increasing velocities [m/s], positive in rebound, shape (points,).
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        ValueError: as `to_csv`.
+    """
+    import io
+
+    from scipy.io import savemat
+
+    table, content = _table(law, velocities, "to_matlab(law, path, velocities)"), io.BytesIO()
+    about = "\n".join(table.comments)
+    savemat(content, {"velocity": table.velocity[:, None], "force": table.force[:, None], "about": about})
+    written = write_whole(path, content.getvalue())
+    warn_of_rows(written, table)
+    return written
+
+
+class _Side(NamedTuple):
+    """The straight lines of one direction in Assetto Corsa."""
+
+    slow: float
+    fast: float
+    threshold: float
+
+    def force(self, speed: np.ndarray) -> np.ndarray:
+        return self.slow * np.minimum(speed, self.threshold) + self.fast * np.maximum(speed - self.threshold, 0.0)
+
+
+def to_assetto_corsa(
+    law: AbstractDamper, path: str | os.PathLike[str], velocities: VectorLike, *, motion_ratio: float = 1.0
+) -> Path:
+    """Write a law as the six damper values of `suspensions.ini` of Assetto Corsa, to paste into an axle's section.
+
+    The game has two straight lines through zero in each direction: a slow rate up to a threshold and a fast rate beyond
+    it. They are fitted to the table by least squares; the comments state the misfit, besides those of `to_adams`. Rates
+    are at the wheel: a damper rate counts with the square of the motion ratio, a threshold with its inverse.
+
+    Arguments:
+        law: the law.
+        path: the file to write; an existing one is replaced, and never left half-written.
+        velocities: strictly increasing velocities [m/s] of the damper, positive in rebound, at least three of each
+            sign, shape (points,).
+        motion_ratio: travel of the damper for one of travel of the wheel.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        ValueError: as `to_csv`; fewer than three velocities in a direction; a motion ratio that is not positive.
+    """
+    _checks.positive("motion_ratio", motion_ratio)
+    table = _table(law, velocities, "to_assetto_corsa(law, path, velocities)")
+    lines = [f"; {line}" for line in table.comments]
+    lines.append(f"; rates at the wheel, for {motion_ratio:g} m of the damper for 1 m of the wheel")
+    for name, sign in (("BUMP", -1.0), ("REBOUND", 1.0)):
+        inside = sign * table.velocity > 0
+        speed, force = sign * table.velocity[inside], sign * table.force[inside]
+        if speed.size < 3:
+            must = f"hold three velocities or more in {'compression' if sign < 0 else 'rebound'}"
+            _checks.refuse("velocities", must, table.velocity)
+        side = _two_lines(speed, force)
+        misfit = np.sqrt(np.mean((side.force(speed) - force) ** 2) / np.mean(force**2))
+        lines += [
+            f"; two straight lines differ from the table by {100 * misfit:.1f} % of its RMS force",
+            f"DAMP_{name}={side.slow * motion_ratio**2:.1f}",
+            f"DAMP_FAST_{name}={max(side.fast * motion_ratio**2, 0.1):.1f}",  # zero stands for the slow rate
+            f"DAMP_FAST_{name}THRESHOLD={side.threshold / motion_ratio:.4f}",
+        ]
+    return _written(path, lines, table)
+
+
+def _two_lines(speed: np.ndarray, force: np.ndarray) -> _Side:
+    """The best two lines that are not falling, with the threshold at one of the speeds."""
+    from scipy.optimize import nnls
+
+    best, least = None, np.inf
+    for threshold in np.unique(speed)[:-1]:
+        parts = np.stack([np.minimum(speed, threshold), np.maximum(speed - threshold, 0.0)], axis=1)
+        rates, error = nnls(parts, force)
+        if error < least:
+            best, least = _Side(float(rates[0]), float(rates[1]), float(threshold)), error
+    assert best is not None
+    return best
+
+
+def _table(law: AbstractDamper, velocities: VectorLike, call: str) -> SettledTable:
+    """The settled table, with comments on its range and on what it leaves out."""
+    table = settled_table(law, velocities, call)
+    low, high = table.velocity[[0, -1]]
+    limits = f"range: {low:g} to {high:g} m/s; beyond it the program that reads the table extrapolates"
+    return table._replace(comments=[*table.comments, limits, *_left_out(law, table)])
+
+
+def _left_out(law: AbstractDamper, table: SettledTable) -> list[str]:
+    """How far the force of a law with states or over stroke differs from its table in settled sines."""
+    if not law.initial_state().size and not law.traits().stroke_dependent:
+        return []
+    peak = 0.5 * float(min(-table.velocity[0], table.velocity[-1]))
+    if peak <= 0:
+        return ["what the table leaves out is not computed, since it holds one direction only"]
+    law = without_fitted_ranges(law)
+    reach = min([np.inf, *(abs(float(limit)) for term in law.side_by_side() for limit in term.stroke_limits)])
+    shares = []
+    for frequency in _FREQUENCIES:
+        turn = 2.0 * np.pi * np.arange(_CYCLES * _SAMPLES + 1) / _SAMPLES
+        speed = min(peak, 0.9 * reach * 2.0 * np.pi * frequency)
+        stroke, velocity = speed / (2.0 * np.pi * frequency) * np.sin(turn), speed * np.cos(turn)
+        try:
+            force = np.asarray(respond(law, turn / (2.0 * np.pi * frequency), stroke, velocity))[-_SAMPLES:]
+        except ValueError as error:
+            return [f"what the table leaves out is not known in a sine of {frequency:g} Hz, {speed:.3g} m/s: {error}"]
+        lost = force - np.interp(velocity[-_SAMPLES:], table.velocity, table.force)
+        share = 100.0 * np.sqrt(np.mean(lost**2) / np.mean(force**2))
+        shares.append(f"{share:.1f} % at {frequency:g} Hz and {speed:.3g} m/s")
+    return [f"left out by the table, as a share of the RMS force in a settled sine: {', '.join(shares)}"]
+
+
+def _section(name: str) -> list[str]:
+    return [f"${name:->71}", f"[{name}]"]
+
+
+def _written(path: str | os.PathLike[str], lines: list[str], table: SettledTable) -> Path:
+    """Write lines in ASCII, which all these programs read."""
+    text = "\n".join([*lines, ""]).replace("−", "-").replace("\N{DEGREE SIGN}", "")
+    written = write_whole(path, text.encode("ascii", "replace"))
+    warn_of_rows(written, table)
+    return written

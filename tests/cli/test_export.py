@@ -1,0 +1,52 @@
+"""`jaxdamp export`: a law file in, other formats out."""
+
+from pathlib import Path
+
+import pytest
+
+from jaxdamp.cli.exporting import PROGRAMS, TABLES
+from jaxdamp.dampers import Bilinear, FittedRange, with_fitted_range
+from jaxdamp.export import to_csv, to_json
+from jaxdamp.roads import sine
+
+from .invoking import jaxdamp, refused
+
+
+LAW = Bilinear(2600.0, 1200.0)
+
+
+@pytest.fixture
+def law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    to_json(LAW, tmp_path / "front-law.json")
+    return tmp_path / "front-law.json"
+
+
+@pytest.mark.parametrize("to", [*PROGRAMS, *TABLES])
+def test_every_format(law: Path, to: str) -> None:
+    ending = (PROGRAMS | TABLES)[to][0]
+    text = jaxdamp("export", law, "--to", to).output
+    assert f"front_law{ending}" in text and (law.parent / f"front_law{ending}").stat().st_size > 100
+
+
+def test_velocities(law: Path) -> None:
+    assert "5 from -0.6 to 0.8 m/s" in jaxdamp("export", law, "--to", "csv", "--velocities", "-0.6:0.8:5").output
+    written = law.parent / "front_law.csv"
+    expected = to_csv(LAW, law.parent / "expected.csv", [-0.6, -0.25, 0.1, 0.45, 0.8])
+    assert written.read_text().splitlines()[-1] == expected.read_text().splitlines()[-1]
+    fitted = law.parent / "fitted.json"
+    to_json(with_fitted_range(LAW, FittedRange(velocity=(-0.2, 0.3))), fitted)
+    assert " from -0.2 to 0.3 m/s" in jaxdamp("export", fitted, "--to", "adams").output
+    assert "\n      0.000000        0.000000\n" in (law.parent / "fitted.dpr").read_text()
+
+
+def test_refusals(law: Path) -> None:
+    folder = law.parent
+    assert "Option --to must be one of" in refused(folder, "export", law, "--to", "adam")
+    assert "--velocities must be FROM:TO:POINTS" in refused(folder, "export", law, "--to", "csv", "--velocities", "1")
+    assert "be left out for fmu" in refused(folder, "export", law, "--to", "fmu", "--velocities", "-1:1:3")
+    to_json(sine(amplitude=0.01, frequency=1.0), folder / "road.json")
+    assert "The law file must hold a damper law" in refused(folder, "export", folder / "road.json", "--to", "csv")
+    jaxdamp("export", law, "--to", "csv")
+    assert "Option --out must be a new file" in refused(folder, "export", law, "--to", "csv")
+    jaxdamp("export", law, "--to", "csv", "--replace")

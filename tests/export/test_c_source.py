@@ -1,0 +1,101 @@
+import subprocess
+
+import equinox as eqx
+import jax
+import numpy as np
+import pytest
+
+from jaxdamp._types import Number
+from jaxdamp.dampers import AbstractMemoryless, Besinger, BoucWen, Lag, Linear, MonoTube, PiecewiseLinear
+from jaxdamp.export import to_c
+from jaxdamp.export._law_program import identifier
+from jaxdamp.parameters import parameter
+from tests.dampers.test_contract import LAWS
+from tests.export.compiled import STRICT, compiled, compiler, in_c, in_jax, worst
+
+
+PLAIN = ["Besinger, car", "lag, power", "polynomial"]  # elementary functions, states, a loop
+CLOSE = 1e-12
+# The slope of its root is the quotient of two small numbers, which rounding changes in the eleventh digit.
+CLOSE_SLOPES = {"modified Bouc and Wen, published": 1e-10}
+
+
+def check(names, folder):
+    laws = {name: LAWS[name]() for name in names}
+    in_file = {name: f"law{k}_{identifier(name)}" for k, name in enumerate(names)}
+    library = compiled({in_file[name]: law for name, law in laws.items()}, folder)
+    for name, law in laws.items():
+        states, force, dstates, dforce = in_c(library, in_file[name], law.initial_state().size)
+        after, force_, dafter, dforce_ = in_jax(law, states)
+        assert max(worst(states[1:], after), worst(force, force_)) < CLOSE, name
+        assert max(worst(dstates, dafter), worst(dforce, dforce_)) < CLOSE_SLOPES.get(name, CLOSE), name
+        assert np.ptp(force) > 1.0
+
+
+def test_printed_laws_give_the_numbers_of_jax(tmp_path):
+    check(PLAIN, tmp_path)
+
+
+@pytest.mark.slow
+def test_all_printed_laws_give_the_numbers_of_jax(tmp_path):
+    check([name for name in LAWS if name not in PLAIN], tmp_path)
+
+
+@pytest.mark.parametrize(("command", "precision"), [("gcc", "float64"), ("g++", "float32")])
+def test_the_test_program_passes_and_fails(tmp_path, command, precision):
+    files = to_c(
+        Lag(Besinger(900.0, 2800.0, 700.0, 0.25, 0.05), 0.004), tmp_path, precision=precision, derivatives=True
+    )
+    assert [file.name for file in files] == ["lag.h", "lag.c", "lag_test.c"]
+    strict = STRICT if command == "gcc" else STRICT[1:]
+
+    def run():
+        build = [compiler(command), *strict, "lag.c", "lag_test.c", "-o", "lag", "-lm"]
+        subprocess.run(build, cwd=tmp_path, check=True)
+        return subprocess.run([tmp_path / "lag"], capture_output=True, text=True, check=False)
+
+    passed = run()
+    assert passed.returncode == 0 and "greatest difference" in passed.stdout
+    source = files[1].read_text(encoding="utf-8")
+    files[1].write_text(source.replace("p->lag_time = 0.004", "p->lag_time = 0.005"), encoding="utf-8")
+    assert run().returncode == 1
+
+
+def test_the_header_explains_every_number(tmp_path):
+    text = to_c(2.0 * PiecewiseLinear([-0.1, 0.1], [700.0, 2000.0, 900.0]), tmp_path / "shim.c")[0].read_text()
+    assert "/* law.slopes [N s/m] positive: " in text and "double law_slopes[3];" in text
+    assert "/* law.knee_width [m/s] not negative, setting: " in text
+    assert "#define SHIM_STATES 0" in text and "shim_force_derivative" not in text
+
+
+def test_the_text_is_the_same_every_time(tmp_path):
+    law = BoucWen(800.0, 2000.0, 300.0, 1e-3, 0.75, 1.5)
+    first = [file.read_text(encoding="utf-8") for file in to_c(law, tmp_path / "law.c")]
+    eqx.filter_jit(law.advance)(0.0, 0.1, 1e-4, 0.1, law.initial_state(), 1e-3)
+    assert [file.read_text(encoding="utf-8") for file in to_c(law, tmp_path / "law.c")] == first
+
+
+def test_single_precision_of_a_law_with_strokes_that_are_limited(tmp_path):
+    source = to_c(MonoTube.reference(), tmp_path, precision="float32")[1].read_text(encoding="utf-8")
+    assert "double" not in source and "powf(" in source
+
+
+class Sorted(AbstractMemoryless):
+    """A law that cannot be printed."""
+
+    rate: Number = parameter("N s/m", "damping coefficient")
+
+    def force_velocity(self, v):
+        return jax.numpy.sort(jax.numpy.stack([self.rate * v, 2.0 * self.rate * v]))[0]
+
+
+def test_refusals(tmp_path):
+    with pytest.raises(NotImplementedError, match="'sort'"):
+        to_c(Sorted(1.0), tmp_path)
+    with pytest.raises(ValueError, match=r"identifier of C, but is .*Try 'front_left\.c'"):
+        to_c(Linear(1.0), tmp_path / "front-left.c")
+    with pytest.raises(ValueError, match="precision"):
+        to_c(Linear(1.0), tmp_path, precision="float16")
+    with pytest.raises(ValueError, match="jit"):
+        jax.jit(lambda rate: to_c(Linear(rate), tmp_path) and 0)(1.0)
+    assert not list(tmp_path.iterdir())

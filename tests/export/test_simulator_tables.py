@@ -1,0 +1,135 @@
+import re
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from jaxdamp.dampers import Bilinear, BoucWen, FittedRange, Lag, Linear, SeriesSpring, Spring, Table, with_fitted_range
+from jaxdamp.export import to_adams, to_assetto_corsa, to_carsim, to_matlab
+
+
+VELOCITIES = np.linspace(-1.0, 0.8, 37)
+LAW = Bilinear(2600.0, 1200.0)
+FORCE = np.where(VELOCITIES > 0, 2600.0, 1200.0) * VELOCITIES
+TABLES = [to_adams, to_carsim, to_matlab, to_assetto_corsa]
+
+
+def read_teimorbit(path):
+    """Blocks with their parameters and rows, without comments, as the manuals of Adams and MotionView describe them."""
+    blocks, block = {}, {}
+    for line in path.read_text(encoding="ascii").splitlines():
+        if line.startswith(("$", "!")) or not line.strip():
+            continue
+        if line.startswith("["):
+            block = blocks.setdefault(line.strip("[]"), {"rows": []})
+        elif line.startswith("{"):
+            block["columns"] = line.strip("{}").split()
+        elif "=" in line:
+            name, value = line.split("=")
+            block[name.strip()] = value.strip().strip("'")
+        else:
+            block["rows"].append([float(number) for number in line.split()])
+    return blocks
+
+
+def values(path):
+    """The values of suspensions.ini."""
+    return {k: float(v) for k, v in re.findall(r"(?m)^(\w+)=([\d.]+)", path.read_text(encoding="ascii"))}
+
+
+def game(known, v):
+    """Force of Assetto Corsa at a velocity, here positive in rebound."""
+    name = np.where(v > 0, "REBOUND", "BUMP")
+    slow, fast = (np.array([known[f"DAMP_{kind}{n}"] for n in name]) for kind in ("", "FAST_"))
+    knee, speed = np.array([known[f"DAMP_FAST_{n}THRESHOLD"] for n in name]), np.abs(v)
+    return np.sign(v) * (slow * np.minimum(speed, knee) + fast * np.maximum(speed - knee, 0.0))
+
+
+def text(path):
+    return "".join(loadmat(path)["about"]) if path.suffix == ".mat" else path.read_text(encoding="ascii")
+
+
+def test_adams(tmp_path):
+    blocks = read_teimorbit(to_adams(LAW, tmp_path / "front.dpr", VELOCITIES))
+    assert blocks["MDI_HEADER"]["FILE_TYPE"] == "dpr" and blocks["MDI_HEADER"]["FILE_FORMAT"] == "ASCII"
+    assert (blocks["UNITS"]["LENGTH"], blocks["UNITS"]["FORCE"], blocks["UNITS"]["TIME"]) == ("mm", "newton", "second")
+    assert blocks["CURVE"]["columns"] == ["vel", "force"]
+    v, force = np.array(blocks["CURVE"]["rows"]).T
+    np.testing.assert_allclose(v, 1e3 * VELOCITIES, atol=1e-6)
+    np.testing.assert_allclose(force, FORCE, atol=1e-6)
+
+
+def test_carsim_counts_compression_positive(tmp_path):
+    lines = to_carsim(LAW, tmp_path / "front.par", VELOCITIES).read_text(encoding="ascii").splitlines()
+    start, end = lines.index("FD_TABLE LINEAR"), lines.index("ENDTABLE")
+    assert lines[0] == "PARSFILE" and lines[-1] == "END"
+    assert all(line.startswith("!") for line in lines[1:start])
+    rate, force = np.array([line.split(",") for line in lines[start + 1 : end]], float).T
+    assert np.all(np.diff(rate) > 0)
+    np.testing.assert_allclose(-1e-3 * rate[::-1], VELOCITIES, atol=1e-9)
+    np.testing.assert_allclose(-force[::-1], FORCE, atol=1e-6)
+
+
+def test_matlab(tmp_path):
+    known = loadmat(to_matlab(LAW, tmp_path / "front.mat", VELOCITIES))
+    assert known["velocity"].shape == (37, 1)
+    np.testing.assert_array_equal(known["velocity"][:, 0], VELOCITIES)
+    np.testing.assert_allclose(known["force"][:, 0], FORCE, rtol=1e-14)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 0.7])
+def test_assetto_corsa_has_the_slopes_of_the_wheel(tmp_path, ratio):
+    file = to_assetto_corsa(LAW, tmp_path / "front.ini", VELOCITIES, motion_ratio=ratio)
+    wheel = np.linspace(-1.0, 0.8, 50) / ratio
+    expected = ratio * np.where(wheel > 0, 2600.0, 1200.0) * (ratio * wheel)
+    np.testing.assert_allclose(game(values(file), wheel), expected, rtol=1e-3)
+    assert "differ from the table by 0.0 %" in text(file)
+
+
+def test_assetto_corsa_finds_the_knee_and_states_the_misfit(tmp_path):
+    knee = np.where(VELOCITIES < 0, 1500.0 * VELOCITIES, 4000.0 * np.minimum(VELOCITIES, 0.2))
+    file = to_assetto_corsa(Table(VELOCITIES, knee), tmp_path / "front.ini", VELOCITIES)
+    known = values(file)
+    np.testing.assert_allclose(game(known, VELOCITIES), knee, atol=1.0)
+    assert known["DAMP_FAST_REBOUND"] == 0.1  # the game takes zero for the slow rate
+    assert abs(known["DAMP_FAST_REBOUNDTHRESHOLD"] - 0.2) < 1e-3
+    with pytest.raises(ValueError, match="three velocities or more in compression"):
+        to_assetto_corsa(LAW, tmp_path / "front.ini", [-0.1, 0.1, 0.2, 0.3])
+    with pytest.raises(ValueError, match="motion_ratio"):
+        to_assetto_corsa(LAW, tmp_path / "front.ini", VELOCITIES, motion_ratio=0.0)
+
+
+@pytest.mark.parametrize("to_table", TABLES)
+def test_comments_state_range_and_extrapolation(tmp_path, to_table):
+    law = with_fitted_range(LAW, FittedRange(velocity=(-0.5, 0.5)))
+    said = text(to_table(law, tmp_path / ("front" + ".mat" * (to_table is to_matlab)), VELOCITIES))
+    assert (
+        "Bilinear(" in said and "range: -1 to 0.8 m/s" in said and "fitted to:" in said and "beyond all records" in said
+    )
+    assert "left out by the table" not in said
+
+
+def test_comments_state_what_is_lost(tmp_path):
+    """A first-order lag: over a sine the table misses |1 - 1/(1 + i w T)| / |1/(1 + i w T)| = w T of the RMS force."""
+    lag = 0.002
+    said = text(to_adams(Lag(Linear(2000.0), lag), tmp_path / "front.dpr", VELOCITIES))
+    shares = [float(share) for share in re.findall(r"([\d.]+) % at", said)]
+    np.testing.assert_allclose(shares, 100.0 * 2.0 * np.pi * np.array([1.5, 12.0]) * lag, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("law", "velocities", "said"),
+    [
+        (Linear(1500.0) + Spring(2000.0), VELOCITIES, "left out by the table"),
+        (SeriesSpring(LAW, 5e5), [0.1, 0.2, 0.4], "it holds one direction only"),
+    ],
+)
+def test_what_is_lost_of_other_laws(tmp_path, law, velocities, said):
+    assert said in text(to_adams(law, tmp_path / "front.dpr", velocities))
+
+
+def test_refusals(tmp_path):
+    with pytest.raises(ValueError, match="strictly increasing"):
+        to_adams(LAW, tmp_path / "front.dpr", [0.1, 0.1])
+    assert not list(tmp_path.iterdir())
+    assert "quasi-static" in text(to_adams(BoucWen(800.0, 0.0, 300.0, 1e-3), tmp_path / "front.dpr", VELOCITIES))
