@@ -9,6 +9,7 @@ from pathlib import Path
 here = Path(__file__).parent
 sys.path.insert(0, str(here))
 
+from _papers import write_table  # noqa: E402
 from _pictures import draw_all  # noqa: E402
 from _reference import process_docstring, skip_member, write_pages  # noqa: E402
 
@@ -56,6 +57,7 @@ if unexecuted := copy_notebooks(here / "notebooks"):
 def setup(app):
     """Write the generated sources before Sphinx looks for pages."""
     draw_all(here / "pictures")
+    write_table(here / "papers.md")
     write_pages(here / "reference")
     app.connect("autodoc-skip-member", skip_member)
     app.connect("autodoc-process-docstring", process_docstring, priority=400)  # before napoleon

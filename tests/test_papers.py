@@ -1,0 +1,27 @@
+"""The table "paper against jaxdamp" of the documentation: every statement has a verdict, and the numbers agree."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+
+SPEC = importlib.util.spec_from_file_location("_papers", Path(__file__).parents[1] / "docs" / "_papers.py")
+assert SPEC is not None and SPEC.loader is not None
+papers = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(papers)
+STATEMENTS = [(title, statement) for title, statements in papers.PAPERS.items() for statement in statements]
+
+
+@pytest.mark.parametrize(("title", "statement"), STATEMENTS, ids=lambda value: getattr(value, "statement", value)[:40])
+def test_verdict(title, statement):
+    assert statement.verdict in (papers.REPRODUCED, papers.CORRECTED, papers.OPEN) and statement.comment, title
+    if statement.computed is not None and statement.printed is not None:
+        close = statement.computed() == pytest.approx(statement.printed, rel=statement.tolerance)
+        assert close == (statement.verdict == papers.REPRODUCED)
+
+
+def test_the_table_has_a_row_for_each_statement(tmp_path):
+    papers.write_table(tmp_path / "papers.md")
+    rows = [line for line in (tmp_path / "papers.md").read_text().splitlines() if line.startswith("| ")]
+    assert len(rows) == len(STATEMENTS) + len(papers.PAPERS)  # and the headings
