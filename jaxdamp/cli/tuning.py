@@ -111,7 +111,7 @@ def run_tune(
             _write(results.draft, result)
             results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
-            page = tuning_report(result, rescored=result.fresh, folder=results.draft, attempts=attempts)
+            page = tuning_report(result, folder=results.draft, attempts=attempts)
             page.write(results.draft / "report.html")
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")

@@ -51,14 +51,17 @@ def add_tuning(
     Arguments:
         report: the page.
         result: of `tune.minimise`.
-        rescored: the same cars on other roads.
+        rescored: the same cars on other roads; the fresh roads of the tuning, if there are any, if left out.
         outcome: result of the tuning, in words.
         elsewhere: result on the other roads, in words; by default those of `rescored`.
     """
     report.table(result.parameter_table())
     report.table(result.table())
     report.text(outcome)
-    report.points(result.warnings)
+    report.points([*result.active, *result.warnings])
+    if result.scenarios is not None:
+        report.table(result.scenario_table())
+    rescored = result.fresh if rescored is None else rescored
     if rescored is not None:
         report.table(rescored.table())
         report.text(elsewhere or rescored.summary)

@@ -39,7 +39,7 @@ class ForceHats(AbstractMemoryless):
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
-        limit = self.forces.size // 2
+        limit = self.forces.size // 2  # its slope by v is not used: it is that of forces of zero
         place = jnp.clip(v / self.spacing, -limit, limit)
         weights = jnp.maximum(1.0 - jnp.abs(place - self.velocities / self.spacing), 0.0)
         return jnp.sum(weights * self.forces)

@@ -1,5 +1,6 @@
 """Power spectral densities of the channels of a vehicle, on a road that is driven over or on a white one."""
 
+import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -44,7 +45,9 @@ def spectra(
         gains = frequency_response(vehicle, frequency, speed=road.speed)
         height = 2.0 * float(road.velocity_psd) / (2.0 * np.pi * frequency) ** 2
         return {name: Spectrum(frequency, np.abs(np.asarray(gains[name])) ** 2 * height) for name in channels}
-    response = simulate(vehicle, road, duration=duration, dt=dt)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the notes of the tuning say it
+        response = simulate(vehicle, road, duration=duration, dt=dt)
     found = {}
     for name in channels:
         values = np.asarray(response[name])
