@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxdamp._types import Number
-from jaxdamp.dampers import AbstractMemoryless, Besinger, BoucWen, Lag, Linear, MonoTube, PiecewiseLinear
+from jaxdamp.dampers import AbstractMemoryless, Besinger, BoucWen, GasSpring, Lag, Linear, PiecewiseLinear
 from jaxdamp.export import to_c
 from jaxdamp.export._law_program import identifier
 from jaxdamp.parameters import parameter
@@ -76,7 +76,7 @@ def test_the_text_is_the_same_every_time(tmp_path):
 
 
 def test_single_precision_of_a_law_with_strokes_that_are_limited(tmp_path):
-    source = to_c(MonoTube.reference(), tmp_path, precision="float32")[1].read_text(encoding="utf-8")
+    source = to_c(GasSpring(2e6, 6e-5, 1e-4, 1.3), tmp_path, precision="float32")[1].read_text(encoding="utf-8")
     assert "double" not in source and "powf(" in source
 
 
