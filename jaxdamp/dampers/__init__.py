@@ -51,6 +51,7 @@ from jaxdamp.dampers.motion_ratio import MotionRatio
 from jaxdamp.dampers.neural_hysteresis import NeuralHysteresis
 from jaxdamp.dampers.piecewise_linear import PiecewiseLinear
 from jaxdamp.dampers.piston_flow import PistonFlow
+from jaxdamp.dampers.play import Play
 from jaxdamp.dampers.polynomial import Polynomial
 from jaxdamp.dampers.power_law import PowerLaw
 from jaxdamp.dampers.range_use import RangeUse, extrapolated, range_use, sentence, warn_outside
@@ -106,6 +107,7 @@ __all__ = [
     "OutsideFittedRangeWarning",
     "PiecewiseLinear",
     "PistonFlow",
+    "Play",
     "Polynomial",
     "PowerLaw",
     "RangeUse",

@@ -16,6 +16,7 @@ from jaxdamp.dampers import (
     Lag,
     Linear,
     MotionRatio,
+    Play,
     Scheduled,
     SeriesSpring,
     Spring,
@@ -44,6 +45,7 @@ WRAPPERS: dict[str, Wrap] = {
 IN_SERIES: dict[str, Wrap] = {
     "SeriesSpring(law, ...)": lambda law: SeriesSpring(law, 5e5),
     "Bushing(law, ...)": lambda law: Bushing(law, 2e6, 6e5, 800.0),
+    "Play(law, ...)": lambda law: Play(law, 5e5, 2e-4),
 }
 WITHOUT_STATES: dict[str, Wrap] = {
     "StrokeDependent((law, law), ...)": lambda law: StrokeDependent((law, law), [-0.01, 0.01]),
