@@ -68,6 +68,7 @@ from jaxdamp.dampers.sum import Sum
 from jaxdamp.dampers.table import Table
 from jaxdamp.dampers.temperature_scaled import TemperatureScaled
 from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.visco_plastic import ViscoPlastic
 from jaxdamp.dampers.with_range import with_fitted_range
 from jaxdamp.dampers.wrapper import AbstractWrapper
 
@@ -125,6 +126,7 @@ __all__ = [
     "Table",
     "TemperatureScaled",
     "Traits",
+    "ViscoPlastic",
     "command_paths",
     "coverage",
     "drives_motion",

@@ -48,6 +48,7 @@ from jaxdamp.dampers import (
     StrokeDependent,
     Table,
     TemperatureScaled,
+    ViscoPlastic,
 )
 from jaxdamp.testing import CHECKS, check_alike_ports, check_inside_wrappers, check_law
 from jaxdamp.testing.places import SLOTS
@@ -143,6 +144,9 @@ LAWS = {
     "play": lambda: Play(Linear(2000.0) + CoulombFriction(40.0, 0.02), 1e6, 3e-4),
     "piston flow": lambda: PistonFlow(1.42e-3, 1.6e-6, 1.2e6, 1.2e11, 2.5e-5, 5e5, 4e10, 4e-5, 2e-13),
     "mono-tube": MonoTube.reference,
+    "visco-plastic": lambda: ViscoPlastic(
+        100.0, 900.0, 0.6, 0.02, [200.0, 300.0], [2e-3, 1e-3], [2e-4, 1e-3], [0.5, 0.1], 0.8
+    ),
     "modified Bouc and Wen, published": lambda: ModifiedBoucWen.prototype(1.5),
     "neural hysteresis": network,
     "hybrid": lambda: Hybrid(PiecewiseLinear([-0.1, 0.1], [700.0, 2000.0, 900.0], 0.02), network(1)),
