@@ -137,7 +137,7 @@ class ViscoPlastic(AbstractDamper):
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "ViscoPlastic":
-        """Start values from measured data: part of the sliding force at once, part after 0.1 mm, part after a clearance.
+        """Start values from measured data: sliding force at once, after 0.1 mm, and after a clearance.
 
         The viscous force is that at the highest velocities, for n = 0.5.
         """
