@@ -38,6 +38,7 @@ from jaxdamp.dampers.fitted_range import (
 from jaxdamp.dampers.force_surface import ForceSurface
 from jaxdamp.dampers.frequency_selective import FrequencySelective
 from jaxdamp.dampers.gas_spring import GasSpring
+from jaxdamp.dampers.heated import Heated
 from jaxdamp.dampers.hybrid import Hybrid
 from jaxdamp.dampers.hyperbolic_tangent import HyperbolicTangent
 from jaxdamp.dampers.karadayi_masada import KaradayiMasada
@@ -94,6 +95,7 @@ __all__ = [
     "ForceSurface",
     "FrequencySelective",
     "GasSpring",
+    "Heated",
     "Hybrid",
     "HyperbolicTangent",
     "KaradayiMasada",

@@ -4,7 +4,7 @@ from typing import final
 
 import numpy as np
 
-from jaxdamp._types import Number
+from jaxdamp._types import Number, ScalarLike
 from jaxdamp.dampers._guesses import ELASTIC_TRAVEL, sliding_fit
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.bilinear import Bilinear
@@ -42,6 +42,10 @@ class KaradayiMasada(AbstractClearance):
         """Dashpot and friction, without spring and clearance."""
         friction = CoulombFriction(self.friction_force, self.friction_velocity)
         return Bilinear(self.rebound_rate, self.compression_rate) + friction
+
+    def contact(self) -> tuple[ScalarLike, ScalarLike]:
+        """Stiffness k [N/m] and clearance δ [m]."""
+        return self.stiffness, self.clearance
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "KaradayiMasada":

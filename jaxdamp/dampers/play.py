@@ -1,8 +1,7 @@
 """Any law in series with a clearance: a worn ball joint, a loose rod end, a void in the oil."""
 
+from abc import abstractmethod
 from typing import final
-
-import equinox as eqx
 
 from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike
@@ -20,8 +19,9 @@ def dead_zone(deflection: ScalarLike, clearance: ScalarLike) -> Scalar:
 class AbstractClearance(AbstractSeries):
     """A law in series with a spring that has a clearance, F = k dz(x_s, δ)."""
 
-    stiffness: eqx.AbstractVar[Number]
-    clearance: eqx.AbstractVar[Number]
+    @abstractmethod
+    def contact(self) -> tuple[ScalarLike, ScalarLike]:
+        """Stiffness k [N/m] and clearance δ [m]."""
 
     def traits(self) -> Traits:
         """The states have a kink where the clearance ends, and so the stroke since a reversal matters."""
@@ -29,12 +29,14 @@ class AbstractClearance(AbstractSeries):
 
     def spring_force(self, deflections: Deflections) -> Scalar:
         """Force [N] of the spring behind its clearance."""
-        return self.stiffness * dead_zone(deflections[0], self.clearance)
+        stiffness, clearance = self.contact()
+        return stiffness * dead_zone(deflections[0], clearance)
 
     def largest_deflection(self, force: Scalar, begun: Deflections) -> Scalar:
         """Clearance and deflection [m] of the spring."""
         del begun
-        return self.clearance + force / self.stiffness
+        stiffness, clearance = self.contact()
+        return clearance + force / stiffness
 
 
 @final
@@ -66,3 +68,7 @@ class Play(AbstractClearance):
 
     def __check_init__(self) -> None:
         require_feed_through("law", self.law, "Play")
+
+    def contact(self) -> tuple[ScalarLike, ScalarLike]:
+        """Stiffness k [N/m] and clearance δ [m]."""
+        return self.stiffness, self.clearance

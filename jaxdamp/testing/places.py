@@ -13,6 +13,7 @@ from jaxdamp.dampers import (
     AbstractDamper,
     Bushing,
     FrequencySelective,
+    Heated,
     Lag,
     Linear,
     MotionRatio,
@@ -40,6 +41,7 @@ WRAPPERS: dict[str, Wrap] = {
     "MotionRatio(law, ...)": lambda law: MotionRatio(law, 0.8),
     "TemperatureScaled(law, ...)": lambda law: TemperatureScaled(law, 313.15),
     "Scheduled((law, law), ...)": lambda law: Scheduled((law, law), [0.0, 1.0], 0.4),
+    "Heated(law, ...)": lambda law: Heated(law, 0.01, 1.0, heat_capacity=10.0),
     "Lag(law, ...)": lambda law: Lag(law, 0.004),
 }
 IN_SERIES: dict[str, Wrap] = {
