@@ -38,6 +38,7 @@ from jaxdamp.dampers.fitted_range import (
 from jaxdamp.dampers.force_surface import ForceSurface
 from jaxdamp.dampers.frequency_selective import FrequencySelective
 from jaxdamp.dampers.gas_spring import GasSpring
+from jaxdamp.dampers.heated import Heated
 from jaxdamp.dampers.hybrid import Hybrid
 from jaxdamp.dampers.hyperbolic_tangent import HyperbolicTangent
 from jaxdamp.dampers.karadayi_masada import KaradayiMasada
@@ -51,6 +52,7 @@ from jaxdamp.dampers.motion_ratio import MotionRatio
 from jaxdamp.dampers.neural_hysteresis import NeuralHysteresis
 from jaxdamp.dampers.piecewise_linear import PiecewiseLinear
 from jaxdamp.dampers.piston_flow import PistonFlow
+from jaxdamp.dampers.play import Play
 from jaxdamp.dampers.polynomial import Polynomial
 from jaxdamp.dampers.power_law import PowerLaw
 from jaxdamp.dampers.range_use import RangeUse, extrapolated, range_use, sentence, warn_outside
@@ -67,6 +69,7 @@ from jaxdamp.dampers.sum import Sum
 from jaxdamp.dampers.table import Table
 from jaxdamp.dampers.temperature_scaled import TemperatureScaled
 from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.visco_plastic import ViscoPlastic
 from jaxdamp.dampers.with_range import with_fitted_range
 from jaxdamp.dampers.wrapper import AbstractWrapper
 
@@ -92,6 +95,7 @@ __all__ = [
     "ForceSurface",
     "FrequencySelective",
     "GasSpring",
+    "Heated",
     "Hybrid",
     "HyperbolicTangent",
     "KaradayiMasada",
@@ -106,6 +110,7 @@ __all__ = [
     "OutsideFittedRangeWarning",
     "PiecewiseLinear",
     "PistonFlow",
+    "Play",
     "Polynomial",
     "PowerLaw",
     "RangeUse",
@@ -123,6 +128,7 @@ __all__ = [
     "Table",
     "TemperatureScaled",
     "Traits",
+    "ViscoPlastic",
     "command_paths",
     "coverage",
     "drives_motion",

@@ -4,31 +4,24 @@ from typing import final
 
 import numpy as np
 
-from jaxdamp._limits import within
-from jaxdamp._types import Number, Scalar, ScalarLike
+from jaxdamp._types import Number, ScalarLike
 from jaxdamp.dampers._guesses import ELASTIC_TRAVEL, sliding_fit
-from jaxdamp.dampers._series import AbstractSeries, Deflections
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.bilinear import Bilinear
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.play import AbstractClearance
 from jaxdamp.parameters import nonnegative, parameter, positive
 
 
-def dead_zone(deflection: ScalarLike, clearance: ScalarLike) -> Scalar:
-    """max(x_k − δ, 0) − max(−x_k − δ, 0) [m], the part of a deflection beyond a clearance of ±δ."""
-    return deflection - within(deflection, -clearance, clearance)
-
-
 @final
-class KaradayiMasada(AbstractSeries):
+class KaradayiMasada(AbstractClearance):
     """F = k dz(x_k, δ) = c v_d + F_c tanh(v_d/v_f), x = x_d + x_k, c = c_r for v_d > 0 and c_c for v_d < 0.
 
     The elements of Karadayi and Masada (1989), for low frequencies: a bilinear dashpot and Coulomb friction, in series
     with a spring that has a clearance of ±δ. After a reversal the force is zero over a travel of 2 δ and then increases
     with the spring. The equations of that paper were not available; these follow from its list of elements, with
-    smoothed friction as in `CoulombFriction`. Passive for any parameters. Without clearance it is
-    `SeriesSpring(Bilinear(c_r, c_c) + CoulombFriction(F_c, v_f), k)`.
+    smoothed friction as in `CoulombFriction`. Passive for any parameters. It is
+    `Play(Bilinear(c_r, c_c) + CoulombFriction(F_c, v_f), k, δ)`.
 
     State: the deflection x_k [m] of spring and clearance. The step is that of `SeriesSpring`, stable for any k.
 
@@ -50,18 +43,9 @@ class KaradayiMasada(AbstractSeries):
         friction = CoulombFriction(self.friction_force, self.friction_velocity)
         return Bilinear(self.rebound_rate, self.compression_rate) + friction
 
-    def traits(self) -> Traits:
-        """The states have a kink where the clearance ends, and so the stroke since a reversal matters."""
-        return super().traits()._replace(extrapolable_states=False, stroke_dependent=True)
-
-    def spring_force(self, deflections: Deflections) -> Scalar:
-        """Force [N] of the spring behind its clearance."""
-        return self.stiffness * dead_zone(deflections[0], self.clearance)
-
-    def largest_deflection(self, force: Scalar, begun: Deflections) -> Scalar:
-        """Clearance and deflection [m] of the spring."""
-        del begun
-        return self.clearance + force / self.stiffness
+    def contact(self) -> tuple[ScalarLike, ScalarLike]:
+        """Stiffness k [N/m] and clearance δ [m]."""
+        return self.stiffness, self.clearance
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "KaradayiMasada":

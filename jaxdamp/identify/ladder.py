@@ -14,16 +14,19 @@ from jaxdamp.dampers import (
     Bilinear,
     BoucWen,
     CoulombFriction,
+    Dahl,
     Lag,
     Linear,
     LuGre,
     PiecewiseLinear,
+    Play,
     Polynomial,
     PowerLaw,
     SegmentedPolynomial,
     SeriesSpring,
     Spring,
     Table,
+    ViscoPlastic,
 )
 from jaxdamp.identify.fitting import NUMERICAL
 from jaxdamp.identify.laws import NAMED_LAWS
@@ -65,6 +68,7 @@ _MEMORYLESS = {
     "besinger": Besinger.guess,
     "linear_friction": _friction,
 }
+_BESIDE_SPRING = {"lugre_spring": LuGre.guess, "visco_plastic_spring": ViscoPlastic.guess}
 LAWS = tuple(NAMED_LAWS)
 
 
@@ -91,8 +95,9 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dic
     Memoryless: `linear`, `bilinear`, `power_law`, `polynomial` (degree 5), `segmented_polynomial` (paper 000),
     `piecewise_linear`, `table`, `besinger` (paper 001), `linear_friction` (with smooth Coulomb friction). With
     hysteresis: `besinger_lag`, `besinger_series_spring` (paper 001), `linear_friction_lag`, and for friction with
-    elastic deformation before sliding, as in magnetorheological dampers, `bouc_wen` and `lugre_spring` (with a parallel
-    spring).
+    elastic deformation before sliding, as in magnetorheological dampers, `bouc_wen`, `lugre_spring` and
+    `visco_plastic_spring` (with a parallel spring). `besinger_play` has a clearance in series, and `series_spring_dahl`
+    a piecewise-linear law behind a spring, beside friction and a spring.
 
     If a start cannot be computed from these records, the entry is a function that raises the reason when a fit calls
     it; `compare` continues with the other laws.
@@ -118,20 +123,31 @@ def _no_start(error: Exception, runs: Sequence[BenchRun]) -> AbstractDamper:
 
 def _start(name: str, runs: Sequence[BenchRun]) -> AbstractDamper:
     """The start of one law of the ladder."""
-    velocity = np.concatenate([run.velocity for run in runs])
-    force = np.concatenate([run.force for run in runs])
+    velocity, force, stroke = (
+        np.concatenate([getattr(run, channel) for run in runs]) for channel in ("velocity", "force", "stroke")
+    )
     if name in _MEMORYLESS:
         return _MEMORYLESS[name](velocity, force)
     if name == "linear_friction_lag":
         return Lag(_friction(velocity, force), lag_time(runs))
     if name == "bouc_wen":
         return BoucWen.guess(velocity, force)
-    if name == "lugre_spring":
-        stroke = np.concatenate([run.stroke for run in runs])
-        return LuGre.guess(velocity, force) + Spring.guess(velocity, force, stroke)
+    if name in _BESIDE_SPRING:
+        return _BESIDE_SPRING[name](velocity, force) + Spring.guess(velocity, force, stroke)
+    if name == "series_spring_dahl":
+        curve, friction = PiecewiseLinear.guess(velocity, force), Dahl.guess(velocity, 0.2 * force)
+        spring = Spring.guess(velocity, force, stroke)
+        return SeriesSpring(curve, _stiffness(curve, lag_time(runs), velocity)) + friction + spring
     law, lag = Besinger.guess(velocity, force), lag_time(runs)
     if name == "besinger_lag":
         return Lag(law, lag)
-    stiffness = max(_rate(law, velocity), 1.0) / lag
+    stiffness = _stiffness(law, lag, velocity)
     deflection = float(np.sqrt(np.mean(force**2))) / stiffness
+    if name == "besinger_play":
+        return Play(law, stiffness, 0.5 * deflection)
     return SeriesSpring(law, stiffness, 0.1 * stiffness / deflection**2)
+
+
+def _stiffness(law: AbstractMemoryless, lag: float, velocity: np.ndarray) -> float:
+    """Stiffness [N/m] in series with which a law has this lag [s]."""
+    return max(_rate(law, velocity), 1.0) / lag

@@ -27,6 +27,9 @@ NAMED_LAWS = {
     "linear_friction_lag": NamedLaw(True, "linear_friction behind a first-order lag"),
     "bouc_wen": NamedLaw(True, "one coefficient, friction that gives before it slides, a spring"),
     "lugre_spring": NamedLaw(True, "friction that sticks, breaks away and slides, one coefficient, a spring"),
+    "besinger_play": NamedLaw(True, "besinger behind a clearance: worn joint, loose mount, void in the oil"),
+    "series_spring_dahl": NamedLaw(True, "piecewise_linear in series with a spring, elastic friction, a spring"),
+    "visco_plastic_spring": NamedLaw(True, "concave viscous force, two yielding elements, a spring"),
 }
 
 

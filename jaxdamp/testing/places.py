@@ -13,9 +13,11 @@ from jaxdamp.dampers import (
     AbstractDamper,
     Bushing,
     FrequencySelective,
+    Heated,
     Lag,
     Linear,
     MotionRatio,
+    Play,
     Scheduled,
     SeriesSpring,
     Spring,
@@ -39,11 +41,13 @@ WRAPPERS: dict[str, Wrap] = {
     "MotionRatio(law, ...)": lambda law: MotionRatio(law, 0.8),
     "TemperatureScaled(law, ...)": lambda law: TemperatureScaled(law, 313.15),
     "Scheduled((law, law), ...)": lambda law: Scheduled((law, law), [0.0, 1.0], 0.4),
+    "Heated(law, ...)": lambda law: Heated(law, 0.01, 1.0, heat_capacity=10.0),
     "Lag(law, ...)": lambda law: Lag(law, 0.004),
 }
 IN_SERIES: dict[str, Wrap] = {
     "SeriesSpring(law, ...)": lambda law: SeriesSpring(law, 5e5),
     "Bushing(law, ...)": lambda law: Bushing(law, 2e6, 6e5, 800.0),
+    "Play(law, ...)": lambda law: Play(law, 5e5, 2e-4),
 }
 WITHOUT_STATES: dict[str, Wrap] = {
     "StrokeDependent((law, law), ...)": lambda law: StrokeDependent((law, law), [-0.01, 0.01]),

@@ -23,6 +23,7 @@ from jaxdamp.dampers import (
     ForceSurface,
     FrequencySelective,
     GasSpring,
+    Heated,
     Hybrid,
     HyperbolicTangent,
     KaradayiMasada,
@@ -35,6 +36,7 @@ from jaxdamp.dampers import (
     NeuralHysteresis,
     PiecewiseLinear,
     PistonFlow,
+    Play,
     Polynomial,
     PowerLaw,
     Saturating,
@@ -47,6 +49,7 @@ from jaxdamp.dampers import (
     StrokeDependent,
     Table,
     TemperatureScaled,
+    ViscoPlastic,
 )
 from jaxdamp.testing import CHECKS, check_alike_ports, check_inside_wrappers, check_law
 from jaxdamp.testing.places import SLOTS
@@ -129,6 +132,7 @@ LAWS = {
     "gas spring": lambda: GasSpring(2e6, 6e-5, 1e-4, 1.3),
     "bump stop": lambda: BumpStop(0.006, 60e3, 2e8, 1500.0, end="both"),
     "lag at another temperature": lambda: TemperatureScaled(Lag(Linear(2500.0), 0.004), 263.15),
+    "heated": lambda: Heated(Bilinear(2600.0, 1200.0, knee_width=0.02), 0.02, 0.5, heat_capacity=5.0),
     "hydraulic stop": lambda: StrokeDependent((2.5 * Linear(1500.0), Bilinear(1500.0, 900.0)), [-0.03, 0.004]),
     "stroke table": stroke_table,
     "Bouc and Wen": lambda: BoucWen(800.0, 2000.0, 300.0, 1e-3, 0.75, 1.5),
@@ -139,8 +143,12 @@ LAWS = {
     "LuGre, stiff": lambda: LuGre(1e6, 300.0, 0.0, 40.0, 60.0, 0.01),
     "hyperbolic tangent": lambda: HyperbolicTangent(900.0, 500.0, 400.0, 30.0, 0.6),
     "Karadayi and Masada": lambda: KaradayiMasada(2600.0, 1200.0, 40.0, 0.01, 1e6, 3e-4),
+    "play": lambda: Play(Linear(2000.0) + CoulombFriction(40.0, 0.02), 1e6, 3e-4),
     "piston flow": lambda: PistonFlow(1.42e-3, 1.6e-6, 1.2e6, 1.2e11, 2.5e-5, 5e5, 4e10, 4e-5, 2e-13),
     "mono-tube": MonoTube.reference,
+    "visco-plastic": lambda: ViscoPlastic(
+        100.0, 900.0, 0.6, 0.02, [200.0, 300.0], [2e-3, 1e-3], [2e-4, 1e-3], [0.5, 0.1], 0.8
+    ),
     "modified Bouc and Wen, published": lambda: ModifiedBoucWen.prototype(1.5),
     "neural hysteresis": network,
     "hybrid": lambda: Hybrid(PiecewiseLinear([-0.1, 0.1], [700.0, 2000.0, 900.0], 0.02), network(1)),
@@ -195,6 +203,7 @@ LONG = {
     "segmented polynomial",
     "series spring, soft cubic",
     "Karadayi and Masada",
+    "play",
     "mono-tube",
     "modified Bouc and Wen, published",
     "neural hysteresis",

@@ -1,0 +1,42 @@
+"""The law of Karadayi and Masada as a case, the derivative by the clearance, laws that are refused."""
+
+import jax
+import numpy as np
+import pytest
+
+from jaxdamp.dampers import Bilinear, CoulombFriction, KaradayiMasada, Lag, Linear, Play
+from jaxdamp.parameters import with_values
+from jaxdamp.rig import march
+
+from .motions import last_cycle
+
+
+DASHPOT = Bilinear(2600.0, 1200.0) + CoulombFriction(40.0, 0.01)
+
+
+def test_around_a_dashpot_with_friction_it_is_the_law_of_karadayi_and_masada():
+    one = last_cycle(Play(DASHPOT, 6e5, 3e-4), 9.0, 0.01, samples=300)[2]
+    two = last_cycle(KaradayiMasada(2600.0, 1200.0, 40.0, 0.01, 6e5, 3e-4), 9.0, 0.01, samples=300)[2]
+    np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize("name", ["clearance", "stiffness"])
+def test_derivatives_agree_with_differences(name):
+    t = np.linspace(0.0, 0.4, 801)
+    x, v = 0.005 * np.sin(20 * t), 0.1 * np.cos(20 * t)
+    law = Play(DASHPOT, 6e5, 3e-4)
+
+    @jax.jit
+    def energy(value):  # an integral, since single samples jump where the clearance ends
+        return jax.numpy.sum(march(with_values(law, {name: value}), jax.numpy.asarray(5e-4), x, v, 1) * v) * 5e-4
+
+    value = getattr(law, name)
+    small = 1e-3 * value
+    slope = jax.jit(jax.grad(energy))(value)
+    np.testing.assert_allclose(slope, (energy(value + small) - energy(value - small)) / (2 * small), rtol=1e-2)
+
+
+def test_a_law_whose_force_is_a_state_needs_damping_beside_it():
+    with pytest.raises(ValueError, match=r"depends directly on the velocity, but is a Lag.*`Lag\(Play\(law\)\)`"):
+        Play(Lag(Linear(2000.0), 0.004), 1e6, 3e-4)
+    Play(Lag(Linear(2000.0), 0.004) + Linear(50.0), 1e6, 3e-4)
