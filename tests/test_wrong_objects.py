@@ -90,7 +90,7 @@ ANSWERS = {  # call: words that its refusal holds
     "identify.fit('bouc_wen', runs)": ("`law` must be a law", "Write `dampers.BoucWen`"),
     "identify.fit('besinger_lag', runs)": ("`law` must be a law", "default_ladder(runs, ['besinger_lag'])"),
     "identify.fit(law, 'a.csv')": ("`runs` must be a record or records", "the text 'a.csv'", "bench.read(paths)"),
-    "identify.fit(law, runs, rig=['gas_force'])": ("`rig` must be a Rig", "a list of 1", "rig=Rig(gas_force=-100.0"),
+    "identify.fit(law, runs, rig=['gas_force'])": ("`rig` must be one of", "'gas'", "but is 'gas_force'"),
     "identify.fit(law, [time])": ("`runs[0]` must be a record", "BenchRun.from_arrays"),
     "identify.fit(vehicles.QuarterCar, runs)": ("`law` must be a law", "the class QuarterCar"),
     "identify.compare(['linear'], runs)": ("`laws` must be laws by name", "default_ladder(runs, ['linear'])"),

@@ -8,6 +8,7 @@ from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.ladder import LAWS, default_ladder, ladder_starts
 from jaxdamp.identify.laws import NAMED_LAWS, NamedLaw, laws_table
+from jaxdamp.identify.machine import OFFSET, machine_names, without_machine
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.residual import ErrorShares, error_shares
@@ -24,6 +25,7 @@ from jaxdamp.identify.virtual_ride import virtual_ride
 __all__ = [
     "LAWS",
     "NAMED_LAWS",
+    "OFFSET",
     "AbstractResiduals",
     "ChannelScore",
     "Comparison",
@@ -54,9 +56,11 @@ __all__ = [
     "judge",
     "ladder_starts",
     "laws_table",
+    "machine_names",
     "prepare",
     "rounded",
     "solve",
     "train",
     "virtual_ride",
+    "without_machine",
 ]

@@ -14,6 +14,7 @@ from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.front_door import also_of_vehicles
 from jaxdamp.identify.judging import judge
+from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import rig_of
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import Problem, linearised
@@ -22,7 +23,6 @@ from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
 from jaxdamp.parameters import FreeParameters
-from jaxdamp.rig import Rig
 
 
 # Errors due to a law that does not suit the records, as opposed to a wrong call (`TypeError` and so on).
@@ -34,7 +34,7 @@ def fit(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],
     *,
-    rig: Rig | None = None,
+    rig: Machine = None,
     freeze: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tie: Mapping[str, str] | None = None,
@@ -67,8 +67,11 @@ def fit(
         runs: one or more records.
         rig: the test machine, if it adds to the force of the damper. Its parameters that differ from their defaults are
             free, with these values as start, beside those of the law: `rig=Rig(gas_force=-100.0, force_delay=1e-3)`
-            estimates a gas force and a delay. `freeze` the known ones (`"rig.moving_mass"`). All paths of parameters
-            then begin with `law.` or `rig.`; their last parts stay the same.
+            estimates a gas force and a delay. `freeze` the known ones (`"rig.moving_mass"`). Names of effects get their
+            starts from the records: `rig=["gas", "friction", "delay"]`, out of offset, gas, gas_stiffness, friction,
+            mass, delay, lag, stroke_offset, heat; an offset or gas force named so is left out beside a law that
+            contains an offset itself. All paths of parameters then begin with `law.` or `rig.`; their last parts stay
+            the same.
         freeze: parameters to hold at their start, by path, last part of a path, or pattern.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
         tie: parameters that take the values of others, such as `{"terms.1.*": "terms.0.*"}`: one free value for each

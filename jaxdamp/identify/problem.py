@@ -49,6 +49,7 @@ class Problem(NamedTuple):
         law: the law or the vehicle to start from, with one value for each parameter.
         per_record: paths of the parameters with a value for each record.
         each: whether every record has its own noise level.
+        sample_steps: time [s] from one sample of the residuals to the next, for each record.
     """
 
     free: FreeParameters
@@ -61,6 +62,7 @@ class Problem(NamedTuple):
     law: Any
     per_record: tuple[str, ...]
     each: bool
+    sample_steps: tuple[float, ...] = ()
 
     @property
     def coordinates(self) -> Coordinates:
