@@ -91,6 +91,7 @@ ANSWERS = {  # call: words that its refusal holds
     "identify.fit('besinger_lag', runs)": ("`law` must be a law", "default_ladder(runs, ['besinger_lag'])"),
     "identify.fit(law, 'a.csv')": ("`runs` must be a record or records", "the text 'a.csv'", "bench.read(paths)"),
     "identify.fit(law, runs, rig=['gas_force'])": ("`rig` must be one of", "'gas'", "but is 'gas_force'"),
+    "identify.fit_many(law, runs[0])": ("`dampers` must be the records of each damper", "fit_many(law, {"),
     "identify.fit(law, [time])": ("`runs[0]` must be a record", "BenchRun.from_arrays"),
     "identify.fit(vehicles.QuarterCar, runs)": ("`law` must be a law", "the class QuarterCar"),
     "identify.compare(['linear'], runs)": ("`laws` must be laws by name", "default_ladder(runs, ['linear'])"),

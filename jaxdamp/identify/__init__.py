@@ -9,6 +9,8 @@ from jaxdamp.identify.judging import judge
 from jaxdamp.identify.ladder import LAWS, default_ladder, ladder_starts
 from jaxdamp.identify.laws import NAMED_LAWS, NamedLaw, laws_table
 from jaxdamp.identify.machine import OFFSET, machine_names, without_machine
+from jaxdamp.identify.many import fit_many
+from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.residual import ErrorShares, error_shares
@@ -35,6 +37,7 @@ __all__ = [
     "Failure",
     "FitResult",
     "InitialMotion",
+    "ManyFits",
     "NamedLaw",
     "Problem",
     "Rung",
@@ -50,6 +53,7 @@ __all__ = [
     "error_shares",
     "fit",
     "fit_each",
+    "fit_many",
     "fit_percent",
     "fit_targets",
     "fit_vehicle",

@@ -74,12 +74,13 @@ def started_machine(rig: Machine, runs: Sequence[BenchRun]) -> Rig | None:
     """
     if rig is None:
         return None
-    if isinstance(rig, str) or (isinstance(rig, Sequence) and all(isinstance(name, str) for name in rig)):
+    if not isinstance(rig, Rig) and (isinstance(rig, str) or all(isinstance(name, str) for name in rig)):
         names = machine_names("rig", rig)
         shown = _shown(runs) if names else None
         starts = [EFFECTS[name](shown) for name in names] if shown else []
         return Rig(**{field: value for start in starts for field, value in start.items()}) if starts else None
     check_module("rig", rig, (Rig,), CALL)
+    assert isinstance(rig, Rig)
     if not free_fields(rig):
         remedy = f"Give the numbers to be fitted a start, name effects as in `{CALL}`, or leave `rig` out."
         _checks.refuse("rig", "have a number that is not at its default", "one that adds nothing", remedy)
@@ -105,6 +106,14 @@ def free_fields(rig: Rig) -> list[str]:
     """The numbers of a machine that differ from their defaults; the others have no part in a fit."""
     pairs = zip(parameters(rig), parameters(Rig()), strict=True)
     return [p.path for p, default in pairs if p.value != default.value]
+
+
+def absent_paths(rig: Rig | None) -> list[str]:
+    """Paths of the numbers of a machine that are left at their defaults, and so have no part in a fit."""
+    if rig is None:
+        return []
+    given = free_fields(rig)
+    return [f"rig.{p.path}" for p in parameters(rig) if p.path not in given]
 
 
 def without_machine(rig: Rig | None, runs: Sequence[BenchRun]) -> list[BenchRun]:

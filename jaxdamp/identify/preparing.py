@@ -8,13 +8,12 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import Reach
-from jaxdamp.identify.machine import Machine, free_fields, started_on
+from jaxdamp.identify.machine import Machine, absent_paths, started_on
 from jaxdamp.identify.model import Model, on_rig
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.traces import batches, owners
 from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
-from jaxdamp.rig import Rig
 
 
 def prepare(
@@ -52,7 +51,7 @@ def prepare(
     sigma = weights(weighting, runs)
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
     begin, machine = started_on(law, fitted_to, rig)
-    model, absent = on_rig(begin, machine), _absent(machine)
+    model, absent = on_rig(begin, machine), absent_paths(machine)
     own = _per_record(model, per_record, sigma, absent)
     frozen = [*name_patterns("freeze", freeze), *absent]
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
@@ -64,14 +63,6 @@ def prepare(
     reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
     steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
     return Problem(free, residuals, level, runs, tuple(sigma), owner, reach, begin, own, weighting == "runs", steps)
-
-
-def _absent(rig: Rig | None) -> list[str]:
-    """Paths of the numbers of a machine that are left at their defaults, and so have no part in a fit."""
-    if rig is None:
-        return []
-    given = free_fields(rig)
-    return [f"rig.{p.path}" for p in parameters(rig) if p.path not in given]
 
 
 def _per_record(model: Model, names: Sequence[str], sigma: Sequence[float], absent: Sequence[str]) -> tuple[str, ...]:
