@@ -1,5 +1,6 @@
 """`fit`: weighted nonlinear least squares of a damper law over many bench records."""
 
+import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 
 import equinox as eqx
@@ -13,6 +14,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.front_door import also_of_vehicles
+from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import rig_of
@@ -40,6 +42,8 @@ def fit(
     tie: Mapping[str, str] | None = None,
     per_record: Sequence[str] = (),
     weighting: str | Sequence[float] = "samples",
+    loss: str = "squares",
+    priors: Mapping[str, tuple[float, float]] | None = None,
     force_noise: float | None = None,
     samples_per_cycle: int | None = 400,
     starts: int | None = None,
@@ -81,6 +85,9 @@ def fit(
         weighting: `"samples"`, equal weight of every sample; `"runs"`, equal weight of every record relative to its RMS
             force; or one standard deviation [N] for each record, of which only the ratios matter. `inf` leaves a record
             out of the fit; it is still scored.
+        loss: `"squares"`; or `"huber"`, `"soft_l1"` or `"student_t"`, which spikes and dropouts hardly move: samples
+            far from the law get less weight. Their share stands in `criterion`.
+        priors: what is known of parameters beforehand, `{name: (mean, standard deviation)}` in the parameter's unit.
         force_noise: standard deviation [N] of the measured force if it is known, as independent noise. Otherwise it is
             estimated from the residual, including its correlation.
         samples_per_cycle: see above; `None` uses every sample.
@@ -103,6 +110,7 @@ def fit(
     >>> abs(result["rebound_rate"].value - 2600.0) < 4 * result["rebound_rate"].standard_error
     True
     """
+    _checks.one_of("loss", loss, LOSSES)
     if force_noise is not None:
         _checks.positive("force_noise", force_noise)
     problem = prepare(
@@ -114,9 +122,16 @@ def fit(
         tie=tie,
         per_record=per_record,
         weighting=weighting,
+        priors=priors,
         samples_per_cycle=samples_per_cycle,
     )
-    return judge(problem, solve(problem, starts=starts, max_steps=max_steps), force_noise=force_noise)
+
+    def by_squares(problem: Problem, starts: int | None) -> Solution:
+        return solve(problem, starts=starts, max_steps=max_steps)
+
+    problem, solution = solve_by(problem, by_squares, loss=loss, force_noise=force_noise, starts=starts)
+    result = judge(problem, solution, force_noise=force_noise)
+    return dataclasses.replace(result, criterion=criterion_in_words(problem, loss, priors or {}))
 
 
 @one_thread()

@@ -115,10 +115,10 @@ class Lanes(NamedTuple):
 @eqx.filter_jit
 def _compared(
     coordinates: Coordinates,
-    y: Float[Array, "pairs free"],
+    y: Any,  # Float[Array, "pairs free"]
     batch: Batch,
-    record: Int[Array, " pairs"],
-    level: Float[Array, " pairs"],
+    record: Any,  # Int[Array, " pairs"]
+    level: Any,  # Float[Array, " pairs"]
 ) -> tuple[Array, Array, Array]:
     """For each pair of a lane and a record: the products of Jacobian and residual, the least margin, the residual."""
     free = coordinates.free

@@ -18,7 +18,8 @@ from jaxdamp.identify.traces import Batch
 
 
 LEAST_SHARE = 0.02  # of the squared residual that an effect must explain
-LEAST_F = 5.0  # F statistic with independent samples only, from which an effect is named
+LEAST_F = 12.0  # F statistic with independent samples only, from which an effect is named
+LARGE_SHARE, LEAST_F_OF_LARGE = 0.1, 5.0  # a large share is named with less certainty
 CLEARER = 0.9  # of the largest share, from which the first effect in the order of the list is named
 FRICTION_VELOCITY = 0.005  # m/s, width of the sign change of friction
 GAPS = (0.02, 0.05, 0.1)  # clearances that are tried, relative to the half stroke
@@ -100,7 +101,8 @@ def _clearest(
     rest = residual - direction * (direction @ residual)
     alike = correlation_time([rest[owner == i] for i in np.unique(owner)])
     independent = rest.size / alike
-    if share * squares < LEAST_F * float(rest @ rest) / independent:
+    least = LEAST_F_OF_LARGE if share >= LARGE_SHARE else LEAST_F
+    if share * squares < least * float(rest @ rest) / independent:
         return None
     return effect, size, share, rest, np.concatenate([span, direction[:, None]], axis=1)
 
@@ -108,7 +110,7 @@ def _clearest(
 def _motions(problem: Problem, best: SearchEnd) -> Iterator[tuple[np.ndarray, _Motion]]:
     """The samples of each fitted record in the residuals, and its motion there."""
     stroke, velocity, force, weight = (_channel(problem, name) for name in ("stroke", "velocity", "force", "weight"))
-    predicted = force + np.divide(best.residual, weight, out=np.zeros_like(force), where=weight > 0)
+    predicted = force + np.divide(best.residual[: weight.size], weight, out=np.zeros_like(force), where=weight > 0)
     first = [run.temperature[0] for run in problem.runs if run.temperature is not None]
     for i, run in enumerate(problem.runs):
         at = np.flatnonzero((problem.owner == i) & problem.used)

@@ -8,6 +8,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import Reach
+from jaxdamp.identify.criteria import FIRST_NOISE, priors_on
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
 from jaxdamp.identify.model import Model, on_rig
 from jaxdamp.identify.problem import Problem
@@ -26,6 +27,7 @@ def prepare(
     tie: Mapping[str, str] | None = None,
     per_record: Sequence[str] = (),
     weighting: str | Sequence[float] = "samples",
+    priors: Mapping[str, tuple[float, float]] | None = None,
     samples_per_cycle: int | None = 400,
 ) -> Problem:
     """The first of the three steps of `fit`, whose arguments these are: `prepare`, `solve`, `judge`.
@@ -61,6 +63,9 @@ def prepare(
     weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
     level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
     reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
+    known = priors_on(free, priors or {}, FIRST_NOISE * level / np.sqrt(max(np.count_nonzero(owner >= 0), 1)))
+    owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in known)])
+    residuals = (*residuals, *known)
     steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
     return Problem(free, residuals, level, runs, tuple(sigma), owner, reach, begin, own, weighting == "runs", steps)
 

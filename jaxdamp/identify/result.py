@@ -168,6 +168,7 @@ class FitResult(AbstractFitted):
             not, or if the noise was given.
         record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
         record_rigs: the test machine of each record, as `record_laws`.
+        criterion: loss and priors in words; empty for plain least squares.
     """
 
     parameters: tuple[Estimate, ...]
@@ -178,6 +179,7 @@ class FitResult(AbstractFitted):
     inflation: float = 1.0
     record_laws: tuple[AbstractDamper, ...] = ()
     record_rigs: tuple[Rig, ...] = ()
+    criterion: str = ""
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name, or of the only name that ends with it: `"rate"` for `"law.rate"`."""
@@ -201,12 +203,16 @@ class FitResult(AbstractFitted):
             true_rig: the true test machine, if one was fitted.
             title: of the table.
         """
+        title = (
+            f"{title or f'Parameters of {type(self.law).__name__}'}{f' ({self.criterion})' if self.criterion else ''}"
+        )
         true = None if truth is None else on_rig(truth, None if self.rig is None else true_rig or Rig())
-        return parameter_table(title or f"Parameters of {type(self.law).__name__}", self.parameters, true)
+        return parameter_table(title, self.parameters, true)
 
     def to_dict(self) -> dict[str, Any]:
         """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         return super().to_dict() | {
+            **({"criterion": self.criterion} if self.criterion else {}),
             "error_shares": plain(self.error_shares._asdict()),
             "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
             "covariance": plain(self.covariance),
@@ -227,6 +233,7 @@ class FitResult(AbstractFitted):
         for e, (value, error) in zip(self.parameters, texts, strict=True):
             note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
             lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
+        lines += [f"  {self.criterion}"] * bool(self.criterion)
         if len(self.minima) > 1:
             lines.append(f"  {describe(self.minima, self.starts)}")
         return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])

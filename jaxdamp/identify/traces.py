@@ -1,5 +1,6 @@
 """Bench records as batches of equal length, ready for one compiled call."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, final
 from weakref import WeakKeyDictionary
@@ -51,6 +52,10 @@ class Batch(AbstractResiduals):
     def __call__(self, model: Model) -> Float[Array, " samples"]:
         """Weighted difference of the model's force from the measured one; zero where the weight is, even beside NaN."""
         return jnp.ravel(jnp.where(self.weight > 0, (self.predict(model) - self.force) * self.weight, 0.0))
+
+    def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "Batch":
+        """The same with every weight times a factor."""
+        return dataclasses.replace(self, weight=self.weight * jnp.asarray(factor.reshape(self.weight.shape)))
 
     def used(self) -> Bool[np.ndarray, " samples"]:
         """Which samples count."""
