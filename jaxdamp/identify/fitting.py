@@ -15,6 +15,7 @@ from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.front_door import also_of_vehicles
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
+from jaxdamp.identify.input_noise import input_noise_bias, on_bias
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import rig_of
@@ -45,6 +46,7 @@ def fit(
     loss: str = "squares",
     priors: Mapping[str, tuple[float, float]] | None = None,
     force_noise: float | None = None,
+    input_noise: tuple[float, float] | None = None,
     samples_per_cycle: int | None = 400,
     starts: int | None = None,
     max_steps: int = 200,
@@ -90,6 +92,8 @@ def fit(
         priors: what is known of parameters beforehand, `{name: (mean, standard deviation)}` in the parameter's unit.
         force_noise: standard deviation [N] of the measured force if it is known, as independent noise. Otherwise it is
             estimated from the residual, including its correlation.
+        input_noise: standard deviations of stroke [m] and velocity [m/s] as they stand in the records. Least squares of
+            the force takes both as exact; the bias that this causes is estimated and stands beside each parameter.
         samples_per_cycle: see above; `None` uses every sample.
         starts: largest number of starts: `law` first, then those that its laws propose (`other_starts`); all of them if
             left out. With 1, the search starts from `law` only.
@@ -131,7 +135,13 @@ def fit(
 
     problem, solution = solve_by(problem, by_squares, loss=loss, force_noise=force_noise, starts=starts)
     result = judge(problem, solution, force_noise=force_noise)
-    return dataclasses.replace(result, criterion=criterion_in_words(problem, loss, priors or {}))
+    criterion = criterion_in_words(problem, loss, priors or {})
+    if input_noise is None:
+        return dataclasses.replace(result, criterion=criterion)
+    biases = map(float, input_noise_bias(problem, solution.best, input_noise))
+    estimates = tuple(e._replace(bias=bias) for e, bias in zip(result.parameters, biases, strict=True))
+    warnings = (*result.warnings, *on_bias(estimates))
+    return dataclasses.replace(result, criterion=criterion, parameters=estimates, warnings=warnings)
 
 
 @one_thread()

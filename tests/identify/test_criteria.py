@@ -62,10 +62,26 @@ def test_a_prior_determines_what_the_records_do_not(sines):
     assert result["blow_off_rate"].standard_error == pytest.approx(50.0, rel=0.05)
 
 
+def test_the_bias_by_noise_of_the_velocity_is_reported(sines):
+    rng, exact = np.random.default_rng(5), sines(Linear(1500.0), noise=2.0)
+    deviation = 0.1  # m/s
+    runs = [dataclasses.replace(r, velocity=r.velocity + deviation * rng.standard_normal(len(r))) for r in exact]
+    result = fit(Linear(1000.0), runs, input_noise=(0.0, deviation))
+    rate = result["rate"]
+    assert rate.value < 1500.0 - 5.0 * rate.standard_error
+    assert rate.bias == pytest.approx(rate.value - 1500.0, rel=0.15)
+    assert any("biases rate by about -" in warning for warning in result.warnings)
+    assert result.table().records()[0]["bias by input noise"] == rate.bias
+    assert result.to_dict()["parameters"][0]["bias"] == rate.bias
+    none = fit(Linear(1000.0), exact, input_noise=(1e-6, 1e-5))
+    assert abs(none["rate"].bias) < 0.1 * none["rate"].standard_error and not none.warnings
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"loss": "hubber"}, "Did you mean 'huber'"),
+        ({"input_noise": (-1.0, 0.0)}, "`input_noise` must be"),
         ({"priors": {"rat": (1.0, 1.0)}}, "No parameter is named 'rat'"),
         ({"priors": {"rate": (1.0, 0.0)}}, "be a mean and a positive standard deviation"),
     ],
