@@ -13,8 +13,8 @@ from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify._tall import triangle
-from jaxdamp.identify.front_door import also_of_vehicles
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
+from jaxdamp.identify.front_door import also_of_vehicles
 from jaxdamp.identify.input_noise import input_noise_bias, on_bias
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.machine import Machine
