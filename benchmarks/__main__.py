@@ -16,6 +16,7 @@ QUESTIONS = (
     ["work_precision"],
     ["fit"],
     ["printed"],
+    ["fit_many"],
 )
 
 

@@ -93,6 +93,13 @@ def fit(
     weighting: Annotated[
         str, typer.Option(help='"samples": every sample counts the same; "runs": every record, by its RMS force.')
     ] = "samples",
+    rig: Annotated[
+        list[str],
+        typer.Option(
+            help="What the test machine adds to the force, fitted with the law: offset, gas, gas_stiffness, friction, "
+            'mass, delay, lag, stroke_offset, heat; "gas,delay" names two, "none" nothing.'
+        ),
+    ] = ["offset"],  # noqa: B006
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-fit"),
     replace: Replace = False,
     debug: Debug = False,
@@ -114,6 +121,7 @@ def fit(
             laws=law,
             held_out=held_out,
             weighting=weighting,
+            rig=rig,
             processing=fitting.ProcessOptions(cycles, between, low_pass, keep_rest),
             out=out,
             replace=replace,

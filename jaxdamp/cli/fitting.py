@@ -51,6 +51,7 @@ def run_fit(
     laws: Sequence[str] = ("all",),
     held_out: Sequence[str] = (),
     weighting: str = "samples",
+    rig: Sequence[str] = (identify.OFFSET,),
     processing: ProcessOptions | None = None,
     out: Path,
     replace: bool = False,
@@ -61,6 +62,7 @@ def run_fit(
     """
     names = law_names(laws)
     _checks.one_of("weighting", weighting, ("samples", "runs"))
+    machine = identify.machine_names("rig", rig)
     attempts = Attempts(interrupt.check, message)
     with results_folder(out, "fit", replace=replace) as results:
         with screen.stage("Reading the records"):
@@ -73,7 +75,7 @@ def run_fit(
         screen.points(remarks)
         remarks += found.sentences()
         screen.say()
-        fits = fit_laws(screen, names, fitted, held, weighting)
+        fits = fit_laws(screen, names, fitted, held, weighting=weighting, rig=machine)
         show(screen, fits)
         with interrupt.saving(), screen.stage("Laws and tables"):
             write_fits(results.draft, fits.comparison, runs, attempts)
@@ -89,9 +91,15 @@ def run_fit(
 
 
 def fit_laws(
-    screen: Screen, names: Sequence[str], runs: BenchSet, held_out: BenchSet, weighting: str = "samples"
+    screen: Screen,
+    names: Sequence[str],
+    runs: BenchSet,
+    held_out: BenchSet,
+    *,
+    weighting: str = "samples",
+    rig: Sequence[str] = (identify.OFFSET,),
 ) -> Fitted:
-    """Fit the laws of these names, one after the other. Ctrl-C keeps those that are finished.
+    """Fit the laws of these names on a test machine, one after the other. Ctrl-C keeps those that are finished.
 
     Raises:
         ValueError: not one law could be fitted.
@@ -100,13 +108,14 @@ def fit_laws(
     outcomes: list[Rung | Failure] = []
     with screen.stage(title, total=len(names)) as advance:
         try:
-            starts = identify.default_ladder(tuple(runs), names)
+            starts = identify.default_ladder(tuple(runs), names, rig=rig)
             for outcome in identify.fit_each(
                 starts,
                 tuple(runs),
                 tuple(held_out),
                 progress=lambda name: advance(name, len(outcomes)),
                 weighting=weighting,
+                rig=rig,
             ):
                 outcomes.append(outcome)
                 if isinstance(outcome, Rung):
@@ -141,6 +150,9 @@ def write_fits(folder: Path, comparison: Comparison, runs: BenchSet, attempts: A
         with attempts.part(f"The files of the law {rung.name}"):
             write_table(folder, f"parameters_{rung.name}", parameters_of(rung))
             export.to_json(rung.result.law, folder / "laws" / f"{rung.name}.json")
+            if rung.result.rig is not None:
+                (folder / "machines").mkdir(exist_ok=True)
+                export.to_json(rung.result.rig, folder / "machines" / f"{rung.name}.json")
     with attempts.part("best_law.json"):
         export.to_json(best, folder / "best_law.json")
     with attempts.part("best_law_force_velocity.csv"):

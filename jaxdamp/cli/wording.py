@@ -27,6 +27,7 @@ OPTIONS = (
     "minimise",
     "over",
     "out",
+    "rig",
     "road",
     "roads",
     "sampling_rate",

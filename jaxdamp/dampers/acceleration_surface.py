@@ -80,7 +80,7 @@ class AccelerationSurface(AbstractDamper):
 
     def traits(self) -> Traits:
         """Linear in the coefficients, as the state does not depend on them."""
-        return Traits(linear_in_parameters=True, stroke_dependent_at_rest=False)
+        return Traits(linear_in_parameters=True, stroke_dependent_at_rest=False, contains_offset=True)
 
     def __check_init__(self) -> None:
         check_surface(self.coefficients, self.outside)

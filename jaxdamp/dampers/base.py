@@ -183,7 +183,8 @@ class AbstractStateless(AbstractDamper):
         """No states; linear in the parameters declared as linear, unless there are laws inside."""
         inside = self.inner_laws()
         feed_through = not inside or any(law.traits().has_feed_through for law in inside)
-        return Traits(feed_through, extrapolable_states=True, linear_in_parameters=not inside)
+        offset = any(law.traits().contains_offset for law in inside)
+        return Traits(feed_through, extrapolable_states=True, linear_in_parameters=not inside, contains_offset=offset)
 
     @abstractmethod
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:

@@ -12,6 +12,7 @@ from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import sliding_fit
 from jaxdamp.dampers._hysteresis import direction
 from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import interval, nonnegative, parameter, positive, real
 
 
@@ -103,6 +104,10 @@ class BoucWen(AbstractDamper):
     shape: Number = parameter("", "γ̂ = γ/(β + γ), shape of the unloading", interval(0.5, 1.0), default=0.75)
     exponent: Number = parameter("", "n, sharpness of the knee", interval(1.0, 20.0), default=2.0)
     static_force: Number = parameter("N", "f₀, force at rest at stroke zero", real, default=0.0)
+
+    def traits(self) -> Traits:
+        """The static force is an offset."""
+        return super().traits()._replace(contains_offset=True)
 
     def initial_state(self) -> State:
         """No hysteretic force."""

@@ -16,6 +16,7 @@ from jaxdamp.dampers._surface import (
     surface_least_squares,
 )
 from jaxdamp.dampers.base import AbstractStateless
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import around_zero, ends, nonnegative, parameter, setting
 
 
@@ -57,6 +58,10 @@ class ForceSurface(AbstractStateless):
 
     def __check_init__(self) -> None:
         check_surface(self.coefficients, self.outside)
+
+    def traits(self) -> Traits:
+        """The first coefficient is an offset."""
+        return super().traits()._replace(contains_offset=True)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m] and velocity v [m/s]."""

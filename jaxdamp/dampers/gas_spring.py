@@ -55,8 +55,8 @@ class GasSpring(AbstractStateless):
     relative: bool = eqx.field(static=True, default=False)
 
     def traits(self) -> Traits:
-        """Independent of the velocity."""
-        return super().traits()._replace(has_feed_through=False)
+        """Independent of the velocity; the pressure is nearly an offset."""
+        return super().traits()._replace(has_feed_through=False, contains_offset=True)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m], independent of the velocity."""

@@ -13,6 +13,7 @@ from jaxdamp.dampers._guesses import sliding_fit
 from jaxdamp.dampers._sdirk2 import GAMMA, sdirk2
 from jaxdamp.dampers.base import AbstractDamper, own_states
 from jaxdamp.dampers.bouc_wen import hysteresis_rate, hysteresis_step
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import interval, nonnegative, parameter, positive, real, setting
 
 
@@ -59,6 +60,10 @@ class ModifiedBoucWen(AbstractDamper):
         """ṙ [m/s] for which dashpot and hysteresis have the same force."""
         viscous, series, level = self.at_voltage()
         return (series * v - self.stiffness * stroke - level * z) / (viscous + series)
+
+    def traits(self) -> Traits:
+        """The static force is an offset."""
+        return super().traits()._replace(contains_offset=True)
 
     def initial_state(self) -> State:
         """No inner stroke, no hysteretic force."""

@@ -82,8 +82,8 @@ class MonoTube(AbstractDamper):
     cavitation_pressure: Number = setting("Pa", "p_v, absolute pressure of a cavity", positive, default=1e5)
 
     def traits(self) -> Traits:
-        """The pressures are states; the friction of the seal alone cannot balance the force of a spring."""
-        return super().traits()._replace(has_feed_through=False)
+        """The pressures are states; the friction of the seal alone cannot balance a spring; gas is an offset."""
+        return super().traits()._replace(has_feed_through=False, contains_offset=True)
 
     def __check_init__(self) -> None:
         charge, cavity = _checks.concrete(self.gas.pressure), _checks.concrete(self.cavitation_pressure)

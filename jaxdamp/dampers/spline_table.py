@@ -13,6 +13,7 @@ from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers._points import check_points, refuse_active
 from jaxdamp.dampers.base import AbstractMemoryless
 from jaxdamp.dampers.table import Table
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import as_float, increasing, parameter, setting
 
 
@@ -75,6 +76,10 @@ class SplineTable(AbstractMemoryless):
 
     def __check_init__(self) -> None:
         check_points(self.velocity, self.force_points)
+
+    def traits(self) -> Traits:
+        """The points may all move by one force."""
+        return super().traits()._replace(contains_offset=True)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

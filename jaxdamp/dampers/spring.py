@@ -26,8 +26,8 @@ class Spring(AbstractStateless):
     preload: Number = parameter("N", "f₀, force at rest at stroke zero", linear=True, default=0.0)
 
     def traits(self) -> Traits:
-        """Independent of the velocity."""
-        return super().traits()._replace(has_feed_through=False)
+        """Independent of the velocity; the preload is an offset."""
+        return super().traits()._replace(has_feed_through=False, contains_offset=True)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m]."""

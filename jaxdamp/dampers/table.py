@@ -10,6 +10,7 @@ from jaxdamp.dampers._guesses import velocity_grid
 from jaxdamp.dampers._hinges import hinges
 from jaxdamp.dampers._points import check_points, refuse_active
 from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import as_float, increasing, parameter, setting
 
 
@@ -43,6 +44,10 @@ class Table(AbstractMemoryless):
 
     def __check_init__(self) -> None:
         check_points(self.velocity, self.force_points)
+
+    def traits(self) -> Traits:
+        """The points may all move by one force."""
+        return super().traits()._replace(contains_offset=True)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

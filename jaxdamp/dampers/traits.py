@@ -21,6 +21,8 @@ class Traits(NamedTuple):
         stroke_dependent_at_rest: the force at zero velocity and initial states depends on the stroke, so that the law
             affects the static equilibrium of a vehicle.
         has_explicit_step: some states have an explicit step, which must be shorter than their time constants.
+        contains_offset: a parameter adds a constant to the force, as a zero error of a load cell does, so that a fit
+            cannot tell the two apart.
     """
 
     has_feed_through: bool = True
@@ -29,9 +31,11 @@ class Traits(NamedTuple):
     stroke_dependent: bool = True
     stroke_dependent_at_rest: bool = True
     has_explicit_step: bool = False
+    contains_offset: bool = False
 
 
 def combined_traits(traits: Iterable[Traits]) -> Traits:
     """The traits of a sum of laws."""
-    feed_through, extrapolable, linear, stroke, at_rest, explicit = zip(*traits, strict=True)
-    return Traits(any(feed_through), all(extrapolable), all(linear), any(stroke), any(at_rest), any(explicit))
+    feed_through, extrapolable, linear, stroke, at_rest, explicit, offset = zip(*traits, strict=True)
+    either = (any(stroke), any(at_rest), any(explicit), any(offset))
+    return Traits(any(feed_through), all(extrapolable), all(linear), *either)

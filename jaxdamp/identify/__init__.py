@@ -8,6 +8,9 @@ from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.ladder import LAWS, default_ladder, ladder_starts
 from jaxdamp.identify.laws import NAMED_LAWS, NamedLaw, laws_table
+from jaxdamp.identify.machine import OFFSET, machine_names, without_machine
+from jaxdamp.identify.many import fit_many
+from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.residual import ErrorShares, error_shares
@@ -24,6 +27,7 @@ from jaxdamp.identify.virtual_ride import virtual_ride
 __all__ = [
     "LAWS",
     "NAMED_LAWS",
+    "OFFSET",
     "AbstractResiduals",
     "ChannelScore",
     "Comparison",
@@ -33,6 +37,7 @@ __all__ = [
     "Failure",
     "FitResult",
     "InitialMotion",
+    "ManyFits",
     "NamedLaw",
     "Problem",
     "Rung",
@@ -48,15 +53,18 @@ __all__ = [
     "error_shares",
     "fit",
     "fit_each",
+    "fit_many",
     "fit_percent",
     "fit_targets",
     "fit_vehicle",
     "judge",
     "ladder_starts",
     "laws_table",
+    "machine_names",
     "prepare",
     "rounded",
     "solve",
     "train",
     "virtual_ride",
+    "without_machine",
 ]

@@ -13,6 +13,7 @@ from jaxdamp._progress import Progress
 from jaxdamp._tables import Table, with_unit
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import NUMERICAL, fit
+from jaxdamp.identify.machine import OFFSET, Machine
 from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.rungs import Failure, Rung, best_of, ladder_table
 from jaxdamp.identify.starting import Start, check_starts
@@ -128,6 +129,7 @@ def compare(
     runs: Iterable[BenchRun],
     *,
     held_out: Iterable[BenchRun] = (),
+    rig: Machine = OFFSET,
     progress: Callable[[str], None] | None = None,
     **options: Any,
 ) -> Comparison:
@@ -139,6 +141,8 @@ def compare(
         laws: starts by name, such as `default_ladder(runs)`.
         runs: records to fit.
         held_out: records to score on, not fitted.
+        rig: the test machine of all fits, as in `fit`; a zero error of the load cell if left out, since a law that must
+            explain it comes out wrong. `None` is a machine that adds nothing.
         progress: called with each name before its fit; a line in the terminal if it is left out.
         options: passed on to `fit`.
 
@@ -163,7 +167,8 @@ def compare(
             number += 1
             shown(f"{name}, {number} of {len(laws)}")
 
-        return Comparison.of(fit_each(laws, runs, held_out, progress=progress or counted, **options), held_out)
+        outcomes = fit_each(laws, runs, held_out, rig=rig, progress=progress or counted, **options)
+        return Comparison.of(outcomes, held_out)
 
 
 def fit_each(
@@ -171,6 +176,7 @@ def fit_each(
     runs: Sequence[BenchRun],
     held_out: Sequence[BenchRun] = (),
     *,
+    rig: Machine = OFFSET,
     progress: Callable[[str], None] = lambda name: None,
     **options: Any,
 ) -> Iterator[Rung | Failure]:
@@ -182,6 +188,7 @@ def fit_each(
         laws: starts by name.
         runs: records to fit.
         held_out: records to score on, not fitted.
+        rig: the test machine of all fits, as in `compare`.
         progress: called with each name before its result is waited for.
         options: passed on to `fit`.
     """
@@ -191,7 +198,7 @@ def fit_each(
     def fitted(name: str, start: Start) -> Rung | Failure:
         try:
             with jax.enable_x64(double):
-                result = fit(start, runs, **options)
+                result = fit(start, runs, rig=rig, **options)
                 percent, rmse = result.score(held_out)[:2] if held_out else (None, None)
         except NUMERICAL as error:
             return Failure(name, str(error))

@@ -11,6 +11,7 @@ from jaxdamp._progress import Progress
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import fit
+from jaxdamp.identify.machine import OFFSET, Machine
 from jaxdamp.identify.result import AbstractFitted
 from jaxdamp.identify.starting import Start, check_starts
 from jaxdamp.parameters import parameters
@@ -110,6 +111,7 @@ def cross_validate(
     *,
     by: Callable[[BenchRun], Hashable] | None = None,
     method: Callable[..., AbstractFitted] = fit,
+    rig: Machine = OFFSET,
     **options: Any,
 ) -> CrossValidation:
     """Hold out each record in turn, fit every law to the others, and score it on the record held out.
@@ -121,6 +123,7 @@ def cross_validate(
         by: the group of a record, such as `lambda run: run.command`: the laws are fitted to each group separately.
         method: called as `method(start, runs, weighting=..., **options)`, with an infinite weighting for the record
             held out; the result has a `law`. `fit`, or for networks a function that calls `train`.
+        rig: the test machine as in `compare`. Another method than `fit` gets it only if it is not the default.
         options: passed on to the method.
 
     Raises:
@@ -141,6 +144,8 @@ def cross_validate(
         if len(members) < 2:
             name, must = ("runs", "hold") if by is None else ("by", f"put into group {group}")
             _checks.refuse(name, f"{must} two records or more", [run.name for run in members])
+    if method is fit or rig != OFFSET:
+        options["rig"] = rig
     total, folds = len(laws) * sum(map(len, groups.values())), []
     with Progress("Cross-validating") as shown:
         for name, start in laws.items():

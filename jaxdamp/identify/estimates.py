@@ -27,6 +27,7 @@ class Estimate(NamedTuple):
     meaning: str
     note: str  # "", "not identifiable" or "at a bound"
     tied: tuple[str, ...] = ()  # the numbers that have the same value
+    bias: float | None = None  # by the noise of stroke and velocity, if this noise was stated
 
     @property
     def remark(self) -> str:
@@ -61,6 +62,8 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | N
         truth: the true law (on its rig, if one was fitted), as on a virtual bench; parameters are compared by name.
     """
     columns = [Column("parameter"), Column("unit"), Column("value", spec=".5g"), Column("standard error", spec=".2g")]
+    biased = any(e.bias is not None for e in estimates)
+    columns += [Column("bias by input noise", spec="+.2g")] * biased
     columns += [Column("true", spec=".5g"), Column("(value − true)/se", spec="+.1f")] * (truth is not None)
     columns += [Column("note"), Column("meaning")]
     true_values = {} if truth is None else _numbers(truth)
@@ -68,6 +71,7 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | N
     for e in estimates:
         value, error = rounded(e.value, e.standard_error)
         row: tuple[Cell, ...] = (e.name, e.unit or "–", Shown(e.value, value), Shown(e.standard_error, error))
+        row += (e.bias,) * biased
         if truth is not None:
             true = true_values.get(e.name)
             row += (true, None if true is None else (e.value - true) / e.standard_error)

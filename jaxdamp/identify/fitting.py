@@ -1,5 +1,6 @@
 """`fit`: weighted nonlinear least squares of a damper law over many bench records."""
 
+import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 
 import equinox as eqx
@@ -12,8 +13,11 @@ from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify._tall import triangle
+from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
 from jaxdamp.identify.front_door import also_of_vehicles
+from jaxdamp.identify.input_noise import input_noise_bias, on_bias
 from jaxdamp.identify.judging import judge
+from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import rig_of
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import Problem, linearised
@@ -22,7 +26,6 @@ from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
 from jaxdamp.parameters import FreeParameters
-from jaxdamp.rig import Rig
 
 
 # Errors due to a law that does not suit the records, as opposed to a wrong call (`TypeError` and so on).
@@ -34,13 +37,16 @@ def fit(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],
     *,
-    rig: Rig | None = None,
+    rig: Machine = None,
     freeze: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tie: Mapping[str, str] | None = None,
     per_record: Sequence[str] = (),
     weighting: str | Sequence[float] = "samples",
+    loss: str = "squares",
+    priors: Mapping[str, tuple[float, float]] | None = None,
     force_noise: float | None = None,
+    input_noise: tuple[float, float] | None = None,
     samples_per_cycle: int | None = 400,
     starts: int | None = None,
     max_steps: int = 200,
@@ -67,8 +73,11 @@ def fit(
         runs: one or more records.
         rig: the test machine, if it adds to the force of the damper. Its parameters that differ from their defaults are
             free, with these values as start, beside those of the law: `rig=Rig(gas_force=-100.0, force_delay=1e-3)`
-            estimates a gas force and a delay. `freeze` the known ones (`"rig.moving_mass"`). All paths of parameters
-            then begin with `law.` or `rig.`; their last parts stay the same.
+            estimates a gas force and a delay. `freeze` the known ones (`"rig.moving_mass"`). Names of effects get their
+            starts from the records: `rig=["gas", "friction", "delay"]`, out of offset, gas, gas_stiffness, friction,
+            mass, delay, lag, stroke_offset, heat; an offset or gas force named so is left out beside a law that
+            contains an offset itself. All paths of parameters then begin with `law.` or `rig.`; their last parts stay
+            the same.
         freeze: parameters to hold at their start, by path, last part of a path, or pattern.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
         tie: parameters that take the values of others, such as `{"terms.1.*": "terms.0.*"}`: one free value for each
@@ -78,8 +87,13 @@ def fit(
         weighting: `"samples"`, equal weight of every sample; `"runs"`, equal weight of every record relative to its RMS
             force; or one standard deviation [N] for each record, of which only the ratios matter. `inf` leaves a record
             out of the fit; it is still scored.
+        loss: `"squares"`; or `"huber"`, `"soft_l1"` or `"student_t"`, which spikes and dropouts hardly move: samples
+            far from the law get less weight. Their share stands in `criterion`.
+        priors: what is known of parameters beforehand, `{name: (mean, standard deviation)}` in the parameter's unit.
         force_noise: standard deviation [N] of the measured force if it is known, as independent noise. Otherwise it is
             estimated from the residual, including its correlation.
+        input_noise: standard deviations of stroke [m] and velocity [m/s] as they stand in the records. Least squares of
+            the force takes both as exact; the bias that this causes is estimated and stands beside each parameter.
         samples_per_cycle: see above; `None` uses every sample.
         starts: largest number of starts: `law` first, then those that its laws propose (`other_starts`); all of them if
             left out. With 1, the search starts from `law` only.
@@ -100,6 +114,7 @@ def fit(
     >>> abs(result["rebound_rate"].value - 2600.0) < 4 * result["rebound_rate"].standard_error
     True
     """
+    _checks.one_of("loss", loss, LOSSES)
     if force_noise is not None:
         _checks.positive("force_noise", force_noise)
     problem = prepare(
@@ -111,9 +126,22 @@ def fit(
         tie=tie,
         per_record=per_record,
         weighting=weighting,
+        priors=priors,
         samples_per_cycle=samples_per_cycle,
     )
-    return judge(problem, solve(problem, starts=starts, max_steps=max_steps), force_noise=force_noise)
+
+    def by_squares(problem: Problem, starts: int | None) -> Solution:
+        return solve(problem, starts=starts, max_steps=max_steps)
+
+    problem, solution = solve_by(problem, by_squares, loss=loss, force_noise=force_noise, starts=starts)
+    result = judge(problem, solution, force_noise=force_noise)
+    criterion = criterion_in_words(problem, loss, priors or {})
+    if input_noise is None:
+        return dataclasses.replace(result, criterion=criterion)
+    biases = map(float, input_noise_bias(problem, solution.best, input_noise))
+    estimates = tuple(e._replace(bias=bias) for e, bias in zip(result.parameters, biases, strict=True))
+    warnings = (*result.warnings, *on_bias(estimates))
+    return dataclasses.replace(result, criterion=criterion, parameters=estimates, warnings=warnings)
 
 
 @one_thread()

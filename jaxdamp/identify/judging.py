@@ -11,6 +11,7 @@ from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, takes_comma
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.estimating import estimate, on_correlation
+from jaxdamp.identify.left_out import left_out
 from jaxdamp.identify.model import Model, OnRig, is_memoryless, law_of, rig_of, with_range
 from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.problem import Problem
@@ -47,7 +48,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     law, rig = law_of(model), rig_of(model)
     percent, rmse, scores = score(models or model, problem.runs, np.isfinite(problem.sigma))
     notes = [f"The search did not converge: {best.status.sentence} {_REMEDY}"] * (not best.converged)
-    notes += [*notes_on(law, problem.fitted_to), *estimates.notes, *on_correlation(inflation)]
+    notes += [*notes_on(law, problem.fitted_to), *estimates.notes, *on_correlation(inflation), *left_out(problem, best)]
     return FitResult(
         law=law,
         runs=problem.runs,

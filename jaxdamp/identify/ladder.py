@@ -30,19 +30,8 @@ from jaxdamp.dampers import (
 )
 from jaxdamp.identify.fitting import NUMERICAL
 from jaxdamp.identify.laws import NAMED_LAWS
-from jaxdamp.identify.starting import Start, started
-
-
-def lag_time(runs: Sequence[BenchRun]) -> float:
-    """Delay [s] of the force behind the velocity, from the phase of their fundamentals: median of tan(φ)/ω."""
-    times = []
-    for run in runs:
-        omega = 2 * np.pi * run.frequency
-        turning = np.exp(-1j * omega * run.time) * np.hanning(len(run))
-        lead = np.angle((run.velocity - run.velocity.mean()) @ turning / ((run.force - run.force.mean()) @ turning))
-        if 0.0 < lead < 1.4:
-            times.append(np.tan(lead) / omega)
-    return float(np.clip(np.median(times) if times else 1e-3, 1e-4, 0.1))
+from jaxdamp.identify.machine import OFFSET, Machine, lag_time, started_on
+from jaxdamp.identify.starting import Start
 
 
 def _friction(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
@@ -89,7 +78,7 @@ def ladder_starts(names: Sequence[str] = LAWS) -> dict[str, Start]:
     return {name: functools.partial(_start, name) for name in names}
 
 
-def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dict[str, Start]:
+def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS, *, rig: Machine = OFFSET) -> dict[str, Start]:
     """Laws from simple to complex by name, each with a start from the records, for `compare` or `fit`.
 
     Memoryless: `linear`, `bilinear`, `power_law`, `polynomial` (degree 5), `segmented_polynomial` (paper 000),
@@ -102,6 +91,11 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dic
     If a start cannot be computed from these records, the entry is a function that raises the reason when a fit calls
     it; `compare` continues with the other laws.
 
+    Arguments:
+        runs: records to start from.
+        names: of the laws.
+        rig: the test machine as in `compare`, whose gas force and offset the starts do not contain.
+
     Raises:
         ValueError: an unknown name.
     """
@@ -109,7 +103,7 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS) -> dic
     ladder: dict[str, Start] = {}
     for name, start in ladder_starts(names).items():
         try:
-            ladder[name] = started(start, runs)
+            ladder[name] = started_on(start, runs, rig)[0]
         except NUMERICAL as error:
             ladder[name] = functools.partial(_no_start, error)
     return ladder

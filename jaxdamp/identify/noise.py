@@ -26,12 +26,19 @@ def noise_of(
     """
     owner, used, sigma = problem.owner, problem.used, problem.sigma
     if force_noise is not None:
-        return np.where(used, force_noise / np.array(sigma)[owner], 1.0), 1.0
+        return _with_priors(force_noise / np.array(sigma)[owner], used), 1.0
     dof = max(int(np.count_nonzero(used)) - found.values.size, 1)
     counted = correlation_time([found.residual[used & (owner == i)] for i in np.unique(owner[used])])
     alike = counted > CORRELATED and not problem.is_rounding(found.squares)
     inflation = float(np.sqrt(counted)) if alike else 1.0
-    return inflation * _from_residual(found.residual, used, owner, len(sigma), dof, problem.each), inflation
+    residual = np.where(used, found.residual, 0.0)
+    shown = _from_residual(residual, used, owner, len(sigma), dof, problem.each)
+    return _with_priors(problem.noise_factor * inflation * shown, used), inflation
+
+
+def _with_priors(noise: Float[np.ndarray, " samples"], used: Bool[np.ndarray, " samples"]) -> np.ndarray:
+    """The mean noise of the records for all other residuals, which are priors or have no weight."""
+    return np.where(used, noise, np.mean(noise[used]))
 
 
 def _from_residual(

@@ -6,27 +6,28 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._field_types import check_module
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import Reach
+from jaxdamp.identify.criteria import FIRST_NOISE, priors_on
+from jaxdamp.identify.machine import Machine, absent_paths, started_on
 from jaxdamp.identify.model import Model, on_rig
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.starting import Start, started
+from jaxdamp.identify.starting import Start
 from jaxdamp.identify.traces import batches, owners
 from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
-from jaxdamp.rig import Rig
 
 
 def prepare(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],
     *,
-    rig: Rig | None = None,
+    rig: Machine = None,
     freeze: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tie: Mapping[str, str] | None = None,
     per_record: Sequence[str] = (),
     weighting: str | Sequence[float] = "samples",
+    priors: Mapping[str, tuple[float, float]] | None = None,
     samples_per_cycle: int | None = 400,
 ) -> Problem:
     """The first of the three steps of `fit`, whose arguments these are: `prepare`, `solve`, `judge`.
@@ -51,8 +52,8 @@ def prepare(
         _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
     sigma = weights(weighting, runs)
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
-    begin = started(law, fitted_to)
-    model, absent = on_rig(begin, rig), _absent(rig)
+    begin, machine = started_on(law, fitted_to, rig)
+    model, absent = on_rig(begin, machine), absent_paths(machine)
     own = _per_record(model, per_record, sigma, absent)
     frozen = [*name_patterns("freeze", freeze), *absent]
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
@@ -62,21 +63,11 @@ def prepare(
     weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
     level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
     reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
-    return Problem(free, residuals, level, runs, tuple(sigma), owner, reach, begin, own, weighting == "runs")
-
-
-def _absent(rig: Rig | None) -> list[str]:
-    """Paths of the numbers of a machine that are left at their defaults, and so have no part in a fit."""
-    if rig is None:
-        return []
-    call = "fit(law, runs, rig=Rig(gas_force=-100.0, force_delay=1e-3))"
-    check_module("rig", rig, (Rig,), call)
-    pairs = list(zip(parameters(rig), parameters(Rig()), strict=True))
-    absent = [f"rig.{p.path}" for p, default in pairs if p.value == default.value]
-    if len(absent) == len(pairs):
-        remedy = f"Give what shall be found a start, as in `{call}`; leave out a machine that adds nothing."
-        _checks.refuse("rig", "have a number that is not at its default", "one that adds nothing", remedy)
-    return absent
+    known = priors_on(free, priors or {}, FIRST_NOISE * level / np.sqrt(max(np.count_nonzero(owner >= 0), 1)))
+    owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in known)])
+    residuals = (*residuals, *known)
+    steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
+    return Problem(free, residuals, level, runs, tuple(sigma), owner, reach, begin, own, weighting == "runs", steps)
 
 
 def _per_record(model: Model, names: Sequence[str], sigma: Sequence[float], absent: Sequence[str]) -> tuple[str, ...]:

@@ -29,6 +29,10 @@ class AbstractResiduals(eqx.Module):
     def used(self) -> Bool[np.ndarray, " samples"]:
         """Which samples are used; the others are padding, or before the model has settled."""
 
+    def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "AbstractResiduals":
+        """The same with every weight times a factor."""
+        raise NotImplementedError(f"{type(self).__name__} cannot be reweighted.")
+
     @abstractmethod
     def total_weight(self) -> Float[Array, ""]:
         """Sum of the squared weights, the number of samples as measured where all weigh the same."""
@@ -49,6 +53,9 @@ class Problem(NamedTuple):
         law: the law or the vehicle to start from, with one value for each parameter.
         per_record: paths of the parameters with a value for each record.
         each: whether every record has its own noise level.
+        sample_steps: time [s] from one sample of the residuals to the next, for each record.
+        noise_factor: factor on the noise that weighted residuals show, because of a robust loss.
+        share_left_out: share of the samples that a robust loss gives less than half weight.
     """
 
     free: FreeParameters
@@ -61,6 +68,9 @@ class Problem(NamedTuple):
     law: Any
     per_record: tuple[str, ...]
     each: bool
+    sample_steps: tuple[float, ...] = ()
+    noise_factor: float = 1.0
+    share_left_out: float = 0.0
 
     @property
     def coordinates(self) -> Coordinates:

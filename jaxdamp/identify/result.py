@@ -107,6 +107,7 @@ class AbstractFitted:
         scores: the same for each record given.
         warnings: doubts about the result, in words.
         status: how the search ended.
+        rig: the fitted test machine, if one was fitted.
     """
 
     law: AbstractDamper
@@ -116,6 +117,7 @@ class AbstractFitted:
     scores: tuple[Score, ...]
     warnings: tuple[str, ...]
     status: Status
+    rig: Rig | None = dataclasses.field(default=None, kw_only=True)
 
     @property
     def converged(self) -> bool:
@@ -125,7 +127,7 @@ class AbstractFitted:
     @property
     def model(self) -> Model:
         """What was fitted to the records: the law, on a machine if that was fitted too."""
-        return self.law
+        return on_rig(self.law, self.rig)
 
     def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
         """Force [N] that the fit expects at every sample of records, old or new, of the same machine."""
@@ -142,6 +144,7 @@ class AbstractFitted:
         """
         return {
             "law": repr(self.law),
+            **({} if self.rig is None else {"rig": repr(self.rig)}),
             "fit": with_unit(self.fit_percent, "%"),
             "rmse": with_unit(self.rmse, "N"),
             "scores": [score.to_dict() for score in self.scores],
@@ -164,8 +167,8 @@ class FitResult(AbstractFitted):
         inflation: factor on the standard errors because the residual is correlated from sample to sample; 1 if it is
             not, or if the noise was given.
         record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
-        rig: the fitted test machine, if one was fitted.
         record_rigs: the test machine of each record, as `record_laws`.
+        criterion: loss and priors in words; empty for plain least squares.
     """
 
     parameters: tuple[Estimate, ...]
@@ -175,19 +178,15 @@ class FitResult(AbstractFitted):
     minima: tuple[Minimum, ...] = ()
     inflation: float = 1.0
     record_laws: tuple[AbstractDamper, ...] = ()
-    rig: Rig | None = None
     record_rigs: tuple[Rig, ...] = ()
-
-    @property
-    def model(self) -> Model:
-        """What was fitted to the records: the law, on a machine if that was fitted too."""
-        return on_rig(self.law, self.rig)
+    criterion: str = ""
 
     def __getitem__(self, name: str) -> Estimate:
-        """The estimate of that name."""
-        for estimate in self.parameters:
-            if estimate.name == name:
-                return estimate
+        """The estimate of that name, or of the only name that ends with it: `"rate"` for `"law.rate"`."""
+        named = [estimate for estimate in self.parameters if estimate.name == name]
+        named = named or [estimate for estimate in self.parameters if estimate.name.endswith(f".{name}")]
+        if len(named) == 1:
+            return named[0]
         raise KeyError(f"No parameter is named {name!r}; there are {', '.join(e.name for e in self.parameters)}.")
 
     @functools.cached_property
@@ -204,13 +203,16 @@ class FitResult(AbstractFitted):
             true_rig: the true test machine, if one was fitted.
             title: of the table.
         """
+        title = (
+            f"{title or f'Parameters of {type(self.law).__name__}'}{f' ({self.criterion})' if self.criterion else ''}"
+        )
         true = None if truth is None else on_rig(truth, None if self.rig is None else true_rig or Rig())
-        return parameter_table(title or f"Parameters of {type(self.law).__name__}", self.parameters, true)
+        return parameter_table(title, self.parameters, true)
 
     def to_dict(self) -> dict[str, Any]:
         """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         return super().to_dict() | {
-            **({} if self.rig is None else {"rig": repr(self.rig)}),
+            **({"criterion": self.criterion} if self.criterion else {}),
             "error_shares": plain(self.error_shares._asdict()),
             "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
             "covariance": plain(self.covariance),
@@ -231,6 +233,7 @@ class FitResult(AbstractFitted):
         for e, (value, error) in zip(self.parameters, texts, strict=True):
             note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
             lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
+        lines += [f"  {self.criterion}"] * bool(self.criterion)
         if len(self.minima) > 1:
             lines.append(f"  {describe(self.minima, self.starts)}")
         return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])

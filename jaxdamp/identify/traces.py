@@ -1,7 +1,9 @@
 """Bench records as batches of equal length, ready for one compiled call."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, final
+from weakref import WeakKeyDictionary
 
 import equinox as eqx
 import jax
@@ -51,6 +53,10 @@ class Batch(AbstractResiduals):
         """Weighted difference of the model's force from the measured one; zero where the weight is, even beside NaN."""
         return jnp.ravel(jnp.where(self.weight > 0, (self.predict(model) - self.force) * self.weight, 0.0))
 
+    def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "Batch":
+        """The same with every weight times a factor."""
+        return dataclasses.replace(self, weight=self.weight * jnp.asarray(factor.reshape(self.weight.shape)))
+
     def used(self) -> Bool[np.ndarray, " samples"]:
         """Which samples count."""
         return np.ravel(self.weight) > 0
@@ -98,10 +104,15 @@ def _averaged(values: np.ndarray, block: int) -> np.ndarray:
     return values[:kept].reshape(-1, block).mean(axis=1)
 
 
+_rates: WeakKeyDictionary[BenchRun, float] = WeakKeyDictionary()  # records do not change
+
+
 def dominant_rate(run: BenchRun) -> float:
     """Dominant angular frequency of a record [rad/s]: RMS velocity over RMS stroke, or its frequency if higher."""
-    moved = float(np.std(run.stroke))
-    return max(2 * np.pi * run.frequency, float(np.std(run.velocity)) / moved)
+    if run not in _rates:
+        moved = float(np.std(run.stroke))
+        _rates[run] = max(2 * np.pi * run.frequency, float(np.std(run.velocity)) / moved)
+    return _rates[run]
 
 
 def settling_time(run: BenchRun) -> float:
@@ -269,16 +280,33 @@ def batches(
     fixed, channels, warms_up = _stated(model, runs), _channels(model, runs), not is_memoryless(model)
     if not (warms_up or fixed or per_record):
         return _memoryless_batch(runs, sigma, samples_per_cycle, channels)
-    pairs = zip(runs, sigma, strict=True)
-    how = (samples_per_cycle, model, warms_up, channels)
-    rows = [_row(run, s, *how, number) for number, (run, s) in enumerate(pairs)]
-    groups = _grouped(rows)
+    rows, groups, made = _row_batches(model, runs, sigma, samples_per_cycle, per_record)
     ranges: dict[int, SampleRange] = {}
     for number, group in enumerate(groups):
         for k, i in enumerate(group):
             ranges[i] = SampleRange(number, k, rows[i].warm_up, len(rows[i].weight), rows[i].block)
-    made = tuple(_batch([rows[i] for i in group], fixed, per_record, effects_of(model)) for group in groups)
     return made, [ranges[i] for i in range(len(runs))]
+
+
+def record_batches(
+    model: Model, runs: Sequence[BenchRun], sigma: Sequence[float], samples_per_cycle: int | None
+) -> tuple[Batch, ...]:
+    """Records prepared as in `batches`, but always with a row for each record, also for a model without memory."""
+    return _row_batches(model, runs, sigma, samples_per_cycle, ())[2]
+
+
+def _row_batches(
+    model: Model,
+    runs: Sequence[BenchRun],
+    sigma: Sequence[float],
+    samples_per_cycle: int | None,
+    per_record: tuple[str, ...],
+) -> tuple[list[_Row], list[list[int]], tuple[Batch, ...]]:
+    """A row for each record, the groups of rows, and the batch of each group."""
+    how = (samples_per_cycle, model, not is_memoryless(model), _channels(model, runs))
+    rows = [_row(run, s, *how, number) for number, (run, s) in enumerate(zip(runs, sigma, strict=True))]
+    groups, fixed = _grouped(rows), _stated(model, runs)
+    return rows, groups, tuple(_batch([rows[i] for i in g], fixed, per_record, effects_of(model)) for g in groups)
 
 
 def owners(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> Int[np.ndarray, " samples"]:

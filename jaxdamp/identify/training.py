@@ -17,9 +17,10 @@ from jaxdamp._progress import Progress
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.dampers import AbstractDamper, with_fitted_range
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.judging import notes_on
+from jaxdamp.identify.machine import Machine
+from jaxdamp.identify.model import Model, law_of, rig_of, with_range
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.result import AbstractFitted, score
@@ -102,6 +103,7 @@ def train(
     runs: BenchRun | Iterable[BenchRun],
     *,
     held_out: BenchRun | Iterable[BenchRun],
+    rig: Machine = None,
     weighting: str | Sequence[float] = "samples",
     freeze: Sequence[str] = (),
     tie: Mapping[str, str] | None = None,
@@ -124,6 +126,7 @@ def train(
         law: a start as in `fit`: a law, a law class, or a function that returns a law.
         runs: records to train on. A few steady cycles of each are enough: `run.last_cycles(3)`.
         held_out: records that decide when to stop; they are not trained on. To assess the law, use further records.
+        rig: the test machine as in `fit`, trained together with the law.
         weighting: of `runs`, as in `fit`.
         freeze: parameters to hold at their start, by path, last part of a path, or pattern.
         tie: parameters that take the values of others, as in `fit`.
@@ -148,9 +151,10 @@ def train(
     runs, held_out = as_runs(runs, call="train(law, runs, held_out=...)"), as_runs(held_out, "held_out")
     _check(runs, held_out, steps, patience)
     _checks.positive("learning_rate", learning_rate)
-    problem = prepare(law, runs, freeze=freeze, tie=tie, weighting=weighting, samples_per_cycle=samples_per_cycle)
-    coordinates, used, law = Coordinates(problem.free, smooth="all"), problem.residuals, problem.law
-    checked = batches(law, held_out, [1.0] * len(held_out), samples_per_cycle)[0]
+    options = {"freeze": freeze, "tie": tie, "weighting": weighting, "samples_per_cycle": samples_per_cycle}
+    problem = prepare(law, runs, rig=rig, **options)
+    coordinates, used, start = Coordinates(problem.free, smooth="all"), problem.residuals, problem.free.tree
+    checked = batches(start, held_out, [1.0] * len(held_out), samples_per_cycle)[0]
     level = float(np.sqrt(np.mean(np.concatenate([run.force for run in problem.fitted_to]) ** 2)))
     rule = _adam(learning_rate, steps) if optimiser is None else optimiser
 
@@ -158,7 +162,9 @@ def train(
     state = rule.init(raw)
     best, best_step, reached = raw, 0, float(_error(coordinates, raw, checked))
     if not np.isfinite(reached):
-        _checks.refuse("law", "give finite forces over the records", f"{law}, which does not", "Start from another.")
+        _checks.refuse(
+            "law", "give finite forces over the records", f"{problem.law}, which does not", "Start from another."
+        )
     taken, history, tested = [0], [float(_error(coordinates, raw, used))], [reached]
     stopped = f"after all {steps} steps"
     with Progress("Training") as shown:
@@ -178,11 +184,12 @@ def train(
                 stopped = f"stopped at step {done}, {patience} steps after the held-out error last fell"
                 break
 
-    trained = with_fitted_range(_law(coordinates, best), covered_range(problem.fitted_to))
+    trained = with_range(_model(coordinates, best), covered_range(problem.fitted_to))
     percent, rmse, scores = score(trained, runs, np.isfinite(problem.sigma))
     held_percent, held_rmse, held_scores = score(trained, held_out)
     return Training(
-        law=trained,
+        law=law_of(trained),
+        rig=rig_of(trained),
         runs=runs,
         held_out=held_out,
         fit_percent=percent,
@@ -190,7 +197,7 @@ def train(
         held_out_fit_percent=held_percent,
         held_out_rmse=held_rmse,
         scores=scores + held_scores,
-        warnings=tuple(notes_on(trained, problem.fitted_to)),
+        warnings=tuple(notes_on(law_of(trained), problem.fitted_to)),
         status=Status.STOPPED_EARLY if taken[-1] < steps else Status.ALL_STEPS,
         steps=np.array(taken, dtype=float),
         history=np.array(history),
@@ -220,15 +227,15 @@ def _adam(learning_rate: float, steps: int) -> optax.GradientTransformation:
     return optax.chain(optax.clip_by_global_norm(1.0), optax.adam(schedule))
 
 
-def _law(coordinates: Coordinates, raw: Array) -> AbstractDamper:
-    """The law at these coordinates."""
+def _model(coordinates: Coordinates, raw: Array) -> Model:
+    """The law at these coordinates, on its machine."""
     return coordinates.free.build(coordinates.to_physical(raw))
 
 
 def _mean_square(coordinates: Coordinates, raw: Array, made: Sequence[AbstractResiduals]) -> Array:
     """Mean squared error [N²] of the law over the samples that count, each as often as it was measured."""
-    law = _law(coordinates, raw)
-    squares = jnp.stack([jnp.sum(jnp.square(part(law))) for part in made])
+    model = _model(coordinates, raw)
+    squares = jnp.stack([jnp.sum(jnp.square(part(model))) for part in made])
     return jnp.sum(squares) / jnp.sum(jnp.stack([part.total_weight() for part in made]))
 
 

@@ -9,7 +9,7 @@ from jaxdamp import plots, rig
 from jaxdamp._tables import Cell, Column, Table
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify import Comparison, Rung
+from jaxdamp.identify import Comparison, Rung, without_machine
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import fitted_range_table
@@ -129,7 +129,9 @@ def _add_curves(report: Report, comparison: Comparison) -> None:
         note = f"Drawn are the {MOST_CURVES} laws with the smallest errors. The other {len(laws) - len(drawn)}: {rest}."
     baseline = best.name if len(drawn) > 1 and best.name in drawn else None
     report.picture(
-        lambda: plots.force_velocity(drawn, runs=best.result.runs, baseline=baseline, note=note),
+        lambda: plots.force_velocity(
+            drawn, runs=without_machine(best.result.rig, best.result.runs), baseline=baseline, note=note
+        ),
         "Force over velocity",
         "force_velocity.png",
     )

@@ -121,3 +121,8 @@ def check_traits(law: AbstractDamper) -> None:
         but = "its response is not linear in the parameters declared `linear=True`"
         atol = 1e-9 * float(np.max(np.abs(force)))
         require_equal(force[1] - force[0], jacobian[0] @ change, says.format("`linear_in_parameters`", but), atol=atol)
+        one = np.ones(jacobian[0].shape[0])
+        missed = one - jacobian[0] @ np.linalg.lstsq(jacobian[0], one, rcond=None)[0]
+        but = "its parameters can add a constant to the force"
+        declared = traits.contains_offset or np.max(np.abs(missed)) > 1e-6
+        require(declared, says.format("not `contains_offset`", but))

@@ -43,7 +43,10 @@ def test_vehicles_are_listed_with_a_line_of_meaning() -> None:
 @pytest.mark.parametrize(
     ("command", "options"),
     [
-        ("fit", "--law --held-out --sign --force-sign --columns --units --sampling-rate --weighting --out --replace"),
+        (
+            "fit",
+            "--law --held-out --sign --force-sign --columns --units --sampling-rate --weighting --rig --out --replace",
+        ),
         ("demo", "--out --seed --replace --debug"),
     ],
 )
@@ -89,6 +92,20 @@ def test_fit_writes_tables_pictures_and_a_report(records: Path, tmp_path: Path) 
     assert float(_rows(out / "tables" / "parameters_bilinear.csv")[0]["value"]) == pytest.approx(2600.0, rel=2e-3)
     report = (out / "report.html").read_text(encoding="utf-8")
     assert report.count("data:image/png;base64,") == 4 and "held-out RMSE [N]" in report
+
+
+def test_what_the_machine_adds_is_fitted_and_shown(records: Path, tmp_path: Path) -> None:
+    out = tmp_path / "fit"
+    text = jaxdamp("fit", records, "--law", "bilinear", "--rig", "gas,friction", "--out", out).output
+    assert "rig.gas_force" in text and "rig.friction" in text
+    assert "rig.gas_force" in (out / "report.html").read_text(encoding="utf-8")
+    machine = from_json(out / "machines" / "bilinear.json")
+    assert abs(float(machine.gas_force)) < 5.0 and float(machine.force_offset) == 0.0
+    bare = tmp_path / "bare"
+    assert "rig." not in jaxdamp("fit", records, "--law", "bilinear", "--rig", "none", "--out", bare).output
+    assert not (bare / "machines").exists()
+    message = refused(tmp_path, "fit", records, "--law", "bilinear", "--rig", "gas,dellay", "--out", tmp_path / "new")
+    assert "Option --rig must be one of" in message and "Did you mean 'delay'" in message
 
 
 def test_one_law_is_fitted_without_a_ladder(records: Path, tmp_path: Path) -> None:

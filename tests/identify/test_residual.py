@@ -87,13 +87,14 @@ def test_a_comparison_as_a_table_and_as_plain_data() -> None:
     table, result = comparison.table(), comparison["linear"]
     row, failed = table.records()
     assert {column.name: column.unit for column in table.columns}["held-out RMSE"] == "N"
-    assert (row["law"], row["free"], row["RMSE"]) == ("linear", 1, result.rmse)
+    assert (row["law"], row["free"], row["RMSE"]) == ("linear", 2, result.rmse)
     assert row["shape"] == pytest.approx(100 * result.error_shares.shape)
     assert (failed["law"], failed["RMSE"], failed["note"]) == ("table", None, "failed")
     data = json.loads(json.dumps(comparison.to_dict(), allow_nan=False))
     assert data["best"] == "linear" and data["failed"] == {"table": "too few knees"}
     assert data["laws"]["linear"]["held_out_rmse"] == {"value": comparison.rungs[0].held_out_rmse, "unit": "N"}
-    (rate,) = data["laws"]["linear"]["parameters"]
+    rate, offset = data["laws"]["linear"]["parameters"]
+    assert offset["name"] == "rig.force_offset"
     estimate = result["rate"]
     assert (rate["value"], rate["unit"], rate["interval"]) == (estimate.value, "N s/m", list(estimate.interval))
     assert data["verdict"] == list(comparison.verdict)

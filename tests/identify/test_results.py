@@ -74,7 +74,7 @@ def test_compare_finds_the_right_law_on_held_out_records(sines):
     result = compare(ladder, runs, held_out=held_out, progress=seen.append)
     assert sorted(seen) == sorted(ladder)
     assert result.best.name == "besinger" and result.best.held_out_rmse == pytest.approx(20.0, rel=0.05)
-    assert [r.parameters for r in result.rungs] == [1, 2, 5, 5]
+    assert [r.parameters for r in result.rungs] == [2, 3, 6, 6]  # each with an offset
     assert result["linear"].fit_percent == result.rungs[0].fit_percent < result.rungs[1].fit_percent
     assert repr(result).splitlines()[-1] == "best: besinger" and "held-out" in repr(result)
     with pytest.raises(KeyError, match="No law is named 'cubic'"):

@@ -8,7 +8,7 @@ import pytest
 
 from jaxdamp import identify
 from jaxdamp.bench import BenchRun, BenchSet, SineTest, VirtualDyno
-from jaxdamp.dampers import AbstractDamper, Bilinear, CoulombFriction, Linear, SeriesSpring
+from jaxdamp.dampers import AbstractDamper, Besinger, Bilinear, CoulombFriction, Linear, SeriesSpring, Spring
 from jaxdamp.export import from_json, to_json
 from jaxdamp.rig import Rig
 
@@ -123,6 +123,52 @@ def test_comparisons_and_cross_validations_take_the_machine():
     assert best.result["rig.gas_force"].value == pytest.approx(-120.0, abs=1.0)
     validated = identify.cross_validate({"bilinear": Bilinear}, runs, rig=rig)
     assert all(fold.fit_percent > 90.0 for fold in validated.folds)
+
+
+def test_a_bare_law_in_a_comparison_is_fitted_beside_an_offset():
+    damper = Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05)
+    runs = records(damper, Rig(gas_force=-250.0, force_offset=20.0))
+    found = identify.compare({"besinger": Besinger, "spring": Linear(1000.0) + Spring(1000.0)}, runs)
+    rate = found["besinger"]["rebound_rate"]
+    assert rate.name == "law.rebound_rate" and rate.value == pytest.approx(float(damper.rebound_rate), rel=0.05)
+    assert found["besinger"]["force_offset"].value == pytest.approx(-230.0, abs=3.0)
+    assert found["spring"].rig is None  # its preload is an offset
+    without = identify.fit(Besinger, runs)
+    assert abs(without["rebound_rate"].value - rate.value) > 0.5 * rate.value
+    assert any("look like a constant force of -" in warning for warning in without.warnings)
+
+
+def test_names_of_effects_get_their_starts_from_the_records():
+    rig = Rig(gas_force=-120.0, force_delay=2e-3)
+    result = identify.fit(Bilinear, records(rig=rig), rig=["gas", "delay"])
+    assert_recovered(result, LAW, rig)
+    assert identify.machine_names("rig", ["gas, delay", "gas"]) == ["gas", "delay"]
+    with pytest.raises(ValueError, match=r"`rig` must be one of .*Did you mean 'delay'"):
+        identify.fit(LAW, records(), rig="dely")
+
+
+@pytest.mark.parametrize(
+    ("rig", "words"),
+    [
+        (Rig(force_delay=2e-3), "a delay of the force by 0.00"),
+        (Rig(moving_mass=3.0), "a moving mass of "),
+        (Rig(friction=60.0), "friction of "),
+        (Rig(temperature_slope=0.004, heating=0.02), "damping that falls as the oil warms up"),
+        (Rig(), ""),
+    ],
+    ids=lambda p: p if isinstance(p, str) else "",
+)
+def test_what_is_left_out_is_named(rig, words):
+    tests = [SineTest(0.02, f, cycles=20 if "oil" in words else 4) for f in (1.0, 3.0, 8.0)]
+    found = [w for w in identify.fit(START, records(rig=rig, tests=tests)).warnings if "leaves out" in w]
+    assert len(found) == bool(words) and all(words in warning for warning in found), found
+
+
+def test_a_network_is_trained_together_with_the_machine():
+    runs = records(rig=Rig(gas_force=-120.0))
+    trained = identify.train(Linear(1000.0), runs[:2], held_out=runs[2], rig="gas", steps=100, samples_per_cycle=50)
+    assert trained.rig is not None and float(trained.rig.gas_force) < -30.0
+    assert isinstance(trained.law, Linear) and "gas_force" in trained.to_dict()["rig"]
 
 
 def test_what_a_fit_refuses():

@@ -161,7 +161,7 @@ def test_a_start_of_the_ladder_is_made_anew_of_the_records_of_each_fit(maxwell_r
     def watched(start, runs, weighting):
         seen.append([run.name for run, s in zip(runs, weighting, strict=True) if np.isfinite(s)])
         made = identify.prepare(start, runs, weighting=weighting).law
-        expected = default_ladder([r for r, s in zip(runs, weighting, strict=True) if np.isfinite(s)], [names[0]])
+        expected = default_ladder([r for r, s in zip(runs, weighting, strict=True) if np.isfinite(s)], names, rig=None)
         assert repr(made) == repr(expected[names[0]])
         return fit(Linear, runs, weighting=weighting)
 

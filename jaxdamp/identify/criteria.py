@@ -1,0 +1,166 @@
+"""Criteria beside plain least squares: losses that spikes hardly move, and prior knowledge of parameters.
+
+A robust loss is minimised by repeated least squares, in which samples far from the model get less weight. A prior is
+one more residual, (value − mean)/standard deviation, in units of the noise, which is estimated between the rounds.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple, final
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from jaxdamp import _checks
+from jaxdamp.identify.model import Model
+from jaxdamp.identify.noise import noise_of
+from jaxdamp.identify.problem import AbstractResiduals, Problem
+from jaxdamp.identify.several import Solution
+from jaxdamp.parameters import FreeParameters, get, match_paths
+
+
+ROUNDS = 20  # of least squares with new weights, at most
+SETTLED = 0.01  # standard errors that a last round moves
+FIRST_NOISE = 0.01  # of the RMS force, before a fit says more
+HALF = 0.5  # weight below which a sample is counted as left out
+
+
+class Loss(NamedTuple):
+    """A loss by its weights; u is the residual in robust standard deviations."""
+
+    weight: Callable[[np.ndarray], np.ndarray]  # ψ(u)/u
+    slope: Callable[[np.ndarray], np.ndarray]  # ψ'(u)
+
+
+LOSSES = {
+    "squares": Loss(np.ones_like, np.ones_like),
+    "huber": Loss(
+        lambda u: np.minimum(1.0, 1.345 / np.maximum(np.abs(u), 1e-9)), lambda u: (np.abs(u) < 1.345).astype(float)
+    ),
+    "soft_l1": Loss(lambda u: (1.0 + (u / 1.5) ** 2) ** -0.5, lambda u: (1.0 + (u / 1.5) ** 2) ** -1.5),
+    "student_t": Loss(lambda u: 5.0 / (4.0 + u**2), lambda u: 5.0 * (4.0 - u**2) / (4.0 + u**2) ** 2),
+}
+"""Huber's loss and the soft absolute value have 95 % of the efficiency of least squares with normal noise, Student's t
+with four degrees of freedom a little less, and it ignores far samples altogether."""
+
+
+@final
+class Priors(AbstractResiduals):
+    """Prior knowledge of parameters as residuals."""
+
+    paths: tuple[str, ...] = eqx.field(static=True)
+    mean: Float[Array, " priors"]
+    deviation: Float[Array, " priors"]
+    size: int = eqx.field(static=True)  # numbers of all parameters together
+    noise: Float[Array, ""]  # standard deviation of the noise of a weighted sample
+
+    def __call__(self, model: Model) -> Float[Array, " samples"]:
+        """Distance of the values from their means, in standard deviations, times that of the noise."""
+        values = zip(self.paths, self.mean, self.deviation, strict=True)
+        return self.noise * jnp.concatenate([jnp.ravel((get(model, path) - m) / d) for path, m, d in values])
+
+    def used(self) -> Bool[np.ndarray, " samples"]:
+        """They are no samples of the records."""
+        return np.zeros(self.size, bool)
+
+    def total_weight(self) -> Float[Array, ""]:
+        """None of the records."""
+        return jnp.zeros(())
+
+
+def priors_on(free: FreeParameters, priors: Mapping[str, tuple[float, float]], noise: float) -> tuple[Priors, ...]:
+    """The residuals of stated priors `{name: (mean, standard deviation)}`.
+
+    Raises:
+        ValueError: an unknown or frozen parameter; numbers that are no mean and standard deviation.
+    """
+    chosen: dict[str, tuple[float, float]] = {}
+    for name, pair in priors.items():
+        if np.shape(pair) != (2,) or not np.all(np.isfinite(pair)) or not pair[1] > 0:
+            must = "be a mean and a positive standard deviation"
+            _checks.refuse(f"priors[{name!r}]", must, pair, "Write {'rebound_rate': (2500.0, 200.0)}.")
+        chosen |= dict.fromkeys(match_paths([p.path for p in free.chosen], [name]), (float(pair[0]), float(pair[1])))
+    if not chosen:
+        return ()
+    mean, deviation = (jnp.asarray(np.array(side)) for side in zip(*chosen.values(), strict=True))
+    size = sum(p.value.size for p in free.chosen if p.path in chosen)
+    return (Priors(tuple(chosen), mean, deviation, size, jnp.asarray(noise)),)
+
+
+def solve_by(
+    problem: Problem,
+    solve: Callable[[Problem, int | None], Solution],
+    *,
+    loss: str,
+    force_noise: float | None,
+    starts: int | None,
+) -> tuple[Problem, Solution]:
+    """Minimise a loss, with priors if the problem has any: least squares again and again, with new weights.
+
+    Arguments:
+        problem: the problem with its start.
+        solve: least squares of a problem from so many starts.
+        loss: a name in `LOSSES`.
+        force_noise: standard deviation of the force [N], if it is known.
+        starts: largest number of starts of the first round; the others continue from its end.
+
+    Returns:
+        The problem of the last round, with its weights, and its solution.
+    """
+    plain, solution = problem, solve(problem, starts)
+    priors = any(isinstance(part, Priors) for part in problem.residuals)
+    if loss == "squares" and not priors:
+        return problem, solution
+    root = np.ones(solution.best.residual.size)  # of the weight of each sample
+    for _ in range(ROUNDS):
+        best = solution.best
+        if not best.finite or problem.is_rounding(best.squares):
+            break
+        residual = best.residual / root
+        noise = noise_of(problem, best, force_noise)[0]
+        spread = 1.4826 * float(np.median(np.abs(residual[plain.used]))) if loss != "squares" else 1.0
+        if not spread > 0:
+            break
+        relative = residual / spread
+        root = np.where(plain.used, np.sqrt(LOSSES[loss].weight(relative)), 1.0)
+        factor = _noise_factor(LOSSES[loss], relative[plain.used])
+        problem = _weighted(plain, root, float(np.mean(noise[plain.used])))._replace(
+            noise_factor=factor, share_left_out=float(np.mean(root[plain.used] ** 2 < HALF))
+        )
+        solution = solve(problem.started_at(best.values), 1)
+        length = np.linalg.norm(solution.best.jacobian, axis=0)
+        moved = np.abs(solution.best.values - best.values) * length
+        if np.all(moved < SETTLED * float(np.mean(noise[plain.used]))):
+            break
+    return problem, solution
+
+
+def _noise_factor(loss: Loss, relative: np.ndarray) -> float:
+    """Factor from the noise that weighted residuals show to that which the errors of an M-estimate follow."""
+    weight = loss.weight(relative)
+    shown = np.mean(weight * relative**2) / np.mean(weight)
+    slope = np.mean(loss.slope(relative))
+    return float(np.sqrt(np.mean((weight * relative) ** 2) / slope**2 / shown)) if shown > 0 and slope > 0 else 1.0
+
+
+def _weighted(problem: Problem, root: Float[np.ndarray, " samples"], noise: float) -> Problem:
+    """The problem with weights times `root`, and priors relative to this noise."""
+    parts, begin = [], 0
+    for part in problem.residuals:
+        size = part.used().size
+        if isinstance(part, Priors):
+            parts.append(eqx.tree_at(lambda p: p.noise, part, jnp.asarray(noise)))
+        else:
+            parts.append(part.reweighted(root[begin : begin + size]))
+        begin += size
+    return problem._replace(residuals=tuple(parts))
+
+
+def criterion_in_words(problem: Problem, loss: str, priors: Mapping[str, Sequence[float]]) -> str:
+    """What was minimised; empty for plain least squares."""
+    parts = []
+    if loss != "squares":
+        parts.append(f"loss {loss}: {100 * problem.share_left_out:.2g} % of the samples have less than half weight")
+    known = [f"{name} {mean:.5g} ± {deviation:.2g}" for name, (mean, deviation) in priors.items()]
+    return "; ".join([*parts, *[f"priors {', '.join(known)}"] * bool(known)])

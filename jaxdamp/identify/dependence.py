@@ -1,0 +1,126 @@
+"""Numbers shared by many dampers, or polynomials of a setting such as the clicks of an adjuster."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from jaxdamp import _checks
+from jaxdamp.identify.lanes import Evaluation
+from jaxdamp.parameters import Bounds, FreeParameters, match_paths, name_patterns
+
+
+OWN = -1  # in place of a degree: every damper has its own value
+
+
+class Dependence(NamedTuple):
+    """How the coordinates of each damper follow from one vector: its own values, then coefficients of polynomials.
+
+    Attributes:
+        degree: of the polynomial of each coordinate in the setting, `OWN` for one that differs from damper to damper.
+        basis: Legendre polynomials of each damper's setting, scaled to −1 … 1.
+        column: of the vector, for each damper and coordinate (the first of a polynomial).
+        size: of the vector.
+        ends: lowest and highest setting.
+    """
+
+    degree: Int[np.ndarray, " free"]
+    basis: Float[np.ndarray, "dampers degrees"]
+    column: Int[np.ndarray, "dampers free"]
+    size: int
+    ends: tuple[float, float]
+
+    def at_dampers(self, vector: Float[np.ndarray, " size"]) -> Float[np.ndarray, "dampers free"]:
+        """The coordinates of every damper."""
+        return np.stack([weights @ vector[columns] for columns, weights in map(self.rows, range(len(self.column)))])
+
+    def at_setting(self, vector: Float[np.ndarray, " size"], setting: float) -> Float[np.ndarray, " free"]:
+        """The coordinates at a setting; not a number where the dampers have their own."""
+        basis = legendre(np.array([setting]), self.ends, self.basis.shape[1])[0]
+        firsts = zip(self.degree, self.column[0], strict=True)
+        return np.array([basis[: d + 1] @ vector[c : c + d + 1] if d != OWN else np.nan for d, c in firsts])
+
+    def rows(self, damper: int) -> tuple[Int[np.ndarray, " used"], Float[np.ndarray, "free used"]]:
+        """The entries of the vector that a damper uses, and the matrix from them to its coordinates."""
+        counts = np.where(self.degree == OWN, 1, self.degree + 1)
+        columns = np.concatenate([c + np.arange(n) for c, n in zip(self.column[damper], counts, strict=True)])
+        weights, begin = np.zeros((counts.size, columns.size)), 0
+        for j, n in enumerate(counts):
+            weights[j, begin : begin + n] = 1.0 if self.degree[j] == OWN else self.basis[damper, :n]
+            begin += n
+        return columns, weights
+
+    def start(self, y: Float[np.ndarray, "dampers free"]) -> Float[np.ndarray, " size"]:
+        """The vector nearest to coordinates of all dampers, polynomials by least squares."""
+        vector = np.zeros(self.size)
+        for j, d in enumerate(self.degree):
+            if d == OWN:
+                vector[self.column[:, j]] = y[:, j]
+            else:
+                first = self.column[0, j]
+                vector[first : first + d + 1] = np.linalg.lstsq(self.basis[:, : d + 1], y[:, j], rcond=None)[0]
+        return vector
+
+    def bounds(self, bounds: Bounds) -> Bounds:
+        """Limits of the vector: those of the coordinates, none for polynomials, whose values are checked instead."""
+        sides = []
+        for side, none in ((bounds.lower, -np.inf), (bounds.upper, np.inf)):
+            limit = np.full(self.size, none)
+            for j, d in enumerate(self.degree):
+                if d in (OWN, 0):
+                    limit[self.column[:, j]] = np.asarray(side)[j]
+            sides.append(limit)
+        return Bounds(*sides)
+
+    def gathered(self, found: Evaluation) -> Evaluation:
+        """The products of all dampers together, by the vector."""
+        gram = np.zeros((self.size + 1, self.size + 1))
+        for damper, own in enumerate(found.gram):
+            columns, weights = self.rows(damper)
+            columns, weights = np.append(columns, self.size), np.pad(weights, ((0, 1), (0, 1)))
+            weights[-1, -1] = 1.0
+            gram[np.ix_(columns, columns)] += weights.T @ own @ weights
+        return Evaluation(gram[None], np.array([bool(np.all(found.keeps_conditions))]))
+
+
+def legendre(setting: np.ndarray, ends: tuple[float, float], count: int) -> np.ndarray:
+    """The first Legendre polynomials of settings, scaled so that the ends are −1 and 1."""
+    width = ends[1] - ends[0] or 1.0
+    return np.polynomial.legendre.legvander((2.0 * setting - ends[0] - ends[1]) / width, count - 1)
+
+
+def dependence(
+    free: FreeParameters,
+    shared: Mapping[str, int] | Sequence[str],
+    settings: Sequence[float | int] | None,
+    dampers: int,
+) -> Dependence | None:
+    """The dependence that the arguments of `fit_many` state; `None` if every damper has its own values.
+
+    Raises:
+        ValueError: an unknown parameter; a degree below zero or too high for the settings; no settings.
+    """
+    degrees = dict(shared) if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
+    if not degrees:
+        return None
+    degree = np.full(len(free.names), OWN)
+    paths = [p.path for p in free.chosen]
+    for name, d in degrees.items():
+        if not isinstance(d, int) or d < 0:
+            _checks.refuse(f"shared[{name!r}]", "be the degree of a polynomial, 0 or more", d)
+        named = match_paths(paths, [name])
+        degree[[p.path in named for p in free.owners]] = d
+    most = int(degree.max())
+    if most > 0 and settings is None:
+        remedy = "Give one number for each damper, such as its clicks, or share with degree 0."
+        _checks.refuse("settings", "be given for polynomials of the setting", None, remedy)
+    number = np.zeros(dampers) if settings is None else np.asarray(settings, float)
+    if most >= (distinct := np.unique(number).size):
+        _checks.refuse("shared", f"have degrees below the number of settings, {distinct}", most, "Take a lower degree.")
+    column, size = np.zeros((dampers, degree.size), int), 0
+    for j, d in enumerate(degree):
+        column[:, j] = size + (np.arange(dampers) if d == OWN else 0)
+        size += dampers if d == OWN else int(d) + 1
+    ends = (float(number.min()), float(number.max()))
+    return Dependence(degree, legendre(number, ends, most + 1), column, size, ends)

@@ -1,0 +1,161 @@
+"""The records of many dampers side by side, compared with one law with other numbers for each damper."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import laws_inside, margins
+from jaxdamp.identify.model import Model
+from jaxdamp.identify.traces import Batch, record_batches
+from jaxdamp.parameters import Coordinates
+
+
+CHUNK_SAMPLES = 16384  # of the records in one call, which should fit into the cache; all calls of a group are alike
+
+
+class Group(NamedTuple):
+    """Records of equal length."""
+
+    batch: Batch
+    damper: Int[np.ndarray, " records"]  # that each record belongs to
+    level: Float[np.ndarray, " records"]  # of the force of its damper, root of the sum of squares
+
+    @property
+    def chunk(self) -> int:
+        """Number of records in one call."""
+        return max(CHUNK_SAMPLES // self.batch.weight.shape[1], 1)
+
+    def parts(self, count: int) -> list[slice]:
+        """Pieces of `count` records for one call each."""
+        return [slice(begin, begin + self.chunk) for begin in range(0, count, self.chunk)]
+
+
+class Evaluation(NamedTuple):
+    """Sums over the records of each lane."""
+
+    gram: Float[np.ndarray, "lanes columns columns"]  # (J, r)ᵀ(J, r), relative to the squares of the measured forces
+    keeps_conditions: np.ndarray  # of each lane
+
+
+class Lanes(NamedTuple):
+    """Many dampers as one problem; a lane is a set of numbers for one of them.
+
+    Attributes:
+        coordinates: of the free numbers, common to all dampers.
+        groups: the records.
+        damper: the damper of each lane.
+    """
+
+    coordinates: Coordinates
+    groups: tuple[Group, ...]
+    damper: Int[np.ndarray, " lanes"]
+
+    def evaluate(self, y: Float[np.ndarray, "lanes free"], lanes: Int[np.ndarray, " some"]) -> Evaluation:
+        """Sums of squares and products of some lanes, at the coordinates of all; the other lanes have zeros."""
+        count, size = y.shape[0], y.shape[1] + 1
+        gram, keeps = np.zeros((count, size, size)), np.ones(count, bool)
+        for group in self.groups:
+            lane, record = self._pairs(group, lanes)
+            for part in group.parts(lane.size):
+                products, margin, _ = self._chunk(group, y, lane[part], record[part])
+                np.add.at(gram, lane[part], products)
+                keeps[lane[part]] &= margin > 0
+        return Evaluation(gram, keeps)
+
+    def missed(self, y: Float[np.ndarray, "lanes free"]) -> list[tuple[list[np.ndarray], ...]]:
+        """Force, weighted residual and weight of every record of each lane, at the samples that count."""
+        found: list[tuple[list[np.ndarray], ...]] = [([], [], []) for _ in range(y.shape[0])]
+        for group in self.groups:
+            lane, record = self._pairs(group, np.arange(y.shape[0]))
+            parts = group.parts(lane.size)
+            residual = np.concatenate([self._chunk(group, y, lane[part], record[part])[2] for part in parts])
+            force, weight = np.asarray(group.batch.force), np.asarray(group.batch.weight)
+            for i, k, own in zip(lane, record, residual, strict=True):
+                used = weight[k] > 0
+                for values, channel in zip(found[i], (force[k], own * group.level[k], weight[k]), strict=True):
+                    values.append(channel[used])
+        return found
+
+    def levels(self) -> Float[np.ndarray, " dampers"]:
+        """Size of the force of each damper, root of the weighted sum of squares."""
+        levels = np.ones(1 + max(int(group.damper.max()) for group in self.groups))
+        for group in self.groups:
+            levels[group.damper] = group.level
+        return levels
+
+    def samples(self) -> Float[np.ndarray, " dampers"]:
+        """Number of samples of each damper that count."""
+        counts = np.zeros(1 + max(int(group.damper.max()) for group in self.groups))
+        for group in self.groups:
+            np.add.at(counts, group.damper, np.count_nonzero(np.asarray(group.batch.weight) > 0, axis=1))
+        return counts
+
+    def _pairs(self, group: Group, lanes: Int[np.ndarray, " some"]) -> tuple[np.ndarray, np.ndarray]:
+        """Each record of a group with each of these lanes of its damper, as numbers of lane and record."""
+        fits = self.damper[lanes][:, None] == group.damper[None, :]
+        which, record = np.nonzero(fits)
+        return lanes[which], record
+
+    def _chunk(self, group: Group, y: np.ndarray, lane: np.ndarray, record: np.ndarray) -> list[np.ndarray]:
+        count = lane.size
+        lane, record = (np.pad(a, (0, group.chunk - count), "edge") for a in (lane, record))
+        dtype = self.coordinates.free.values.dtype
+        point, level = y[lane].astype(dtype), group.level[record].astype(dtype)
+        found = _compared(self.coordinates, point, group.batch, record, level)
+        return [np.asarray(a, np.float64)[:count] for a in found]
+
+
+@eqx.filter_jit
+def _compared(
+    coordinates: Coordinates,
+    y: Any,  # Float[Array, "pairs free"]
+    batch: Batch,
+    record: Any,  # Int[Array, " pairs"]
+    level: Any,  # Float[Array, " pairs"]
+) -> tuple[Array, Array, Array]:
+    """For each pair of a lane and a record: the products of Jacobian and residual, the least margin, the residual."""
+    free = coordinates.free
+    has_conditions = any(law.has_conditions() for _, law in laws_inside(free.tree))
+    fields = ("dt", "stroke", "velocity", "force", "weight", "number", "fixed", "temperature")
+    rows = {name: jax.tree.map(lambda a: a[record][:, None], getattr(batch, name)) for name in fields}
+
+    def pair(y: Array, row: dict[str, Any], level: Array) -> tuple[Array, Array, Array]:
+        one = dataclasses.replace(batch, **row)
+
+        def residual(y: Array) -> tuple[Array, Array]:
+            missed = one(free.build(coordinates.to_physical(y))) / level
+            return missed, missed
+
+        slopes, missed = jax.jacfwd(residual, has_aux=True)(y)
+        both = jnp.concatenate([slopes, missed[:, None]], axis=1)
+        model = free.build(coordinates.to_physical(y))
+        margin = jnp.min(margins(model)) if has_conditions else jnp.ones((), y.dtype)
+        return both.T @ both, margin, missed
+
+    return jax.vmap(pair)(y, rows, level)
+
+
+def grouped_records(
+    model: Model,
+    records: Sequence[Sequence[BenchRun]],
+    sigma: Sequence[Sequence[float]],
+    samples_per_cycle: int | None,
+) -> tuple[Group, ...]:
+    """The records of all dampers in groups of equal length, prepared as `traces.batches` does for one damper."""
+    owner = np.repeat(np.arange(len(records)), [len(runs) for runs in records])
+    together = [run for runs in records for run in runs]
+    batches = record_batches(model, together, [s for own in sigma for s in own], samples_per_cycle)
+    squares = np.zeros(len(records))
+    for batch in batches:
+        weighted = np.asarray(batch.force) * np.asarray(batch.weight)
+        np.add.at(squares, owner[np.asarray(batch.number)], np.sum(weighted**2, axis=1))
+    level = np.sqrt(squares)
+    numbers = [owner[np.asarray(batch.number)] for batch in batches]
+    return tuple(Group(batch, number, level[number]) for batch, number in zip(batches, numbers, strict=True))

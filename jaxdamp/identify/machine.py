@@ -1,0 +1,150 @@
+"""The test machine of a fit: stated as a `Rig`, or by the names of its effects, with starts from the records."""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._field_types import check_module
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.starting import Start, started
+from jaxdamp.parameters import parameters
+from jaxdamp.rig import Rig
+
+
+Machine = Rig | str | Sequence[str] | None
+
+OFFSET = "offset"  # the machine of a comparison of laws: the least that any load cell adds
+NEAR_REST = 0.1  # velocity, relative to its peak, below which the force shows gas, offset and springs
+SMALL = 1e-3  # of the force: a start that is nearly zero
+CALL = 'fit(law, runs, rig=["gas", "delay"])'
+
+
+@dataclasses.dataclass(frozen=True)
+class _Records:
+    """What the records show of the machine before any fit."""
+
+    level: float  # N, mean force near rest
+    stiffness: float  # N/m, slope of the force over the stroke near rest
+    force: float  # N, RMS about the level
+    acceleration: float  # m/s², RMS
+    lag: float  # s, of the force behind the velocity
+    measured_temperature: bool
+
+
+_Start = Callable[[_Records], Mapping[str, float]]
+EFFECTS: dict[str, _Start] = {
+    "offset": lambda r: {"force_offset": r.level},
+    "gas": lambda r: {"gas_force": min(r.level, -SMALL * r.force)},
+    "gas_stiffness": lambda r: {"gas_stiffness": max(r.stiffness, 1.0)},
+    "friction": lambda r: {"friction": 0.05 * r.force},
+    "mass": lambda r: {"moving_mass": 0.01 * r.force / r.acceleration},
+    "delay": lambda r: {"force_delay": min(r.lag, 2e-3)},
+    "lag": lambda r: {"force_lag": min(r.lag, 2e-3)},
+    "stroke_offset": lambda r: {"stroke_offset": 1e-4},
+    "heat": lambda r: (
+        {"temperature_slope": 2e-3} | ({} if r.measured_temperature else {"heating": 2e-3, "cooling": 2e-3})
+    ),
+}
+"""Effects of a machine by name, each with the numbers of `Rig` that describe it and their starts."""
+
+
+def machine_names(argument: str, names: str | Sequence[str]) -> list[str]:
+    """Names of effects, each once: "gas,delay" names two, "none" none.
+
+    Raises:
+        ValueError: an unknown name.
+
+    >>> machine_names("rig", "gas, delay")
+    ['gas', 'delay']
+    """
+    words = [word.strip() for text in ([names] if isinstance(names, str) else names) for word in text.split(",")]
+    for word in filter(None, words):
+        _checks.one_of(argument, word, ("none", *EFFECTS))
+    return [word for word in dict.fromkeys(words) if word not in ("", "none")]
+
+
+def started_machine(rig: Machine, runs: Sequence[BenchRun]) -> Rig | None:
+    """The machine with the starts of its free numbers; names get starts from the records.
+
+    Raises:
+        ValueError: an unknown name; a machine that adds nothing.
+    """
+    if rig is None:
+        return None
+    if not isinstance(rig, Rig) and (isinstance(rig, str) or all(isinstance(name, str) for name in rig)):
+        names = machine_names("rig", rig)
+        shown = _shown(runs) if names else None
+        starts = [EFFECTS[name](shown) for name in names] if shown else []
+        return Rig(**{field: value for start in starts for field, value in start.items()}) if starts else None
+    check_module("rig", rig, (Rig,), CALL)
+    assert isinstance(rig, Rig)
+    if not free_fields(rig):
+        remedy = f"Give the numbers to be fitted a start, name effects as in `{CALL}`, or leave `rig` out."
+        _checks.refuse("rig", "have a number that is not at its default", "one that adds nothing", remedy)
+    return rig
+
+
+def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine) -> tuple[AbstractDamper, Rig | None]:
+    """The law to start from and the machine beside it, which was asked for as `rig`.
+
+    A law class or function gets the records without what the machine adds at rest. If the machine was asked for by
+    names, an offset or gas force is left out beside a law that contains an offset itself.
+    """
+    machine = started_machine(rig, runs)
+    begin = started(law, without_machine(machine, runs))
+    if machine is None or isinstance(rig, Rig) or not begin.traits().contains_offset:
+        return begin, machine
+    left = dataclasses.replace(machine, force_offset=Rig().force_offset, gas_force=Rig().gas_force)
+    own = left if free_fields(left) else None
+    return started(law, without_machine(own, runs)), own
+
+
+def free_fields(rig: Rig) -> list[str]:
+    """The numbers of a machine that differ from their defaults; the others have no part in a fit."""
+    pairs = zip(parameters(rig), parameters(Rig()), strict=True)
+    return [p.path for p, default in pairs if p.value != default.value]
+
+
+def absent_paths(rig: Rig | None) -> list[str]:
+    """Paths of the numbers of a machine that are left at their defaults, and so have no part in a fit."""
+    if rig is None:
+        return []
+    given = free_fields(rig)
+    return [f"rig.{p.path}" for p in parameters(rig) if p.path not in given]
+
+
+def without_machine(rig: Rig | None, runs: Sequence[BenchRun]) -> list[BenchRun]:
+    """Records without gas force, gas stiffness and offset of a machine, from which a law can be started or drawn."""
+    if rig is None:
+        return list(runs)
+    gas, stiffness, offset = (float(a) for a in (rig.gas_force, rig.gas_stiffness, rig.force_offset))
+    added = [gas + offset + stiffness * run.stroke for run in runs]
+    return [dataclasses.replace(run, force=run.force - force) for run, force in zip(runs, added, strict=True)]
+
+
+def _shown(runs: Sequence[BenchRun]) -> _Records:
+    force, stroke = (np.concatenate([getattr(run, name) for run in runs]) for name in ("force", "stroke"))
+    slow = np.concatenate([np.abs(run.velocity) < NEAR_REST * run.peak_velocity for run in runs])
+    level = float(np.mean(force[slow]))
+    around = stroke[slow] - np.mean(stroke[slow])
+    stiffness = float(around @ force[slow] / max(around @ around, np.finfo(float).tiny))
+    acceleration = np.concatenate([np.gradient(run.velocity, run.time) for run in runs])
+    rms = float(np.sqrt(np.mean((force - level) ** 2)))
+    level = level if abs(level) > SMALL * rms else SMALL * rms  # zero would count as left out
+    moving = max(float(np.sqrt(np.mean(acceleration**2))), np.finfo(float).tiny)
+    return _Records(level, stiffness, rms, moving, lag_time(runs), any(run.temperature is not None for run in runs))
+
+
+def lag_time(runs: Sequence[BenchRun]) -> float:
+    """Delay [s] of the force behind the velocity, from the phase of their fundamentals: median of tan(φ)/ω."""
+    times = []
+    for run in runs:
+        omega = 2 * np.pi * run.frequency
+        turning = np.exp(-1j * omega * run.time) * np.hanning(len(run))
+        lead = np.angle((run.velocity - run.velocity.mean()) @ turning / ((run.force - run.force.mean()) @ turning))
+        if 0.0 < lead < 1.4:
+            times.append(np.tan(lead) / omega)
+    return float(np.clip(np.median(times) if times else 1e-3, 1e-4, 0.1))

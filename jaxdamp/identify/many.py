@@ -1,0 +1,246 @@
+"""`fit_many`: one law fitted to many dampers, clicks or temperatures in one call."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.dampers import Reach
+from jaxdamp.identify._blas import one_thread
+from jaxdamp.identify.dependence import Dependence, dependence
+from jaxdamp.identify.lanes import Evaluation, Lanes, grouped_records
+from jaxdamp.identify.lanes_search import LanesEnd, search_lanes
+from jaxdamp.identify.machine import Machine, absent_paths, started_on
+from jaxdamp.identify.many_result import ManyFits
+from jaxdamp.identify.model import on_rig
+from jaxdamp.identify.noise import CORRELATED, correlation_time
+from jaxdamp.identify.preparing import weights
+from jaxdamp.identify.several import other_starts
+from jaxdamp.identify.starting import Start
+from jaxdamp.parameters import Coordinates, free_parameters
+
+
+STARTED_FROM = 12  # dampers whose records give the start of a law class
+BLIND = 1e-12  # eigenvalue of JᵀJ, relative to the largest, below which a direction changes no force
+CALL = 'fit_many(law, {"A": runs_of_a, "B": runs_of_b})'
+
+
+@one_thread()
+def fit_many(
+    law: Start,
+    dampers: Mapping[str, BenchRun | Iterable[BenchRun]] | Iterable[BenchRun | Iterable[BenchRun]],
+    *,
+    rig: Machine = None,
+    freeze: Sequence[str] = (),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    tie: Mapping[str, str] | None = None,
+    shared: Mapping[str, int] | Sequence[str] = (),
+    settings: Sequence[float | int] | None = None,
+    weighting: str = "samples",
+    samples_per_cycle: int | None = 400,
+    starts: int = 1,
+    max_steps: int = 200,
+) -> ManyFits:
+    """Fit one law to many dampers at once: the same least squares as `fit`, for all of them side by side.
+
+    All records are computed in one compiled call for each step, and each damper ends by itself. Standard errors are
+    those of the linearised problem, increased where the residual is correlated; the further checks of `fit` (other
+    minima, profiles, groups of undetermined parameters) are left to `fit` of single dampers.
+
+    With `shared`, parameters are common to all dampers or polynomials of a setting, such as the clicks of an adjuster
+    or the temperature. All dampers are then one problem, in which each counts relative to the level of its force, and
+    `law_at(setting)` is the law at settings that were not measured.
+
+    Arguments:
+        law: the start of all dampers, as in `fit`; a law class starts from the records of some of them together.
+        dampers: the records of each damper, by name or in order.
+        rig: the test machine, as in `fit`; its numbers differ from damper to damper unless they are `shared`.
+        freeze: parameters to hold at the start.
+        bounds: extra limits, as in `fit`.
+        tie: parameters that take the values of others, as in `fit`.
+        shared: parameters common to all dampers, `["blow_off_rate"]`, or the degree of their polynomials in the
+            setting, `{"blow_off_rate": 0, "rebound_rate": 2}`.
+        settings: one number for each damper.
+        weighting: of the records of a damper: `"samples"` or `"runs"`, as in `fit`.
+        samples_per_cycle: slow records are averaged in blocks down to this number.
+        starts: largest number of starts of each damper, side by side: `law`, then those that it proposes.
+        max_steps: largest number of steps of each search.
+
+    Returns:
+        The laws with their parameters, standard errors, scores and a status each; dampers that differ from the others
+        by their error or their parameters are named in `remarks`.
+
+    Raises:
+        ValueError: no dampers; names that fit no parameter; settings or degrees that do not suit the dampers.
+
+    >>> from jaxdamp import bench
+    >>> from jaxdamp.dampers import Bilinear
+    >>> laws = {f"{clicks} clicks": Bilinear(2000.0 + 100.0 * clicks, 1200.0) for clicks in range(4)}
+    >>> test = bench.SineTest(0.02, 2.0)
+    >>> records = {name: bench.VirtualDyno(law, force_noise=5.0).run(test) for name, law in laws.items()}
+    >>> many = fit_many(Bilinear, records, shared={"rebound_rate": 1, "compression_rate": 0}, settings=range(4))
+    >>> round(float(many.law_at(1.5).rebound_rate), -1)
+    2150.0
+    """
+    names, records = _named(dampers)
+    _checks.one_of("weighting", weighting, ["samples", "runs"])
+    for name, count in (("max_steps", max_steps), ("starts", starts)):
+        if count < 1:
+            _checks.refuse(name, "be 1 or more", count)
+    if settings is not None and len(list(settings)) != len(names):
+        _checks.refuse(
+            "settings", f"give one number for each of {len(names)} dampers", f"{len(list(settings))} numbers"
+        )
+    some = [run for runs in records[:: -(-len(records) // STARTED_FROM)] for run in runs]
+    begun, machine = started_on(law, some, rig)
+    model, absent = on_rig(begun, machine), absent_paths(machine)
+    free = free_parameters(model, freeze=[*freeze, *absent], bounds=bounds, tie=tie)
+    _checks.finite("law", free.values)
+    coordinates = Coordinates(free, smooth="ordered")
+    sigma = [weights(weighting, runs) for runs in records]
+    lanes = Lanes(coordinates, grouped_records(model, records, sigma, samples_per_cycle), np.arange(len(names)))
+    depends = dependence(free, shared, settings, len(names))
+    if depends is not None and starts > 1:
+        _checks.refuse("starts", "be 1 with shared parameters", starts, "Fit the dampers apart first.")
+    lanes, begin = _with_other_starts(lanes, records, starts)
+    end, best, vector = _solved(lanes, begin, depends, max_steps)
+    lanes = lanes._replace(damper=np.arange(len(names)))
+    fitted = _physical(coordinates, end.y[best])
+    errors, percent, rmse = _judged(lanes, end.y[best], end.gram[best], depends, records)
+    return ManyFits(
+        names=tuple(names),
+        records=tuple(records),
+        settings=None if settings is None else tuple(float(s) for s in settings),
+        values=fitted,
+        standard_errors=errors,
+        fit_percent=percent,
+        rmse=rmse,
+        status=tuple(end.status[i] for i in best),
+        steps=end.steps[best],
+        free=coordinates.free,
+        dependence=depends,
+        vector=vector,
+    )
+
+
+def _named(dampers: object) -> tuple[list[str], list[tuple[BenchRun, ...]]]:
+    """The names of the dampers and the records of each."""
+    if isinstance(dampers, Mapping):
+        pairs = [(str(name), runs) for name, runs in dampers.items()]
+    elif isinstance(dampers, Iterable) and not isinstance(dampers, str | BenchRun):
+        pairs = [(str(i), runs) for i, runs in enumerate(dampers)]
+    else:
+        _checks.refuse("dampers", "be the records of each damper", _checks.described(dampers), f"The call is `{CALL}`.")
+    if not pairs:
+        _checks.refuse("dampers", "hold at least one damper", "empty")
+    records = [as_runs(runs, f"dampers[{name!r}]") for name, runs in pairs]
+    for (name, _), runs in zip(pairs, records, strict=True):
+        if not any(np.ptp(run.force) > 0 for run in runs):
+            _checks.refuse(f"dampers[{name!r}]", "hold records with a force that varies", f"{len(runs)} without")
+    return [name for name, _ in pairs], records
+
+
+def _with_other_starts(
+    lanes: Lanes, records: Sequence[Sequence[BenchRun]], starts: int
+) -> tuple[Lanes, Float[np.ndarray, "lanes free"]]:
+    """A lane for every start of every damper, and the coordinates to start from."""
+    free, together = lanes.coordinates.free, [run for runs in records for run in runs]
+    begin = [np.asarray(free.values)]
+    if starts > 1:
+        reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in together), max(r.peak_velocity for r in together))
+        begin += other_starts(free, reach)[: starts - 1]
+    found = np.asarray(_from_physical(lanes.coordinates, jnp.asarray(np.array(begin))), np.float64)
+    dampers = np.arange(len(records))
+    return lanes._replace(damper=dampers.repeat(len(begin))), np.tile(found, (len(records), 1))
+
+
+@eqx.filter_jit
+def _from_physical(coordinates: Coordinates, values: Float[Array, "lanes free"]) -> Float[Array, "lanes free"]:
+    return jax.vmap(coordinates.from_physical)(values)
+
+
+@eqx.filter_jit
+def _both(coordinates: Coordinates, y: Float[Array, "lanes free"]) -> tuple[Array, Array]:
+    """Physical values and their derivatives by the coordinates."""
+    return jax.vmap(coordinates.to_physical)(y), jax.vmap(jax.jacfwd(coordinates.to_physical))(y)
+
+
+def _physical(coordinates: Coordinates, y: Float[np.ndarray, "lanes free"]) -> Float[np.ndarray, "lanes free"]:
+    return np.asarray(_both(coordinates, jnp.asarray(y))[0], np.float64)
+
+
+def _solved(
+    lanes: Lanes, begin: Float[np.ndarray, "lanes free"], depends: Dependence | None, max_steps: int
+) -> tuple[LanesEnd, np.ndarray, np.ndarray | None]:
+    """The ends of all lanes, the best lane of each damper, and the vector of shared parameters."""
+    bounds, precision = lanes.coordinates.bounds(), float(jnp.finfo(lanes.coordinates.free.values.dtype).eps)
+    samples = lanes.samples()
+    if depends is None:
+        end = search_lanes(lanes.evaluate, begin, bounds, samples[lanes.damper], max_steps, precision)
+        squares = [s if np.isfinite(s) else np.inf for s in end.gram[:, -1, -1]]
+        best = [min(np.flatnonzero(lanes.damper == i), key=lambda lane: squares[lane]) for i in range(samples.size)]
+        return end, np.array(best), None
+    everyone = np.arange(samples.size)
+
+    def evaluate(vector: np.ndarray, _: np.ndarray) -> Evaluation:
+        y = depends.at_dampers(vector[0])
+        found = depends.gathered(lanes.evaluate(y, everyone))
+        inside = np.all((y >= bounds.lower) & (y <= bounds.upper))
+        return found._replace(keeps_conditions=found.keeps_conditions & inside)
+
+    inner = depends.bounds(bounds)
+    end = search_lanes(evaluate, depends.start(begin)[None], inner, samples.sum(keepdims=True), max_steps, precision)
+    y, count = depends.at_dampers(end.y[0]), samples.size
+    whole = LanesEnd(y, end.gram.repeat(count, 0), end.status * count, end.steps.repeat(count))
+    return whole, everyone, end.y[0]
+
+
+def _judged(
+    lanes: Lanes,
+    y: Float[np.ndarray, "dampers free"],
+    gram: np.ndarray,
+    depends: Dependence | None,
+    records: Sequence[Sequence[BenchRun]],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Standard errors [dampers, free], fit percent and RMSE [N] of each damper."""
+    count, free = y.shape
+    errors, percent, rmse = np.full((count, free), np.inf), np.zeros(count), np.zeros(count)
+    slopes = np.asarray(_both(lanes.coordinates, jnp.asarray(y))[1], np.float64)
+    inverse = [_inverse(own[:-1, :-1]) for own in (gram if depends is None else gram[:1])]
+    missed = lanes.missed(y)
+    free_numbers = free if depends is None else depends.size / count
+    noise, levels = np.zeros(count), lanes.levels()
+    for i, (force, residual, weight) in enumerate(missed):
+        error = [r / w for r, w in zip(residual, weight, strict=True)]
+        together, measured = np.concatenate(error), np.concatenate(force)
+        rmse[i] = np.sqrt(np.mean(together**2))
+        spread = np.linalg.norm(measured - measured.mean())
+        percent[i] = 100.0 * (1.0 - np.linalg.norm(together) / spread) if spread > 0 else -np.inf
+        alike = correlation_time(residual)
+        dof = max(together.size - free_numbers, 1)
+        squares = sum(float(r @ r) for r in residual) / levels[i] ** 2
+        noise[i] = squares / dof * (alike if alike > CORRELATED else 1.0)
+    for i in range(count):
+        columns, rows = (np.arange(free), np.eye(free)) if depends is None else depends.rows(i)
+        whole, lost = inverse[i if depends is None else 0]
+        variance = noise[i] if depends is None else float(np.mean(noise))
+        to_values = slopes[i] @ rows
+        covariance = variance * to_values @ whole[np.ix_(columns, columns)] @ to_values.T
+        undetermined = np.any(lost[columns] & (to_values != 0), axis=1)
+        errors[i] = np.where(undetermined, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+    return errors, percent, rmse
+
+
+def _inverse(products: Float[np.ndarray, "free free"]) -> tuple[np.ndarray, np.ndarray]:
+    """(JᵀJ)⁻¹ without the directions that change no force, and the numbers that take part in those."""
+    norms = np.sqrt(np.diag(products))
+    scale = np.where(norms > 0, norms, 1.0)
+    squares, directions = np.linalg.eigh(products / np.outer(scale, scale))
+    seen = squares > BLIND * squares[-1]
+    whole = (directions[:, seen] / squares[seen]) @ directions[:, seen].T
+    return whole / np.outer(scale, scale), np.sum(directions[:, seen] ** 2, axis=1) < 1.0 - 1e-3

@@ -1,0 +1,210 @@
+"""The result of `fit_many`: a row for each damper."""
+
+import dataclasses
+import functools
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from jaxdamp import _checks
+from jaxdamp._status import Status
+from jaxdamp._tables import Column, Shown, Table, plain, with_unit
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.covered import covered_range
+from jaxdamp.identify.dependence import Dependence
+from jaxdamp.identify.estimates import rounded
+from jaxdamp.identify.model import Model, law_of, rig_of, with_range
+from jaxdamp.parameters import Coordinates, FreeParameters
+from jaxdamp.rig import Rig
+
+
+OUTLYING = 6.0  # robust standard deviations from the other dampers from which one is named
+LEAST_SPREAD = 0.02  # of the median: numbers that differ by less do not make a damper stand out
+CERTAIN = 4.0  # standard errors by which it must differ as well
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class ManyFits:
+    """One law fitted to many dampers.
+
+    Attributes:
+        names: of the dampers.
+        records: the records of each damper.
+        settings: the setting of each damper, if stated.
+        values: of the free numbers of each damper, in their units, shape (dampers, free).
+        standard_errors: of the values; infinite for numbers that the records do not determine.
+        fit_percent: of each damper over its records.
+        rmse: of each damper over its records [N].
+        status: how the search of each damper ended.
+        steps: of each search.
+        free: the free parameters, with names, units and meanings.
+        dependence: how shared parameters depend on the setting.
+        vector: the numbers that the dependence is made of.
+    """
+
+    names: tuple[str, ...]
+    records: tuple[tuple[BenchRun, ...], ...]
+    settings: tuple[float, ...] | None
+    values: Float[np.ndarray, "dampers free"]
+    standard_errors: Float[np.ndarray, "dampers free"]
+    fit_percent: Float[np.ndarray, " dampers"]
+    rmse: Float[np.ndarray, " dampers"]
+    status: tuple[Status, ...]
+    steps: Int[np.ndarray, " dampers"]
+    free: FreeParameters
+    dependence: Dependence | None = None
+    vector: Float[np.ndarray, " size"] | None = None
+
+    @property
+    def converged(self) -> bool:
+        """Whether every search ended by its tolerance."""
+        return all(status is Status.CONVERGED for status in self.status)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The names of the free numbers."""
+        return tuple(self.free.names)
+
+    @functools.cached_property
+    def models(self) -> tuple[Model, ...]:
+        """The fitted law of each damper, on its machine if one was fitted."""
+        rows = zip(self.values, self.records, strict=True)
+        return tuple(with_range(self.free.started_at(row).tree, covered_range(runs)) for row, runs in rows)
+
+    @property
+    def laws(self) -> tuple[AbstractDamper, ...]:
+        """The fitted law of each damper, with the range of its records."""
+        return tuple(law_of(model) for model in self.models)
+
+    @property
+    def rigs(self) -> tuple[Rig | None, ...]:
+        """The fitted machine of each damper."""
+        return tuple(rig_of(model) for model in self.models)
+
+    def __len__(self) -> int:
+        """Number of dampers."""
+        return len(self.names)
+
+    def __getitem__(self, name: str) -> AbstractDamper:
+        """The fitted law of the damper of that name."""
+        _checks.one_of("name", name, self.names)
+        return self.laws[self.names.index(name)]
+
+    def law_at(self, setting: float) -> AbstractDamper:
+        """The law at a setting between those of the dampers.
+
+        Shared parameters follow their polynomials; all others are interpolated by straight lines between the
+        neighbouring settings.
+
+        Raises:
+            ValueError: no settings were given, or the setting is outside them.
+        """
+        if self.settings is None:
+            _checks.refuse("settings", "be given to `fit_many` for a law between them", None)
+        known = np.array(self.settings)
+        if not known.min() <= setting <= known.max():
+            must = f"be from {known.min():g} to {known.max():g}, where there are dampers"
+            _checks.refuse("setting", must, setting)
+        distinct = np.unique(known)
+        means = np.stack([self.values[known == own].mean(axis=0) for own in distinct])
+        values = np.array([np.interp(setting, distinct, column) for column in means.T])
+        if self.dependence is not None and self.vector is not None:
+            y = self.dependence.at_setting(self.vector, setting)
+            with_own = np.where(np.isnan(y), Coordinates(self.free, smooth="ordered").start, y)
+            shared = np.asarray(Coordinates(self.free, smooth="ordered").to_physical(jnp.asarray(with_own)))
+            values = np.where(np.isnan(y), values, shared)
+        runs = [run for own in self.records for run in own]
+        return law_of(with_range(self.free.started_at(values).tree, covered_range(runs)))
+
+    @functools.cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """For each damper how its search failed and in what it differs from the others; empty for most."""
+        texts: list[list[str]] = [[] if s is Status.CONVERGED else [s.sentence] for s in self.status]
+        misfit = 100.0 - self.fit_percent
+        for i, score in enumerate(_robust_scores(misfit, None)):
+            if score > OUTLYING:
+                texts[i].append(f"its error is {misfit[i] / np.median(misfit):.2g} times that of the others")
+        for j, name in enumerate(self.parameters):
+            expected, scores = self._expected(j)
+            apart = np.abs(self.values[:, j] - expected)
+            sure = (np.abs(scores) > OUTLYING) & (apart > CERTAIN * self.standard_errors[:, j])
+            for i in np.flatnonzero(sure):
+                unit = f" {self.free.owners[j].unit}".rstrip()
+                texts[i].append(f"{name} = {self.values[i, j]:.4g}{unit} where the others suggest {expected[i]:.4g}")
+        return tuple("; ".join(text) for text in texts)
+
+    @property
+    def unusual(self) -> tuple[str, ...]:
+        """The dampers with a remark."""
+        return tuple(name for name, remark in zip(self.names, self.remarks, strict=True) if remark)
+
+    def table(self) -> Table:
+        """A row for each damper: its parameters with standard errors, its error and a remark."""
+        columns = [Column("damper"), *([Column("setting")] if self.settings is not None else [])]
+        for name, owner in zip(self.parameters, self.free.owners, strict=True):
+            columns += [Column(name, owner.unit), Column("±", owner.unit)]
+        columns += [Column("fit", "%", ".1f"), Column("RMSE", "N", ".1f"), Column("remark")]
+        rows = []
+        for i, name in enumerate(self.names):
+            row: list[Any] = [name, *([self.settings[i]] if self.settings is not None else [])]
+            for value, error in zip(self.values[i], self.standard_errors[i], strict=True):
+                texts = rounded(float(value), float(error))
+                row += [Shown(float(value), texts[0]), Shown(float(error), texts[1])]
+            rows.append((*row, float(self.fit_percent[i]), float(self.rmse[i]), self.remarks[i]))
+        return Table(
+            f"{type(law_of(self.free.tree)).__name__} fitted to {len(self)} dampers", tuple(columns), tuple(rows)
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""
+        names = list(self.parameters)
+        units = dict(zip(names, (owner.unit for owner in self.free.owners), strict=True))
+        dampers = {
+            name: {
+                **({} if self.settings is None else {"setting": self.settings[i]}),
+                "values": plain(dict(zip(names, self.values[i].tolist(), strict=True))),
+                "standard_errors": plain(dict(zip(names, self.standard_errors[i].tolist(), strict=True))),
+                "fit": with_unit(float(self.fit_percent[i]), "%"),
+                "rmse": with_unit(float(self.rmse[i]), "N"),
+                "status": self.status[i].name.lower(),
+                "steps": int(self.steps[i]),
+                "remark": self.remarks[i],
+            }
+            for i, name in enumerate(self.names)
+        }
+        return {"law": repr(law_of(self.free.tree)), "units": units, "dampers": dampers}
+
+    def __repr__(self) -> str:
+        named = [f"{name}: {remark}" for name, remark in zip(self.names, self.remarks, strict=True) if remark]
+        head = f"{type(law_of(self.free.tree)).__name__} fitted to {len(self)} dampers: mean fit"
+        return "\n".join([f"{head} {np.mean(self.fit_percent):.1f} %, RMSE up to {np.max(self.rmse):.4g} N", *named])
+
+    def _expected(self, j: int) -> tuple[np.ndarray, np.ndarray]:
+        """What the other dampers suggest for a number of each, and by how many deviations it differs."""
+        values = self.values[:, j]
+        scores = _robust_scores(values, self.settings)
+        trend = _trend(values, self.settings)
+        return trend, scores
+
+
+def _trend(values: np.ndarray, settings: tuple[float, ...] | None) -> np.ndarray:
+    """The median, or with settings a line through the medians of slopes and levels (Theil and Sen)."""
+    if settings is None or np.ptp(settings) == 0:
+        return np.full(values.shape, np.median(values))
+    x = np.array(settings)
+    first, second = np.triu_indices(x.size, 1)
+    apart = x[second] != x[first]
+    slope = np.median((values[second] - values[first])[apart] / (x[second] - x[first])[apart])
+    return slope * x + np.median(values - slope * x)
+
+
+def _robust_scores(values: np.ndarray, settings: tuple[float, ...] | None) -> np.ndarray:
+    """Distances from the trend in deviations, as the median of distances gives them; zero for four dampers or fewer."""
+    if values.size < 5:
+        return np.zeros(values.shape)
+    trend = _trend(values, settings)
+    spread = max(1.4826 * np.median(np.abs(values - trend)), LEAST_SPREAD * np.median(np.abs(values)))
+    return (values - trend) / spread if spread > 0 else np.zeros(values.shape)

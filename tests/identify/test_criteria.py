@@ -1,0 +1,91 @@
+"""Robust losses and priors."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import Besinger, Bilinear, Linear
+from jaxdamp.identify import fit
+
+
+TRUTH = Bilinear(2600.0, 1200.0)
+
+
+@pytest.fixture(scope="module")
+def spiky(sines) -> list[BenchRun]:
+    """Noise of 5 N, and one sample in fifty with a spike of 500 N."""
+    rng, runs = np.random.default_rng(3), sines(TRUTH, noise=5.0)
+    spikes = [500.0 * (rng.random(len(run)) < 0.02) for run in runs]
+    return [dataclasses.replace(run, force=run.force + s) for run, s in zip(runs, spikes, strict=True)]
+
+
+@pytest.mark.parametrize("loss", ["huber", "soft_l1", "student_t"])
+def test_spikes_hardly_move_a_robust_fit(spiky, loss):
+    squares, robust = fit(Bilinear, spiky), fit(Bilinear, spiky, loss=loss)
+    away = [abs(r["rebound_rate"].value - 2600.0) for r in (squares, robust)]
+    assert away[1] < 3.0 * robust["rebound_rate"].standard_error < 0.25 * squares["rebound_rate"].standard_error
+    assert away[1] < 0.2 * away[0]
+    assert f"loss {loss}: " in robust.criterion and "less than half weight" in robust.criterion
+    assert robust.criterion in repr(robust)
+    assert robust.to_dict()["criterion"] == robust.criterion and robust.criterion in robust.table().title
+
+
+def test_standard_errors_of_robust_fits_hold_with_normal_noise(sines):
+    robust = [fit(Linear(1000.0), sines(Linear(1500.0), noise=20.0, seed=s), loss="huber") for s in range(40)]
+    scores = [(r["rate"].value - 1500.0) / r["rate"].standard_error for r in robust]
+    plain = fit(Linear(1000.0), sines(Linear(1500.0), noise=20.0))
+    assert 0.75 < np.std(scores) < 1.3
+    assert robust[0]["rate"].standard_error == pytest.approx(1.026 * plain["rate"].standard_error, rel=0.03)
+
+
+def test_a_prior_is_weighed_against_the_records(sines):
+    runs = sines(Linear(1500.0), noise=20.0)
+    alone = fit(Linear(1000.0), runs, force_noise=20.0)["rate"]
+    error, mean = alone.standard_error, alone.value + 3.0 * alone.standard_error
+    result = fit(Linear(1000.0), runs, force_noise=20.0, priors={"rate": (mean, error)})
+    assert result["rate"].value == pytest.approx(alone.value + 1.5 * error, abs=0.01 * error)
+    assert result["rate"].standard_error == pytest.approx(error / np.sqrt(2.0), rel=1e-3)
+    assert result.criterion.startswith("priors rate 15")
+    estimated = fit(Linear(1000.0), runs, priors={"rate": (mean, error)})  # with the noise that the residual shows
+    assert estimated["rate"].value == pytest.approx(result["rate"].value, abs=0.1 * error)
+
+
+def test_a_prior_determines_what_the_records_do_not(sines):
+    slow = sines(Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05), noise=5.0, tests=[(0.01, 1.0)])  # never opens the valve
+    known = {"blow_off_rate": (900.0, 50.0), "limit_velocity": (0.13, 0.005)}
+    start = Besinger(1500.0, 4000.0, 1000.0, 0.12, 0.06)
+    result = fit(start, slow, priors=known, starts=1)
+    assert result["blow_off_rate"].value == pytest.approx(900.0, abs=1.0)
+    assert result["blow_off_rate"].standard_error == pytest.approx(50.0, rel=0.05)
+
+
+def test_the_bias_by_noise_of_the_velocity_is_reported(sines):
+    rng, exact = np.random.default_rng(5), sines(Linear(1500.0), noise=2.0)
+    deviation = 0.1  # m/s
+    runs = [dataclasses.replace(r, velocity=r.velocity + deviation * rng.standard_normal(len(r))) for r in exact]
+    result = fit(Linear(1000.0), runs, input_noise=(0.0, deviation))
+    rate = result["rate"]
+    assert rate.value < 1500.0 - 3.0 * rate.standard_error
+    assert rate.bias == pytest.approx(rate.value - 1500.0, rel=0.15)
+    assert any("biases rate by about -" in warning for warning in result.warnings)
+    assert result.table().records()[0]["bias by input noise"] == rate.bias
+    assert result.to_dict()["parameters"][0]["bias"] == rate.bias
+    none = fit(Linear(1000.0), exact, input_noise=(1e-6, 1e-5))
+    assert abs(none["rate"].bias) < 0.1 * none["rate"].standard_error and not none.warnings
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"loss": "hubber"}, "Did you mean 'huber'"),
+        ({"input_noise": (-1.0, 0.0)}, "`input_noise` must be"),
+        ({"priors": {"rat": (1.0, 1.0)}}, "No parameter is named 'rat'"),
+        ({"priors": {"rate": (1.0, 0.0)}}, "be a mean and a positive standard deviation"),
+    ],
+)
+def test_what_is_refused(sines, options: dict[str, Any], message: str):
+    with pytest.raises(ValueError, match=message):
+        fit(Linear(1000.0), sines(Linear(1500.0)), **options)

@@ -1,0 +1,117 @@
+"""Many dampers in one call: the optimum of single fits, shared parameters, dampers that stand out."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from jaxdamp import identify
+from jaxdamp.bench import BenchRun, SineTest, VirtualDyno
+from jaxdamp.dampers import AbstractDamper, Bilinear, Lag, Linear, Scheduled, with_command
+from jaxdamp.identify import Status, fit, fit_many
+from jaxdamp.parameters import get
+from jaxdamp.rig import Rig
+
+
+TESTS = [SineTest(0.02, 1.0), SineTest(0.01, 4.0)]
+CLICKS = (0.0, 2.0, 4.0, 6.0, 8.0, 10.0)
+
+
+def records(law: AbstractDamper, seed: int = 0, rig: Rig | None = None) -> list[BenchRun]:
+    return list(VirtualDyno(law, rig=rig or Rig(), force_noise=4.0, sampling_rate=200.0, seed=seed).run(TESTS))
+
+
+@pytest.fixture(scope="module")
+def clicks() -> dict[str, list[BenchRun]]:
+    """Rebound by clicks, compression and gas force common to all."""
+    laws = {f"{c:g}": Bilinear(2000.0 + 100.0 * c - 4.0 * c**2, 1200.0) for c in CLICKS}
+    return {name: records(law, i, Rig(gas_force=-80.0)) for i, (name, law) in enumerate(laws.items())}
+
+
+@pytest.mark.parametrize(
+    ("start", "options"),
+    [
+        (Bilinear, {"rig": "gas"}),
+        (Lag(Bilinear(1500.0, 1500.0), 2e-3), {"rig": "gas", "bounds": {"lag_time": (1e-4, 1e-2)}}),
+    ],
+    ids=["memoryless", "with a state"],
+)
+def test_the_optimum_is_that_of_single_fits(clicks, start, options):
+    many = fit_many(start, clicks, **options)
+    assert many.converged and many.names == tuple(clicks) and len(many) == 6
+    for i in (0, 5):
+        single = fit(start, clicks[many.names[i]], starts=1, **options)
+        assert many.parameters == tuple(e.name for e in single.parameters)
+        values, errors = (
+            np.array([getattr(e, name) for e in single.parameters]) for name in ("value", "standard_error")
+        )
+        np.testing.assert_allclose(many.values[i], values, atol=1e-2 * errors.min(), rtol=1e-3)
+        np.testing.assert_allclose(many.standard_errors[i], errors, rtol=1e-2)
+        assert many.rmse[i] == pytest.approx(single.rmse, rel=0.02)
+        assert repr(many.laws[i].fitted_to) == repr(single.law.fitted_to)
+        assert float(get(many.rigs[i], "gas_force")) == pytest.approx(-80.0, abs=2.0)
+
+
+def test_shared_parameters_follow_the_setting(clicks):
+    some = {name: runs for name, runs in clicks.items() if name != "4"}
+    settings = [float(name) for name in some]
+    shared = {"rebound_rate": 2, "compression_rate": 0, "gas_force": 0}
+    many = fit_many(Bilinear, some, rig="gas", shared=shared, settings=settings)
+    assert many.converged
+    assert np.ptp(many.values[:, 1]) == 0.0 and many.values[0, 1] == pytest.approx(1200.0, abs=5.0)
+    between = many.law_at(4.0)  # never measured
+    assert float(get(between, "rebound_rate")) == pytest.approx(2336.0, abs=8.0)
+    apart = fit_many(Bilinear, some, rig="gas", settings=settings)
+    assert np.all(many.standard_errors[:, 1] < 0.6 * apart.standard_errors[:, 1])
+    assert float(get(apart.law_at(4.0), "rebound_rate")) == pytest.approx(np.mean(apart.values[[1, 2], 0]))
+    with pytest.raises(ValueError, match="`setting` must be from 0 to 10"):
+        many.law_at(11.0)
+
+
+def test_a_bad_run_stands_out(clicks):
+    bad = [BenchRun(r.name, r.time, r.stroke, r.velocity, 1.5 * r.force) for r in clicks["4"]]
+    many = fit_many(Bilinear, clicks | {"4": bad}, rig="gas", settings=CLICKS)
+    assert many.unusual == ("4",)
+    assert "rebound_rate = " in many.remarks[2] and "where the others suggest" in many.remarks[2]
+    assert many.remarks[2] in repr(many)
+    assert not any(fit_many(Bilinear, clicks, rig="gas", settings=CLICKS).remarks)
+    row = many.table().records()[2]
+    assert row["damper"] == "4" and row["setting"] == 4.0 and row["remark"] == many.remarks[2]
+    data = json.loads(json.dumps(many.to_dict(), allow_nan=False))
+    assert data["units"]["law.rebound_rate"] == "N s/m" and data["dampers"]["4"]["status"] == "converged"
+
+
+def test_several_starts_side_by_side(clicks):
+    start = Lag(Bilinear(1500.0, 1500.0), 0.3)  # a lag so long that its neighbourhood is flat
+    few = fit_many(start, [clicks["0"]], rig="gas", max_steps=3)
+    assert few.status == (Status.STEP_LIMIT,) and few.remarks[0].startswith("The search stopped")
+    assert fit_many(start, [clicks["0"]], rig="gas", max_steps=3, starts=4).rmse[0] <= few.rmse[0]
+
+
+def test_dampers_with_commands():
+    law = Scheduled((Linear(1000.0), Linear(3000.0)), [0.0, 2.0], 0.0)
+    dampers = [
+        [BenchRun(r.name, r.time, r.stroke, r.velocity, r.force, command=u) for r in records(with_command(law, u))]
+        for u in (0.5, 1.5)
+    ]
+    together = [run for runs in dampers for run in runs]
+    many = fit_many(law, [together, together])
+    np.testing.assert_allclose(many.values, [[1000.0, 3000.0]] * 2, rtol=0.01)
+
+
+def test_what_is_refused(clicks):
+    refusals: tuple[tuple[dict[str, Any], str], ...] = (
+        ({"shared": {"rebound_rate": 1}}, "`settings` must be given"),
+        ({"shared": {"rebound_rate": 6}, "settings": CLICKS}, "degrees below the number of settings, 6"),
+        ({"shared": ["rebound"]}, "No parameter is named 'rebound'"),
+        ({"settings": CLICKS[:3]}, "one number for each of 6 dampers"),
+        ({"starts": 0}, "`starts` must be 1 or more"),
+        ({"starts": 2, "shared": ["rebound_rate"]}, "`starts` must be 1 with shared parameters"),
+    )
+    for options, message in refusals:
+        with pytest.raises(ValueError, match=message):
+            fit_many(Bilinear, clicks, **options)
+    with pytest.raises(ValueError, match="`dampers` must hold at least one damper"):
+        fit_many(Bilinear, {})
+    assert identify.ManyFits is type(fit_many(Bilinear, [clicks["0"]]))
