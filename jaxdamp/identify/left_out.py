@@ -142,7 +142,7 @@ def _effects(problem: Problem, best: SearchEnd) -> list[_Effect]:
         ("friction", False, "friction of {:.3g} N", f"{TO_THE_MACHINE}, or take a law with friction"),
         ("delay", True, "a delay of the force by {:.2g} s", f"{TO_THE_MACHINE}, or take a law with hysteresis"),
         ("heat", True, "damping that falls as the oil warms up", f"{TO_THE_MACHINE}, or cut the records"),
-        *(("clearance", False, gap, "look for play in the mounts, or take a law with clearance") for gap in gaps),
+        *(("clearance", False, gap, "look for play in the mounts, or put the law into `Play`") for gap in gaps),
     ]
     signals = np.zeros((len(kinds), best.residual.size))
     weight = _channel(problem, "weight")
