@@ -1,6 +1,7 @@
 """The law of Karadayi and Masada as a case, the derivative by the clearance, laws that are refused."""
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -23,12 +24,12 @@ def test_around_a_dashpot_with_friction_it_is_the_law_of_karadayi_and_masada():
 @pytest.mark.parametrize("name", ["clearance", "stiffness"])
 def test_derivatives_agree_with_differences(name):
     t = np.linspace(0.0, 0.4, 801)
-    x, v = 0.005 * np.sin(20 * t), 0.1 * np.cos(20 * t)
+    x, v = jnp.asarray(0.005 * np.sin(20 * t)), jnp.asarray(0.1 * np.cos(20 * t))
     law = Play(DASHPOT, 6e5, 3e-4)
 
     @jax.jit
     def energy(value):  # an integral, since single samples jump where the clearance ends
-        return jax.numpy.sum(march(with_values(law, {name: value}), jax.numpy.asarray(5e-4), x, v, 1) * v) * 5e-4
+        return jnp.sum(march(with_values(law, {name: value}), jnp.asarray(5e-4), x, v, 1) * v) * 5e-4
 
     value = getattr(law, name)
     small = 1e-3 * value

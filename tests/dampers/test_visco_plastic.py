@@ -11,10 +11,9 @@ from .motions import last_cycle
 from .single_precision import single_precision_error
 
 
-def make(flow=1.0, times=1e3, asymmetry=0.8):
-    times = np.broadcast_to(times, 2)
+def make(flow=1.0, times=(1e3, 1e3), asymmetry=0.8):
     return ViscoPlastic(
-        100.0 * flow, 800.0 * flow, 0.5, 0.002, [150.0, 400.0], [1e-4, 5e-5], [0.0, 2e-4], times, asymmetry
+        100.0 * flow, 800.0 * flow, 0.5, 0.002, [150.0, 400.0], [1e-4, 5e-5], [0.0, 2e-4], [*times], asymmetry
     )
 
 
@@ -36,7 +35,7 @@ def test_after_a_reversal_the_force_stays_on_a_shelf_over_the_clearance_and_then
 def test_the_force_relaxes_at_rest():
     t = np.linspace(0.0, 1.0, 2001)
     v = np.where(t < 0.5, 0.05, 0.0)
-    force = np.asarray(respond(make(flow=0.0, times=[0.2, 0.05]), t, np.cumsum(v) * 5e-4, v))
+    force = np.asarray(respond(make(flow=0.0, times=(0.2, 0.05)), t, np.cumsum(v) * 5e-4, v))
     later, rest = (t > 0.55), t[t > 0.55] - 0.5
     first = 150.0 * np.exp(-rest / 0.2)
     second = 400.0 * np.maximum(2.5e-4 * np.exp(-rest / 0.05) - 2e-4, 0.0) / 5e-5
