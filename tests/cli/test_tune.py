@@ -54,7 +54,7 @@ def test_sweep_of_a_vehicle_from_a_file_writes_a_table_and_pictures(tmp_path: Pa
     to_json(vehicles.presets.half_car_002(), tmp_path / "car.json")
     words = ["--over", "front.damper.rate=1000:2000:2", "--over", "rear.damper.rate=800;1600", "--metric", "comfort"]
     out = tmp_path / "swept"
-    jaxdamp("sweep", tmp_path / "car.json", "white:C", *words, "--out", out)
+    jaxdamp("sweep", tmp_path / "car.json", "bump:0.05:4", "--duration", "1.5", "--dt", "2e-3", *words, "--out", out)
     rows = list(csv.DictReader((out / "sweep.csv").read_text().splitlines()))
     assert len(rows) == 4 and "weighted_rms_sprung_acceleration [m/s²]" in rows[0]
     assert (out / "weighted_rms_sprung_acceleration.png").is_file() and (out / "sweep.nc").is_file()
