@@ -43,6 +43,10 @@ def entry(x):
     return lax.dynamic_index_in_dim(x, (x[2] * 10).astype(int), keepdims=False), lax.dynamic_slice(x, [1], [2])
 
 
+def replaced(x):
+    return x.at[0].set(2.0 * x[1]), x.at[1:].set(x[:2]), x.at[-1].set(0.0)
+
+
 def matrix(x):
     rows = jnp.stack([x, 2.0 * x])
     return jnp.outer(x, x) @ x, rows.T.reshape(-1)[::-1], jnp.cumsum(x), lax.cumsum(x, reverse=True)
@@ -98,7 +102,7 @@ IN_DOUBLE = [root, slopes, known]
 FUNCTIONS = {
     f.__name__: f
     for f in [
-        *(series, swapped, branch, entry, matrix, padded, reduced, limits),
+        *(series, swapped, branch, entry, replaced, matrix, padded, reduced, limits),
         *(rounded, powers, functions, whole, chosen, *IN_DOUBLE),
     ]
 }
@@ -180,6 +184,7 @@ def test_each_operation_is_computed_once_and_nothing_in_vain():
         (lambda x: jnp.linalg.solve(jnp.eye(3), x), "'lu'"),
         (lambda x: lax.dot_general(x[None], x[None], (((), ()), ((0,), (0,)))), "batch"),
         (lambda x: lax.pad(x, 0.0, [(-1, 0, 0)]), "'pad'"),
+        (lambda x: x.at[x[0].astype(int)].set(1.0), "'scatter'"),
     ],
 )
 def test_what_cannot_be_printed_is_refused_by_name(function, said):

@@ -27,12 +27,13 @@ def compiler(name="gcc"):
 
 
 def motion():
-    """A random stroke [m] of 10 mm with its velocity [m/s]."""
+    """A random stroke [m] about a sine of 12 mm, which reaches a bump stop, with its velocity [m/s]."""
     rng = np.random.default_rng(7)
-    frequency, phase = rng.uniform(1.0, 40.0, 6), rng.uniform(0.0, 6.28, 6)
-    angle = 2.0 * np.pi * frequency * np.arange(INSTANTS)[:, None] * STEP + phase
-    size = 0.05 / (2.0 * np.pi * frequency)
-    return (size * np.sin(angle)).sum(1), (size * 2.0 * np.pi * frequency * np.cos(angle)).sum(1)
+    frequency, phase = np.append(rng.uniform(1.0, 40.0, 6), 5.0), np.append(rng.uniform(0.0, 6.28, 6), 0.0)
+    omega = 2.0 * np.pi * frequency
+    angle = omega * np.arange(INSTANTS)[:, None] * STEP + phase
+    size = np.append(0.05 / omega[:-1], 0.012)
+    return (size * np.sin(angle)).sum(1), (size * omega * np.cos(angle)).sum(1)
 
 
 def drive(name, states):

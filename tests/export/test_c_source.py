@@ -16,8 +16,8 @@ from tests.export.compiled import STRICT, compiled, compiler, in_c, in_jax, wors
 
 PLAIN = ["Besinger, car", "lag, power", "polynomial"]  # elementary functions, states, a loop
 CLOSE = 1e-12
-# The slope of its root is the quotient of two small numbers, which rounding changes in the eleventh digit.
-CLOSE_SLOPES = {"modified Bouc and Wen, published": 1e-10}
+# The slope of its root is a quotient of differences of nearly equal numbers: rounding counts a million times.
+CLOSE_SLOPES = {"modified Bouc and Wen, published": 1e-6}
 
 
 def check(names, folder):
