@@ -35,6 +35,7 @@ def read(
     settings: str | Mapping[str, Settings] | None = None,
     manifest: str | os.PathLike[str] | bool = True,
     readers: Mapping[str, Reader] | None = None,
+    stroke_from_velocity: bool | None = None,
     skip_bad: bool = False,
 ) -> BenchSet:
     r"""Read bench records from text files, workbooks, MATLAB, TDMS, MDF4 and Parquet files.
@@ -64,6 +65,8 @@ def read(
         manifest: a TOML file with these arguments; True takes `jaxdamp.toml` of the folder that is read, and a note
             says so; False takes none. What is given in the call wins.
         readers: suffix to function that reads such files, beside or instead of `READERS` (docs/own_reader.md).
+        stroke_from_velocity: integrate the velocity of files without a stroke, as for laws that need no place of the
+            stroke; `BenchRun.stroke_is_integrated` says so.
         skip_bad: leave out files that cannot be read, instead of reading none; `BenchSet.left_out` says which and why.
 
     Returns:
@@ -99,6 +102,7 @@ def read(
         "delimiter": delimiter,
         "command": command,
         "settings": settings,
+        "stroke_from_velocity": stroke_from_velocity,
     }
     own_readers, note = with_own(readers), ()
     file = find_manifest(manifest, asked)
@@ -109,7 +113,8 @@ def read(
     signs.check_words(given["sign"], given["force_sign"])
     if given["sampling_rate"] is not None:
         _checks.positive("sampling_rate", given["sampling_rate"])
-    choice = Choice(*({**(given[name] or {})} for name in ("columns", "units", "gains")))
+    tables = ({**(given[name] or {})} for name in ("columns", "units", "gains"))
+    choice = Choice(*tables, stroke_from_velocity=bool(given["stroke_from_velocity"]))
     how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"])
     files = find_files(asked, folder_suffixes(readers))
     runs, left_out = _read_files(files, own_readers, given["delimiter"], how, skip_bad)

@@ -216,6 +216,12 @@ def evaluate(
     chosen = as_records(runs, "evaluate(runs)")
     whole = [run for run in chosen if run.cycles]
     notes = [f"{run.name} has no full cycle: it is not evaluated." for run in chosen if not run.cycles]
+    notes += [
+        f"{run.name}: the stroke was integrated from the velocity, so that forces at mid-stroke and gas force belong "
+        "to the middle of the motion, wherever in the damper that is."
+        for run in whole
+        if run.stroke_is_integrated
+    ]
     if not whole:
         _checks.refuse("runs", "hold a record with a full cycle", ", ".join(run.name for run in chosen))
     settings: dict[str, tuple[BenchRun, ...]] = {}

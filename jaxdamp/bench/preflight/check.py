@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # In this order; where one family finds an error in a record, the later ones are left out for it.
 FAMILIES = (
-    (motion_checks.magnitudes, motion_checks.few_samples, motion_checks.few_cycles),
+    (motion_checks.magnitudes, motion_checks.few_samples, motion_checks.few_cycles, motion_checks.integrated),
     (channel_checks.stuck, channel_checks.clipping, motion_checks.rest, motion_checks.run_up),
     (channel_checks.spikes, channel_checks.quantisation, channel_checks.ripple, consistency.velocity, consistency.sign),
     (motion_checks.jitter, consistency.gas_force, consistency.delay, consistency.breakaway, consistency.drift),

@@ -55,6 +55,14 @@ def run_up(e: Examined) -> list[Finding]:
     return found
 
 
+def integrated(e: Examined) -> list[Finding]:
+    """A stroke that no channel measured."""
+    if not e.run.stroke_is_integrated:
+        return []
+    message = "the stroke was integrated from the velocity: its place in the damper is not known"
+    return e.finding("note", "stroke integrated", message, remedy="Laws that depend on the stroke need its channel.")
+
+
 def few_cycles(e: Examined) -> list[Finding]:
     """Too few full cycles to know the scatter."""
     count = max(len(cycle_instants(e.run.time, e.run.stroke)) - 1, 0)
