@@ -1,7 +1,7 @@
 """The evaluation of records: every measurement, as tables, plain data and pictures."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -154,7 +154,8 @@ class Evaluation:
         """One row for each measurement, for files."""
         columns = (Column("setting"), Column("record"), Column("quantity"), Column("velocity", "m/s"))
         columns += (Column("unit"), Column("value"), Column("scatter", spec=".2g"), Column("count", spec="d"))
-        rows = ((m.setting, m.record, m.quantity, m.velocity, m.unit, m.value, m.scatter, m.count)
+        columns += (Column("uncertainty", spec=".2g"),)
+        rows = ((m.setting, m.record, m.quantity, m.velocity, m.unit, m.value, m.scatter, m.count, m.uncertainty)
                 for m in self.measurements)  # fmt: skip
         return Table("All measurements", columns, tuple(rows))
 
@@ -246,8 +247,7 @@ def evaluate(
         except ArgumentError as error:
             notes.append(f"Gas force and friction were not separated. {error}")
         else:
-            found += [Measurement(m.quantity, m.unit, m.value, m.scatter, m.count, name, m.record)
-                      for m in gas[name].measurements if np.isfinite(m.value)]  # fmt: skip
+            found += [replace(m, setting=name) for m in gas[name].measurements if np.isfinite(m.value)]
             notes += [f"{slowest.name}: {gas[name].note}"] if gas[name].note else []
     stated = tuple(sorted({m.velocity for m in found if m.velocity is not None}))
     return Evaluation(tuple(found), settings, cycles, gas, stated, method, tuple(notes))
