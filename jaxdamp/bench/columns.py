@@ -1,7 +1,7 @@
 """Which column of a table is which quantity, and in which unit."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NoReturn
 
@@ -188,11 +188,11 @@ def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tu
     return found, tuple(notes)
 
 
-def is_record(table: RawTable, choice: Choice) -> bool:
-    """Whether a table has a stroke or a force, or its columns have no names to tell."""
+def is_record(table: RawTable, choice: Choice, roles: Sequence[str] = REQUIRED) -> bool:
+    """Whether a table has one of these quantities, or its columns have no names to tell."""
     if not table.is_named:
         return len(table.columns) > 1
-    return any(role in choice.columns or _candidates(table, role, choice) for role in REQUIRED)
+    return any(_places(table, choice.columns.get(role)) or _candidates(table, role, choice) for role in roles)
 
 
 def _column(table: RawTable, role: str, choice: Choice) -> tuple[Column | None, list[str]]:

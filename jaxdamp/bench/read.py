@@ -19,6 +19,7 @@ from jaxdamp.bench.record import Interpretation, records
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.settings import Settings, settings_by_name
+from jaxdamp.bench.several_clocks import on_one_clock
 
 
 def read(
@@ -156,6 +157,7 @@ def _names(files: Sequence[Path]) -> list[str]:
 
 def _read_file(tables: Sequence[RawTable], name: str, how: Interpretation) -> list[tuple[str, BenchRun]]:
     """The records of a file. Tables without stroke and force are left out of a file that has others, with a note."""
+    tables = on_one_clock(tables, how.choice) if len(tables) > 1 else tables
     good = [table for table in tables if is_record(table, how.choice)] or tables
     rest = ", ".join(repr(table.record) for table in tables if table not in good)
     note = (f"{rest} of the file left out: neither stroke nor force",) if rest else ()

@@ -117,9 +117,10 @@ def separate_gas_and_friction(run: BenchRun, *, up_to: float = LOW_SPEED) -> Gas
     directions fit clearly better, these are taken; bleed rates are mean slopes over the range. Where the velocity is
     constant, as under a triangle, friction and damping cannot be told apart, and the note says so.
 
-    The uncertainty of gas force and friction is twice the standard error, twice the change that the next higher power
-    would make, and half the change that the parabolas made, as the root of the sum of squares. It holds the true values of laws with a finite slope at zero velocity; a power law with an
-    exponent below one looks like friction at any velocity that is measured.
+    The uncertainty of gas force and friction is the root of the sum of squares of twice the standard error, twice the
+    change that the next higher power would make, and half the change that the parabolas made. It holds the true values
+    of laws with a finite slope at zero velocity; a power law with an exponent below one looks like friction at any
+    velocity that is measured.
 
     Arguments:
         run: the record.
