@@ -282,6 +282,12 @@ def test_plain_data_text_and_pictures(two_settings):
     assert {axes.get_title(loc="left") for axes in figure.axes} >= {"Force over stroke", "Force over acceleration"}
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels[:3] == ["baseline", "setting 1", "setting 3"] and labels[-1] == "limits, not kept"
+    over_time = next(axes for axes in figure.axes if axes.get_title(loc="left") == "Force over time")
+    bands, loops = over_time.collections, len(two_settings.runs) + len(two_settings.runs)  # of the baseline too
+    assert (
+        "± scatter over cycles" in labels
+        and len([band for band in bands if band.get_paths()[0].vertices.size]) == loops
+    )
     assert two_settings.gas_and_friction["1"].plot().axes
     assert two_settings.gas_and_friction["1"].to_dict()["record"] == "soft 0.5 Hz"
 
