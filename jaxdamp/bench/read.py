@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxdamp import _checks
+from jaxdamp._checks import Setting
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice, is_record
 from jaxdamp.bench.files import find_files
@@ -143,7 +144,9 @@ def _read_files(
     for error in errors if not skip_bad or not runs else ():
         with problems.collected():
             raise error
-    problems.raise_any()
+    setting, count = Setting("skip_bad", True), len(files) - len(errors)
+    others = "The other file" if count == 1 else f"The other {count} files"
+    problems.raise_any(f"{others} can be read: {setting} leaves out what cannot." if runs else "", setting)
     return runs, tuple(map(str, errors))
 
 

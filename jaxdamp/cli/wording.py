@@ -32,6 +32,7 @@ OPTIONS = (
     "sampling_rate",
     "seed",
     "sign",
+    "skip_bad",
     "speed",
     "starts",
     "stroke_from_velocity",

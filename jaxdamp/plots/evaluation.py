@@ -26,8 +26,8 @@ def evaluation(
 ) -> "matplotlib.figure.Figure":
     """Mean cycles of records over velocity, stroke, acceleration and time, and forces over velocity.
 
-    One setting: a colour for each record, from slow to fast. Several: a colour for each setting. Bands show the standard
-    deviation of the force from cycle to cycle.
+    One setting: a colour for each record, from slow to fast. Several: a colour for each setting. Bands show the
+    standard deviation of the force from cycle to cycle.
 
     Arguments:
         evaluation: what is to be shown.

@@ -142,3 +142,10 @@ def test_files_without_a_stroke(folder: Path, tmp_path: Path) -> None:
     words = ("--stroke-from-velocity", "--out", tmp_path / "out")
     flat = " ".join(jaxdamp("bench", tmp_path / "v.csv", *words).output.split())
     assert "the stroke was integrated from the velocity" in flat and "stroke integrated from the velocity, less" in flat
+
+
+def test_a_broken_file_among_others_names_the_option_that_leaves_it_out(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "broken.csv").write_text("t_s,x_mm,F_N\n0,1,x\n1,2\n")
+    words = ("bench", folder / "10mm_2Hz.csv", tmp_path / "broken.csv", "--out", tmp_path / "out")
+    assert "The other file can be read: --skip-bad leaves out what cannot." in refused(tmp_path, *words)
+    assert "left out: " in jaxdamp(*words, "--skip-bad").output
