@@ -1,7 +1,7 @@
 """Which column of a table is which quantity, and in which unit."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NoReturn
 
@@ -120,11 +120,13 @@ class Choice:
         columns: quantity to header or number of the column (from 0); None means that the file's column is not used.
         units: quantity to unit; wins over the header.
         gains: quantity to gain of the sensor, "500 N/V".
+        stroke_from_velocity: integrate the velocity where a table has no stroke.
     """
 
     columns: Mapping[str, str | int | None] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     gains: Mapping[str, str] = field(default_factory=dict)
+    stroke_from_velocity: bool = False
 
     def __post_init__(self) -> None:
         for name in ("columns", "units", "gains"):
@@ -134,7 +136,8 @@ class Choice:
 
     def asks_for(self, role: str) -> bool:
         """Whether the caller wants this quantity, so that it must not be left out."""
-        return self.columns.get(role) is not None or role in self.units or role in self.gains
+        named = self.columns.get(role) is not None or role in self.units or role in self.gains
+        return named or (role == "velocity" and self.stroke_from_velocity)
 
 
 def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tuple[str, ...]]:
@@ -176,7 +179,8 @@ def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tu
             notes += more
             if column is not None:
                 found[role] = column
-    for role in REQUIRED:
+    integrated = choice.stroke_from_velocity and "stroke" not in found
+    for role in ("velocity", "force") if integrated else REQUIRED:
         with problems.collected():
             if role not in found:
                 _refuse_missing(table, role, found)
@@ -184,11 +188,11 @@ def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tu
     return found, tuple(notes)
 
 
-def is_record(table: RawTable, choice: Choice) -> bool:
-    """Whether a table has a stroke or a force, or its columns have no names to tell."""
+def is_record(table: RawTable, choice: Choice, roles: Sequence[str] = REQUIRED) -> bool:
+    """Whether a table has one of these quantities, or its columns have no names to tell."""
     if not table.is_named:
         return len(table.columns) > 1
-    return any(role in choice.columns or _candidates(table, role, choice) for role in REQUIRED)
+    return any(_places(table, choice.columns.get(role)) or _candidates(table, role, choice) for role in roles)
 
 
 def _column(table: RawTable, role: str, choice: Choice) -> tuple[Column | None, list[str]]:
@@ -316,17 +320,22 @@ def _signal(name: str) -> str:
 def _refuse_missing(table: RawTable, role: str, found: Mapping[str, Column | None]) -> NoReturn:
     """Refuse a table without a stroke or a force; propose a column that is no other quantity."""
     names = ", ".join(map(repr, table.names))
+    settings = (Setting("stroke_from_velocity", True),) if role == "stroke" and found.get("velocity") else ()
+    other = f" Or integrate the velocity, if the law needs no place of the stroke: {settings[0]}." if settings else ""
     taken = {column.index for column in found.values() if column is not None}
     left = [i for i, column in enumerate(table.columns) if i not in taken and not column.is_text]
     free = [i for i in left if not _is_other(table.columns[i], role)]
     if not free:
         raise ArgumentError(
             f"{table.where} has no column for the {role}: its columns are {names}, all of them other quantities. A "
-            f"record needs the {role}: export the file again with it."
+            f"record needs the {role}: export the file again with it.{other}",
+            *settings,
         )
     choice = Setting("columns", {role: table.columns[free[0]].name or free[0]})
     raise ArgumentError(
-        f"{table.where} has no column for the {role}: its columns are {names}. Name it, for example {choice}.", choice
+        f"{table.where} has no column for the {role}: its columns are {names}. Name it, for example {choice}.{other}",
+        choice,
+        *settings,
     )
 
 

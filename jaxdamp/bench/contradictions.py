@@ -11,7 +11,7 @@ from jaxdamp.bench.motion import crossings, extended
 from jaxdamp.bench.runs import BenchRun
 
 
-ALIKE = 0.05  # relative difference of amplitudes, and of frequencies, of the same motion
+ALIKE = 0.05  # relative difference of amplitudes, of frequencies, and of periods, of the same motion
 SAME_SHAPE = 0.1  # RMS difference of two strokes over a cycle, relative to their amplitude, of the same motion
 OTHER_FORCE = 0.1  # RMS difference of two forces, relative to their RMS, from which they contradict
 BEYOND_SCATTER = 5.0  # and relative to what the cycles of one record differ by
@@ -98,7 +98,8 @@ def _mean_cycle(run: BenchRun) -> _Cycle | None:
     rising, _ = crossings(run.time, run.stroke)
     instants = extended(run.time, run.stroke, rising, 1 / run.frequency)
     count = len(instants) - 1
-    if count < 1:
+    periods = np.diff(instants)
+    if count < 1 or np.median(np.abs(periods / np.median(periods) - 1.0)) > ALIKE:
         return None
     within = (run.time >= instants[0]) & (run.time < instants[-1])
     phase = np.interp(run.time[within], instants, np.arange(count + 1.0))

@@ -11,7 +11,8 @@ from jaxdamp import _checks
 
 NAME = "jaxdamp.toml"
 TABLES = ("columns", "units", "gains")
-KEYS = ("sign", "force_sign", "sampling_rate", "delimiter", "command", "settings", "files", "test", *TABLES)
+KEYS = ("sign", "force_sign", "sampling_rate", "delimiter", "command", "settings", "files", "test")
+KEYS += ("stroke_from_velocity", *TABLES)
 _KINDS = {
     "sign": str,
     "force_sign": str,
@@ -21,7 +22,9 @@ _KINDS = {
     "command": (int, float, str, dict),
     "settings": (str, dict),
     "files": list,
+    "stroke_from_velocity": bool,
 }
+_KIND_NAMES = {"dict": "table", "str": "text", "bool": "true or false"}
 
 
 def find_manifest(manifest: str | os.PathLike[str] | bool, paths: Sequence[str | os.PathLike[str]]) -> Path | None:
@@ -60,9 +63,10 @@ def read_manifest(file: Path) -> dict[str, Any]:
             hint = f" Did you mean {near!r}?" if near else ""
             raise ValueError(f"{file}: unknown key {key!r}; there are {', '.join(KEYS)}.{hint}")
         kinds = _KINDS.get(key, dict)
-        if not isinstance(value, kinds) or isinstance(value, bool):
-            names = " or ".join({"dict": "table", "str": "text"}.get(k.__name__, k.__name__) for k in _as_tuple(kinds))
-            raise ValueError(f"{file}: {key} must be a {names}, but is {_checks.described(value)}.")
+        if not isinstance(value, kinds) or (isinstance(value, bool) and kinds is not bool):
+            names = " or ".join(_KIND_NAMES.get(k.__name__, k.__name__) for k in _as_tuple(kinds))
+            article = "" if kinds is bool else "a "
+            raise ValueError(f"{file}: {key} must be {article}{names}, but is {_checks.described(value)}.")
     if "columns" in given:  # TOML has no None
         given["columns"] = {role: None if name is False else name for role, name in given["columns"].items()}
     return given

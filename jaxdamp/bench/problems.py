@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from jaxdamp._checks import ArgumentError
+from jaxdamp._checks import ArgumentError, Setting
 
 
 class Problems:
@@ -34,12 +34,15 @@ class Problems:
         except (ValueError, OSError, ImportError) as error:
             self.errors.append(error)
 
-    def raise_any(self) -> None:
-        """Raise what was collected: a single error as it is, several as one."""
+    def raise_any(self, remedy: str = "", *settings: Setting) -> None:
+        """Raise what was collected: a single error as it is, several as one; and what else could be done."""
         if len(self.errors) == 1:
-            raise self.errors[0]
+            (error,) = self.errors
+            if remedy and isinstance(error, ValueError):
+                raise ArgumentError(f"{error} {remedy}", *getattr(error, "settings", ()), *settings) from error
+            raise error
         if self.errors:
-            raise Several(self.errors)
+            raise Several(self.errors, remedy, *settings)
 
 
 class Several(ArgumentError):
@@ -49,8 +52,8 @@ class Several(ArgumentError):
         errors: each of them.
     """
 
-    def __init__(self, errors: Sequence[Exception]) -> None:
-        text = "\n".join(f"  {number}. {error}" for number, error in enumerate(errors, 1))
-        settings = [setting for error in errors for setting in getattr(error, "settings", ())]
-        super().__init__(f"{len(errors)} problems:\n{text}", *settings)
+    def __init__(self, errors: Sequence[Exception], remedy: str = "", *settings: Setting) -> None:
+        lines = [f"  {number}. {error}" for number, error in enumerate(errors, 1)] + [remedy] * bool(remedy)
+        own = [setting for error in errors for setting in getattr(error, "settings", ())]
+        super().__init__("\n".join([f"{len(errors)} problems:", *lines]), *own, *settings)
         self.errors = tuple(errors)

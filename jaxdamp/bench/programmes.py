@@ -237,12 +237,26 @@ class RandomTest(_Ends):
         lines[2] = 0.9998 * min(self.stroke_limit / np.max(np.abs(x)), self.velocity_limit / np.max(np.abs(v)))
 
     def _motion(self, time: Samples) -> tuple[Samples, Samples]:
-        """The random motion without its beginning."""
+        """The random motion without its beginning; on a grid of which a step divides the period, by one transform."""
+        points = _points_of_period(time, self.duration)
+        if points > 2 * self.band[1] * self.duration:
+            return self._transformed(time, points)
         x, v = np.zeros_like(time), np.zeros_like(time)
         for omega, phase, size in self._lines.T:
             x += size * np.sin(omega * time + phase)
             v += size * omega * np.cos(omega * time + phase)
         return x, v
+
+    def _transformed(self, time: Samples, points: int) -> tuple[Samples, Samples]:
+        """The sums of all lines at a whole period of instants, repeated over the time."""
+        omega, phase, size = self._lines
+        number = np.round(omega * self.duration / (2 * np.pi)).astype(int)
+        wave = 0.5 * points * size * np.exp(1j * (omega * time[0] + phase - np.pi / 2))
+        spectra = np.zeros((2, points // 2 + 1), dtype=complex)
+        spectra[:, number] = wave, 1j * omega * wave
+        x, v = np.fft.irfft(spectra, points, axis=1)
+        place = np.arange(len(time)) % points
+        return x[place], v[place]
 
     @property
     def highest_frequency(self) -> float:
@@ -263,6 +277,18 @@ class RandomTest(_Ends):
         grown, rate = self._envelope(time, self.warm_up, self.duration)
         x, v = self._motion(time)
         return grown * v + rate * x
+
+
+def _points_of_period(time: Samples, period: float | int) -> int:
+    """Number of steps of a uniform grid in a period; 0 if it is no whole number, or the grid is not uniform."""
+    if len(time) < 3:
+        return 0
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    points = round(period / step) if step > 0 else 0
+    if not points or abs(period / step - points) > 1e-6:
+        return 0
+    off = np.max(np.abs(time - time[0] - step * np.arange(len(time))))
+    return points if off < 1e-6 * step + 1e-12 * np.abs(time).max() else 0
 
 
 def sines(

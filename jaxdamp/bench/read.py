@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxdamp import _checks
+from jaxdamp._checks import Setting
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice, is_record
 from jaxdamp.bench.files import find_files
@@ -19,6 +20,7 @@ from jaxdamp.bench.record import Interpretation, records
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.settings import Settings, settings_by_name
+from jaxdamp.bench.several_clocks import on_one_clock
 
 
 def read(
@@ -35,6 +37,7 @@ def read(
     settings: str | Mapping[str, Settings] | None = None,
     manifest: str | os.PathLike[str] | bool = True,
     readers: Mapping[str, Reader] | None = None,
+    stroke_from_velocity: bool | None = None,
     skip_bad: bool = False,
 ) -> BenchSet:
     r"""Read bench records from text files, workbooks, MATLAB, TDMS, MDF4 and Parquet files.
@@ -64,6 +67,8 @@ def read(
         manifest: a TOML file with these arguments; True takes `jaxdamp.toml` of the folder that is read, and a note
             says so; False takes none. What is given in the call wins.
         readers: suffix to function that reads such files, beside or instead of `READERS` (docs/own_reader.md).
+        stroke_from_velocity: integrate the velocity of files without a stroke, as for laws that need no place of the
+            stroke; `BenchRun.stroke_is_integrated` says so.
         skip_bad: leave out files that cannot be read, instead of reading none; `BenchSet.left_out` says which and why.
 
     Returns:
@@ -99,6 +104,7 @@ def read(
         "delimiter": delimiter,
         "command": command,
         "settings": settings,
+        "stroke_from_velocity": stroke_from_velocity,
     }
     own_readers, note = with_own(readers), ()
     file = find_manifest(manifest, asked)
@@ -109,7 +115,8 @@ def read(
     signs.check_words(given["sign"], given["force_sign"])
     if given["sampling_rate"] is not None:
         _checks.positive("sampling_rate", given["sampling_rate"])
-    choice = Choice(*({**(given[name] or {})} for name in ("columns", "units", "gains")))
+    tables = ({**(given[name] or {})} for name in ("columns", "units", "gains"))
+    choice = Choice(*tables, stroke_from_velocity=bool(given["stroke_from_velocity"]))
     how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"])
     files = find_files(asked, folder_suffixes(readers))
     runs, left_out = _read_files(files, own_readers, given["delimiter"], how, skip_bad)
@@ -137,7 +144,9 @@ def _read_files(
     for error in errors if not skip_bad or not runs else ():
         with problems.collected():
             raise error
-    problems.raise_any()
+    setting, count = Setting("skip_bad", True), len(files) - len(errors)
+    others = "The other file" if count == 1 else f"The other {count} files"
+    problems.raise_any(f"{others} can be read: {setting} leaves out what cannot." if runs else "", setting)
     return runs, tuple(map(str, errors))
 
 
@@ -151,6 +160,7 @@ def _names(files: Sequence[Path]) -> list[str]:
 
 def _read_file(tables: Sequence[RawTable], name: str, how: Interpretation) -> list[tuple[str, BenchRun]]:
     """The records of a file. Tables without stroke and force are left out of a file that has others, with a note."""
+    tables = on_one_clock(tables, how.choice) if len(tables) > 1 else tables
     good = [table for table in tables if is_record(table, how.choice)] or tables
     rest = ", ".join(repr(table.record) for table in tables if table not in good)
     note = (f"{rest} of the file left out: neither stroke nor force",) if rest else ()

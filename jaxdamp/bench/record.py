@@ -12,10 +12,11 @@ from jaxdamp.bench import sampling, stamps
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.clock import Part, regular_parts
 from jaxdamp.bench.columns import REQUIRED, Choice, Column, find_columns
+from jaxdamp.bench.integration import integrate_velocity
 from jaxdamp.bench.motion import Samples, cycle_instants
 from jaxdamp.bench.problems import Problems
 from jaxdamp.bench.raw import RawColumn, RawTable
-from jaxdamp.bench.runs import COMMAND_MARK, FILE_MARK, NOTE_MARK, SETTINGS_MARK, BenchRun
+from jaxdamp.bench.runs import COMMAND_MARK, FILE_MARK, INTEGRATED_MARK, NOTE_MARK, SETTINGS_MARK, BenchRun
 from jaxdamp.bench.velocity import estimate_velocity
 
 
@@ -39,7 +40,8 @@ def records(table: RawTable, name: str, how: Interpretation) -> list[BenchRun]:
     sampling.check_count(len(table), table.where)
     channels, notes = _channels(table, columns, how.choice)
     notes = [_columns_note(table, columns), *table.notes, *doubts, *notes]
-    parts = _parts(table, channels.pop("time", None), channels["stroke"], how.sampling_rate)
+    motion = channels["stroke" if "stroke" in channels else "velocity"]
+    parts = _parts(table, channels.pop("time", None), motion, how.sampling_rate)
     if len(parts) == 1:
         return [_record(table, columns, channels, parts[0], name, how, notes)]
     names = [f"{name}_part{number}" for number in range(1, len(parts) + 1)]
@@ -87,7 +89,7 @@ def _columns_note(table: RawTable, columns: Mapping[str, Column]) -> str:
     return f"{used}; brought to SI" + (f"; not used: {', '.join(rest)}" if rest else "")
 
 
-def _parts(table: RawTable, time: Samples | None, stroke: Samples, rate: float | int | None) -> list[Part]:
+def _parts(table: RawTable, time: Samples | None, motion: Samples, rate: float | int | None) -> list[Part]:
     """The stretches without gap that hold a full cycle; all of a record that has no gap."""
     where = table.where
     if time is None:
@@ -96,7 +98,7 @@ def _parts(table: RawTable, time: Samples | None, stroke: Samples, rate: float |
     _check_rate(parts, rate, where)
     if len(parts) == 1:
         return parts
-    good = [part for part in parts if _has_cycle(part, stroke)]
+    good = [part for part in parts if _has_cycle(part, motion)]
     if not good:
         sampling.refuse_gaps(time, sampling.gaps(time), where, table.lines)
     left_out = [part for part in parts if part not in good]
@@ -106,8 +108,8 @@ def _parts(table: RawTable, time: Samples | None, stroke: Samples, rate: float |
     return [replace(part, notes=(*part.notes, *note)) for part in good]
 
 
-def _has_cycle(part: Part, stroke: Float[np.ndarray, " file_time"]) -> bool:
-    moved = part.of(stroke)
+def _has_cycle(part: Part, motion: Float[np.ndarray, " file_time"]) -> bool:
+    moved = part.of(motion)
     return len(part.time) >= sampling.FEWEST and np.ptp(moved) > 0 and len(cycle_instants(part.time, moved)) > 1
 
 
@@ -148,16 +150,21 @@ def _record(
     notes: list[str],
 ) -> BenchRun:
     where = table.where
-    time, stroke, force = part.time, part.of(channels["stroke"]), part.of(channels["force"])
-    sampling.check_stroke(stroke, f"{where}, column {columns['stroke'].header!r}")
+    time, force = part.time, part.of(channels["force"])
+    velocity, source = (None if "velocity" not in channels else part.of(channels["velocity"])), ""
+    integrated = "stroke" not in channels
+    if velocity is not None and integrated:
+        stroke, velocity, source = integrate_velocity(time, velocity, where)
+    else:
+        stroke = part.of(channels["stroke"])
+        sampling.check_stroke(stroke, f"{where}, column {columns['stroke'].header!r}")
     own = bool(table.preamble) and table.preamble[0].strip() == FILE_MARK
     if own:
         _refuse_signs(how, where)
         decision = signs.Decision(1.0, 1.0, ("positive stroke is rebound, as the file states",))
     else:
         decision = signs.decide(time, stroke, force, how.sign, how.force_sign, where)
-    velocity, source = (None if "velocity" not in channels else part.of(channels["velocity"])), ""
-    if velocity is None or not own:
+    if velocity is None or not (own or integrated):
         velocity, source = _velocity(time, stroke, velocity, where)
     temperature = channels.get("temperature")
     stated = _stated(table) if own else {}
@@ -172,6 +179,7 @@ def _record(
         settings=stated.get("settings", {}),
         source=str(table.file),
         notes=(*stated.get("notes", ()), *notes, *part.notes, *decision.notes, source or "velocity as the file states"),
+        stroke_is_integrated=integrated or stated.get("stroke_is_integrated", False),
     )
 
 
@@ -195,6 +203,7 @@ def _stated(table: RawTable) -> dict:
         "command": float(command[0]) if command else None,
         "settings": json.loads(settings[0]) if settings else {},
         "notes": after[NOTE_MARK],
+        "stroke_is_integrated": any(line.strip() == INTEGRATED_MARK for line in table.preamble),
     }
 
 

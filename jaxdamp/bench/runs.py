@@ -22,6 +22,7 @@ FILE_MARK = "# jaxdamp bench record: stroke and velocity positive in extension, 
 NOTE_MARK = "# note: "
 COMMAND_MARK = "# command: "
 SETTINGS_MARK = "# settings: "
+INTEGRATED_MARK = "# stroke: integrated from the velocity"
 _HEADERS = {"time": "time [s]", "stroke": "stroke [m]", "velocity": "velocity [m/s]", "force": "force [N]"}
 
 
@@ -53,6 +54,8 @@ class BenchRun:
         settings: what else is known of the record, by name: clicks, temperature, the test.
         source: the file, or what else the record comes from.
         notes: sentences on what was done to the data.
+        stroke_is_integrated: the stroke was integrated from the velocity, so that its zero is the middle of the motion
+            and no place in the damper.
 
     Raises:
         ValueError: channels of different lengths, fewer than 20 samples, NaN, time not uniform, constant stroke.
@@ -75,6 +78,7 @@ class BenchRun:
     source: str = ""
     notes: tuple[str, ...] = ()
     settings: Mapping[str, float | int | str] = field(default_factory=dict)
+    stroke_is_integrated: bool = False
     _origin: "Origin | None" = field(default=None, init=False)
 
     def __post_init__(self) -> None:
@@ -276,8 +280,9 @@ class BenchRun:
             channels, header = [*channels, self.temperature], [*header, "temperature [K]"]
         command = [] if self.command is None else [f"{COMMAND_MARK}{self.command!r}"]
         settings = [SETTINGS_MARK + json.dumps(dict(self.settings))] if self.settings else []
+        integrated = [INTEGRATED_MARK] * self.stroke_is_integrated
         notes = [NOTE_MARK + " ".join(note.split()) for note in self.notes]
-        lines = [FILE_MARK, *command, *settings, *notes, ",".join(header)]
+        lines = [FILE_MARK, *command, *settings, *integrated, *notes, ",".join(header)]
         lines += [",".join(map(repr, row)) for row in np.stack(channels, axis=1).tolist()]
         path = Path(path)
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")

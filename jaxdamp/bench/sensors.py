@@ -35,6 +35,7 @@ class Sensors:
         force_resolution: step to which the force is rounded [N]; zero rounds nothing.
         stroke_resolution: and the stroke [m].
         clock_jitter: standard deviation by which an instant of sampling differs from the time written to it [s].
+        stamped_jitter: write the instants of sampling as they are; the record is then resampled, as by `bench.read`.
         reversed_force: write the force with the wrong sign.
         force_stuck_from: instant from which the force channel repeats its value [s]; never if left out.
         stroke_stuck_from: and the stroke channel [s].
@@ -55,6 +56,7 @@ class Sensors:
     force_resolution: float | int = _fault("N")
     stroke_resolution: float | int = _fault("m")
     clock_jitter: float | int = _fault("s")
+    stamped_jitter: bool = False
     reversed_force: bool = False
     force_stuck_from: float | int | None = _fault("s", None)
     stroke_stuck_from: float | int | None = _fault("s", None)

@@ -93,8 +93,12 @@ class _Fit(NamedTuple):
 
 def _basis(phase: Samples, harmonics: int) -> Float[np.ndarray, "time columns"]:
     """Columns 1, cos kφ, sin kφ for k = 1 … harmonics."""
-    angles = np.outer(phase, np.arange(1, harmonics + 1))
-    return np.concatenate([np.ones((len(phase), 1)), np.cos(angles), np.sin(angles)], axis=1)
+    basis = np.ones((len(phase), 1 + 2 * harmonics))
+    cosines, sines = basis[:, 1 : harmonics + 1], basis[:, harmonics + 1 :]
+    np.multiply(phase[:, None], np.arange(1, harmonics + 1), out=cosines)  # in place: records may be long
+    np.sin(cosines, out=sines)
+    np.cos(cosines, out=cosines)
+    return basis
 
 
 def _least_squares(basis: Float[np.ndarray, "time columns"], values: Samples) -> Float[np.ndarray, " columns"]:

@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp.bench.clock import Part, regular_parts
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.programmes import Excitation
 from jaxdamp.bench.runs import BenchRun
@@ -182,10 +183,22 @@ class VirtualDyno:
         taken = self.sensors.instants(time, seed)
         stroke = test.stroke(taken) + float(self.rig.stroke_offset)
         stroke, force = self.sensors.show(time, stroke, np.interp(taken, grid, force), seed)
+        made: tuple[str, ...] = (self._note(),)
+        if self.sensors.stamped_jitter:
+            part = self._stamped(taken, test.name)
+            time, stroke, force, made = part.time, part.of(stroke), part.of(force), (*made, *part.notes)
         velocity, how = estimate_velocity(time, stroke)
         warm = np.interp(time, grid, temperature) if self.temperature_channel else None
-        notes = (self._note(), how)
+        notes = (*made, how)
         return BenchRun(test.name, time, stroke, velocity, force, warm, source="virtual dyno", notes=notes)
+
+    def _stamped(self, taken: Samples, name: str) -> Part:
+        """Uniform instants for those at which the samples were taken."""
+        steps = np.diff(taken) * self.sampling_rate
+        if steps.min() <= 0 or len(parts := regular_parts(taken, name)) > 1:
+            must = f"be small beside a step, {1 / self.sampling_rate:.3g} s, so that stamps increase and leave no gaps"
+            _checks.refuse("clock_jitter", must, self.sensors.clock_jitter)
+        return parts[0]
 
     def _note(self) -> str:
         """The settings of the bench that are not their defaults, in words."""

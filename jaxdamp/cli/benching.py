@@ -1,16 +1,17 @@
 """`jaxdamp bench`: records of a bench in, what is odd about them and their evaluation out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from jaxdamp import _checks, bench
-from jaxdamp.bench import BenchRun, Evaluation
+from jaxdamp import bench
+from jaxdamp.bench import Evaluation
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.fitting import write_table
-from jaxdamp.cli.options import ReadOptions, decisions
+from jaxdamp.cli.grouping import value_of
+from jaxdamp.cli.options import decisions
 from jaxdamp.cli.preflighting import checked
-from jaxdamp.cli.processing import ProcessOptions
+from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.wording import message
 from jaxdamp.report import Attempts, bench_report, records_table
@@ -48,7 +49,7 @@ def run_bench(
         remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.heading("What was done to the records")
         screen.points(remarks)
-        by = None if group_by is None else _setting(tuple(raw), group_by)
+        by = None if group_by is None else value_of(tuple(raw), group_by)
         with screen.stage("Evaluating the records"):
             evaluation = bench.evaluate(runs, velocities=wanted, by=by)
         check = None if chosen is None else evaluation.check(chosen)
@@ -79,18 +80,6 @@ def _velocities(text: str | None) -> list[float] | None:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise ValueError(f"Option --velocities must read like 0.052,0.131 [m/s], but is {text!r}.") from None
-
-
-def _setting(runs: Sequence[BenchRun], name: str) -> Callable[[BenchRun], str]:
-    """The setting of a record by name, which all records must state, in words."""
-    lacking = [run.name for run in runs if name not in run.settings]
-    if lacking:
-        known = sorted({known for run in runs for known in run.settings})
-        there = f"There are {', '.join(known)}." if known else "A manifest states settings, see docs/reading.md."
-        must = "name a setting that every record states"
-        _checks.refuse("group_by", must, f"{name!r}, which {', '.join(lacking[:3])} do not state", there)
-    values = {run.name: run.settings[name] for run in runs}
-    return lambda run: value if isinstance(value := values[run.name], str) else f"{value:g}"
 
 
 def _write_evaluation(folder: Path, evaluation: Evaluation) -> None:

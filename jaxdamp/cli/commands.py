@@ -6,31 +6,19 @@ from typing import Annotated
 import typer
 
 from jaxdamp.cli.option_types import (
-    Between,
-    Columns,
-    Command,
-    Cycles,
     Debug,
-    Delimiter,
     Duration,
     Files,
-    Filter,
-    ForceSign,
-    Gains,
-    KeepRest,
-    Manifest,
+    GroupBy,
     Replace,
     Road,
-    SamplingRate,
     Seed,
-    Sign,
-    SkipBad,
     Speed,
     Start,
     Step,
-    Units,
     Vehicle,
 )
+from jaxdamp.cli.record_options import ProcessOptions, ReadOptions, spread
 
 
 app = typer.Typer(
@@ -67,8 +55,10 @@ def common(
 
 
 @app.command()
+@spread
 def fit(
     files: Files,
+    *,
     law: Annotated[
         list[str],
         typer.Option(help='Names of laws, see "jaxdamp laws": "linear,besinger"; or "all". May be repeated.'),
@@ -76,20 +66,9 @@ def fit(
     held_out: Annotated[
         list[str], typer.Option(help='Records to score on, not to fit: a name or a pattern, such as "30mm_*".')
     ] = [],  # noqa: B006
-    sign: Sign = None,
-    force_sign: ForceSign = None,
-    columns: Columns = [],  # noqa: B006
-    units: Units = [],  # noqa: B006
-    sampling_rate: SamplingRate = None,
-    delimiter: Delimiter = None,
-    gains: Gains = [],  # noqa: B006
-    manifest: Manifest = None,
-    skip_bad: SkipBad = False,
-    command: Command = [],  # noqa: B006
-    cycles: Cycles = None,
-    between: Between = None,
-    low_pass: Filter = None,
-    keep_rest: KeepRest = False,
+    reading: ReadOptions,
+    processing: ProcessOptions,
+    group_by: GroupBy = None,
     weighting: Annotated[
         str, typer.Option(help='"samples": every sample counts the same; "runs": every record, by its RMS force.')
     ] = "samples",
@@ -106,51 +85,38 @@ def fit(
 ) -> None:
     """Fit damper laws to bench records, and say how good they are.
 
-    Writes a report, pictures, tables, and each law as JSON, which jaxdamp.export.from_json reads.
+    Writes a report, pictures, tables, and each law as JSON, which jaxdamp.export.from_json reads; with --group-by all
+    of this in a folder for each value of the setting.
     """
     from jaxdamp.cli import console, fitting
 
     with console.plain_errors(debug):
         console.prepare()
-        numbers = (tuple(columns), tuple(units), sampling_rate, delimiter)
-        reading = (sign, force_sign, *numbers, tuple(gains), manifest, skip_bad, tuple(command))
         fitting.run_fit(
             console.Screen(),
             files,
-            fitting.ReadOptions(*reading),
+            reading,
             laws=law,
             held_out=held_out,
             weighting=weighting,
             rig=rig,
-            processing=fitting.ProcessOptions(cycles, between, low_pass, keep_rest),
+            processing=processing,
+            group_by=group_by,
             out=out,
             replace=replace,
         )
 
 
 @app.command()
+@spread
 def bench(
     files: Files,
-    sign: Sign = None,
-    force_sign: ForceSign = None,
-    columns: Columns = [],  # noqa: B006
-    units: Units = [],  # noqa: B006
-    sampling_rate: SamplingRate = None,
-    delimiter: Delimiter = None,
-    gains: Gains = [],  # noqa: B006
-    manifest: Manifest = None,
-    skip_bad: SkipBad = False,
-    command: Command = [],  # noqa: B006
-    cycles: Cycles = None,
-    between: Between = None,
-    low_pass: Filter = None,
-    keep_rest: KeepRest = False,
+    *,
+    reading: ReadOptions,
+    processing: ProcessOptions,
+    group_by: GroupBy = None,
     velocities: Annotated[
         str | None, typer.Option(help="At which forces are stated [m/s]: 0.052,0.131; usual ones if left out.")
-    ] = None,
-    group_by: Annotated[
-        str | None,
-        typer.Option(help="Setting of the manifest to compare records by, else the command."),
     ] = None,
     limits: Annotated[
         Path | None, typer.Option(help="CSV of limits: quantity, minimum, maximum, velocity, setting, record.")
@@ -168,13 +134,11 @@ def bench(
 
     with console.plain_errors(debug):
         console.prepare()
-        numbers = (tuple(columns), tuple(units), sampling_rate, delimiter)
-        reading = (sign, force_sign, *numbers, tuple(gains), manifest, skip_bad, tuple(command))
         passed = benching.run_bench(
             console.Screen(),
             files,
-            benching.ReadOptions(*reading),
-            processing=benching.ProcessOptions(cycles, between, low_pass, keep_rest),
+            reading,
+            processing=processing,
             velocities=velocities,
             group_by=group_by,
             limits=limits,

@@ -2,17 +2,19 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from jaxdamp import _checks, export, identify
 from jaxdamp._tables import Table
-from jaxdamp.bench import BenchSet
+from jaxdamp.bench import BenchSet, Preflight
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.grouping import grouped
 from jaxdamp.cli.interrupt import Interrupted
-from jaxdamp.cli.options import ReadOptions, decisions, law_names, split
+from jaxdamp.cli.options import decisions, law_names, split
 from jaxdamp.cli.preflighting import checked
-from jaxdamp.cli.processing import ProcessOptions
-from jaxdamp.cli.results import results_folder
+from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
+from jaxdamp.cli.results import Results, results_folder
 from jaxdamp.cli.wording import message
 from jaxdamp.identify import Comparison, Failure, Rung
 from jaxdamp.report import (
@@ -53,12 +55,14 @@ def run_fit(
     weighting: str = "samples",
     rig: Sequence[str] = (identify.OFFSET,),
     processing: ProcessOptions | None = None,
+    group_by: str | None = None,
     out: Path,
     replace: bool = False,
-) -> Comparison:
+) -> None:
     """Read and check records, fit laws to those without an error, say how good they are, and write all into a folder.
 
-    Laws and tables are in the folder before the first picture is drawn.
+    Laws and tables are in the folder before the first picture is drawn. Records that are grouped by a setting are
+    fitted one group after the other, each into a folder of its own inside.
     """
     names = law_names(laws)
     _checks.one_of("weighting", weighting, ("samples", "runs"))
@@ -69,25 +73,63 @@ def run_fit(
             raw = options.read(files)
         sound, found = checked(screen, raw, notes=False)
         runs = (processing or ProcessOptions()).apply(sound)
-        fitted, held = split(runs, held_out)
+        _, held = split(runs, held_out)
+        groups = grouped(runs, group_by)
+        for name, part in groups.items():
+            if all(run in held.runs for run in part):
+                raise ValueError(f"Option --held-out leaves no record of {name} to fit: hold out fewer.")
         remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
-        remarks += found.sentences()
-        screen.say()
-        fits = fit_laws(screen, names, fitted, held, weighting=weighting, rig=machine)
-        show(screen, fits)
-        with interrupt.saving(), screen.stage("Laws and tables"):
-            write_fits(results.draft, fits.comparison, runs, attempts)
-            write_table(results.draft, "preflight", found.table())
-            results.publish(fits.missing)
-        with screen.stage("Pictures and report"):
-            places = {"folder": results.draft, "attempts": attempts}
-            report = fit_report(fits.comparison, runs=runs, remarks=remarks, failures=fits.failures, **places)
-            report.write(results.draft / "report.html")
+        job = FitJob(screen, names, weighting, machine, results, attempts, found, [*remarks, *found.sentences()])
+        for number, (name, part) in enumerate(groups.items(), 1):
+            job.fit_group(name, part, held, later=list(groups)[number:])
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
-    return fits.comparison
+
+
+class FitJob(NamedTuple):
+    """What the fits of all groups of records share."""
+
+    screen: Screen
+    names: Sequence[str]
+    weighting: str
+    rig: Sequence[str]
+    results: Results
+    attempts: Attempts
+    found: Preflight
+    remarks: Sequence[str]
+
+    def fit_group(self, name: str, runs: BenchSet, held_out: BenchSet, later: Sequence[str]) -> None:
+        """Fit one group of records and write its folder, which has the name of the group.
+
+        Arguments:
+            name: of the group; empty if there is only one, which is written without a folder of its own.
+            runs: its records.
+            held_out: the records of all groups that are not fitted.
+            later: the groups that follow.
+        """
+        self.screen.say()
+        if name:
+            self.screen.heading(name)
+        held, fitted = (runs.where(lambda run, yes=yes: (run in held_out.runs) == yes) for yes in (True, False))
+        fits = fit_laws(self.screen, self.names, fitted, held, weighting=self.weighting, rig=self.rig)
+        show(self.screen, fits)
+        following = f" and the fits of {', '.join(later)}" if later else ""
+        with interrupt.saving(), self.screen.stage("Laws and tables"):
+            folder = self.results.draft / name
+            folder.mkdir(exist_ok=True)
+            write_fits(folder, fits.comparison, runs, self.attempts)
+            write_table(folder, "preflight", self.found.table())
+            self.results.publish(fits.missing + following)
+        with self.screen.stage("Pictures and report"):
+            folder = self.results.draft / name
+            folder.mkdir(exist_ok=True)
+            places = {"folder": folder, "attempts": self.attempts}
+            page = fit_report(fits.comparison, runs=runs, remarks=self.remarks, failures=fits.failures, **places)
+            page.write(folder / "report.html")
+            if later:
+                self.results.publish(f"the fits of {', '.join(later)}")
 
 
 def fit_laws(

@@ -2,13 +2,11 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from jaxdamp import _checks, bench, identify
 from jaxdamp._checks import Setting
 from jaxdamp.bench import BenchRun, BenchSet
-from jaxdamp.cli.processing import commands
 from jaxdamp.cli.wording import in_options
 
 
@@ -55,6 +53,24 @@ def column_numbers(columns: Mapping[str, str]) -> dict[str, str | int | None]:
     }
 
 
+def commands(texts: Sequence[str]) -> Mapping[str, float] | None:
+    """What "*_0.5A=0.5,*_1A=1" states of the records; None where nothing is stated.
+
+    >>> commands(["*_0.5A=0.5,*_1A=1"])
+    {'*_0.5A': 0.5, '*_1A': 1.0}
+    """
+    stated = {}
+    for part in (part for text in texts for part in text.split(",")):
+        pattern, _, number = part.rpartition("=")
+        try:
+            stated[pattern.strip()] = float(number)
+        except ValueError:
+            pattern = ""
+        if not pattern:
+            raise ValueError(f"Option --command must read like '*_0.5A=0.5', but is {part!r}.")
+    return stated or None
+
+
 def split(runs: BenchSet, patterns: Sequence[str]) -> tuple[BenchSet, BenchSet]:
     """The records to fit and those to hold out, which are named by name, file or pattern."""
     if not patterns:
@@ -93,35 +109,3 @@ def decisions(runs: Sequence[BenchRun]) -> list[str]:
         alike = "" if len(set(notes)) == 1 else ", numbers of the first"
         sentences.append(notes[0] if len(runs) == 1 else f"{notes[0]} ({who}{alike})")
     return sentences
-
-
-@dataclass(frozen=True)
-class ReadOptions:
-    """How the files are to be read, as the command line says it."""
-
-    sign: str | None = None
-    force_sign: str | None = None
-    columns: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    sampling_rate: float | None = None
-    delimiter: str | None = None
-    gains: tuple[str, ...] = ()
-    manifest: Path | None = None
-    skip_bad: bool = False
-    command: tuple[str, ...] = ()
-
-    def read(self, files: Sequence[Path]) -> BenchSet:
-        """Read the records."""
-        return bench.read(
-            list(files),
-            sign=self.sign,
-            force_sign=self.force_sign,
-            columns=column_numbers(assignments("columns", self.columns)),
-            units=assignments("units", self.units),
-            sampling_rate=self.sampling_rate,
-            delimiter=self.delimiter,
-            gains=assignments("gains", self.gains),
-            manifest=True if self.manifest is None else self.manifest,
-            skip_bad=self.skip_bad,
-            command=commands(self.command),
-        )

@@ -33,8 +33,10 @@ OPTIONS = (
     "sampling_rate",
     "seed",
     "sign",
+    "skip_bad",
     "speed",
     "starts",
+    "stroke_from_velocity",
     "tie",
     "to",
     "units",
@@ -63,9 +65,11 @@ def option_text(setting: Setting) -> str:
 
     >>> option_text(Setting("columns", {"time": None, "stroke": "x mm"}))
     "--columns 'time=none,stroke=x mm'"
-    >>> option_text(Setting("sampling_rate"))
-    '--sampling-rate ...'
+    >>> option_text(Setting("sampling_rate")), option_text(Setting("stroke_from_velocity", True))
+    ('--sampling-rate ...', '--stroke-from-velocity')
     """
+    if setting.value is True:
+        return option(setting.argument)
     if isinstance(setting.value, dict):
         value = ",".join(f"{role}={_word(item)}" for role, item in setting.value.items())
     else:

@@ -80,8 +80,8 @@ def _fitted(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:
 
 
 def notes_on(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
-    """Sentences on records that contradict each other and on a fitted curve that adds energy."""
-    return _contradicting(law, runs) + _driving(law, runs)
+    """Sentences on records that contradict each other, strokes without a place, and a curve that adds energy."""
+    return _contradicting(law, runs) + _without_place(law, runs) + _driving(law, runs)
 
 
 def _contradicting(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
@@ -91,6 +91,20 @@ def _contradicting(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
     for run in runs:
         groups.setdefault(run.command if follows else None, []).append(run)
     return contradictions_in_words([pair for group in groups.values() for pair in contradictions(group)])
+
+
+def _without_place(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
+    """A sentence on a law that depends on the place of the stroke, which integrated strokes do not have."""
+    traits = law.traits()
+    depends = traits.stroke_dependent_at_rest or (traits.stroke_dependent and not law.initial_state().size)
+    integrated = [run.name for run in runs if run.stroke_is_integrated]
+    if not (depends and integrated):
+        return []
+    return [
+        f"The force of this law depends on the place of the stroke, but that of {', '.join(integrated[:3])} was "
+        "integrated from the velocity: its zero is the middle of the motion, and so is that of the parameters. "
+        "Record the stroke, or take a law of the velocity."
+    ]
 
 
 def _driving(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:

@@ -26,7 +26,8 @@ def evaluation(
 ) -> "matplotlib.figure.Figure":
     """Mean cycles of records over velocity, stroke, acceleration and time, and forces over velocity.
 
-    One setting: a colour for each record, from slow to fast. Several: a colour for each setting.
+    One setting: a colour for each record, from slow to fast. Several: a colour for each setting. Bands show the
+    standard deviation of the force from cycle to cycle.
 
     Arguments:
         evaluation: what is to be shown.
@@ -56,6 +57,7 @@ def evaluation(
     }
     _draw_forces(panels["peaks"], evaluation, styles)
     handles += [Line2D([], [], color=colour, linewidth=2.0, label=label) for label, colour in labels]
+    handles.append(Line2D([], [], color=_style.GREY, linewidth=7.0, alpha=0.3, label="± scatter over cycles"))
     marks: dict[str, Any] = {"marker": "o", "markerfacecolor": "white", "color": _style.BLACK, "linestyle": ""}
     handles.append(Line2D([], [], label="at peak velocity", **marks))
     handles.append(Line2D([], [], label="at stated velocity", **{**marks, "marker": "D", "markerfacecolor": None}))
@@ -99,15 +101,33 @@ def _colours(evaluation: Evaluation) -> tuple[dict[str, Any], list[tuple[str, An
 
 
 def _draw_cycle(panels: Mapping[str, "matplotlib.axes.Axes"], cycles: FoldedCycles, style: Mapping[str, Any]) -> None:
-    """The mean cycle of a record, closed."""
+    """The mean cycle of a record, closed, in a band of one standard deviation of the force over its cycles."""
     stroke, velocity, force = (
         _closed(values.mean(axis=0)) for values in (cycles.stroke, cycles.velocity, cycles.force)
     )
     phase = np.linspace(0.0, 1.0, len(force))
     step = float(cycles.periods.mean()) / (len(force) - 1)
     acceleration = _closed((np.roll(velocity[:-1], -1) - np.roll(velocity[:-1], 1)) / (2 * step))
+    scatter = _closed(cycles.force.std(axis=0, ddof=1)) if len(cycles.periods) > 1 else None
     for name, values in (("v", velocity), ("x", 1e3 * stroke), ("a", acceleration), ("t", phase)):
         panels[name].plot(values, force, **style)
+        if scatter is not None:
+            _draw_band(panels[name], values, force, scatter, style["color"])
+
+
+def _draw_band(
+    axes: "matplotlib.axes.Axes",
+    values: Float[np.ndarray, " points"],
+    force: Float[np.ndarray, " points"],
+    scatter: Float[np.ndarray, " points"],
+    colour: Any,
+) -> None:
+    """A band about a loop, drawn from the smallest value to the largest and back, so that it does not cover itself."""
+    first, last = sorted((int(np.argmin(values)), int(np.argmax(values))))
+    there, back = np.arange(first, last + 1), np.r_[last : len(values), 0 : first + 1]
+    for part in (there, back) if len(there) < len(values) else (there,):  # time does not come back
+        low, high = force[part] - scatter[part], force[part] + scatter[part]
+        axes.fill_between(values[part], low, high, color=colour, alpha=0.25, linewidth=0.0, zorder=1.2)
 
 
 def _closed(values: Float[np.ndarray, " points"]) -> Float[np.ndarray, " more"]:

@@ -88,6 +88,26 @@ def test_scatter_is_that_of_the_cycles():
 # ---- gas and friction
 
 
+BENT = {
+    "straight": lambda v: np.where(v > 0, 2600.0, 1200.0) * v,
+    "digressive": lambda v: np.where(v > 0, 900.0, -400.0) * (1 - np.exp(-np.abs(v) / 0.06)) + 400.0 * v,
+    "orifice": lambda v: np.where(v > 0, 4e4, -1.5e4) * v**2 + 300.0 * v,
+}
+
+
+@pytest.mark.parametrize("law", BENT)
+def test_uncertainty_holds_gas_and_friction_where_damping_bends(law):
+    time = np.arange(0.0, 12.0, 1 / 400)
+    velocity = 0.02 * np.pi * np.cos(np.pi * time)
+    for seed in range(10):
+        noise = 3.0 * np.random.default_rng(seed).standard_normal(len(time))
+        force = BENT[law](velocity) - 150.0 + 40.0 * np.tanh(velocity / 0.002) + noise
+        found = separate_gas_and_friction(BenchRun.from_arrays("slow", time, 0.02 * np.sin(np.pi * time), force))
+        named = {m.quantity: m for m in found.measurements}
+        for quantity, truth, most in (("gas force", -150.0, 16.0), ("friction", 40.0, 36.0)):
+            assert abs(named[quantity].value - truth) <= named[quantity].uncertainty <= most, (quantity, seed)
+
+
 def test_gas_and_friction_of_a_slow_record(evaluation):
     found = evaluation.gas_and_friction[""]
     assert found.record == "20 mm 0.2 Hz" and not found.note
@@ -262,6 +282,12 @@ def test_plain_data_text_and_pictures(two_settings):
     assert {axes.get_title(loc="left") for axes in figure.axes} >= {"Force over stroke", "Force over acceleration"}
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels[:3] == ["baseline", "setting 1", "setting 3"] and labels[-1] == "limits, not kept"
+    over_time = next(axes for axes in figure.axes if axes.get_title(loc="left") == "Force over time")
+    bands, loops = over_time.collections, len(two_settings.runs) + len(two_settings.runs)  # of the baseline too
+    assert (
+        "± scatter over cycles" in labels
+        and len([band for band in bands if band.get_paths()[0].vertices.size]) == loops
+    )
     assert two_settings.gas_and_friction["1"].plot().axes
     assert two_settings.gas_and_friction["1"].to_dict()["record"] == "soft 0.5 Hz"
 

@@ -143,6 +143,34 @@ def test_mf4(tmp_path):
     assert any("'slow' of the file left out: neither stroke nor force" in note for note in run.notes)
 
 
+def test_mf4_groups_on_different_clocks(tmp_path):
+    from asammdf import MDF, Signal
+
+    def written(**groups):
+        with MDF() as file:
+            for name, signal in groups.items():
+                file.append([signal], comment=name)
+            file.save(tmp_path / "a.mf4", overwrite=True)
+        return tmp_path / "a.mf4"
+
+    slow, fast = np.arange(200) / 100, 0.1 + np.arange(600) / 400
+    stroke = Signal(20 * np.sin(9 * slow), slow, unit="mm", name="x")
+    force = Signal(540 * np.cos(9 * fast), fast, unit="N", name="F")
+    (run,) = read(written(motion=stroke, load=force))
+    np.testing.assert_allclose(run.time, fast)
+    np.testing.assert_array_equal(run.force, 540 * np.cos(9 * fast))
+    np.testing.assert_allclose(run.stroke, 0.02 * np.sin(9 * fast), atol=1e-6)
+    assert any("the stroke in 'motion' and the force in 'load', on different clocks" in note for note in run.notes)
+    with pytest.raises(ValueError, match=r"is not clear: the stroke in 'motion', 'two'"):
+        read(written(motion=stroke, two=Signal(stroke.samples, slow + 0.001, unit="mm", name="x"), load=force))
+    late = Signal(force.samples, fast + 5.0, unit="N", name="F")
+    with pytest.raises(ValueError, match=r"hardly overlap\. Export the channels of a record on one clock"):
+        read(written(motion=stroke, load=late))
+    gap = Signal(np.delete(force.samples, slice(100, 120)), np.delete(fast, slice(100, 120)), unit="N", name="F")
+    with pytest.raises(ValueError, match="'load': the clock has gaps"):
+        read(written(motion=stroke, load=gap))
+
+
 def test_parquet(tmp_path):
     import pyarrow as pa
     import pyarrow.parquet as pq

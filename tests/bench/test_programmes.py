@@ -118,3 +118,12 @@ def test_bad_tests():
         RandomTest(band=(1.01, 1.02))
     with pytest.raises(ValueError, match="`velocity_limit`"):
         RandomTest(velocity_limit=0.0)
+
+
+@pytest.mark.parametrize("rate", [400.0, 401.0, 399.7])
+def test_random_motion_by_a_transform_is_the_sum_of_its_lines(rate):
+    test = RandomTest(duration=9.0, band=(0.3, 12.0), seed=4)
+    time = np.arange(-700, 4000) / rate
+    order = np.random.default_rng(0).permutation(len(time))  # of scattered instants each line is summed
+    for motion in (test.stroke, test.velocity):
+        np.testing.assert_allclose(motion(time)[order], motion(time[order]), rtol=0, atol=1e-12)

@@ -115,3 +115,37 @@ def test_fit_processes_the_records_first(folder: Path, tmp_path: Path) -> None:
     law = from_json(out / "best_law.json")
     assert isinstance(law, Bilinear) and float(law.rebound_rate) == pytest.approx(2600.0, rel=0.01)
     assert all(int(row["cycles"]) == 3 for row in rows(out / "tables" / "records.csv"))
+
+
+def test_fits_of_each_value_of_a_setting(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    files = [folder / f"10mm_{speed}Hz.csv" for speed in (1, 2, 4)]
+    words = ("--command", "*_1Hz=0.5,*_2Hz=1,*_4Hz=1", "--group-by", "command", "--law", "linear", "--out", out)
+    text = jaxdamp("fit", *files, "--held-out", "10mm_4Hz", *words).output
+    assert "command_0.5" in text and "command_1" in text
+    for name, records in (("command_0.5", ["10mm_1Hz"]), ("command_1", ["10mm_2Hz", "10mm_4Hz"])):
+        assert (out / name / "report.html").is_file() and (out / name / "best_law.json").is_file()
+        assert [row["record"] for row in rows(out / name / "tables" / "records.csv")] == records
+    assert not (out / "best_law.json").exists() and not (out / "UNFINISHED.txt").exists()
+    said = refused(tmp_path, "fit", *files, "--held-out", "10mm_1Hz", *words[:-1], tmp_path / "none")
+    assert "Option --held-out leaves no record of command_0.5 to fit" in said
+    said = refused(tmp_path, "fit", *files, "--group-by", "clicks", "--out", tmp_path / "none")
+    assert "Option --group-by must name a setting that every record states" in said
+
+
+def test_files_without_a_stroke(folder: Path, tmp_path: Path) -> None:
+    lines = (folder / "10mm_2Hz.csv").read_text().splitlines()
+    cells = [line.split(",") for line in lines if not line.startswith("#")]
+    (tmp_path / "v.csv").write_text("\n".join(",".join([row[0], *row[2:]]) for row in cells))
+    said = refused(tmp_path, "bench", tmp_path / "v.csv", "--out", tmp_path / "none")
+    assert "Or integrate the velocity, if the law needs no place of the stroke: --stroke-from-velocity." in said
+    words = ("--stroke-from-velocity", "--out", tmp_path / "out")
+    flat = " ".join(jaxdamp("bench", tmp_path / "v.csv", *words).output.split())
+    assert "the stroke was integrated from the velocity" in flat and "stroke integrated from the velocity, less" in flat
+
+
+def test_a_broken_file_among_others_names_the_option_that_leaves_it_out(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "broken.csv").write_text("t_s,x_mm,F_N\n0,1,x\n1,2\n")
+    words = ("bench", folder / "10mm_2Hz.csv", tmp_path / "broken.csv", "--out", tmp_path / "out")
+    assert "The other file can be read: --skip-bad leaves out what cannot." in refused(tmp_path, *words)
+    assert "left out: " in jaxdamp(*words, "--skip-bad").output

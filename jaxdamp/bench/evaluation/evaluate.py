@@ -1,7 +1,7 @@
 """The evaluation of records: every measurement, as tables, plain data and pictures."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -154,7 +154,8 @@ class Evaluation:
         """One row for each measurement, for files."""
         columns = (Column("setting"), Column("record"), Column("quantity"), Column("velocity", "m/s"))
         columns += (Column("unit"), Column("value"), Column("scatter", spec=".2g"), Column("count", spec="d"))
-        rows = ((m.setting, m.record, m.quantity, m.velocity, m.unit, m.value, m.scatter, m.count)
+        columns += (Column("uncertainty", spec=".2g"),)
+        rows = ((m.setting, m.record, m.quantity, m.velocity, m.unit, m.value, m.scatter, m.count, m.uncertainty)
                 for m in self.measurements)  # fmt: skip
         return Table("All measurements", columns, tuple(rows))
 
@@ -216,6 +217,12 @@ def evaluate(
     chosen = as_records(runs, "evaluate(runs)")
     whole = [run for run in chosen if run.cycles]
     notes = [f"{run.name} has no full cycle: it is not evaluated." for run in chosen if not run.cycles]
+    notes += [
+        f"{run.name}: the stroke was integrated from the velocity, so that forces at mid-stroke and gas force belong "
+        "to the middle of the motion, wherever in the damper that is."
+        for run in whole
+        if run.stroke_is_integrated
+    ]
     if not whole:
         _checks.refuse("runs", "hold a record with a full cycle", ", ".join(run.name for run in chosen))
     settings: dict[str, tuple[BenchRun, ...]] = {}
@@ -240,8 +247,7 @@ def evaluate(
         except ArgumentError as error:
             notes.append(f"Gas force and friction were not separated. {error}")
         else:
-            found += [Measurement(m.quantity, m.unit, m.value, m.scatter, m.count, name, m.record)
-                      for m in gas[name].measurements if np.isfinite(m.value)]  # fmt: skip
+            found += [replace(m, setting=name) for m in gas[name].measurements if np.isfinite(m.value)]
             notes += [f"{slowest.name}: {gas[name].note}"] if gas[name].note else []
     stated = tuple(sorted({m.velocity for m in found if m.velocity is not None}))
     return Evaluation(tuple(found), settings, cycles, gas, stated, method, tuple(notes))

@@ -21,6 +21,8 @@ class Measurement:
         setting: of the damper, such as "0.5" for a coil current; empty if there is only one.
         record: of which it was measured; empty if several records went into it.
         velocity: at which it was measured [m/s], positive; None where it belongs to no velocity.
+        uncertainty: half the width of an interval that should hold the true value, with errors of the method that the
+            scatter does not show; None where it is not known.
     """
 
     quantity: str
@@ -31,13 +33,15 @@ class Measurement:
     setting: str = ""
     record: str = ""
     velocity: float | None = None
+    uncertainty: float | None = None
 
     @property
     def cell(self) -> Cell:
-        """Value and scatter for a table; nothing where there is no value."""
+        """Value and uncertainty, or scatter where that is not known, for a table; nothing where there is no value."""
         if not np.isfinite(self.value):
             return None
-        spread = "" if self.scatter is None else f" ± {self.scatter:.2g}"
+        width = self.scatter if self.uncertainty is None else self.uncertainty
+        spread = "" if width is None else f" ± {width:.2g}"
         return Shown(self.value, f"{self.value:.4g}{spread}")
 
 

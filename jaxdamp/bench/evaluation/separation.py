@@ -1,7 +1,8 @@
 """Gas force and friction of a damper, from the even and the odd part of its force at low velocity."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 from jaxtyping import Float
@@ -10,6 +11,7 @@ from jaxdamp import _checks
 from jaxdamp._tables import Column, Table
 from jaxdamp.bench.analysis import FoldedCycles, fold_cycles
 from jaxdamp.bench.evaluation.measurements import Measurement, measured
+from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.runs import BenchRun
 
 
@@ -17,10 +19,14 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 
-LOW_SPEED = 0.05  # m/s, up to which damping is taken as proportional to velocity
+LOW_SPEED = 0.05  # m/s, up to which damping is taken as a straight line or a parabola
 LOWEST_SHARE = 0.3  # of the range of velocities, below which friction is not fully there
 _COLLINEAR = 100.0  # condition number from which friction and damping cannot be told apart
 _BINS = 40  # of the stroke, for the curves
+_CLEAR = 6.0  # standard deviations of the ratio of variances from which the damping is curved
+_ALTERNATING = (-1.0) ** np.arange(1, 4)  # sign of powers of a negative number
+_SAFE = 2.0  # standard errors, and changes by the next higher power, that make an uncertainty
+_BELOW = 0.5  # share of the change from straight lines to parabolas that an uncertainty contains
 
 
 @final
@@ -29,7 +35,8 @@ class GasAndFriction:
     """Gas force, its rate over the stroke, friction and bleed rates (damping at low speed) of one record.
 
     Attributes:
-        measurements: gas force at mid-stroke, gas rate, friction, bleed rates; means over cycles with scatter.
+        measurements: gas force at mid-stroke, gas rate, friction, bleed rates; means over cycles with scatter, gas
+            force and friction with their uncertainty too.
         stroke: of the curves [m].
         rebound: force on the way into rebound at these strokes [N].
         compression: force on the way into compression [N].
@@ -83,8 +90,9 @@ class GasAndFriction:
         """The figures with their scatter over cycles."""
         low, high = self.velocities
         title = f"Gas force and friction of {self.record}, from {low:.3g} to {high:.3g} m/s"
-        rows = tuple((m.quantity, m.unit, m.cell, m.count) for m in self.measurements)
-        return Table(title, (Column("quantity"), Column("unit"), Column("value"), Column("cycles", spec="d")), rows)
+        rows = tuple((m.quantity, m.unit, m.cell, m.uncertainty, m.count) for m in self.measurements)
+        columns = (Column("quantity"), Column("unit"), Column("value"), Column("uncertainty", spec=".2g"))
+        return Table(title, (*columns, Column("cycles", spec="d")), rows)
 
     def to_dict(self) -> dict[str, Any]:
         """The figures as plain data."""
@@ -105,13 +113,18 @@ def separate_gas_and_friction(run: BenchRun, *, up_to: float = LOW_SPEED) -> Gas
 
     In each steady cycle the samples with 0.3 to 1 times the velocity `up_to` are fitted by
     F = F_gas + k (x - x_mid) + F_friction sign(v) + c_r max(v, 0) + c_c min(v, 0): friction is what is left of the odd
-    part at zero velocity, gas what is left of the even part. Where the velocity is constant, as under a triangle,
-    friction and damping cannot be told apart, and the note says so.
+    part at zero velocity, gas what is left of the even part. Where parabolas in place of the straight lines of both
+    directions fit clearly better, these are taken; bleed rates are mean slopes over the range. Where the velocity is
+    constant, as under a triangle, friction and damping cannot be told apart, and the note says so.
+
+    The uncertainty of gas force and friction is the root of the sum of squares of twice the standard error, twice the
+    change that the next higher power would make, and half the change that the parabolas made. It holds the true values
+    of laws with a finite slope at zero velocity; a power law with an exponent below one looks like friction at any
+    velocity that is measured.
 
     Arguments:
         run: the record.
-        up_to: largest velocity to use [m/s]; the record's own peak if that is less. Below it the damping must be
-            proportional to the velocity: stay below the knee.
+        up_to: largest velocity to use [m/s]; the record's own peak if that is less. Stay below the knee.
 
     Raises:
         ValueError: no full cycle, or too few samples at these velocities.
@@ -127,11 +140,11 @@ def separate_gas_and_friction(run: BenchRun, *, up_to: float = LOW_SPEED) -> Gas
     cycles = fold_cycles(run)
     high = min(up_to, run.peak_velocity)
     low = LOWEST_SHARE * high
-    fits, note = _fit(cycles, low, high, run)
+    fits, uncertain, note = _fit(cycles, low, high, run)
     quantities = (("gas force", "N"), ("gas rate", "N/m"), ("friction", "N"))
     quantities += (("rebound bleed rate", "N s/m"), ("compression bleed rate", "N s/m"))
     found = tuple(
-        Measurement(name, unit, *measured(column), record=run.name)
+        Measurement(name, unit, *measured(column), record=run.name, uncertainty=uncertain.get(name))
         for (name, unit), column in zip(quantities, fits.T, strict=True)
     )
     stroke, rebound, compression = _branches(cycles)
@@ -139,26 +152,72 @@ def separate_gas_and_friction(run: BenchRun, *, up_to: float = LOW_SPEED) -> Gas
     return GasAndFriction(found, middle, stroke, rebound, compression, run.name, (low, high), note)
 
 
-def _fit(cycles: FoldedCycles, low: float, high: float, run: BenchRun) -> tuple[Float[np.ndarray, "cycles 5"], str]:
-    """Gas force, gas rate, friction and both rates of each cycle; NaN where a record cannot tell."""
+class _Fits(NamedTuple):
+    """Every cycle fitted with damping of one order."""
+
+    values: Float[np.ndarray, "cycles 5"]  # gas force, gas rate, friction, both rates; NaN for what cannot be told
+    errors: Float[np.ndarray, "cycles 3"]  # standard errors of the first three
+    squares: float  # sum over all samples [N²]
+    free: int  # samples less coefficients
+
+
+def _fit(
+    cycles: FoldedCycles, low: float, high: float, run: BenchRun
+) -> tuple[Float[np.ndarray, "cycles 5"], dict[str, float], str]:
+    """Gas force, gas rate, friction and both rates of each cycle, the uncertainty of gas force and friction, a note."""
+    use = [(np.abs(velocity) >= low) & (np.abs(velocity) <= high) for velocity in cycles.velocity]
+    speeds = [velocity[part] / high for velocity, part in zip(cycles.velocity, use, strict=True)]
+    if min(min(np.sum(u > 0), np.sum(u < 0)) for u in speeds) < 4:
+        remedy = "Take a slower record, or a larger `up_to`."
+        must = "leave four samples in each direction"
+        _checks.refuse("up_to", must, f"{high:.3g} m/s of record {run.name!r}", remedy)
     middle = 0.5 * float(cycles.stroke.max() + cycles.stroke.min())
-    rows, note = [], ""
-    for stroke, velocity, force in zip(cycles.stroke, cycles.velocity, cycles.force, strict=True):
-        use = (np.abs(velocity) >= low) & (np.abs(velocity) <= high)
-        x, v = stroke[use] - middle, velocity[use]
-        if min(np.sum(v > 0), np.sum(v < 0)) < 4:
-            remedy = "Take a slower record, or a larger `up_to`."
-            must = "leave four samples in each direction"
-            _checks.refuse("up_to", must, f"{high:.3g} m/s of record {run.name!r}", remedy)
-        columns = np.stack([np.ones(len(v)), x, np.sign(v), np.maximum(v, 0.0), np.minimum(v, 0.0)], axis=1)
+    parts = [
+        (stroke[part] - middle, u, force[part])
+        for stroke, force, part, u in zip(cycles.stroke, cycles.force, use, speeds, strict=True)
+    ]
+    straight = [_columns(x, u, 1) for x, u, _ in parts]
+    if any(np.linalg.cond(columns / np.linalg.norm(columns, axis=0)) > _COLLINEAR for columns in straight):
+        mean = high * np.mean([np.abs(u).mean() for u in speeds])
+        note = f"The velocity hardly varies: the friction contains the damping at {mean:.3g} m/s."
+        return _of_order(parts, 0, high).values, {}, note
+    orders = [_of_order(parts, order, high) for order in (1, 2, 3)]
+    line, curve = orders[:2]
+    ratio = (line.squares - curve.squares) / (2 * len(parts)) / max(curve.squares / max(curve.free, 1), 1e-300)
+    best = 1 if curve.free > 0 and ratio > 1 + _CLEAR / np.sqrt(len(parts)) else 0
+    uncertain = {}
+    for name, column in (("gas force", 0), ("friction", 2)):
+        means = [float(fits.values[:, column].mean()) for fits in orders]
+        scatter = float(orders[best].values[:, column].std(ddof=1)) if len(parts) > 1 else 0.0
+        error = max(scatter, float(np.sqrt(np.mean(orders[best].errors[:, column] ** 2)))) / np.sqrt(len(parts))
+        below = _BELOW * (means[best] - means[0])
+        uncertain[name] = float(np.linalg.norm([_SAFE * error, _SAFE * (means[best + 1] - means[best]), below]))
+    return orders[best].values, uncertain, ""
+
+
+def _columns(x: Samples, u: Samples, order: int) -> Float[np.ndarray, "time terms"]:
+    """Columns for gas, its rate, friction, and for each power of the relative speed one of each direction."""
+    powers = [np.where(side, u**k, 0.0) for k in range(1, order + 1) for side in (u > 0, u < 0)]
+    return np.stack([np.ones(len(u)), x, np.sign(u), *powers], axis=1)
+
+
+def _of_order(parts: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], order: int, high: float) -> _Fits:
+    """Stroke from the middle, velocity over its largest, and force of every cycle, with damping of an order."""
+    values, errors, squares, free = [], [], 0.0, 0
+    for x, u, force in parts:
+        columns = _columns(x, u, order)
         scale = np.linalg.norm(columns, axis=0)
-        told_apart = bool(np.linalg.cond(columns / scale) < _COLLINEAR)
-        size = 5 if told_apart else 3
-        if not told_apart:
-            note = f"The velocity hardly varies: the friction contains the damping at {np.abs(v).mean():.3g} m/s."
-        solution = np.linalg.lstsq((columns / scale)[:, :size], force[use])[0] / scale[:size]
-        rows.append(np.concatenate([solution, np.full(5 - size, np.nan)]))
-    return np.stack(rows), note
+        solution = np.linalg.lstsq(columns / scale, force)[0] / scale
+        left, more = float(np.sum((force - columns @ solution) ** 2)), max(len(u) - len(scale), 0)
+        error = np.sqrt(np.diag(np.linalg.pinv((columns / scale).T @ (columns / scale))) * left / max(more, 1)) / scale
+        slopes = [
+            (1 - LOWEST_SHARE**k) / (1 - LOWEST_SHARE) for k in range(1, order + 1)
+        ]  # means of u^k over the range
+        rates = [np.dot(solution[3::2], slopes), -np.dot(solution[4::2], np.array(slopes) * _ALTERNATING[:order])]
+        values.append([*solution[:3], *(np.array(rates) / high if order else (np.nan, np.nan))])
+        errors.append(error[:3])
+        squares, free = squares + left, free + more
+    return _Fits(np.array(values), np.array(errors), squares, free)
 
 
 def _branches(cycles: FoldedCycles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 # In this order; where one family finds an error in a record, the later ones are left out for it.
 FAMILIES = (
-    (motion_checks.magnitudes, motion_checks.few_samples, motion_checks.few_cycles),
+    (motion_checks.magnitudes, motion_checks.few_samples, motion_checks.few_cycles, motion_checks.integrated),
     (channel_checks.stuck, channel_checks.clipping, motion_checks.rest, motion_checks.run_up),
     (channel_checks.spikes, channel_checks.quantisation, channel_checks.ripple, consistency.velocity, consistency.sign),
     (motion_checks.jitter, consistency.gas_force, consistency.delay, consistency.breakaway, consistency.drift),
 )
-BENCH = (bench_checks.turned_by_the_reader, bench_checks.turned_motion, bench_checks.mixed_settings)
+BENCH = ((bench_checks.turned_by_the_reader, bench_checks.turned_motion), (bench_checks.mixed_settings,))
 
 
 @final
@@ -120,9 +120,10 @@ def preflight(runs: BenchRun | Iterable[BenchRun]) -> Preflight:
     """
     chosen = as_records(runs, "preflight(runs)")
     findings = [finding for run in chosen for finding in _of_record(run)]
-    wrong = {name for finding in findings if finding.severity == "error" for name in finding.records}
-    sound = [run for run in chosen if run.name not in wrong]
-    findings += [finding for check in BENCH for finding in check(sound)]
+    for family in BENCH:
+        wrong = {name for finding in findings if finding.severity == "error" for name in finding.records}
+        sound = [run for run in chosen if run.name not in wrong]
+        findings += [finding for check in family for finding in check(sound)]
     findings = bench_checks.hysteresis_or_delay(findings)
     findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
     return Preflight(tuple(findings), tuple(run.name for run in chosen))

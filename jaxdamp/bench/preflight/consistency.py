@@ -103,7 +103,10 @@ def _delay(cycles: FoldedCycles, noise: float, orders: "range | tuple[int, ...]"
         return 0.0, float("inf")
     each = -(turned.imag @ weight) / power
     least = noise * np.sqrt(2.0 / (points * count)) / np.sqrt(power)
-    return float(each.mean()), max(float(each.std(ddof=1)) / np.sqrt(count), float(least))
+    change, drifts = _trend(cycles.starts, cycles.force.mean(axis=1)) if count > 2 else (0.0, False)
+    # The ramp of a drift has harmonics of the size ramp / (π k), of which the phase is not known.
+    ramp = drifts * abs(change) / (count - 1) * float(np.sum(np.abs(weight) / number)) / (np.pi * power)
+    return float(each.mean()), max(float(each.std(ddof=1)) / np.sqrt(count), float(least)) + ramp / CLEAR
 
 
 def breakaway(e: Examined) -> list[Finding]:

@@ -6,12 +6,14 @@ from functools import cached_property
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp.bench.analysis import FoldedCycles, fold_cycles
+from jaxdamp.bench.analysis import FoldedCycles, fold_cycles, steady_cycles
+from jaxdamp.bench.contradictions import ALIKE, SAME_SHAPE
 from jaxdamp.bench.motion import Samples, moving_span, white_noise
 from jaxdamp.bench.runs import BenchRun
 
 
 SEVERITIES = ("error", "warning", "note")
+FEWEST_CYCLES = 3  # from which a scatter over cycles can be told
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,28 @@ class Examined:
 
     @cached_property
     def cycles(self) -> FoldedCycles | None:
-        """The steady cycles; none in a record without a full one."""
-        return fold_cycles(self.run) if self.run.cycles else None
+        """The steady cycles; none in a record without a full one, or of a motion that does not repeat."""
+        return fold_cycles(self.run) if self.run.cycles and self.repeats else None
+
+    @cached_property
+    def repeats(self) -> bool:
+        """Whether the motion repeats from cycle to cycle, unlike a random one or a sweep.
+
+        Three steady cycles, or half of all, must agree in stroke within 10 % of the amplitude (RMS) and in period
+        within 5 %. Fewer cycles repeat if the velocity changes its sign no more often than twice a cycle and thrice at
+        the ends.
+        """
+        count = self.run.cycles
+        if count < FEWEST_CYCLES:
+            velocity = self.run.velocity[self.moving]
+            signs = np.sign(velocity[np.abs(velocity) > 0.05 * self.run.peak_velocity])
+            return int(np.count_nonzero(np.diff(signs))) <= 2 * count + 3
+        if len(steady_cycles(self.run)) < min(FEWEST_CYCLES, 0.5 * count):
+            return False
+        cycles = fold_cycles(self.run)
+        mean = cycles.stroke.mean(axis=0)
+        alike = np.sqrt(np.mean((cycles.stroke - mean) ** 2)) < SAME_SHAPE * 0.5 * np.ptp(mean)
+        return bool(alike and np.std(cycles.periods) < ALIKE * np.mean(cycles.periods))
 
     @cached_property
     def noise(self) -> dict[str, float]:

@@ -4,10 +4,9 @@ import numpy as np
 
 from jaxdamp.bench.analysis import steady_cycles
 from jaxdamp.bench.motion import cycle_instants
-from jaxdamp.bench.preflight.finding import Examined, Finding, step
+from jaxdamp.bench.preflight.finding import FEWEST_CYCLES, Examined, Finding, step
 
 
-FEWEST_CYCLES = 3  # from which a scatter over cycles can be told
 FEWEST_SAMPLES = 30  # a cycle, as the reader recommends
 _ALIVE = 0.3  # share of the force's deviation in motion by which it moves when it is not at rest
 _CLEAR = 6.0  # standard errors from which an effect is there
@@ -37,7 +36,7 @@ def rest(e: Examined) -> list[Finding]:
 def run_up(e: Examined) -> list[Finding]:
     """Run-up and run-down of the machine: motion before the first and behind the last steady cycle."""
     steady, count = steady_cycles(e.run), e.run.cycles
-    if not steady or len(steady) < 0.5 * count:
+    if not steady or len(steady) < 0.5 * count or not e.repeats:
         return []
     found, period, end = [], 1 / e.run.frequency, len(e.run) - 1
     first, last = e.moving.start, min(e.moving.stop - 1, end)
@@ -55,10 +54,18 @@ def run_up(e: Examined) -> list[Finding]:
     return found
 
 
+def integrated(e: Examined) -> list[Finding]:
+    """A stroke that no channel measured."""
+    if not e.run.stroke_is_integrated:
+        return []
+    message = "the stroke was integrated from the velocity: its place in the damper is not known"
+    return e.finding("note", "stroke integrated", message, remedy="Laws that depend on the stroke need its channel.")
+
+
 def few_cycles(e: Examined) -> list[Finding]:
-    """Too few full cycles to know the scatter."""
+    """Too few full cycles to know the scatter, of a motion that repeats."""
     count = max(len(cycle_instants(e.run.time, e.run.stroke)) - 1, 0)
-    if count >= FEWEST_CYCLES:
+    if count >= FEWEST_CYCLES or not e.repeats:
         return []
     message = f"{count} full cycle{'s' * (count != 1)}, so the scatter from cycle to cycle is not known"
     return e.finding("warning", "few cycles", message, count, "", None, f"Record {FEWEST_CYCLES} or more.")
