@@ -49,7 +49,7 @@ class Effect(NamedTuple):
 
 
 def effects(problem: Problem, found: SearchEnd) -> list[Effect | None]:
-    """Where each free number acts, everywhere if the residuals are not those of bench records; `None` where it does not."""
+    """Where each free number acts, `None` where it does not; everywhere if the records are not those of a bench."""
     batches = [part for part in problem.residuals if isinstance(part, Batch)]
     if len(batches) < len(problem.residuals):
         return [Effect(1.0, (0.0, 0.0), 0.0)] * found.values.size
