@@ -28,7 +28,7 @@ from jaxdamp.bench.evaluation import (
 )
 from jaxdamp.bench.preflight import Finding, Preflight, preflight
 from jaxdamp.bench.processing import Steps, low_pass_gain
-from jaxdamp.bench.programmes import RandomTest, SineTest
+from jaxdamp.bench.programmes import Excitation, RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.read import read
 from jaxdamp.bench.read_rides import read_rides
@@ -39,6 +39,7 @@ from jaxdamp.bench.sensors import Sensors
 from jaxdamp.bench.sets import BenchSet, as_runs
 from jaxdamp.bench.velocity import estimate_velocity
 from jaxdamp.bench.virtual_dyno import VirtualDyno
+from jaxdamp.bench.waveforms import MultiSineTest, TriangleTest
 
 
 __all__ = [
@@ -48,12 +49,14 @@ __all__ = [
     "BenchSet",
     "Contradiction",
     "Evaluation",
+    "Excitation",
     "Finding",
     "FoldedCycles",
     "GasAndFriction",
     "Limit",
     "LimitCheck",
     "Measurement",
+    "MultiSineTest",
     "PeakVelocityPoints",
     "Preflight",
     "RandomTest",
@@ -63,6 +66,7 @@ __all__ = [
     "Sensors",
     "SineTest",
     "Steps",
+    "TriangleTest",
     "VelocityLoops",
     "VirtualDyno",
     "as_runs",

@@ -49,7 +49,7 @@ class Excitation(Protocol):
         ...
 
 
-def _growth(time: Samples, start: float | int, stop: float | int) -> tuple[Samples, Samples]:
+def growth(time: Samples, start: float | int, stop: float | int) -> tuple[Samples, Samples]:
     """Envelope s³ (10 - 15 s + 6 s²) from 0 to 1 between two instants, smooth to its curvature, and its rate [1/s]."""
     if stop <= start:
         return np.ones_like(time), np.zeros_like(time)
@@ -83,11 +83,11 @@ class _Ends:
         start, stop = (
             (self.rest_before, self.rest_before + self.run_up) if self.begins_at_rest else (-warm_up, -warm_up / 2)
         )
-        grown, rate = _growth(time, start, stop)
+        grown, rate = growth(time, start, stop)
         if not self.run_down > 0:
             return grown, rate
         end = duration - self.rest_after
-        gone, loss = _growth(time, end - self.run_down, end)
+        gone, loss = growth(time, end - self.run_down, end)
         return grown * (1 - gone), rate * (1 - gone) - grown * loss
 
 

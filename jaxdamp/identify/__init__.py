@@ -1,8 +1,11 @@
 """From bench records to a damper law: `fit` one law, `compare` many, and say how well the records determine them."""
 
 from jaxdamp._status import Status
+from jaxdamp.identify.bayes import Posterior, Spread
+from jaxdamp.identify.candidates import MachineLimits
 from jaxdamp.identify.comparing import Comparison, compare, fit_each
 from jaxdamp.identify.cross_validation import CrossValidation, cross_validate
+from jaxdamp.identify.designing import ExperimentDesign, design_experiment, extent
 from jaxdamp.identify.estimates import Estimate, rounded
 from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import judge
@@ -13,6 +16,8 @@ from jaxdamp.identify.many import fit_many
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals, Problem
+from jaxdamp.identify.profile_curve import ProfileCurve
+from jaxdamp.identify.propagation import Band, Evidence, Propagated
 from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.result import FitResult, Score, fit_percent
 from jaxdamp.identify.rungs import Failure, Rung
@@ -29,19 +34,27 @@ __all__ = [
     "NAMED_LAWS",
     "OFFSET",
     "AbstractResiduals",
+    "Band",
     "ChannelScore",
     "Comparison",
     "CrossValidation",
     "ErrorShares",
     "Estimate",
+    "Evidence",
+    "ExperimentDesign",
     "Failure",
     "FitResult",
     "InitialMotion",
+    "MachineLimits",
     "ManyFits",
     "NamedLaw",
+    "Posterior",
     "Problem",
+    "ProfileCurve",
+    "Propagated",
     "Rung",
     "Score",
+    "Spread",
     "Status",
     "TargetFit",
     "Training",
@@ -50,7 +63,9 @@ __all__ = [
     "compare",
     "cross_validate",
     "default_ladder",
+    "design_experiment",
     "error_shares",
+    "extent",
     "fit",
     "fit_each",
     "fit_many",

@@ -118,7 +118,7 @@ def solve_by(
         if not best.finite or problem.is_rounding(best.squares):
             break
         residual = best.residual / root
-        noise = noise_of(problem, best, force_noise)[0]
+        noise = noise_of(problem, best, force_noise).sigma
         spread = 1.4826 * float(np.median(np.abs(residual[plain.used]))) if loss != "squares" else 1.0
         if not spread > 0:
             break

@@ -26,13 +26,14 @@ class Estimate(NamedTuple):
     interval: tuple[float, float]  # 95 %, cut at the edges of the range
     meaning: str
     note: str  # "", "not identifiable" or "at a bound"
+    reason: str = ""  # why it is not identifiable
     tied: tuple[str, ...] = ()  # the numbers that have the same value
     bias: float | None = None  # by the noise of stroke and velocity, if this noise was stated
 
     @property
     def remark(self) -> str:
-        """The note, and the names of the numbers tied to this one."""
-        return with_tied(self.note, self.tied)
+        """The note with its reason, and the names of the numbers tied to this one."""
+        return with_tied(": ".join(filter(None, [self.note, self.reason])), self.tied)
 
 
 def rounded(value: float, error: float) -> tuple[str, str]:
@@ -65,7 +66,7 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | N
     biased = any(e.bias is not None for e in estimates)
     columns += [Column("bias by input noise", spec="+.2g")] * biased
     columns += [Column("true", spec=".5g"), Column("(value − true)/se", spec="+.1f")] * (truth is not None)
-    columns += [Column("note"), Column("meaning")]
+    columns += [Column("95 % from", spec=".5g"), Column("to", spec=".5g"), Column("note"), Column("meaning")]
     true_values = {} if truth is None else _numbers(truth)
     rows: list[tuple[Cell, ...]] = []
     for e in estimates:
@@ -75,7 +76,8 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | N
         if truth is not None:
             true = true_values.get(e.name)
             row += (true, None if true is None else (e.value - true) / e.standard_error)
-        rows.append((*row, e.remark, e.meaning))
+        low, high = (Shown(end, rounded(end, e.standard_error)[0]) for end in e.interval)
+        rows.append((*row, low, high, e.remark, e.meaning))
     return Table(title, tuple(columns), tuple(rows))
 
 

@@ -9,6 +9,8 @@ from jaxtyping import Bool, Float
 
 from jaxdamp.dampers import Reach
 from jaxdamp.identify.ends import at_ends
+from jaxdamp.identify.identifiability import on_identifiability
+from jaxdamp.identify.noise import Noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.profile import Profile, profile
 from jaxdamp.identify.result import Estimate, Minimum
@@ -33,7 +35,7 @@ class Estimates(NamedTuple):
     notes: tuple[str, ...]
 
 
-def estimate(problem: Problem, solution: Solution, noise: Float[np.ndarray, " samples"]) -> Estimates:
+def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     """Standard errors, 95 % intervals by Student's t within the domain, and remarks.
 
     A parameter is "not identifiable" if its standard error is not finite or more than half of its value. A number that
@@ -45,10 +47,10 @@ def estimate(problem: Problem, solution: Solution, noise: Float[np.ndarray, " sa
     Arguments:
         problem: the problem that was minimised.
         solution: the ends of the searches.
-        noise: standard deviation of each weighted residual.
+        noise: of the weighted residual.
     """
-    free, found, used = problem.free, solution.best, problem.used
-    uncertain, variance = uncertainty(found.jacobian, found.residual, noise), float(np.mean(noise[used] ** 2))
+    free, found = problem.free, solution.best
+    uncertain, variance = uncertainty(found.jacobian, found.residual, noise), noise.variance
     large = large_changes(free, found.values, np.linalg.norm(found.jacobian, axis=0) / problem.level)
     sides, minima = at_ends(problem.coordinates, found.values), minima_of(solution, free.names, variance)
     errors = np.sqrt(np.diag(uncertain.covariance))
@@ -65,8 +67,9 @@ def estimate(problem: Problem, solution: Solution, noise: Float[np.ndarray, " sa
     at_zero = numbers & (sides < 0) & (lower == 0) & np.isinf(upper) & ~pressed
     undetermined = ~(moved.errors <= far) | moved.open_ended
     weak = np.where(sides != 0, at_zero | ~np.isfinite(errors), undetermined)
-    estimates = _estimates(problem, found, moved.errors, weak, sides != 0, int(np.count_nonzero(used)))
-    notes = on_estimates(estimates, weak_directions(found.jacobian, float(np.sqrt(variance)), large, WEAK))
+    estimates = _estimates(problem, found, moved.errors, weak, sides != 0, noise.dof)
+    directions = weak_directions(found.jacobian, float(np.sqrt(variance)), large, WEAK)
+    estimates, notes = on_identifiability(problem, found, estimates, directions)
     notes += on_minima(minima, estimates) + on_reach(estimates, spans)
     return Estimates(estimates, uncertain.covariance, minima, tuple(notes))
 
@@ -77,11 +80,11 @@ def _estimates(
     errors: Float[np.ndarray, " free"],
     weak: Bool[np.ndarray, " free"],
     bound: Bool[np.ndarray, " free"],
-    samples: int,
+    dof: float,
 ) -> tuple[Estimate, ...]:
     free = problem.free
     lower, upper = free.limits()
-    reach = float(scipy.special.stdtrit(max(samples - found.values.size, 1), 0.975))  # quantile of Student's t
+    reach = float(scipy.special.stdtrit(dof, 0.975))  # quantile of Student's t
     rows = []
     for i, (name, p, tied) in enumerate(zip(free.names, free.owners, free.followers, strict=True)):
         value, error = float(found.values[i]), float(errors[i])
@@ -90,7 +93,7 @@ def _estimates(
         meaning = p.meaning
         if p.path in problem.per_record:
             meaning += f" in record {problem.runs[int(name.rpartition('[')[2][:-1])].name!r}"
-        rows.append(Estimate(name, value, p.unit, error, interval, meaning, note, tied))
+        rows.append(Estimate(name, value, p.unit, error, interval, meaning, note, tied=tied))
     return tuple(rows)
 
 
@@ -109,47 +112,6 @@ def large_changes(
     signed = (lower < 0) & (upper > 0)
     by_force = np.divide(1.0, sensitivity, out=np.full(sensitivity.shape, tiny), where=sensitivity > 0)
     return np.where(signed, by_force, np.maximum(np.abs(values), tiny))
-
-
-def on_estimates(estimates: Sequence[Estimate], directions: Sequence[np.ndarray]) -> list[str]:
-    """Sentences on parameters at bounds, and on parameters and groups that are not identifiable."""
-    notes = []
-    for e in estimates:
-        unit = f" {e.unit}" if e.unit else ""
-        if e.note == "at a bound":
-            notes.append(f"{e.name} = {e.value:.4g}{unit} is at a bound: the best value is beyond it.")
-        elif e.note == "not identifiable":
-            notes.append(
-                f"{e.name} is not identifiable from these records ({e.value:.3g} ± {e.standard_error:.2g}{unit}):"
-                " freeze it or add records that excite it."
-            )
-    return notes + _together(estimates, directions)
-
-
-def _together(estimates: Sequence[Estimate], directions: Sequence[np.ndarray]) -> list[str]:
-    """Sentences on groups of parameters of which the records determine only a combination."""
-    weak = np.array([e.note == "not identifiable" for e in estimates])
-    groups: list[tuple[set[int], str]] = []
-    for direction in directions:
-        signs = np.sign(direction) * weak
-        members = set(map(int, np.flatnonzero(signs)))
-        if len(members) < 2:
-            continue
-        ways = (("raising", np.flatnonzero(signs > 0)), ("lowering", np.flatnonzero(signs < 0)))
-        how = " while ".join(f"{way} {_listed([estimates[int(i)].name for i in who])}" for way, who in ways if who.size)
-        joined = [group for group in groups if group[0] & members]
-        groups = [group for group in groups if not group[0] & members]
-        groups.append((members.union(*(group[0] for group in joined)), "" if joined else how))
-    return [
-        f"These records cannot distinguish {_listed([estimates[i].name for i in sorted(members)])}"
-        + f": {how} hardly changes the force" * bool(how)
-        + ". Freeze all but one of them, or add records."
-        for members, how in groups
-    ]
-
-
-def _listed(names: Sequence[str]) -> str:
-    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
 def _spans(free: FreeParameters, reach: Reach) -> Float[np.ndarray, " free"]:
@@ -188,11 +150,12 @@ def on_minima(minima: Sequence[Minimum], estimates: Sequence[Estimate]) -> list[
     return notes
 
 
-def on_correlation(inflation: float) -> list[str]:
-    """A sentence on a residual with correlated noise."""
-    if inflation == 1.0:
+def on_misfit(noise: Noise) -> list[str]:
+    """A sentence on a residual that is not noise."""
+    if not noise.systematic:
         return []
     return [
-        "Neighbouring residuals are alike: the law misses something systematic. The standard errors count that as noise"
-        f" with the correlation of the residual, which makes them {inflation:.3g} times those of independent noise."
+        "Neighbouring residuals are alike, from cycle to cycle: the law misses something systematic. The standard"
+        " errors count that as noise with the correlation of the residual, which makes them"
+        f" {noise.inflation:.3g} times those of independent noise."
     ]

@@ -10,11 +10,12 @@ from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
 from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, takes_command
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.covered import covered_range
-from jaxdamp.identify.estimating import estimate, on_correlation
+from jaxdamp.identify.estimating import estimate, on_misfit
 from jaxdamp.identify.left_out import left_out
 from jaxdamp.identify.model import Model, OnRig, is_memoryless, law_of, rig_of, with_range
 from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.result import FitResult, score
 from jaxdamp.identify.several import Solution
 from jaxdamp.identify.traces import predict_runs
@@ -42,13 +43,13 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         _checks.refuse(
             "law", must, f"{problem.law}, which does not", coverage(problem.law) or "Start from another law."
         )
-    noise, inflation = noise_of(problem, best, force_noise)
+    noise = noise_of(problem, best, force_noise)
     estimates = estimate(problem, solution, noise)
     models, model = _fitted(problem, best.values)
     law, rig = law_of(model), rig_of(model)
     percent, rmse, scores = score(models or model, problem.runs, np.isfinite(problem.sigma))
     notes = [f"The search did not converge: {best.status.sentence} {_REMEDY}"] * (not best.converged)
-    notes += [*notes_on(law, problem.fitted_to), *estimates.notes, *on_correlation(inflation), *left_out(problem, best)]
+    notes += [*notes_on(law, problem.fitted_to), *estimates.notes, *on_misfit(noise), *left_out(problem, best)]
     return FitResult(
         law=law,
         runs=problem.runs,
@@ -62,10 +63,11 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         steps=best.steps,
         starts=solution.starts,
         minima=estimates.minima,
-        inflation=inflation,
+        inflation=noise.inflation,
         record_laws=tuple(map(law_of, models)),
         rig=rig,
         record_rigs=tuple(m.rig for m in models if isinstance(m, OnRig)),
+        evidence=Evidence(problem, best, noise, estimates.covariance),
     )
 
 

@@ -1,74 +1,225 @@
-"""The noise of the measured force, estimated from the residual of a fit: its size and correlation."""
+"""The noise of the measured force, estimated from the residual of a fit: its size and its autocorrelation."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+import scipy.signal
+from jaxtyping import Bool, Float, Int
 
+from jaxdamp.identify._tall import orthonormal
+from jaxdamp.identify.model import is_memoryless
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.traces import settling_time
 
 
-CORRELATED = 3.0  # samples per independent sample above which the residual counts as correlated
+CORRELATED = 3.0  # samples per independent sample above which residuals are called alike
+REPEATED = 0.3  # correlation of the residual with itself one cycle later above which the law misses something
+LEAST_OVERLAP = 0.5  # of a cycle, of a record with itself one cycle later
+MOST_COEFFICIENTS = 30  # of an autoregression
+FEWEST_SAMPLES = 10  # for each coefficient
+PENALTY = 2.0  # decrease of the deviance that each coefficient must give, in logarithms of the number of samples
 
 
-def noise_of(
-    problem: Problem, found: SearchEnd, force_noise: float | None
-) -> tuple[Float[np.ndarray, " samples"], float]:
-    """Standard deviation of each weighted residual, and the factor on it due to correlation.
+class Noise(NamedTuple):
+    """A model of the noise in the weighted residual of a fit.
 
-    Correlated samples contain less information than independent ones. If more than `CORRELATED` samples correspond to
-    one independent sample, the standard deviation is multiplied by the root of this number, which increases the
-    standard errors accordingly.
+    Attributes:
+        sigma: standard deviation of each sample; a systematic residual is inflated by its correlation time.
+        records: the samples of each record.
+        correlations: autocorrelation ρ(0), ρ(1), … of the noise of each record; of length one if it is white.
+        variance: of a sample, times the square of the inflation.
+        dof: degrees of freedom of the estimated variance, for Student's t.
+        inflation: factor on the standard errors due to autocorrelation, root of the mean over the directions of the
+            parameters.
+        systematic: whether the residual repeats from cycle to cycle.
+    """
+
+    sigma: Float[np.ndarray, " samples"]
+    records: tuple[Int[np.ndarray, " _"], ...]
+    correlations: tuple[Float[np.ndarray, " _"], ...]
+    variance: float
+    dof: float
+    inflation: float = 1.0
+    systematic: bool = False
+
+    def with_sigma(self, sigma: Float[np.ndarray, " samples"]) -> "Noise":
+        """The same with these standard deviations, which contain the inflation."""
+        return self._replace(sigma=sigma, variance=float(np.mean(sigma[np.concatenate(self.records)] ** 2)))
+
+    def covariance_of(self, matrix: Float[np.ndarray, "samples free"]) -> Float[np.ndarray, "free free"]:
+        """Aᵀ Σ A with the covariance Σ of the noise: the covariance of the products Aᵀ noise."""
+        noisy = matrix * self.sigma[:, None]
+        total = noisy.T @ noisy
+        for rows, alike in zip(self.records, self.correlations, strict=True):
+            if alike.size > 1:
+                part = noisy[rows]
+                total += part.T @ (_toeplitz_product(alike, part) - part)
+        return total
+
+    def scaled(self, factor: float, used: Bool[np.ndarray, " samples"]) -> "Noise":
+        """The same a factor larger, with the mean level for residuals that are not used: priors."""
+        sigma = factor * np.where(used, self.sigma, np.mean(self.sigma[used]))
+        return self._replace(sigma=sigma, variance=factor**2 * self.variance)
+
+
+def independent(sigma: Float[np.ndarray, " samples"], used: Bool[np.ndarray, " samples"], free: int) -> Noise:
+    """White noise of these standard deviations.
+
+    Arguments:
+        sigma: of each sample.
+        used: which samples count.
+        free: number of fitted parameters.
+    """
+    rows = np.flatnonzero(used)
+    return Noise(sigma, (rows,), (np.ones(1),), 1.0, float(max(rows.size - free, 1))).with_sigma(sigma)
+
+
+def noise_of(problem: Problem, found: SearchEnd, force_noise: float | None) -> Noise:
+    """The noise of all residuals; that of records as `_noise_of_records`, that of priors at its mean level."""
+    factor = 1.0 if force_noise is not None else float(problem.noise_factor)
+    return _noise_of_records(problem, found, force_noise).scaled(factor, problem.used)
+
+
+def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | None) -> Noise:
+    """The noise in the residual of a fit.
+
+    The residual of each record gets an autoregression (Yule-Walker), whose order minimises a criterion like Schwarz's
+    with `PENALTY` times its penalty. If all orders are zero, the noise is white, with one level for all records, or
+    one for each if the problem weights them so. Otherwise:
+
+    - If the residual repeats from cycle to cycle, it is no noise: the law misses something. It then counts as white
+      noise of so few samples as its correlation time leaves, which is the most that its errors can be.
+    - Else each record has its own level and autocorrelation. The fit removes some of the noise from the residual: with
+      the projection P on the derivatives, the sum of squares has the mean tr Σ − tr PΣ, by which Σ is corrected, and
+      Student's t has (tr Σ − tr PΣ) tr Σ / tr Σ² degrees of freedom (Satterthwaite), N − p for white noise.
 
     Arguments:
         problem: the problem that was minimised.
         found: the minimum.
-        force_noise: standard deviation of the measured force [N], if it is known, as independent noise.
+        force_noise: standard deviation of the measured force [N], if it is known, as white noise.
     """
-    owner, used, sigma = problem.owner, problem.used, problem.sigma
+    owner, used, sigma = problem.owner, problem.used, np.array(problem.sigma)
+    records = tuple(np.flatnonzero(used & (owner == i)) for i in range(sigma.size))
+    parts = [found.residual[rows] for rows in records]
+    count = int(np.count_nonzero(used))
+    white = independent(np.ones(used.size), used, found.values.size)
     if force_noise is not None:
-        return _with_priors(force_noise / np.array(sigma)[owner], used), 1.0
-    dof = max(int(np.count_nonzero(used)) - found.values.size, 1)
-    counted = correlation_time([found.residual[used & (owner == i)] for i in np.unique(owner[used])])
-    alike = counted > CORRELATED and not problem.is_rounding(found.squares)
-    inflation = float(np.sqrt(counted)) if alike else 1.0
-    residual = np.where(used, found.residual, 0.0)
-    shown = _from_residual(residual, used, owner, len(sigma), dof, problem.each)
-    return _with_priors(problem.noise_factor * inflation * shown, used), inflation
+        return white.with_sigma(np.where(used, force_noise / sigma[owner], 1.0))
+    correlations = [np.ones(1)] if problem.is_rounding(found.squares) else [autocorrelation(part) for part in parts]
+    is_white = all(alike.size == 1 for alike in correlations)
+    if is_white or repeats(problem, parts):
+        level = np.sqrt(count / white.dof) * _levels(found.residual, records, problem.each)
+        if is_white:
+            return white.with_sigma(level)
+        counted = max(correlation_time([part for part in parts if part.size]), 1.0)
+        few = white._replace(dof=max(count / counted - found.values.size, 1.0), inflation=float(np.sqrt(counted)))
+        return few._replace(systematic=True).with_sigma(np.sqrt(counted) * level)
+    noise = Noise(_levels(found.residual, records, True), records, tuple(correlations), 0.0, 1.0)
+    return _corrected(noise, orthonormal(found.jacobian))
 
 
-def _with_priors(noise: Float[np.ndarray, " samples"], used: Bool[np.ndarray, " samples"]) -> np.ndarray:
-    """The mean noise of the records for all other residuals, which are priors or have no weight."""
-    return np.where(used, noise, np.mean(noise[used]))
+def _corrected(noise: Noise, basis: Float[np.ndarray, "samples rank"]) -> Noise:
+    """Noise from a residual, corrected for what a fit with these directions has removed from it."""
+    removed, whole = float(np.trace(noise.covariance_of(basis))), float(np.sum(noise.sigma**2))
+    count = sum(rows.size for rows in noise.records)
+    squares = sum(_squares(noise.sigma[r], a) for r, a in zip(noise.records, noise.correlations, strict=True))
+    left = max(whole - removed, squares / whole)
+    inflation = max(removed / basis.shape[1] / (whole / count), 1.0)
+    return noise._replace(
+        sigma=noise.sigma * np.sqrt(whole / left),
+        variance=inflation * whole**2 / left / count,
+        dof=left * whole / squares,
+        inflation=float(np.sqrt(inflation)),
+    )
 
 
-def _from_residual(
-    residual: Float[np.ndarray, " samples"],
-    used: Bool[np.ndarray, " samples"],
-    owner: np.ndarray,
-    runs: int,
-    dof: int,
-    each: bool,
-) -> Float[np.ndarray, " samples"]:
-    """Standard deviation of each weighted residual, common to all records or (`each`) separate for each."""
-    count = np.bincount(owner, used, minlength=runs)
-    squares = np.bincount(owner, residual**2, minlength=runs) * (count.sum() / dof)
-    if not each:
-        return np.full(residual.size, np.sqrt(squares.sum() / count.sum()))
-    return np.sqrt(squares / np.maximum(count, 1))[owner]
+def _levels(residual: np.ndarray, records: Sequence[np.ndarray], each: bool) -> Float[np.ndarray, " samples"]:
+    """Root of the mean square of the residual, of all records together or (`each`) of each."""
+    level = np.zeros(residual.size)
+    for rows in records if each else [np.concatenate(records)]:
+        level[rows] = np.sqrt(np.mean(residual[rows] ** 2)) if rows.size else 0.0
+    return level
 
 
-def correlation_time(residuals: list[Float[np.ndarray, " _"]]) -> float:
+def _toeplitz_product(first: Float[np.ndarray, " _"], matrix: Float[np.ndarray, "rows free"]) -> np.ndarray:
+    """A matrix multiplied by the symmetric Toeplitz matrix with this first column."""
+    if first.size == 1:
+        return matrix
+    count = len(matrix)
+    length = 1 << (2 * count - 1).bit_length()  # a power of two
+    circulant = np.zeros(length)
+    circulant[:count], circulant[length - count + 1 :] = first, first[:0:-1]
+    spectrum = np.fft.rfft(circulant).real[:, None]
+    return np.fft.irfft(spectrum * np.fft.rfft(matrix, length, axis=0), length, axis=0)[:count]
+
+
+def _squares(sigma: Float[np.ndarray, " _"], alike: Float[np.ndarray, " _"]) -> float:
+    """Trace of Σ² of a record with one level: the sum of the squared elements of Σ."""
+    if not sigma.size:
+        return 0.0
+    pairs = 2.0 * np.arange(sigma.size - 1, sigma.size - alike.size, -1)
+    return float(sigma[0] ** 4 * (sigma.size + pairs @ alike[1:] ** 2))
+
+
+def _products(residual: Float[np.ndarray, " samples"]) -> Float[np.ndarray, " samples"]:
+    """Σ r(t) r(t + k) for every lag k."""
+    length = 1 << (2 * residual.size).bit_length()
+    return np.fft.irfft(np.abs(np.fft.rfft(residual, length)) ** 2, length)[: residual.size]
+
+
+def autocorrelation(residual: Float[np.ndarray, " samples"]) -> Float[np.ndarray, " lags"]:
+    """Autocorrelation ρ(0), ρ(1), … of the autoregression of a residual, for all its lags; [1] for white noise."""
+    count = residual.size
+    order = min(MOST_COEFFICIENTS, count // FEWEST_SAMPLES)
+    products = _products(residual) if order else np.zeros(1)
+    if not products[0] > 0:
+        return np.ones(1)
+    known = products / products[0]
+    coefficients, best, error, least = np.ones(1), np.ones(1), 1.0, 0.0
+    for k in range(1, order + 1):
+        reflection = -float(coefficients @ known[k:0:-1]) / error
+        padded = np.append(coefficients, 0.0)
+        coefficients, error = padded + reflection * padded[::-1], error * (1.0 - reflection**2)
+        criterion = count * np.log(max(error, np.finfo(float).tiny)) + PENALTY * k * np.log(count)
+        best, least = (coefficients, criterion) if criterion < least else (best, least)
+    if best.size == 1:
+        return best
+    known = known[: best.size]  # the first lags are those of the residual, the others follow from them
+    begin = scipy.signal.lfiltic([1.0], best, known[:0:-1])
+    return np.append(known, scipy.signal.lfilter([1.0], best, np.zeros(count - best.size), zi=begin)[0])
+
+
+def correlation_time(residuals: Sequence[Float[np.ndarray, " _"]]) -> float:
     """Number of samples per independent sample, 1 + 2 Σ ρ(k), 1 for white noise.
 
     ρ is the autocorrelation over all records, summed up to its first zero or negative value.
     """
-    length = max(map(len, residuals))
-    total = np.zeros(length)
+    total = np.zeros(max(map(len, residuals)))
     for residual in residuals:
-        spectrum = np.fft.rfft(residual, 2 * len(residual))
-        total[: len(residual)] += np.fft.irfft(np.abs(spectrum) ** 2, 2 * len(residual))[: len(residual)]
+        total[: len(residual)] += _products(residual)
     if not total[0] > 0:
         return 1.0
     alike = total / total[0]
     ends = np.flatnonzero(alike <= 0)
     return float(1.0 + 2.0 * np.sum(alike[1 : ends[0] if ends.size else None]))
+
+
+def repeats(problem: Problem, residuals: Sequence[Float[np.ndarray, " _"]]) -> bool:
+    """Whether the residual returns from cycle to cycle; yes if no record is long enough to tell.
+
+    Arguments:
+        problem: the problem that was minimised.
+        residuals: the used samples of each record.
+    """
+    memoryless = is_memoryless(problem.free.tree)
+    alike, size = 0.0, 0.0
+    for run, residual in zip(problem.runs, residuals, strict=True):
+        used = run.duration - (0.0 if memoryless else settling_time(run))
+        block = max(round(used * run.sampling_rate / max(residual.size, 1)), 1)
+        cycle = round(run.sampling_rate / (block * run.frequency)) if run.frequency > 0 else residual.size
+        if residual.size >= (1.0 + LEAST_OVERLAP) * cycle:
+            early, late = residual[:-cycle], residual[cycle:]
+            alike, size = alike + float(early @ late), size + 0.5 * float(early @ early + late @ late)
+    return alike >= REPEATED * size

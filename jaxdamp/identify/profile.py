@@ -57,7 +57,7 @@ def profile(
         distance, end = np.sqrt(CHI_SQUARE) * errors[i], found
         most = max(far[i], distance)
         while distance <= most and left > 0:
-            moved = _moved(problem, end, i, found.values[i] + side * distance)
+            moved = moved_to(problem, end, i, found.values[i] + side * distance)
             if moved is None:
                 break
             end = search(moved, STEPS, held=i, tolerance=TOLERANCE)
@@ -71,7 +71,7 @@ def profile(
     return Profile(wide, open_ended)
 
 
-def _moved(problem: Problem, end: SearchEnd, index: int, value: float) -> Problem | None:
+def moved_to(problem: Problem, end: SearchEnd, index: int, value: float) -> Problem | None:
     """The problem from the end of another search, with one value changed; `None` if the law refuses this value."""
     lower, upper = problem.free.limits()
     values = end.values.copy()

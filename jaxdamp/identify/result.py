@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,10 +10,14 @@ from jaxtyping import Float
 
 from jaxdamp._status import Status
 from jaxdamp._tables import Table, plain, with_unit
+from jaxdamp._types import VectorLike
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.bayes import Posterior, posterior
 from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
 from jaxdamp.identify.model import Model, is_memoryless, on_rig
+from jaxdamp.identify.profile_curve import ProfileCurve, profile_curve
+from jaxdamp.identify.propagation import Band, Evidence, Propagated, band, propagate
 from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.traces import predict_by_record, predict_runs, used_samples
 from jaxdamp.rig import Rig
@@ -169,6 +173,7 @@ class FitResult(AbstractFitted):
         record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
         record_rigs: the test machine of each record, as `record_laws`.
         criterion: loss and priors in words; empty for plain least squares.
+        evidence: the minimum and the noise, for `band`, `propagate`, `profile` and `posterior`.
     """
 
     parameters: tuple[Estimate, ...]
@@ -180,6 +185,7 @@ class FitResult(AbstractFitted):
     record_laws: tuple[AbstractDamper, ...] = ()
     record_rigs: tuple[Rig, ...] = ()
     criterion: str = ""
+    evidence: Evidence | None = None
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name, or of the only name that ends with it: `"rate"` for `"law.rate"`."""
@@ -208,6 +214,62 @@ class FitResult(AbstractFitted):
         )
         true = None if truth is None else on_rig(truth, None if self.rig is None else true_rig or Rig())
         return parameter_table(title, self.parameters, true)
+
+    def propagate(self, function: Callable[[Any], Any], *, samples: int | None = None, seed: int = 0) -> Propagated:
+        """The uncertainty of any function of the law: a force, a table, a metric of a ride with it.
+
+        Arguments:
+            function: of the law, such as `lambda law: law.force_velocity(0.5)`; computed by JAX, of any shape.
+            samples: number of laws drawn from the uncertainty of the parameters, for functions that are not straight
+                within it; derivatives are used if it is left out.
+            seed: of the samples.
+
+        Returns:
+            Value, standard error, and lower and upper end of the 95 % interval.
+        """
+        return propagate(self._evidence, function, samples, seed)
+
+    def band(self, velocities: VectorLike) -> Band:
+        """95 % intervals of the force [N] at constant velocities [m/s]; `result.band(velocities).plot()`.
+
+        The states of a law with states are settled, for the derivatives over two seconds at each velocity.
+        """
+        return band(self._evidence, self.law, np.asarray(velocities, float))
+
+    def profile(self, name: str) -> ProfileCurve:
+        """The cost of other values of a parameter, all others fitted again, and its 95 % interval; `.plot()` shows it.
+
+        Unlike the standard error it is valid where the sum of squares is no parabola.
+
+        Arguments:
+            name: as in `parameters`.
+        """
+        return profile_curve(self._evidence, name, self[name].interval)
+
+    def posterior(self, *, samples: int = 1000, warm_up: int = 500, chains: int = 2, seed: int = 0) -> Posterior:
+        """The full posterior of the parameters, by the no-U-turn sampler of numpyro (`pip install 'jaxdamp[bayes]'`).
+
+        Unlike standard errors it is valid where parameters depend on one another along curves, or end at bounds. The
+        prior is flat within the domains and `bounds`; the level of the noise is unknown. Noise with a memory counts by
+        its `inflation`.
+
+        Arguments:
+            samples: of each chain.
+            warm_up: steps before them, to adapt the sampler.
+            chains: side by side.
+            seed: of the sampler.
+
+        Raises:
+            ImportError: numpyro is not installed.
+            ValueError: a parameter that nothing determines.
+        """
+        return posterior(self._evidence, samples, warm_up, chains, seed)
+
+    @property
+    def _evidence(self) -> Evidence:
+        if self.evidence is None:
+            raise ValueError("This result was made without `evidence`: only those of `fit` and `judge` hold it.")
+        return self.evidence
 
     def to_dict(self) -> dict[str, Any]:
         """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""

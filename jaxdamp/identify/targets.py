@@ -16,6 +16,7 @@ from jaxdamp.dampers import Reach, without_fitted_ranges
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.ends import at_ends
 from jaxdamp.identify.estimates import Estimate, parameter_table
+from jaxdamp.identify.noise import independent
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.identify.uncertainty import uncertainty
@@ -254,7 +255,8 @@ def _check_numbers(residuals: TargetResiduals, model: Any) -> None:
 def _estimates(problem: Problem, end: SearchEnd) -> tuple[Estimate, ...]:
     """The numbers with the errors that the tolerances leave them."""
     free = problem.free
-    errors = np.sqrt(np.diag(uncertainty(end.jacobian, end.residual, np.ones(end.residual.shape)).covariance))
+    exact = independent(np.ones(end.residual.size), np.ones(end.residual.size, bool), end.values.size)
+    errors = np.sqrt(np.diag(uncertainty(end.jacobian, end.residual, exact).covariance))
     sides, (lower, upper) = at_ends(problem.coordinates, end.values), free.limits()
     rows = []
     for i, (name, p, tied) in enumerate(zip(free.names, free.owners, free.followers, strict=True)):

@@ -5,11 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp.identify._tall import triangle
+from jaxdamp.identify._tall import determined, triangle, unit_columns
+from jaxdamp.identify.noise import Noise
 
 
-RANK_TOLERANCE = 1e-7  # singular value, relative to the largest, below which a direction leaves the force unchanged
-RANK_TOLERANCE_SINGLE = 1e-4  # the same in single precision
 TAKES_PART = 0.1  # force of a parameter in a direction, relative to the largest, above which it belongs to it
 
 
@@ -20,22 +19,10 @@ class Uncertainty(NamedTuple):
     unconstrained_step: Float[np.ndarray, " free"]  # step to the minimum without any bounds, in standard errors
 
 
-def _inverse(factor: Float[np.ndarray, "rows free"]) -> tuple[np.ndarray, np.ndarray]:
-    """(RᵀR)⁻¹ for a matrix R with columns of length one or zero, and the parameters in undetermined directions."""
-    _, singular, directions = np.linalg.svd(factor)
-    blind = RANK_TOLERANCE if factor.dtype == np.float64 else RANK_TOLERANCE_SINGLE
-    directions = directions[: singular.size]
-    seen = singular > blind * singular[0]
-    inverse = (directions[seen].T / singular[seen] ** 2) @ directions[seen]
-    return inverse, np.sum(directions[seen] ** 2, axis=0) < 1.0 - 1e-3
-
-
 def uncertainty(
-    jacobian: Float[np.ndarray, "samples free"],
-    residual: Float[np.ndarray, " samples"],
-    noise: Float[np.ndarray, " samples"],
+    jacobian: Float[np.ndarray, "samples free"], residual: Float[np.ndarray, " samples"], noise: Noise
 ) -> Uncertainty:
-    """Covariance at a minimum, (JᵀJ)⁻¹ Jᵀ diag(σ²) J (JᵀJ)⁻¹, without edges of parameters.
+    """Covariance at a minimum, (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with the covariance Σ of the noise, without edges of parameters.
 
     A parameter at an edge of its range thus counts as unknown in the errors of the others; if it were taken as fixed,
     their errors would be too small. A direction with a singular value below `RANK_TOLERANCE` of the largest does not
@@ -44,15 +31,13 @@ def uncertainty(
     Arguments:
         jacobian: derivatives of the weighted residual by the parameters.
         residual: the weighted residual.
-        noise: standard deviation σ of each weighted sample. If the weights are the inverse of the true standard
-            deviation, it is one and the covariance is (JᵀJ)⁻¹.
+        noise: of the weighted residual.
     """
-    norms = np.linalg.norm(jacobian, axis=0)
-    scale = np.where(norms > 0, norms, 1.0)
-    scaled = jacobian / scale
-    inverse, lost = _inverse(triangle(scaled))
-    noisy = scaled * noise[:, None]
-    whole = inverse @ (noisy.T @ noisy) @ inverse
+    scaled, scale = unit_columns(jacobian)
+    singular, directions = determined(scaled)
+    inverse = (directions.T / singular**2) @ directions
+    lost = np.sum(directions**2, axis=0) < 1.0 - 1e-3
+    whole = inverse @ noise.covariance_of(scaled) @ inverse
     whole[lost, :] = whole[:, lost] = 0.0
     whole[lost, lost] = np.inf
     errors = np.sqrt(np.diag(whole))

@@ -10,6 +10,7 @@ from jaxdamp._field_types import check_module
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.estimating import estimate
+from jaxdamp.identify.noise import independent
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.identify.several import Solution
@@ -138,7 +139,7 @@ def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScal
     held = () if scale.held is None else (problem.free.names[scale.held],)
     problem, end = without(problem.started_at(end.values), end, scale.held)
     noise = channel_noise(problem, end.residual, end.values.size)
-    estimates = estimate(problem, Solution(end, (end,), 1), noise.sigma)
+    estimates = estimate(problem, Solution(end, (end,), 1), independent(noise.sigma, problem.used, end.values.size))
     own = {path: get(model, path) for path in data.per_record}
     model = with_values(model, {path: jnp.mean(values) for path, values in own.items()})
     notes = [f"The search did not converge: {end.status.sentence}"] * (not end.converged)

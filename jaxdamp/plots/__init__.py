@@ -10,9 +10,11 @@ from jaxdamp.plots.curves import force_velocity
 from jaxdamp.plots.damper_use import damper_use
 from jaxdamp.plots.errors import ladder
 from jaxdamp.plots.evaluation import evaluation, gas_and_friction
+from jaxdamp.plots.experiments import experiment
 from jaxdamp.plots.history import training_history
 from jaxdamp.plots.loops import fit_loops
 from jaxdamp.plots.preflight import preflight
+from jaxdamp.plots.profiles import profile
 from jaxdamp.plots.rides import ride
 from jaxdamp.plots.roughness import roughness_by_segment
 from jaxdamp.plots.sensitivities import sensitivity
@@ -25,12 +27,14 @@ __all__ = [
     "cross_validation",
     "damper_use",
     "evaluation",
+    "experiment",
     "fit_loops",
     "force_velocity",
     "gas_and_friction",
     "ladder",
     "law_card",
     "preflight",
+    "profile",
     "ride",
     "roughness_by_segment",
     "sensitivity",

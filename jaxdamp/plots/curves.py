@@ -1,6 +1,7 @@
 """Laws as curves of force over velocity."""
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ from jaxdamp import _checks
 from jaxdamp._types import VectorLike
 from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle, peak_velocity_points
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify import Band
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.rig import quasi_static
 
@@ -26,6 +28,7 @@ def force_velocity(
     *,
     baseline: str | None = None,
     note: str = "",
+    bands: Band | Mapping[str, Band] | None = None,
 ) -> "matplotlib.figure.Figure":
     """Force over velocity of one law or several, over the samples and the peak-velocity points of records.
 
@@ -39,9 +42,10 @@ def force_velocity(
         runs: measured records to draw under the curves.
         baseline: name of the law to draw as a dashed black line, for comparison.
         note: a remark to write under the picture.
+        bands: 95 % bands of the laws by name (`FitResult.band`), or that of the only law.
 
     Raises:
-        ValueError: no law, or a baseline that is not among the laws.
+        ValueError: no law, or a baseline or band that is not of one of the laws.
     """
     alone = _style.law_name(laws) if isinstance(laws, AbstractDamper) else ""
     laws = _style.by_name(
@@ -57,7 +61,10 @@ def force_velocity(
     figure = _style.new_figure(9.5, 5.5)
     axes = figure.subplots()
     handles = _measured(axes, runs)
-    curves, gaps = draw_laws(axes, laws, points, baseline)
+    bands = {alone: bands} if isinstance(bands, Band) else bands or {}
+    for name in bands:
+        _checks.one_of("bands", name, laws)
+    curves, gaps = draw_laws(axes, laws, points, baseline, bands)
     handles += curves
     handles += fitted_range.shade(axes, laws.values(), points)
     _style.dress(axes, _style.VELOCITY, _style.FORCE)
@@ -73,6 +80,7 @@ def draw_laws(
     laws: Mapping[str, AbstractDamper],
     velocities: Float[np.ndarray, " points"],
     baseline: str | None,
+    bands: Mapping[str, Band] = MappingProxyType({}),
 ) -> tuple[list, list[str]]:
     """One curve for each law; the handles for the legend, and remarks on gaps in the curves."""
     handles, gaps, number = [], [], 0
@@ -86,6 +94,10 @@ def draw_laws(
             style, number = _style.line_style(number), number + 1
         force = np.asarray(curve.force)
         handles += fitted_range.curve(axes, law, velocities, force, linewidth=1.8, label=label, **style)
+        if name in bands:
+            own, label = bands[name], f"{name}, 95 %"
+            shade = {"color": style["color"], "alpha": 0.25, "linewidth": 0.0, "zorder": 2.0, "label": label}
+            handles.append(axes.fill_between(own.velocity, own.lower, own.upper, **shade))
     return handles, gaps
 
 

@@ -9,13 +9,14 @@ from jaxdamp import plots, rig
 from jaxdamp._tables import Cell, Column, Table
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify import Comparison, Rung, without_machine
+from jaxdamp.identify import Band, Comparison, Rung, without_machine
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import fitted_range_table
 
 
 MOST_CURVES = 5  # laws in one picture of force over velocity
+BAND_STEP = 10  # points of a curve from one of its band to the next
 
 
 def fit_report(
@@ -121,7 +122,11 @@ def _add_curves(report: Report, comparison: Comparison) -> None:
     """Force over velocity of the best laws; a law without a curve is left out of the picture and named."""
     best = comparison.best
     order = sorted(comparison.rungs, key=lambda rung: rung.error)
-    laws = _with_curves(report, {rung.name: rung.result.law for rung in order}, fitted_velocities(comparison))
+    points = fitted_velocities(comparison)
+    laws = _with_curves(report, {rung.name: rung.result.law for rung in order}, points)
+    bands: dict[str, Band] = {}
+    with report.part(f"The band of {best.name} in force_velocity.png"):
+        bands |= {best.name: best.result.band(points[::BAND_STEP])} if best.name in laws else {}
     drawn = dict(list(laws.items())[:MOST_CURVES])
     note = ""
     if len(laws) > len(drawn):
@@ -130,7 +135,7 @@ def _add_curves(report: Report, comparison: Comparison) -> None:
     baseline = best.name if len(drawn) > 1 and best.name in drawn else None
     report.picture(
         lambda: plots.force_velocity(
-            drawn, runs=without_machine(best.result.rig, best.result.runs), baseline=baseline, note=note
+            drawn, runs=without_machine(best.result.rig, best.result.runs), baseline=baseline, note=note, bands=bands
         ),
         "Force over velocity",
         "force_velocity.png",

@@ -70,9 +70,10 @@ def test_equals_lstsq(sines, start, freeze, columns):
     expected, squares, *_ = np.linalg.lstsq(matrix, target, rcond=None)
     assert result.converged and result.steps == 0
     assert np.allclose([e.value for e in result.parameters], expected, rtol=1e-8)
-    covariance = squares[0] / (force.size - expected.size) * np.linalg.inv(matrix.T @ matrix) * result.inflation**2
-    assert np.allclose(result.covariance, covariance, rtol=1e-6, atol=1e-9 * covariance.max())
-    assert np.allclose([e.standard_error for e in result.parameters], np.sqrt(np.diag(covariance)), rtol=1e-6)
+    covariance = 400.0 * np.linalg.inv(matrix.T @ matrix)
+    known = fit(start, runs, freeze=freeze, force_noise=20.0)
+    assert np.allclose(known.covariance, covariance, rtol=1e-6, atol=1e-9 * covariance.max())
+    assert np.allclose([e.standard_error for e in known.parameters], np.sqrt(np.diag(covariance)), rtol=1e-6)
     assert result.rmse == pytest.approx(np.sqrt(squares[0] / force.size), rel=1e-9)
 
 

@@ -129,6 +129,16 @@ def test_fisher_information_of_paper_001(amplitude, frequency, relative):
     assert ("blow_off_rate" in weak) == (amplitude == 0.010)
     assert sum("not identifiable" in w for w in result.warnings) == len(weak)
     assert sum("is outside the records" in w for w in result.warnings) == 1
+    if amplitude == 0.010:
+        blow_off = result["blow_off_rate"]
+        (said,) = [w for w in result.warnings if w.startswith("blow_off_rate")]
+        assert ": only 2.4 % of the samples show it" in said
+        assert said.endswith(
+            "at velocities from 0.125 to 0.126 m/s. Add tests that are faster in rebound than 0.126 m/s."
+        )
+        assert blow_off.remark.startswith("not identifiable: only 2.4 % of the samples show it")
+        together = [w for w in result.warnings if w.startswith("These records cannot distinguish")]
+        assert together and together[0].endswith("or add records of another frequency and another stroke.")
 
 
 def test_a_search_that_is_cut_short_says_so(sines):

@@ -1,0 +1,163 @@
+"""Further motions of a bench: triangles of nearly constant velocity, and sums of a few sines."""
+
+from abc import abstractmethod
+from dataclasses import dataclass, field
+from typing import Any, final
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp import _checks
+from jaxdamp.bench.motion import Samples
+from jaxdamp.bench.programmes import growth
+
+
+class _Steady:
+    """A motion that grows over the first half of its warm-up."""
+
+    warm_up: Any
+
+    @abstractmethod
+    def _motion(self, time: Samples) -> tuple[Samples, Samples]:
+        """Stroke and velocity of the steady motion."""
+
+    def stroke(self, time: Samples) -> Samples:
+        """Stroke [m] at instants [s]."""
+        return growth(time, -self.warm_up, -self.warm_up / 2)[0] * self._motion(time)[0]
+
+    def velocity(self, time: Samples) -> Samples:
+        """Velocity [m/s] at instants [s]."""
+        grown, rate = growth(time, -self.warm_up, -self.warm_up / 2)
+        x, v = self._motion(time)
+        return grown * v + rate * x
+
+
+@final
+@dataclass(frozen=True)
+class TriangleTest(_Steady):
+    """Triangle of rounded turns: stroke x = a asin(k sin 2πft)/asin k, of nearly constant velocity between its ends.
+
+    Arguments:
+        amplitude: a [m], zero to peak.
+        frequency: f [Hz].
+        cycles: recorded cycles.
+        sharpness: k, between 0 (a sine) and 1 (corners, where the velocity jumps). Turns much sharper than the default
+            hold frequencies above ten times f, which `estimate_velocity` takes for noise.
+        warm_up_cycles: cycles before the record, over half of which the amplitude grows.
+        name: of the record; made of amplitude and frequency if left out.
+
+    Raises:
+        ValueError: an amplitude, frequency or number of cycles that is not positive; a sharpness beyond 0 to 0.999.
+
+    >>> test = TriangleTest(amplitude=0.02, frequency=1.0)
+    >>> test.name, round(test.peak_velocity, 4)
+    ('triangle_20mm_1Hz', 0.101)
+    """
+
+    amplitude: float | int
+    frequency: float | int
+    cycles: float | int = 3
+    sharpness: float = 0.9
+    warm_up_cycles: float | int = 2
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        for argument in ("amplitude", "frequency", "cycles", "sharpness"):
+            _checks.positive(argument, getattr(self, argument))
+        _checks.nonnegative("warm_up_cycles", self.warm_up_cycles)
+        if self.sharpness > 0.999:
+            _checks.refuse("sharpness", "be at most 0.999", self.sharpness, "A corner would need infinite force.")
+        if not self.name:
+            object.__setattr__(self, "name", f"triangle_{1e3 * self.amplitude:g}mm_{self.frequency:g}Hz")
+
+    @property
+    def duration(self) -> float:
+        """Length of the record [s]."""
+        return self.cycles / self.frequency
+
+    @property
+    def warm_up(self) -> float:
+        """Motion before the record [s]."""
+        return self.warm_up_cycles / self.frequency
+
+    @property
+    def highest_frequency(self) -> float:
+        """Frequency of a sine that turns as sharply [Hz]."""
+        return float(self.frequency / np.sqrt(1.0 - self.sharpness**2))
+
+    @property
+    def peak_velocity(self) -> float:
+        """Velocity at mid-stroke [m/s]."""
+        return float(self.amplitude * 2 * np.pi * self.frequency * self.sharpness / np.arcsin(self.sharpness))
+
+    def _motion(self, time: Samples) -> tuple[Samples, Samples]:
+        k, omega = self.sharpness, 2 * np.pi * self.frequency
+        sine, cosine, scale = np.sin(omega * time), np.cos(omega * time), self.amplitude / np.arcsin(self.sharpness)
+        return scale * np.arcsin(k * sine), scale * k * omega * cosine / np.sqrt(1.0 - (k * sine) ** 2)
+
+
+@final
+@dataclass(frozen=True)
+class MultiSineTest(_Steady):
+    """Several frequencies at once, each with the same peak velocity, within a stroke and a velocity limit.
+
+    The phases are Schroeder's, φ_k = −π k² / n, for low peaks; the motion is scaled so that it touches one of the
+    limits.
+
+    Arguments:
+        stroke_limit: largest |x| [m].
+        velocity_limit: largest |v| [m/s].
+        frequencies: of the sines [Hz].
+        duration: length of the record [s].
+        warm_up: motion before the record [s]; it grows over the first half.
+        name: of the record; made of the limits and frequencies if left out.
+
+    Raises:
+        ValueError: a limit, duration or frequency that is not positive; no frequency.
+
+    >>> test = MultiSineTest(0.02, 0.5, (1.0, 3.0, 9.0), duration=4.0)
+    >>> round(test.peak_velocity, 3)
+    0.306
+    """
+
+    stroke_limit: float | int
+    velocity_limit: float | int
+    frequencies: tuple[float | int, ...]
+    duration: float | int = 5.0
+    warm_up: float | int = 2.0
+    name: str = ""
+    _lines: Float[np.ndarray, "3 lines"] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for argument in ("stroke_limit", "velocity_limit", "duration", "frequencies"):
+            _checks.positive(argument, np.asarray(getattr(self, argument)))
+        _checks.nonnegative("warm_up", self.warm_up)
+        if not self.frequencies:
+            _checks.refuse("frequencies", "hold at least one", "empty")
+        if not self.name:
+            lines = "+".join(f"{f:g}" for f in self.frequencies)
+            object.__setattr__(self, "name", f"multisine_{1e3 * self.stroke_limit:g}mm_{lines}Hz")
+        omega, number = 2 * np.pi * np.array(self.frequencies, float), np.arange(len(self.frequencies))
+        lines = np.stack([omega, -np.pi * number**2 / len(number), 1.0 / omega])
+        object.__setattr__(self, "_lines", lines)
+        x, v = self._motion(self._grid)
+        lines[2] *= min(self.stroke_limit / np.max(np.abs(x)), self.velocity_limit / np.max(np.abs(v)))
+
+    @property
+    def _grid(self) -> Samples:
+        return np.arange(-self.warm_up, self.duration, 0.02 / (2 * np.pi * self.highest_frequency))
+
+    def _motion(self, time: Samples) -> tuple[Samples, Samples]:
+        omega, phase, size = self._lines[:, :, None]
+        angle = omega * time + phase
+        return np.sum(size * np.sin(angle), axis=0), np.sum(size * omega * np.cos(angle), axis=0)
+
+    @property
+    def highest_frequency(self) -> float:
+        """The highest of the frequencies [Hz]."""
+        return float(max(self.frequencies))
+
+    @property
+    def peak_velocity(self) -> float:
+        """Largest |v| [m/s]."""
+        return float(np.max(np.abs(self._motion(self._grid)[1])))

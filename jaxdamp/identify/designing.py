@@ -1,0 +1,289 @@
+"""`design_experiment`: the runs of a test machine that determine a law best."""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp import _checks
+from jaxdamp._tables import Column, Table
+from jaxdamp.bench import Excitation
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.candidates import WAVEFORMS, MachineLimits, Point, grid, near
+from jaxdamp.identify.design_goal import Goal
+from jaxdamp.identify.information import Information, information
+from jaxdamp.parameters import FreeParameters
+from jaxdamp.rig import Rig
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+CRITERIA = ("D", "A", "c")
+FINER = (1.25, 1.08)  # ratios of stroke and frequency of the tests around the chosen ones
+WEAK = 0.5  # standard error, relative to the value, above which a parameter is not identifiable
+
+
+@dataclasses.dataclass(frozen=True)
+class ExperimentDesign:
+    """Runs chosen for a law, and the standard errors that they are expected to give.
+
+    Attributes:
+        law: the law that the design is for, with the expected values.
+        tests: the chosen runs, in the order in which they help, for `VirtualDyno.run` or a real machine.
+        free: the free parameters.
+        covariance: expected covariance of the free numbers, in their units; the prior counts.
+        criterion: "D", "A" or "c".
+        programme: the tests of the programme for comparison.
+        programme_covariance: what that programme would give; `None` without one.
+        runs_to_match: number of runs of the design that are as good, by the criterion, as the whole programme; `None`
+            without a programme, or if more runs than it has would be needed.
+        function_errors: expected standard error of the function of the criterion "c", with the design and with the
+            programme; `None` where there is none.
+    """
+
+    law: AbstractDamper
+    tests: tuple[Excitation, ...]
+    free: FreeParameters
+    covariance: Float[np.ndarray, "free free"]
+    criterion: str
+    programme: tuple[Excitation, ...] = ()
+    programme_covariance: Float[np.ndarray, "free free"] | None = None
+    runs_to_match: int | None = None
+    function_errors: tuple[float | None, float | None] = (None, None)
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Expected standard error of each free number, by name."""
+        return dict(zip(self.free.names, map(float, np.sqrt(np.diag(self.covariance))), strict=True))
+
+    @property
+    def runs_saved(self) -> int | None:
+        """Runs of the programme less those of the design that are as good; `None` if the design does not reach it."""
+        return None if self.runs_to_match is None else len(self.programme) - self.runs_to_match
+
+    def table(self) -> Table:
+        """Expected standard errors of the parameters, beside those of the programme."""
+        several = self.programme_covariance is not None
+        columns = [Column("parameter"), Column("unit"), Column("value", spec=".5g")]
+        columns += [Column(f"standard error, {len(self.tests)} runs", spec=".2g")]
+        columns += [Column(f"standard error, {len(self.programme)} runs of the programme", spec=".2g")] * several
+        columns += [Column("note")]
+        others = np.sqrt(np.diag(self.programme_covariance)) if self.programme_covariance is not None else None
+        rows = []
+        for i, (p, value) in enumerate(zip(self.free.owners, np.asarray(self.free.values), strict=True)):
+            error = self.standard_errors[self.free.names[i]]
+            note = "not identifiable" if error > WEAK * abs(value) else ""
+            beside = () if others is None else (float(others[i]),)
+            rows.append((self.free.names[i], p.unit or "–", float(value), error, *beside, note))
+        return Table("Expected standard errors", tuple(columns), tuple(rows))
+
+    def runs_table(self) -> Table:
+        """The chosen runs."""
+        columns = (
+            Column("run"),
+            Column("0-peak", "mm", ".3g"),
+            Column("peak velocity", "m/s", ".3g"),
+            Column("highest frequency", "Hz", ".3g"),
+            Column("duration", "s", ".3g"),
+        )
+        rows = [(t.name, *extent(t), t.highest_frequency, t.duration) for t in self.tests]
+        return Table("Runs, the most useful first", columns, tuple(rows))
+
+    def plot(self) -> "Figure":
+        """The runs over stroke and velocity, and the standard errors they give."""
+        from jaxdamp.plots import experiment
+
+        return experiment(self)
+
+    def __repr__(self) -> str:
+        lines = [str(self.runs_table()), "", str(self.table())]
+        if self.programme_covariance is not None:
+            whole, match = len(self.programme), self.runs_to_match
+            lines += [f"{match or f'More than {whole}'} such runs are as good as the {whole} of the programme."]
+        return "\n".join(lines)
+
+
+def extent(test: Excitation) -> tuple[float, float]:
+    """Largest stroke [mm] and velocity [m/s] of a record."""
+    time = np.arange(0.0, test.duration, 0.01 / test.highest_frequency)
+    return 1e3 * float(np.max(np.abs(test.stroke(time)))), float(np.max(np.abs(test.velocity(time))))
+
+
+def design_experiment(
+    law: AbstractDamper,
+    limits: MachineLimits | None = None,
+    *,
+    runs: int = 6,
+    force_noise: float,
+    tests: Iterable[Excitation] | None = None,
+    duration: float = 3.0,
+    waveforms: Sequence[str] = WAVEFORMS,
+    strokes: int = 5,
+    frequencies: int = 7,
+    sampling_rate: float = 1000.0,
+    criterion: str = "D",
+    function: Callable[[Any], Any] | None = None,
+    prior: Mapping[str, float] | None = None,
+    programme: Iterable[Excitation] | None = None,
+    rig: Rig | None = None,
+    freeze: Sequence[str] = (),
+    tie: Mapping[str, str] | None = None,
+) -> ExperimentDesign:
+    """Choose the runs that determine the parameters of a law best, before any of them is run.
+
+    The Fisher information of every candidate is JᵀJ/σ² with the derivatives J of the force by the free parameters, by
+    the same model as in a fit. Runs are added one by one, each the best beside those before, then exchanged one for
+    another until no exchange helps; where the candidates come from limits, tests around the chosen ones, with strokes
+    and frequencies between those of the grid, then take part too. A run may be chosen more than once.
+
+    The information is that of the law with the values given: a design is as good as the guess. Fit, and design again.
+
+    Arguments:
+        law: the law with the values that are expected, such as that of a first fit.
+        limits: of the machine; the candidates are made from them (without `tests`), and those with too much force or
+            heat are left out.
+        runs: number of runs.
+        force_noise: standard deviation of a sample of the measured force [N], as white noise.
+        tests: the candidates, instead of a grid of tests within the limits.
+        duration: length of each run of the grid [s], at least three cycles.
+        waveforms: of the grid: "sine", "triangle", "random", "multisine".
+        strokes: number of strokes of the grid.
+        frequencies: number of frequencies of the grid.
+        sampling_rate: of the records [Hz].
+        criterion: "D", the volume of the confidence ellipsoid; "A", the sum of the squared relative standard errors;
+            "c", the standard error of `function`.
+        function: of the law, a number computed by JAX, such as a ride metric with it; for the criterion "c".
+        prior: standard deviations of parameters that are known before, as Gaussians around their values; by path, last
+            part of a path or pattern.
+        programme: tests to compare with, such as `bench.programmes.paper_000_table_1()`.
+        rig: the test machine, as in `fit`: its free numbers are determined too.
+        freeze: parameters that are known, as in `fit`.
+        tie: as in `fit`.
+
+    Raises:
+        ValueError: neither limits nor tests; no candidate within the limits; a criterion without its function, or a
+            function that the criterion does not use; unknown names.
+
+    >>> from jaxdamp.dampers import Bilinear
+    >>> limits = MachineLimits(stroke=0.02, velocity=0.5)
+    >>> design = design_experiment(
+    ...     Bilinear(2600.0, 1200.0), limits, runs=2, force_noise=10.0, waveforms=["sine"], strokes=2, frequencies=2
+    ... )
+    >>> max(design.standard_errors.values()) < 10.0
+    True
+    """
+    _check(limits, tests, runs, force_noise, criterion, function)
+    how = {"rig": rig, "freeze": freeze, "tie": tie, "sampling_rate": sampling_rate, "force_noise": force_noise}
+    if tests is not None:
+        candidates: dict[Any, Excitation] = dict(enumerate(tests))
+    else:
+        assert limits is not None
+        candidates = dict(grid(limits, waveforms, duration, strokes, frequencies))
+    if not candidates:
+        _checks.refuse("limits", "leave tests to choose from", "no candidate", "Allow more, or give `tests`.")
+    pool = _Pool.of(candidates, information(law, list(candidates.values()), **how), limits)
+    free = pool.free
+    goal = Goal.of(free, criterion, function, prior)
+    chosen = goal.exchanged(goal.added([], runs, pool.matrices), pool.matrices)
+    for ratio in FINER if tests is None else ():
+        assert limits is not None
+        keys = [pool.keys[k] for k in chosen]
+        more = near([key for key in keys if isinstance(key, Point)], ratio, limits, duration)
+        new = {point: test for point, test in more.items() if point not in pool.keys}
+        if new:
+            pool = pool.joined(_Pool.of(new, information(law, list(new.values()), **how), limits))
+        chosen = goal.exchanged(chosen, pool.matrices)
+    chosen = goal.ordered(chosen, pool.matrices)
+    covariance = goal.covariance(pool.matrices[chosen].sum(axis=0))
+    design = ExperimentDesign(law, _named([pool.tests[k] for k in chosen]), free, covariance, criterion)
+    design = dataclasses.replace(design, function_errors=(goal.function_error(covariance), None))
+    return design if programme is None else _compared(design, goal, pool, chosen, tuple(programme), how)
+
+
+def _check(
+    limits: MachineLimits | None,
+    tests: Iterable[Excitation] | None,
+    runs: int,
+    force_noise: float,
+    criterion: str,
+    function: Callable[[Any], Any] | None,
+) -> None:
+    if limits is None and tests is None:
+        remedy = "Write `limits=MachineLimits(stroke=0.05, velocity=1.0)` or `tests=[...]`."
+        _checks.refuse("limits", "be given, or `tests`", "neither", remedy)
+    if runs < 1:
+        _checks.refuse("runs", "be 1 or more", runs)
+    _checks.positive("force_noise", force_noise)
+    _checks.one_of("criterion", criterion, CRITERIA)
+    if (criterion == "c") != (function is not None):
+        remedy = "Write `criterion='c', function=lambda law: law.force_velocity(0.5)`."
+        _checks.refuse("function", "be given with the criterion 'c', and only with it", repr(function), remedy)
+
+
+def _named(tests: Sequence[Any]) -> tuple[Excitation, ...]:
+    """Tests with different names: a run that is chosen again gets a number."""
+    seen: dict[str, int] = {}
+    named = []
+    for test in tests:
+        seen[test.name] = seen.get(test.name, 0) + 1
+        number = seen[test.name]
+        named.append(test if number == 1 else dataclasses.replace(test, name=f"{test.name}_{number}"))
+    return tuple(named)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Pool:
+    """Candidates with their information."""
+
+    keys: list[Any]  # points of a grid, or numbers
+    tests: list[Excitation]
+    matrices: Float[np.ndarray, "tests free free"]
+    free: FreeParameters
+
+    @classmethod
+    def of(cls, candidates: Mapping[Any, Excitation], known: Information, limits: MachineLimits | None) -> "_Pool":
+        """Those within the limits of force and heat."""
+        bears = [
+            limits is None or (force <= limits.force and power <= limits.power)
+            for force, power in zip(known.force, known.power, strict=True)
+        ]
+        if not any(bears):
+            assert limits is not None
+            value = f"no candidate below {limits.force:g} N and {limits.power:g} W"
+            _checks.refuse(
+                "limits", "leave tests to choose from", value, "Allow more, or add slower and shorter tests."
+            )
+        items = [item for item, within in zip(candidates.items(), bears, strict=True) if within]
+        return cls([k for k, _ in items], [t for _, t in items], known.matrices[np.array(bears)], known.free)
+
+    def joined(self, other: "_Pool") -> "_Pool":
+        """Both together."""
+        matrices = np.concatenate([self.matrices, other.matrices])
+        return _Pool(self.keys + other.keys, self.tests + other.tests, matrices, self.free)
+
+
+def _compared(
+    design: ExperimentDesign,
+    goal: Goal,
+    pool: _Pool,
+    chosen: list[int],
+    programme: tuple[Excitation, ...],
+    how: Mapping[str, Any],
+) -> ExperimentDesign:
+    """The design beside a programme of tests."""
+    whole = information(design.law, programme, **how).matrices.sum(axis=0)
+    aim = float(goal.value(whole))
+    longest = goal.added(chosen, max(len(programme) - len(chosen), 0), pool.matrices)
+    reached = goal.value(np.cumsum(pool.matrices[longest[: len(programme)]], axis=0)) <= aim
+    covariance = goal.covariance(whole)
+    return dataclasses.replace(
+        design,
+        programme=programme,
+        programme_covariance=covariance,
+        runs_to_match=int(np.argmax(reached)) + 1 if np.any(reached) else None,
+        function_errors=(design.function_errors[0], goal.function_error(covariance)),
+    )

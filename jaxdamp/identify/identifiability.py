@@ -1,0 +1,152 @@
+"""Parameters that the records do not determine: which, why, and which tests would."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp.bench import BenchRun
+from jaxdamp.identify.estimates import Estimate
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.traces import Batch
+
+
+MOST = 0.95  # part of the squared effect on the force that counts as all of it
+RARE = 0.15  # share of the samples that show an effect below which this is the reason
+FAST, SLOW = 0.8, 0.25  # of the largest velocity: above, or below, which an effect is one of fast or slow motion
+ALIKE = 0.1  # relative difference below which frequencies or amplitudes of records count as one
+
+
+class Effect(NamedTuple):
+    """Where in the records a parameter changes the force."""
+
+    share: float  # of the samples, that hold `MOST` of its squared effect
+    velocities: tuple[float, float]  # m/s, of these samples
+    largest: float  # m/s, largest magnitude in the records
+
+    @property
+    def words(self) -> str:
+        """The reason why so few samples cannot determine the parameter; empty if they are not few."""
+        if self.share >= RARE:
+            return ""
+        low, high = self.velocities
+        return f"only {100 * self.share:.2g} % of the samples show it, at velocities from {low:.3g} to {high:.3g} m/s"
+
+    @property
+    def remedy(self) -> str:
+        """What tests would show more of it; empty if that does not follow from the velocities."""
+        low, high = self.velocities
+        if self.share >= RARE:
+            return ""
+        if low > FAST * self.largest or high < -FAST * self.largest:
+            way = "rebound" if low > 0 else "compression"
+            return f"Add tests that are faster in {way} than {max(abs(low), abs(high)):.3g} m/s."
+        if max(abs(low), abs(high)) < SLOW * self.largest:
+            return f"Add tests slower than {max(abs(low), abs(high)):.3g} m/s."
+        return ""
+
+
+def effects(problem: Problem, found: SearchEnd) -> list[Effect | None]:
+    """Where each free number acts, `None` where it does not; everywhere if the records are not those of a bench."""
+    batches = [part for part in problem.residuals if isinstance(part, Batch)]
+    if len(batches) < len(problem.residuals):
+        return [Effect(1.0, (0.0, 0.0), 0.0)] * found.values.size
+    used = problem.used
+    velocity = np.concatenate([np.ravel(batch.velocity) for batch in batches])[used]
+    return [_effect(column, velocity) for column in found.jacobian[used].T]
+
+
+def _effect(column: Float[np.ndarray, " samples"], velocity: Float[np.ndarray, " samples"]) -> Effect | None:
+    squares = column**2
+    if not squares.sum() > 0:
+        return None
+    order = np.argsort(-squares, kind="stable")
+    count = 1 + int(np.searchsorted(np.cumsum(squares[order]), MOST * squares.sum()))
+    shown = velocity[order[:count]]
+    return Effect(count / velocity.size, (float(shown.min()), float(shown.max())), float(np.abs(velocity).max()))
+
+
+def on_identifiability(
+    problem: Problem,
+    found: SearchEnd,
+    estimates: Sequence[Estimate],
+    directions: Sequence[Float[np.ndarray, " free"]],
+) -> tuple[tuple[Estimate, ...], list[str]]:
+    """The reasons why parameters are not identifiable.
+
+    Arguments:
+        problem: the problem that was minimised.
+        found: the minimum.
+        estimates: the fitted numbers with their notes.
+        directions: changes of the parameters that hardly change the force (`weak_directions`).
+
+    Returns:
+        The estimates with reasons, and sentences on parameters at bounds, on those that are not identifiable, and on
+        groups of which only a combination is.
+    """
+    shown, groups = effects(problem, found), _groups(estimates, directions)
+    noted, notes = [], []
+    for i, (e, effect) in enumerate(zip(estimates, shown, strict=True)):
+        unit = f" {e.unit}" if e.unit else ""
+        if e.note == "at a bound":
+            notes.append(f"{e.name} = {e.value:.4g}{unit} is at a bound: the best value is beyond it.")
+        reason = ""
+        if e.note == "not identifiable":
+            others = [estimates[j].name for members, _ in groups if i in members for j in sorted(members - {i})]
+            reason = _reason(effect, others)
+            remedy = (effect and effect.remedy) or "Freeze it or add records that excite it."
+            notes.append(
+                f"{e.name} is not identifiable from these records ({e.value:.3g} ± {e.standard_error:.2g}{unit})"
+                + f": {reason}" * bool(reason)
+                + f". {remedy}"
+            )
+        noted.append(e._replace(reason=reason))
+    return tuple(noted), notes + [_together(problem, estimates, *group) for group in groups]
+
+
+def _reason(effect: Effect | None, others: Sequence[str]) -> str:
+    if effect is None:
+        return "it does not change the force"
+    return effect.words or (f"a change of it looks like one of {_listed(others, 'or')}" if others else "")
+
+
+def _groups(
+    estimates: Sequence[Estimate], directions: Sequence[Float[np.ndarray, " free"]]
+) -> list[tuple[set[int], str]]:
+    """Groups of parameters of which the records determine only a combination, and what hardly changes the force."""
+    weak = np.array([e.note == "not identifiable" for e in estimates])
+    groups: list[tuple[set[int], str]] = []
+    for direction in directions:
+        signs = np.sign(direction) * weak
+        members = set(map(int, np.flatnonzero(signs)))
+        if len(members) < 2:
+            continue
+        ways = (("raising", np.flatnonzero(signs > 0)), ("lowering", np.flatnonzero(signs < 0)))
+        how = " while ".join(f"{way} {_listed([estimates[int(i)].name for i in who])}" for way, who in ways if who.size)
+        joined = [group for group in groups if group[0] & members]
+        groups = [group for group in groups if not group[0] & members]
+        groups.append((members.union(*(group[0] for group in joined)), "" if joined else how))
+    return groups
+
+
+def _together(problem: Problem, estimates: Sequence[Estimate], members: set[int], how: str) -> str:
+    """A sentence on parameters that only tests of another kind tell apart, and what kind."""
+    runs = [run for run in problem.fitted_to if isinstance(run, BenchRun)]
+    lacking = [
+        f"another {what}"
+        for what, values in (("frequency", [r.frequency for r in runs]), ("stroke", [r.amplitude for r in runs]))
+        if runs and max(values) - min(values) < ALIKE * max(values)
+    ]
+    tests = f"records of {_listed(lacking)}" if lacking else "records"
+    tests += " (`identify.design_experiment` proposes tests)" * bool(runs and not lacking)
+    return (
+        f"These records cannot distinguish {_listed([estimates[i].name for i in sorted(members)])}"
+        + f": {how} hardly changes the force" * bool(how)
+        + f". Freeze all but one of them, or add {tests}."
+    )
+
+
+def _listed(names: Sequence[str], word: str = "and") -> str:
+    return f" {word} ".join(filter(None, [", ".join(names[:-1]), names[-1]]))

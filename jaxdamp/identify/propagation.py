@@ -1,0 +1,183 @@
+"""The uncertainty of what follows from a fitted law: forces at velocities, or any function of the law."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.special
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import AbstractDamper, keeps_conditions, without_fitted_ranges
+from jaxdamp.identify.model import law_of
+from jaxdamp.identify.noise import Noise
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.search import SearchEnd
+from jaxdamp.parameters import get, with_values
+from jaxdamp.rig import march, quasi_static
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+HELD = 2.0  # s at constant velocity, for the derivatives of a law with states
+STEP = 1e-3  # s
+MOST_DRAWS = 100  # batches of draws; draws outside the domains are thrown away
+
+
+class Evidence(NamedTuple):
+    """What a fit knows of its minimum.
+
+    Attributes:
+        problem: the problem that was minimised.
+        minimum: the minimum.
+        noise: of the weighted residual.
+        covariance: of the free numbers.
+    """
+
+    problem: Problem
+    minimum: SearchEnd
+    noise: Noise
+    covariance: Float[np.ndarray, "free free"]
+
+    def law(self, values: Float[Array, " free"]) -> AbstractDamper:
+        """The law with these values, without its fitted range; where each record has a value, with their mean."""
+        model = self.problem.free.build(values)
+        means = {path: jnp.mean(get(model, path)) for path in self.problem.per_record}
+        return without_fitted_ranges(law_of(with_values(model, means)))
+
+    @property
+    def quantile(self) -> float:
+        """Half the width of a 95 % interval in standard errors, by Student's t."""
+        return float(scipy.special.stdtrit(self.noise.dof, 0.975))
+
+    def draws(self, count: int, seed: int) -> Float[np.ndarray, "draws free"]:
+        """Values of the free numbers as the fit leaves them possible: Student's t within domains and conditions."""
+        if not np.all(np.isfinite(self.covariance)):
+            remedy = "Freeze the parameters that do not change the force."
+            _checks.refuse("samples", "be drawn from finite standard errors", "infinite for some parameters", remedy)
+        rng, free = np.random.default_rng(seed), self.problem.free
+        half = _root(self.covariance)
+        lower, upper = free.limits()
+        limited = any(law.has_conditions() for law in [self.law(free.values)])
+        kept: list[np.ndarray] = []
+        for _ in range(MOST_DRAWS):
+            spread = np.sqrt(rng.chisquare(self.noise.dof, (count, 1)) / self.noise.dof)
+            values = self.minimum.values + rng.standard_normal((count, len(half))) @ half.T / spread
+            inside = values[np.all((values >= lower) & (values <= upper), axis=1)]
+            kept += [v for v in inside if not limited or keeps_conditions(free.started_at(v).tree)]
+            if len(kept) >= count:
+                return np.stack(kept[:count])
+        value, remedy = f"nearly all outside the domains, {len(kept)} inside", "Leave `samples` out."
+        _checks.refuse("samples", "be drawn within the domains of the parameters", value, remedy)
+
+
+def _root(covariance: Float[np.ndarray, "free free"]) -> Float[np.ndarray, "free free"]:
+    """A matrix whose product with its transpose is the covariance, of full rank or not."""
+    errors = np.sqrt(np.diag(covariance))
+    scale = np.where(errors > 0, errors, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+class Propagated(NamedTuple):
+    """A function of the fitted law, with its uncertainty; all arrays have the shape of the function's value.
+
+    Attributes:
+        value: at the fitted values.
+        standard_error: from the derivatives by the parameters, or the standard deviation of the samples.
+        lower: lower end of the 95 % interval, of Student's t or between the samples.
+        upper: upper end.
+        samples: the function of every sample, shape (samples, ...), if samples were drawn.
+    """
+
+    value: Float[np.ndarray, "..."]
+    standard_error: Float[np.ndarray, "..."]
+    lower: Float[np.ndarray, "..."]
+    upper: Float[np.ndarray, "..."]
+    samples: Float[np.ndarray, "samples ..."] | None = None
+
+
+def propagate(
+    evidence: Evidence, function: Callable[[Any], Any], samples: int | None = None, seed: int = 0
+) -> Propagated:
+    """`FitResult.propagate`."""
+
+    def of(values: Array) -> Array:
+        return jnp.asarray(function(evidence.law(values)), float)
+
+    centre = jnp.asarray(evidence.minimum.values, evidence.problem.free.values.dtype)
+    if samples is not None:
+        if samples < 2:
+            _checks.refuse("samples", "be 2 or more", samples)
+        value = np.asarray(eqx.filter_jit(of)(centre), float)
+        drawn = np.asarray(
+            eqx.filter_jit(jax.vmap(of))(jnp.asarray(evidence.draws(samples, seed), centre.dtype)), float
+        )
+        lower, upper = np.quantile(drawn, [0.025, 0.975], axis=0)
+        return Propagated(value, drawn.std(axis=0, ddof=1), lower, upper, drawn)
+
+    def twice(values: Array) -> tuple[Array, Array]:
+        result = of(values)
+        return result, result
+
+    slopes, value = (np.asarray(a, float) for a in eqx.filter_jit(jax.jacfwd(twice, has_aux=True))(centre))
+    error = np.asarray(standard_error(slopes, evidence.covariance))
+    return Propagated(value, error, value - evidence.quantile * error, value + evidence.quantile * error)
+
+
+def standard_error(slopes: Float[np.ndarray, "... free"], covariance: Float[np.ndarray, "free free"]) -> np.ndarray:
+    """√(g C gᵀ) of derivatives g; infinite where they meet a parameter of infinite variance."""
+    lost = ~np.isfinite(np.diag(covariance))
+    known = np.where(lost[:, None] | lost, 0.0, covariance)
+    variance = np.einsum("...i,ij,...j->...", slopes, known, slopes)
+    return np.where(np.any((slopes != 0.0) & lost, axis=-1), np.inf, np.sqrt(np.maximum(variance, 0.0)))
+
+
+@dataclasses.dataclass(frozen=True)
+class Band:
+    """95 % intervals of the force of a fitted law, each for its own velocity.
+
+    Attributes:
+        law: the fitted law.
+        velocity: velocities [m/s].
+        force: of the law [N], NaN where it has none at constant velocity.
+        lower: lower ends [N].
+        upper: upper ends [N].
+        runs: the fitted records.
+    """
+
+    law: AbstractDamper
+    velocity: Float[np.ndarray, " points"]
+    force: Float[np.ndarray, " points"]
+    lower: Float[np.ndarray, " points"]
+    upper: Float[np.ndarray, " points"]
+    runs: tuple[BenchRun, ...] = ()
+
+    def plot(self) -> "Figure":
+        """The curve with its band, over the records."""
+        from jaxdamp.plots import force_velocity
+
+        return force_velocity(self.law, self.velocity, self.runs or None, bands=self)
+
+
+def band(evidence: Evidence, law: AbstractDamper, velocities: Float[np.ndarray, " points"]) -> Band:
+    """`FitResult.band`."""
+    velocity = np.asarray(velocities, float)
+    force = np.asarray(quasi_static(law, velocity).force, float)
+    steps = 1 if law.initial_state().size == 0 else round(HELD / STEP)
+
+    def curve(law: AbstractDamper) -> Array:
+        def held(v: Array) -> Array:
+            return march(law, jnp.asarray(STEP, v.dtype), jnp.zeros(steps + 1, v.dtype), jnp.full(steps + 1, v), 1)[-1]
+
+        return jax.vmap(held)(jnp.asarray(velocity, float))
+
+    width = evidence.quantile * propagate(evidence, curve).standard_error
+    return Band(law, velocity, force, force - width, force + width, tuple(evidence.problem.fitted_to))

@@ -1,0 +1,52 @@
+"""The posterior by sampling, beside the covariance of a linear law and an integral for a banana."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from jaxdamp.dampers import Bilinear, Saturating
+from jaxdamp.identify import fit
+
+
+@pytest.mark.slow
+def test_the_posterior_of_a_linear_law_has_the_covariance_of_the_fit(sines):
+    pytest.importorskip("numpyro")
+    result = fit(Bilinear, sines(Bilinear(2600.0, 1200.0), noise=20.0))
+    posterior = result.posterior(samples=1500, warm_up=300, seed=1)
+    for estimate in result.parameters:
+        row = posterior[estimate.name]
+        assert row.mean == pytest.approx(estimate.value, abs=0.15 * estimate.standard_error)
+        assert row.standard_deviation == pytest.approx(estimate.standard_error, rel=0.1)
+        np.testing.assert_allclose(row.interval, estimate.interval, atol=0.25 * estimate.standard_error)
+        assert row.r_hat < 1.02 and row.effective > 500
+    assert posterior.divergences == 0
+    ratio = posterior.propagate(lambda law: law.rebound_rate / law.compression_rate)
+    assert float(ratio.standard_error) == pytest.approx(
+        float(result.propagate(lambda law: law.rebound_rate / law.compression_rate).standard_error), rel=0.1
+    )
+    assert len(posterior.table().rows) == 2
+
+
+@pytest.mark.slow
+def test_the_posterior_of_a_banana_is_that_of_an_integral_over_a_grid(sines):
+    pytest.importorskip("numpyro")
+    law = Saturating(900.0, 2000.0, 900.0, 2000.0)
+    runs = sines(law, noise=120.0, tests=[(0.01, 2.0), (0.01, 3.0), (0.01, 5.0)])
+    ties = {"compression_force": "rebound_force", "compression_rate": "rebound_rate"}
+    result = fit(law, runs, freeze=["*high_rate"], tie=ties)
+    drawn = result.posterior(samples=1500, warm_up=400, seed=2).samples[:, 0]
+    v, force = (np.concatenate([getattr(r, name) for r in result.runs]) for name in ("velocity", "force"))
+    levels, rates = np.linspace(600.0, 1500.0, 181), np.linspace(1700.0, 2300.0, 121)
+    squares = np.array([[np.sum((a * np.tanh(c * v / a) - force) ** 2) for c in rates] for a in levels])
+    density = np.exp(-0.5 * v.size * np.log(squares / squares.min())).sum(axis=1)  # flat prior, unknown noise
+    below = np.cumsum(density) / density.sum()
+    for share in (0.025, 0.25, 0.5, 0.75, 0.975):
+        assert np.mean(drawn < np.interp(share, below, levels)) == pytest.approx(share, abs=0.04)
+
+
+def test_without_the_package_the_error_says_what_to_install(sines, monkeypatch):
+    result = fit(Bilinear, sines(Bilinear(2600.0, 1200.0), noise=20.0))
+    monkeypatch.setitem(sys.modules, "numpyro.infer", None)
+    with pytest.raises(ImportError, match=r"pip install 'jaxdamp\[bayes\]'"):
+        result.posterior()

@@ -1,0 +1,112 @@
+"""Bands, functions of a fitted law and profiles: closed forms, other methods, and what they refuse."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+from jaxdamp import Ride, plots, roads, vehicles
+from jaxdamp.dampers import Bilinear, Linear, Saturating, SeriesSpring, Table
+from jaxdamp.identify import FitResult, fit
+from jaxdamp.rig import Rig
+
+
+@pytest.fixture(scope="module")
+def bilinear(sines) -> FitResult:
+    return fit(Bilinear, sines(Bilinear(2600.0, 1200.0), noise=20.0))
+
+
+@pytest.fixture(scope="module")
+def curved(sines) -> FitResult:
+    """A curve of which the records show little more than the slope: level and slope go together along a banana."""
+    law = Saturating(900.0, 2000.0, 900.0, 2000.0)
+    runs = sines(law, noise=120.0, tests=[(0.01, 2.0), (0.01, 3.0), (0.01, 5.0)])
+    ties = {"compression_force": "rebound_force", "compression_rate": "rebound_rate"}
+    return fit(law, runs, freeze=["*high_rate"], tie=ties)
+
+
+def test_the_band_of_two_slopes(bilinear):
+    velocities = np.array([-0.4, -0.1, 0.0, 0.2])
+    band = bilinear.band(velocities)
+    half = [0.5 * np.ptp(bilinear[name].interval) for name in ("compression_rate", "rebound_rate")]
+    np.testing.assert_allclose(band.upper - band.lower, 2.0 * np.abs(velocities) * np.array(half)[[0, 0, 0, 1]])
+    np.testing.assert_allclose(band.force, [bilinear.law.force_velocity(v) for v in velocities])
+    assert band.plot().axes[0].get_legend_handles_labels()[1][-1].endswith("95 %")
+    with pytest.raises(ValueError, match="bands"):
+        plots.force_velocity({"bilinear": bilinear.law}, bands={"linear": band})
+
+
+def test_any_function_by_derivatives_and_by_samples(bilinear):
+    def ratio(law):
+        return law.rebound_rate / law.compression_rate
+
+    by_slopes, by_samples = bilinear.propagate(ratio), bilinear.propagate(ratio, samples=4000, seed=1)
+    value, error = float(by_slopes.value), float(by_slopes.standard_error)
+    shares = [e.standard_error / e.value for e in bilinear.parameters]
+    assert error == pytest.approx(value * np.hypot(*shares), rel=1e-6)  # independent errors
+    assert float(by_samples.standard_error) == pytest.approx(error, rel=0.05)
+    np.testing.assert_allclose(
+        [by_samples.lower, by_samples.upper], [by_slopes.lower, by_slopes.upper], atol=0.15 * error
+    )
+    with pytest.raises(ValueError, match="`samples` must be 2 or more"):
+        bilinear.propagate(ratio, samples=1)
+
+
+@pytest.mark.slow
+def test_a_ride_metric(sines):
+    result = fit(Linear, sines(Linear(1500.0), noise=200.0))
+    car = vehicles.presets.quarter_car_000(Linear(1500.0))
+    ride = Ride(car, roads.white("C", 20.0), metrics=["rms_sprung_acceleration"])
+    found = result.propagate(lambda law: ride({"damper.rate": law.rate})["rms_sprung_acceleration"])
+    rate, step = result["rate"], 1.0
+    near = [float(ride({"damper.rate": rate.value + way})["rms_sprung_acceleration"]) for way in (-step, step)]
+    assert float(found.standard_error) == pytest.approx(rate.standard_error * abs(near[1] - near[0]) / 2.0, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_laws_with_states_rigs_and_records_of_their_own(maxwell_runs):
+    rng = np.random.default_rng(0)
+    runs = [dataclasses.replace(r, force=r.force + 2.0 * rng.standard_normal(len(r))) for r in maxwell_runs[:2]]
+    start = SeriesSpring(Linear(1500.0), 4e5)
+    result = fit(start, runs, rig=Rig(force_offset=1.0), freeze=["cubic_stiffness"], per_record=["force_offset"])
+    band = result.band(np.array([-0.1, 0.1]))
+    width = 0.1 * np.ptp(result["law.law.rate"].interval)
+    np.testing.assert_allclose(band.upper - band.lower, width, rtol=1e-3)
+
+
+def test_what_nothing_shows_is_infinite(bilinear, sines):
+    table = Table(np.array([-0.7, 0.0, 0.7, 9.0, 10.0]), np.zeros(5))
+    blind = fit(table, sines(Linear(2000.0), noise=5.0))
+    errors = blind.propagate(lambda law: law.force_points).standard_error
+    assert np.all(np.isfinite(errors[:3])) and np.isinf(errors[4])
+    with pytest.raises(ValueError, match="finite standard errors"):
+        blind.propagate(lambda law: law.force_points, samples=10)
+    with pytest.raises(ValueError, match="evidence"):
+        dataclasses.replace(bilinear, evidence=None).band(np.array([0.1]))
+
+
+def test_the_profile_of_a_linear_law_is_its_parabola(bilinear):
+    rate, curve = bilinear["rebound_rate"], bilinear.profile("rebound_rate")
+    np.testing.assert_allclose(curve.cost, ((curve.values - rate.value) / rate.standard_error) ** 2, atol=1e-6)
+    np.testing.assert_allclose(curve.interval, rate.interval, rtol=1e-6)
+    assert len(curve.plot().axes[0].get_lines()) >= 4
+    with pytest.raises(KeyError, match="rebound_rat"):
+        bilinear.profile("rebound_rat")
+
+
+def test_the_profile_of_a_banana(curved):
+    """The ends are where the least squares over the other parameter, by another method, have risen by the level."""
+    level, curve = curved["rebound_force"], curved.profile("rebound_force")
+    low, high = curve.interval
+    assert high - level.value > 1.3 * (level.value - low)  # the standard error has both sides alike
+    v, force = (np.concatenate([getattr(r, name) for r in curved.runs]) for name in ("velocity", "force"))
+
+    def squares(rate, at):
+        return float(np.sum((at * np.tanh(rate * v / at) - force) ** 2))
+
+    least = squares(curved["rebound_rate"].value, level.value)
+    variance = least / (v.size - 2)
+    for end in curve.interval:
+        other = minimize_scalar(squares, bounds=(500.0, 5000.0), args=(end,), method="bounded", options={"xatol": 1e-6})
+        assert (other.fun - least) / variance == pytest.approx(curve.level, rel=0.03)
