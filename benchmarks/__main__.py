@@ -17,6 +17,7 @@ QUESTIONS = (
     ["fit"],
     ["printed"],
     ["fit_many"],
+    ["pareto"],
 )
 
 

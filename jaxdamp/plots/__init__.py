@@ -8,9 +8,11 @@ from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
 from jaxdamp.plots.curves import force_velocity
 from jaxdamp.plots.damper_use import damper_use
+from jaxdamp.plots.decisions import damper_comparison
 from jaxdamp.plots.errors import ladder
 from jaxdamp.plots.evaluation import evaluation, gas_and_friction
 from jaxdamp.plots.experiments import experiment
+from jaxdamp.plots.fronts import pareto
 from jaxdamp.plots.history import training_history
 from jaxdamp.plots.loops import fit_loops
 from jaxdamp.plots.preflight import preflight
@@ -20,11 +22,13 @@ from jaxdamp.plots.roughness import roughness_by_segment
 from jaxdamp.plots.sensitivities import sensitivity
 from jaxdamp.plots.sweeps import sweep
 from jaxdamp.plots.validation import cross_validation
+from jaxdamp.plots.valve_choice import valving
 from jaxdamp.plots.vehicle_fit import vehicle_fit
 
 
 __all__ = [
     "cross_validation",
+    "damper_comparison",
     "damper_use",
     "evaluation",
     "experiment",
@@ -33,6 +37,7 @@ __all__ = [
     "gas_and_friction",
     "ladder",
     "law_card",
+    "pareto",
     "preflight",
     "profile",
     "ride",
@@ -41,5 +46,6 @@ __all__ = [
     "sweep",
     "training_history",
     "tuning",
+    "valving",
     "vehicle_fit",
 ]

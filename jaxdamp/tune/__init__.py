@@ -6,10 +6,15 @@
 - `Scenarios`: roads and conditions of the vehicle, in place of one road.
 - `Targets`, `smooth_peak`, `smooth_settling`: objectives.
 - `slope`, `monotone`, `ratio`, `knee`: constraints on the shape of the force-velocity curve.
+- `pareto`: fronts of two or three metrics; `hypervolume`.
+- `compare_dampers`: differences between dampers with error bars; `valving`: a mono-tube damper for a wanted force.
 """
 
 from jaxdamp._status import Status
+from jaxdamp.tune.decisions import DamperComparison, Difference, FittedLaw, compare_dampers
+from jaxdamp.tune.front import ParetoFront, hypervolume
 from jaxdamp.tune.minimising import minimise
+from jaxdamp.tune.pareto_search import pareto
 from jaxdamp.tune.rescoring import Rescore, rescore
 from jaxdamp.tune.result import Change, ScenarioValues, TuneResult
 from jaxdamp.tune.risk import CVaR
@@ -24,6 +29,8 @@ from jaxdamp.tune.spectra import Spectrum
 from jaxdamp.tune.starts import Attempt
 from jaxdamp.tune.targets import Targets
 from jaxdamp.tune.tolerance import ToleranceEffect, tolerance_effects
+from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
+from jaxdamp.tune.valving_search import valving
 
 
 __all__ = [
@@ -32,6 +39,11 @@ __all__ = [
     "Change",
     "Condition",
     "CurveSensitivity",
+    "DamperComparison",
+    "Difference",
+    "FittedLaw",
+    "OutOfReach",
+    "ParetoFront",
     "Rescore",
     "RobustResult",
     "Scenario",
@@ -45,10 +57,15 @@ __all__ = [
     "Targets",
     "ToleranceEffect",
     "TuneResult",
+    "ValveParameter",
+    "ValvingResult",
+    "compare_dampers",
     "damper_paths",
+    "hypervolume",
     "knee",
     "minimise",
     "monotone",
+    "pareto",
     "ratio",
     "rescore",
     "robust",
@@ -59,4 +76,5 @@ __all__ = [
     "smooth_settling",
     "tolerance_effects",
     "tolerances",
+    "valving",
 ]

@@ -1,0 +1,365 @@
+"""`compare_dampers`: the difference between dampers in ride metrics, with its uncertainty."""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._field_types import check_module
+from jaxdamp._jacobian import value_and_jacobian
+from jaxdamp._progress import Progress
+from jaxdamp._tables import Column, Table, plain, typeset_unit
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.metrics import Metric
+from jaxdamp.parameters import FreeParameters, free_parameters
+from jaxdamp.roads import AbstractRoad, WhiteRoad
+from jaxdamp.simulation import Ride
+from jaxdamp.vehicles import AbstractVehicle
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+CONFIDENCE = 0.95
+NO_EFFECT = 1e-6  # change of a metric per 100 % of a parameter, relative to its size, that counts as none
+
+
+@runtime_checkable
+class FittedLaw(Protocol):
+    """A law with uncertain parameters, as `identify.fit` gives it.
+
+    `parameters` have a `name` and the names of numbers `tied` to them; `covariance` is theirs, in their units and
+    order, infinite for parameters that the records do not determine.
+    """
+
+    @property
+    def law(self) -> AbstractDamper:
+        """The law."""
+        ...
+
+    @property
+    def parameters(self) -> Sequence[Any]:
+        """The estimates."""
+        ...
+
+    @property
+    def covariance(self) -> Float[np.ndarray, "free free"]:
+        """Of the estimates."""
+        ...
+
+
+class Difference(NamedTuple):
+    """The change of a metric from the first damper to another one, relative to the first.
+
+    Attributes:
+        damper: name of the other damper.
+        metric: name of the metric.
+        change: mean over the roads [%].
+        from_parameters: standard error due to the fitted parameters [%].
+        from_roads: standard error due to the choice of roads, the same for both dampers [%].
+        margin: half the width of the 95 % interval from both sources [%].
+    """
+
+    damper: str
+    metric: str
+    change: float
+    from_parameters: float
+    from_roads: float
+    margin: float
+
+    @property
+    def significant(self) -> bool:
+        """Whether the interval excludes zero."""
+        return abs(self.change) > self.margin
+
+    @property
+    def sentence(self) -> str:
+        """The difference in words."""
+        parts = f"± {self.from_parameters:.2g} % from the fitted parameters, ± {self.from_roads:.2g} % from the roads"
+        less = "less" if self.change < 0 else "more"
+        size = f"{abs(self.change):.2g} ± {self.margin:.2g} % {less} {self.metric}"
+        verdict = "" if self.significant else ", which may be none"
+        return f"{self.damper} has {size}{verdict} (95 %; standard errors {parts})."
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class DamperComparison:
+    """Ride metrics of several dampers on the same roads, with their uncertainties.
+
+    Attributes:
+        values: each metric of each damper on each road, by damper and metric.
+        parameter_errors: standard error of the mean of each metric due to the fitted parameters, likewise.
+        road_errors: standard error of the mean of each metric due to the choice of roads, likewise.
+        differences: from the first damper to each other one.
+        units: of the metrics.
+        warnings: parameters that no record determines but that matter here.
+    """
+
+    values: dict[str, dict[str, Float[np.ndarray, " roads"]]]
+    parameter_errors: dict[str, dict[str, float]]
+    road_errors: dict[str, dict[str, float]]
+    differences: tuple[Difference, ...]
+    units: dict[str, str]
+    warnings: tuple[str, ...]
+
+    @property
+    def summary(self) -> str:
+        """The differences of the first metric in words."""
+        first = next(iter(self.units))
+        return " ".join(d.sentence for d in self.differences if d.metric == first)
+
+    def difference(self, metric: str, damper: str | None = None) -> Difference:
+        """The difference in a metric; of the second damper, if none is named."""
+        _checks.one_of("metric", metric, self.units)
+        damper = list(self.values)[1] if damper is None else damper
+        _checks.one_of("damper", damper, list(self.values)[1:])
+        return next(d for d in self.differences if (d.metric, d.damper) == (metric, damper))
+
+    def table(self) -> Table:
+        """Each metric of each damper with both standard errors, and the change from the first one."""
+        names = ["metric", "unit", "damper", "mean", "from parameters", "from roads"]
+        columns = [*map(Column, names), Column("change", "%", "+.2f"), Column("95 %", "%", ".2f"), Column("note")]
+        changes = {(d.damper, d.metric): d for d in self.differences}
+        rows = []
+        for metric, unit in self.units.items():
+            for damper, values in self.values.items():
+                errors = self.parameter_errors[damper][metric], self.road_errors[damper][metric]
+                d = changes.get((damper, metric))
+                more = (None, None, "") if d is None else (d.change, d.margin, "" if d.significant else "may be none")
+                rows.append((metric, typeset_unit(unit, "–"), damper, float(values[metric].mean()), *errors, *more))
+        return Table("Ride metrics with standard errors", tuple(columns), tuple(rows))
+
+    def to_dict(self) -> dict[str, Any]:
+        """All numbers with units and words, ready for JSON; numbers that are not finite are None."""
+        return {
+            "summary": self.summary,
+            "units": self.units,
+            "values": plain(self.values),
+            "parameter_errors": plain(self.parameter_errors),
+            "road_errors": plain(self.road_errors),
+            "differences": [plain(d._asdict()) | {"significant": bool(d.significant)} for d in self.differences],
+            "warnings": list(self.warnings),
+        }
+
+    def plot(self, **options: Any) -> "Figure":
+        """The change of each metric with its interval, and the share of each source."""
+        from jaxdamp.plots import damper_comparison
+
+        return damper_comparison(self, **options)
+
+    def __repr__(self) -> str:
+        warnings = [f"warning: {warning}" for warning in self.warnings]
+        return "\n".join([self.summary, self.table().to_text(), *warnings])
+
+
+class _Rated(NamedTuple):
+    """Metrics of one damper on each road, and the variance of their means due to its parameters."""
+
+    values: Float[np.ndarray, "roads metrics"]
+    variance: Float[np.ndarray, " metrics"]
+
+
+def compare_dampers(
+    dampers: Mapping[str, AbstractDamper | FittedLaw],
+    vehicle: Callable[[AbstractDamper], AbstractVehicle],
+    roads: Sequence[AbstractRoad] | WhiteRoad,
+    *,
+    metrics: Sequence[str | Metric] | None = None,
+    duration: float | None = None,
+    dt: float = 1e-3,
+) -> DamperComparison:
+    """Compare dampers in ride metrics on the same roads, with standard errors and 95 % intervals of the differences.
+
+    The uncertainty has two sources. The parameters of a fitted law are uncertain: their covariance is carried to each
+    metric by exact derivatives (to first order). A random road is one of many: the scatter from road to road gives the
+    standard error of a mean. All dampers drive over the same roads, so most of this scatter cancels in a difference.
+    The errors of different fits are taken as independent. A white road has no scatter.
+
+    Neither source includes a law of the wrong form: look at the residuals of the fits.
+
+    Arguments:
+        dampers: two or more by name, the first of which is the one to compare with: results of `identify.fit`, or laws,
+            whose parameters then count as exact.
+        vehicle: gives the vehicle for a law, such as `vehicles.presets.quarter_car_000`.
+        roads: two or more roads, such as one class with several seeds; or `roads.white(...)`.
+        metrics: as in `Ride`; all ride metrics if left out, but counts and means.
+        duration: length of each run [s], as in `simulate`.
+        dt: step [s], as in `simulate`.
+
+    Raises:
+        ValueError: fewer than two dampers or roads; estimates that are no parameters of their law; what `Ride` refuses.
+
+    >>> from jaxdamp import dampers, roads, vehicles
+    >>> laws = {"A": dampers.Linear(2500.0), "B": dampers.Linear(4500.0)}
+    >>> compared = compare_dampers(laws, vehicles.presets.quarter_car_000, roads.white("C", 20.0))
+    >>> round(compared.difference("rms_sprung_acceleration").change, 2)
+    -8.68
+    """
+    _check(dampers, vehicle, roads)
+    listed: list[Any] = [roads] if isinstance(roads, WhiteRoad) else list(roads)
+    rated, warnings, units = {}, [], {}
+    with Progress("Comparing dampers") as shown:
+        for number, (name, damper) in enumerate(dampers.items()):
+            shown(f"{name}, {number + 1} of {len(dampers)}")
+            law = damper if isinstance(damper, AbstractDamper) else damper.law
+            car = vehicle(law)
+            check_module("vehicle", car, (AbstractVehicle,), "compare_dampers(dampers, vehicle, roads)")
+            rides = [
+                Ride(car, road, metrics=_chosen(car, listed, metrics), duration=duration, dt=dt) for road in listed
+            ]
+            units = {m.name: m.unit(car.units) for m in rides[0].metrics}
+            rated[name], doubts = _rated(damper, vehicle, rides)
+            warnings += [f"{name}: {doubt}" for doubt in doubts]
+    order, (first, *others) = list(units), list(rated)
+    by_metric = {name: dict(zip(order, one.values.T, strict=True)) for name, one in rated.items()}
+    count = len(listed)
+    return DamperComparison(
+        values=by_metric,
+        parameter_errors={
+            name: dict(zip(order, map(float, np.sqrt(one.variance)), strict=True)) for name, one in rated.items()
+        },
+        road_errors={
+            name: {metric: _standard_error(values[metric]) for metric in order} for name, values in by_metric.items()
+        },
+        differences=tuple(
+            _difference(name, metric, rated[first], rated[name], i, count)
+            for name in others
+            for i, metric in enumerate(order)
+        ),
+        units=units,
+        warnings=tuple(warnings),
+    )
+
+
+def _check(dampers: Any, vehicle: Any, roads: Any) -> None:
+    call = "compare_dampers({'A': fit_a, 'B': fit_b}, vehicle, roads)"
+    if not isinstance(dampers, Mapping) or len(dampers) < 2:
+        _checks.refuse("dampers", "be two or more by name", _checks.described(dampers), f"The call is `{call}`.")
+    for name, damper in dampers.items():
+        must = "be a damper law or the result of a fit"
+        _checks.instance(f"dampers[{name!r}]", damper, (AbstractDamper, FittedLaw), must)
+    if isinstance(vehicle, AbstractVehicle) or not callable(vehicle):
+        remedy = "Write `lambda law: QuarterCar(..., law)`."
+        _checks.refuse("vehicle", "be a function from a law to a vehicle", _checks.described(vehicle), remedy)
+    if not isinstance(roads, WhiteRoad) and (not isinstance(roads, Sequence) or len(roads) < 2):
+        remedy = "Take a road class with several seeds: one road says nothing about the next one."
+        _checks.refuse("roads", "be two or more roads, or a white one", _checks.described(roads), remedy)
+
+
+def _chosen(car: AbstractVehicle, roads: Sequence[Any], metrics: Sequence[str | Metric] | None) -> list[Any]:
+    """The metrics to compare: those asked for, or all that have a derivative and one sign."""
+    if metrics is not None:
+        return list(metrics)
+    known = Ride(car, roads[0]).metrics if isinstance(roads[0], WhiteRoad) else car.ride_metrics
+    return [m for m in known if m.statistic.differentiable and not m.statistic.signed]
+
+
+def _rated(
+    damper: AbstractDamper | FittedLaw, vehicle: Callable[[AbstractDamper], AbstractVehicle], rides: Sequence[Ride]
+) -> tuple[_Rated, list[str]]:
+    """The metrics of a damper on all roads side by side, with exact derivatives by its estimates."""
+    law = damper if isinstance(damper, AbstractDamper) else damper.law
+    free = free_parameters(law)
+    estimates, names = ([], free.names) if isinstance(damper, AbstractDamper) else (damper.parameters, free.names)
+    effects = _effects(estimates, names)
+    order = [m.name for m in rides[0].metrics]
+    driven = [ride.heights for ride in rides if ride.heights is not None]
+    heights = jnp.stack(driven) if driven else None
+    values, slopes = _metrics_on_roads(rides[0].side_by_side(), vehicle, free, heights, jnp.asarray(effects), order)
+    values, slopes = np.asarray(values, np.float64), np.asarray(slopes, np.float64).mean(axis=0)
+    if isinstance(damper, AbstractDamper):
+        return _Rated(values, np.zeros(len(order))), []
+    covariance = np.array(damper.covariance, np.float64)
+    unknown = ~np.isfinite(np.diag(covariance))
+    size = np.abs(effects.T @ np.asarray(free.values, np.float64)) * np.abs(slopes)
+    matters = (size > NO_EFFECT * np.abs(values.mean(axis=0))[:, None]) & unknown
+    covariance[unknown, :] = covariance[:, unknown] = 0.0
+    variance = np.einsum("mi,ij,mj->m", slopes, covariance, slopes)
+    variance[matters.any(axis=1)] = np.inf
+    notes = [
+        f"{e.name} is not determined by its records, and changes {', '.join(np.array(order)[column])}."
+        for e, column in zip(estimates, matters.T, strict=True)
+        if column.any()
+    ]
+    return _Rated(values, variance), notes
+
+
+def _effects(estimates: Sequence[Any], names: Sequence[str]) -> Float[np.ndarray, "numbers free"]:
+    """Change of each number of a law per change of each estimate: one, or a share where the law has a mean."""
+    plain_names = [str(e.name).removeprefix("law.") for e in estimates]
+    effects = np.zeros((len(names), len(estimates)))
+    for i, (estimate, name) in enumerate(zip(estimates, plain_names, strict=True)):
+        owner = name.rpartition("[")[0]
+        by_record = name not in names and owner in names  # one value for each record, of which the law has the mean
+        if by_record:
+            effects[names.index(owner), i] = 1.0 / sum(other.startswith(f"{owner}[") for other in plain_names)
+        elif name in names:
+            effects[names.index(name), i] = 1.0
+        elif not name.startswith("rig."):  # a test machine takes no part in a ride
+            _checks.refuse("dampers", f"have estimates among {', '.join(names)}", repr(estimate.name))
+        for tied in (str(other).removeprefix("law.") for other in estimate.tied):
+            if tied in names:
+                effects[names.index(tied), i] = 1.0
+    return effects
+
+
+@eqx.filter_jit
+def _metrics_on_roads(
+    ride: Ride,
+    vehicle: Callable[[AbstractDamper], AbstractVehicle],
+    free: FreeParameters,
+    heights: Array | None,
+    effects: Array,
+    order: list[str],
+) -> tuple[Array, Array]:
+    """The metrics on each road (roads, metrics), and their derivatives by the estimates (roads, metrics, estimates)."""
+    count = 1 if heights is None else len(heights)
+    columns = [str(i) for i in range(effects.shape[1])]
+
+    def one(heights: Array | None, moved: dict[str, Array]) -> dict[str, Array]:
+        step = jnp.stack([moved[name] for name in columns]) if columns else jnp.zeros(0)
+        car = vehicle(free.build(free.values + effects @ step))
+        on_road = ride.of_vehicle(car)
+        return dict(on_road() if heights is None else eqx.tree_at(lambda r: r.heights, on_road, heights)())
+
+    def on_roads(moved: dict[str, Array]) -> dict[str, Array]:
+        return jax.vmap(one, in_axes=(None if heights is None else 0, 0), axis_size=count)(heights, moved)
+
+    still = {name: jnp.zeros(count, free.values.dtype) for name in columns}
+    if not columns:
+        found = on_roads(still)
+        values = jnp.stack([found[name] for name in order], axis=-1)
+        return values, jnp.zeros((*values.shape, 0))
+    found, slopes = value_and_jacobian(on_roads, still, of=order)
+    rows = [jnp.stack([slopes[name][column] for column in columns], axis=-1) for name in order]
+    return jnp.stack([found[name] for name in order], axis=-1), jnp.stack(rows, axis=1)
+
+
+def _standard_error(values: Float[np.ndarray, " roads"]) -> float:
+    """Of the mean over independent roads; zero for a single, white one."""
+    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
+
+
+def _difference(name: str, metric: str, first: _Rated, other: _Rated, i: int, roads: int) -> Difference:
+    """The change of a metric in percent, with both errors to first order and the interval by Student's t."""
+    from scipy.special import ndtri, stdtrit
+
+    base, new = first.values[:, i], other.values[:, i]
+    ratio = new.mean() / base.mean()
+    share = 100.0 / abs(base.mean())
+    from_roads = share * _standard_error(new - ratio * base)
+    from_parameters = share * float(np.sqrt(other.variance[i] + ratio**2 * first.variance[i]))
+    total = float(np.hypot(from_roads, from_parameters))
+    tail = 0.5 + CONFIDENCE / 2.0
+    # degrees of freedom after Welch and Satterthwaite: only the error from the roads is estimated from a few values
+    freedom = (roads - 1) * (total / from_roads) ** 4 if from_roads > 0.0 else np.inf
+    factor = float(stdtrit(freedom, tail)) if np.isfinite(freedom) else float(ndtri(tail))
+    numbers = 100.0 * (ratio - 1.0), from_parameters, from_roads, factor * total
+    return Difference(name, metric, *map(float, numbers))

@@ -1,0 +1,206 @@
+"""A front: the designs of which none is better in one objective without being worse in another."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jaxdamp import _checks
+from jaxdamp._status import Status
+from jaxdamp._tables import Column, Table, plain, typeset_unit, with_unit
+from jaxdamp.metrics import MetricValues
+from jaxdamp.parameters import FreeParameters
+from jaxdamp.simulation import Ride
+from jaxdamp.tune.objective import Objective
+from jaxdamp.tune.result import V
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def non_dominated(values: Float[np.ndarray, "points objectives"]) -> Bool[np.ndarray, " points"]:
+    """Which points no other one equals or beats in every objective (of equal points, the first one counts)."""
+    no_worse = np.all(values[:, None] <= values[None, :], axis=2)
+    better = np.any(values[:, None] < values[None, :], axis=2)
+    earlier = np.tri(len(values), k=-1, dtype=bool).T
+    return ~np.any(no_worse & (better | earlier), axis=0)
+
+
+def hypervolume(values: Float[np.ndarray, "points objectives"], reference: Float[np.ndarray, " objectives"]) -> float:
+    """Volume of objectives that at least one point beats, up to a reference point, by slices along the last objective.
+
+    >>> hypervolume(np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([3.0, 3.0]))
+    3.0
+    """
+    values = values[np.all(values < reference, axis=1)]
+    if not len(values):
+        return 0.0
+    if values.shape[1] == 1:
+        return float(reference[0] - values.min())
+    values = values[np.argsort(values[:, -1])]
+    heights = np.diff(np.append(values[:, -1], reference[-1]))
+    areas = [hypervolume(values[: i + 1, :-1], reference[:-1]) if h > 0 else 0.0 for i, h in enumerate(heights)]
+    return float(heights @ areas)
+
+
+class FrontParameter(NamedTuple):
+    """A free number of a front with the bounds of the search."""
+
+    name: str
+    unit: str
+    start: float
+    lower: float
+    upper: float
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class ParetoFront(Generic[V]):
+    """The designs of a front, ordered by the first objective, and the vehicle that the search started from.
+
+    Attributes:
+        start: the vehicle before.
+        names: of the objectives.
+        values: every metric at each point, by name.
+        before: every metric of the start, by name.
+        units: unit of each metric.
+        parameters: the free numbers, with their bounds.
+        designs: the value of each free number at each point.
+        limits: largest allowed values of metrics.
+        reference: the point up to which the hypervolume counts, by objective.
+        warnings: doubts about the front, in words.
+        status: `CONVERGED` only if every search of the front ended at an optimum.
+        evaluations: number of designs simulated with derivatives.
+        interpolated: number of designs between them simulated without derivatives.
+        dropped: number of searches whose result another point beats or a limit excludes.
+        free: the free parameters of the start.
+        ride: the ride of the start.
+        objective: the objectives and all metrics.
+    """
+
+    start: V
+    names: tuple[str, ...]
+    values: dict[str, Float[np.ndarray, " points"]]
+    before: dict[str, float]
+    units: dict[str, str]
+    parameters: tuple[FrontParameter, ...]
+    designs: Float[np.ndarray, "points free"]
+    limits: dict[str, float]
+    reference: dict[str, float]
+    warnings: tuple[str, ...]
+    status: Status
+    evaluations: int
+    interpolated: int
+    dropped: int
+    free: FreeParameters
+    ride: Ride
+    objective: tuple[Objective, ...]
+
+    def __len__(self) -> int:
+        return len(self.designs)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every point is an optimum."""
+        return self.status is Status.CONVERGED
+
+    @property
+    def objectives(self) -> Float[np.ndarray, "points objectives"]:
+        """The objectives at each point."""
+        return np.stack([self.values[name] for name in self.names], axis=1)
+
+    @property
+    def shares(self) -> Float[np.ndarray, "points objectives"]:
+        """The objectives at each point, from 0 at the best value on the front to 1 at the worst."""
+        values = self.objectives
+        best, worst = values.min(axis=0), values.max(axis=0)
+        return (values - best) / np.where(worst > best, worst - best, 1.0)
+
+    @property
+    def knee(self) -> int:
+        """Number of the point with the best compromise: farthest from the plane through the ends of the front."""
+        return int(np.argmin(self.shares.sum(axis=1)))
+
+    @property
+    def hypervolume(self) -> float:
+        """Volume of objectives that the front beats up to `reference`, in the product of their units."""
+        return hypervolume(self.objectives, np.array([self.reference[name] for name in self.names]))
+
+    def point(self, index: int) -> V:
+        """The vehicle of a point, 0 for the best value of the first objective: for `export.to_json`, for a ride."""
+        if not -len(self) <= index < len(self):
+            _checks.refuse("index", f"be that of a point, 0 to {len(self) - 1}", index)
+        return self.free.build(jnp.asarray(self.designs[index], self.free.values.dtype))
+
+    def metrics_of(self, vehicle: Any) -> dict[str, float]:
+        """Every metric of another vehicle on the same road, such as a baseline."""
+        found: Mapping[str, Any] = self.ride.on_axles_of(vehicle)()
+        for objective in self.objective:
+            found = objective.of(found)
+        return MetricValues.with_units({name: float(found[name]) for name in self.units}, self.units)
+
+    def plot(self, baselines: Mapping[str, Any] | None = None, **options: Any) -> "Figure":
+        """The front with its knee, the start and other vehicles, and the damper laws along the front."""
+        from jaxdamp.plots import pareto
+
+        return pareto(self, baselines, **options)
+
+    @property
+    def summary(self) -> str:
+        """The range of each objective, and the knee, in a sentence."""
+        ends = [
+            f"{name} {self.values[name].min():.4g} to {self.values[name].max():.4g} {self.units[name]}".rstrip()
+            for name in self.names
+        ]
+        knee = ", ".join(f"{name} {self.values[name][self.knee]:.4g}" for name in self.names)
+        from_start = [f"{100 * (self.values[n][self.knee] / self.before[n] - 1):+.1f} %" for n in self.names]
+        return (
+            f"{len(self)} points, {'; '.join(ends)}. Knee at point {self.knee}: {knee} "
+            f"({', '.join(from_start)} from the start). {self.evaluations} designs simulated with derivatives."
+        )
+
+    def table(self) -> Table:
+        """All metrics at each point, the objectives first, with a note at the knee."""
+        names = [*self.names, *(name for name in self.values if name not in self.names)]
+        columns = [Column("point"), *(Column(name, typeset_unit(self.units[name])) for name in names), Column("note")]
+        notes = ["knee" if i == self.knee else "" for i in range(len(self))]
+        rows = [(i, *(float(self.values[name][i]) for name in names), notes[i]) for i in range(len(self))]
+        return Table("Front", tuple(columns), (*rows, ("start", *(self.before[name] for name in names), "")))
+
+    def parameter_table(self) -> Table:
+        """The free numbers at each point, with those of the start."""
+        columns = [Column("point"), *(Column(p.name, p.unit, ".5g") for p in self.parameters)]
+        rows = [(i, *map(float, row)) for i, row in enumerate(self.designs)]
+        return Table(
+            "Parameters along the front", tuple(columns), (*rows, ("start", *(p.start for p in self.parameters)))
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The front as numbers with units and words, ready for JSON; numbers that are not finite are None."""
+        return {
+            "summary": self.summary,
+            "objectives": list(self.names),
+            "converged": self.converged,
+            "metrics": {
+                name: {"points": plain(values), "start": plain(self.before[name]), "unit": self.units[name]}
+                for name, values in self.values.items()
+            },
+            "parameters": [
+                plain(p._asdict()) | {"points": plain(column)}
+                for p, column in zip(self.parameters, self.designs.T, strict=True)
+            ],
+            "knee": self.knee,
+            "hypervolume": plain(self.hypervolume),
+            "reference": {name: with_unit(value, self.units[name]) for name, value in self.reference.items()},
+            "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
+            "evaluations": self.evaluations,
+            "interpolated": self.interpolated,
+            "dropped": self.dropped,
+            "warnings": list(self.warnings),
+        }
+
+    def __repr__(self) -> str:
+        return "\n".join([self.summary, self.table().to_text(), *(f"warning: {warning}" for warning in self.warnings)])

@@ -1,0 +1,140 @@
+"""The result of a choice of valving."""
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp._status import Status
+from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp.dampers import MonoTube
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class ValveParameter(NamedTuple):
+    """A chosen number with its bounds."""
+
+    name: str
+    unit: str
+    start: float
+    value: float
+    lower: float
+    upper: float
+    note: str  # "", "at its lower bound" or "at its upper bound"
+    meaning: str
+
+
+class OutOfReach(NamedTuple):
+    """A part of the target that the damper does not reach.
+
+    Attributes:
+        side: `"rebound"` or `"compression"`.
+        slowest: lowest speed with a large error [m/s].
+        fastest: highest speed with a large error [m/s].
+        largest_error: reached minus wanted force where they differ most [N].
+        at: velocity there [m/s].
+        binding: names of the parameters beyond whose bounds the error would be smaller, the most effective first.
+    """
+
+    side: str
+    slowest: float
+    fastest: float
+    largest_error: float
+    at: float
+    binding: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """Where, by how much and why."""
+        why = "no bound prevents it: a damper of this kind has no such force"
+        if self.binding:
+            whose = "its bound" if len(self.binding) == 1 else "their bounds"
+            why = f"{' and '.join(self.binding)} would have to pass {whose}"
+        return (
+            f"In {self.side}, {self.slowest:.2g} to {self.fastest:.2g} m/s, the target is out of reach, by up to "
+            f"{self.largest_error:+.0f} N at {self.at:.2g} m/s: {why}."
+        )
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class ValvingResult:
+    """A mono-tube damper whose valving was chosen for a wanted force.
+
+    Attributes:
+        law: the damper: the nearest one within the bounds.
+        start: the damper before.
+        parameters: the chosen numbers with their bounds.
+        velocity: velocities of all compared forces [m/s]: those of the curve first, then those of the loops.
+        target_force: the wanted forces [N].
+        force: the forces of the damper [N].
+        curve_points: number of points of the curve at constant velocity.
+        loop_lengths: number of samples of each loop.
+        rmse: error of the force [N].
+        error_percent: the same relative to the RMS of the wanted force [%].
+        tolerance: largest relative error of a feasible valving.
+        out_of_reach: the parts of the target that the damper does not reach.
+        status: how the search ended.
+    """
+
+    law: MonoTube
+    start: MonoTube
+    parameters: tuple[ValveParameter, ...]
+    velocity: Float[np.ndarray, " samples"]
+    target_force: Float[np.ndarray, " samples"]
+    force: Float[np.ndarray, " samples"]
+    curve_points: int
+    loop_lengths: tuple[int, ...]
+    rmse: float
+    error_percent: float
+    tolerance: float
+    out_of_reach: tuple[OutOfReach, ...]
+    status: Status
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the damper gives the wanted force within the tolerance."""
+        return self.error_percent <= 100.0 * self.tolerance
+
+    @property
+    def summary(self) -> str:
+        """The error, the bounds reached and the parts out of reach, in sentences."""
+        verdict = "reached" if self.feasible else "not reached; this is the nearest force within the bounds"
+        texts = [f"The target is {verdict}: error {self.rmse:.3g} N ({self.error_percent:.2g} %)."]
+        texts += [f"{p.name} is {p.note}, {p.value:.4g} {p.unit}." for p in self.parameters if p.note]
+        texts += [part.sentence for part in self.out_of_reach]
+        if self.status is not Status.CONVERGED:
+            texts.append(self.status.sentence)
+        return " ".join(texts)
+
+    def table(self) -> Table:
+        """The chosen numbers with start, bounds and meaning."""
+        names = ["parameter", "unit", "start", "chosen", "lower", "upper", "note", "meaning"]
+        rows = ((p.name, p.unit, p.start, p.value, p.lower, p.upper, p.note, p.meaning) for p in self.parameters)
+        return Table("Valving", tuple(map(Column, names)), tuple(rows))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as numbers with units and words, ready for JSON; the law is written by `export.to_json`."""
+        return {
+            "summary": self.summary,
+            "feasible": self.feasible,
+            "rmse": with_unit(self.rmse, "N"),
+            "error": with_unit(self.error_percent, "%"),
+            "parameters": [plain(p._asdict()) for p in self.parameters],
+            "out_of_reach": [plain(part._asdict()) for part in self.out_of_reach],
+            "velocity": with_unit(self.velocity, "m/s"),
+            "target_force": with_unit(self.target_force, "N"),
+            "force": with_unit(self.force, "N"),
+        }
+
+    def plot(self) -> "Figure":
+        """Wanted and reached force over velocity, with the parts out of reach, and the error below."""
+        from jaxdamp.plots import valving
+
+        return valving(self)
+
+    def __repr__(self) -> str:
+        return f"{self.summary}\n{self.table().to_text()}"

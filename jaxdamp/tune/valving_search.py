@@ -1,0 +1,321 @@
+"""`valving`: the bleed, valves and gas pressure of a mono-tube damper that give a wanted force."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks
+from jaxdamp._field_types import check_module
+from jaxdamp._progress import Progress
+from jaxdamp._status import Status
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import AbstractDamper, MonoTube
+from jaxdamp.parameters import FreeParameters
+from jaxdamp.rig import march, quasi_static, respond
+from jaxdamp.tune.ranges import INSIDE, SearchRange, search_range
+from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
+
+
+VELOCITIES = np.linspace(-1.0, 1.0, 101)  # m/s
+LONGEST_STEP, CYCLE = 1e-3, 400  # s, and least number of steps in a cycle
+SETTLING = 0.1  # share of a measured record that is not compared
+BINDING = 0.02  # decrease of the squared error per 100 % of a parameter beyond its bound, relative to that error
+CLOSE_ENOUGH = 0.05  # of the tolerance, at which no further start is tried
+APART = 2.0  # a start is a factor of up to so much from the given one, within the bounds
+
+
+class Loop(NamedTuple):
+    """A motion with the wanted force at some of its instants."""
+
+    dt: float
+    stroke: Float[np.ndarray, " time"]
+    velocity: Float[np.ndarray, " time"]
+    force: Float[np.ndarray, " time"]
+    first: int  # sample that is compared
+
+
+class Wanted(NamedTuple):
+    """The wanted force: points of the curve at constant velocity, then loops."""
+
+    velocity: Float[np.ndarray, " points"]
+    force: Float[np.ndarray, " points"]
+    loops: tuple[Loop, ...]
+
+    @property
+    def all_forces(self) -> np.ndarray:
+        """Every wanted force in one vector."""
+        return np.concatenate([self.force, *(loop.force[loop.first :] for loop in self.loops)])
+
+    @property
+    def all_velocities(self) -> np.ndarray:
+        """The velocity at each of them."""
+        return np.concatenate([self.velocity, *(loop.velocity[loop.first :] for loop in self.loops)])
+
+
+def valving(
+    target: AbstractDamper | BenchRun | Sequence[BenchRun] | tuple[Any, Any],
+    start: MonoTube,
+    *,
+    velocities: Any = None,
+    motions: Sequence[tuple[float, float]] = (),
+    over: Sequence[str] | Mapping[str, Any] = ("piston.*", "gas.pressure"),
+    freeze: Sequence[str] = (),
+    bounds: Mapping[str, Any] | None = None,
+    tolerance: float = 0.03,
+    starts: int = 8,
+    substeps: int = 1,
+    max_steps: int = 200,
+) -> ValvingResult:
+    """Find the valving of a mono-tube damper that gives a wanted force, or the nearest one within its bounds.
+
+    Least squares of the force with exact derivatives, in logarithms of the parameters, from several starts. If the
+    remaining error is above the tolerance, the result says in which range of velocity, by how much, and which bound
+    prevents more.
+
+    Arguments:
+        target: the wanted force: a law; a force-velocity curve `(velocities [m/s], forces [N])`; or one or more
+            measured records, with hysteresis.
+        start: the damper to start from, with the geometry that is to stay.
+        velocities: of the curve of a law [m/s]; −1 to 1 m/s if left out.
+        motions: of a law also loops of sinusoidal motion, `[(frequency [Hz], amplitude [m]), ...]`, for its hysteresis.
+        over: the parameters to choose, as in `minimise`; all of the piston and the gas pressure by default.
+        freeze: parameters among these to hold at their start.
+        bounds: as in `minimise`, one third to three times the start by default.
+        tolerance: largest error of a feasible valving: RMS over RMS of the wanted force.
+        starts: number of starts.
+        substeps: steps between two samples of a record, as in `respond`.
+        max_steps: largest number of steps from each start.
+
+    Returns:
+        The damper with its error, the parameters with their bounds, and the parts of the target out of reach.
+
+    Raises:
+        ValueError: a target of another kind or without force; `motions` beside records; a motion beyond the strokes of
+            the damper; what `minimise` refuses of `over`, `freeze` and `bounds`.
+
+    >>> wanted = MonoTube.reference().incompressible()
+    >>> result = valving(wanted, MonoTube.reference(), over=["bleed_area", "*_opening_pressure"])
+    >>> result.feasible, result.rmse < 1.0
+    (True, True)
+    """
+    check_module("start", start, (MonoTube,), "valving(target, start)")
+    _checks.positive("tolerance", tolerance)
+    for name, number in (("starts", starts), ("substeps", substeps), ("max_steps", max_steps)):
+        if number < 1:
+            _checks.refuse(name, "be 1 or more", number)
+    wanted = _wanted(target, start, velocities, motions)
+    size = float(np.sqrt(np.mean(wanted.all_forces**2)))
+    if not size > 0.0:
+        _checks.refuse("target", "have a force", "zero everywhere")
+    space = search_range(start, over, freeze, bounds)
+    charge = np.array([name == "gas.pressure" for name in space.free.names])  # which must stay above that of a cavity
+    cavity = (1.0 + INSIDE) * float(start.cavitation_pressure)
+    space = dataclasses.replace(space, lower=np.where(charge, np.maximum(space.lower, cavity), space.lower))
+    force_of = _forces(space.free, wanted, substeps)
+    best: Any = None
+    with Progress("Choosing the valving") as shown:
+        for number, begin in enumerate(_starts(space, starts)):
+            shown(f"start {number + 1} of {starts}")
+            found = _search(space, force_of, wanted.all_forces, begin, max_steps)
+            if np.isfinite(found.cost) and (best is None or found.cost < best.cost):
+                best = found
+            if best is not None and np.sqrt(2 * best.cost / len(wanted.all_forces)) < CLOSE_ENOUGH * tolerance * size:
+                break
+    if best is None:
+        _checks.refuse("start", "give a finite force", start, "Widen its valves, or shorten the motion.")
+    values = _physical(space, best.x)
+    reached, slopes = force_of(values)
+    error = reached - wanted.all_forces
+    parameters = tuple(
+        ValveParameter(name, p.unit, float(a), float(b), float(low), float(high), side, p.meaning)
+        for name, p, a, b, low, high, side in zip(
+            space.free.names,
+            space.free.owners,
+            space.start,
+            values,
+            space.lower,
+            space.upper,
+            _sides(space, values),
+            strict=True,
+        )
+    )
+    rmse = float(np.sqrt(np.mean(error**2)))
+    return ValvingResult(
+        law=space.free.build(jnp.asarray(values, space.free.values.dtype)),
+        start=start,
+        parameters=parameters,
+        velocity=wanted.all_velocities,
+        target_force=wanted.all_forces,
+        force=reached,
+        curve_points=len(wanted.velocity),
+        loop_lengths=tuple(len(loop.force) - loop.first for loop in wanted.loops),
+        rmse=rmse,
+        error_percent=100.0 * rmse / size,
+        tolerance=tolerance,
+        out_of_reach=_out_of_reach(wanted, error, slopes, parameters, tolerance, size)
+        if rmse > tolerance * size
+        else (),
+        status=Status.CONVERGED if best.status > 0 else Status.STEP_LIMIT,
+    )
+
+
+def _wanted(target: Any, start: MonoTube, velocities: Any, motions: Sequence[tuple[float, float]]) -> Wanted:
+    """The target as points and loops."""
+    none = np.zeros(0)
+    if isinstance(target, AbstractDamper):
+        points = np.asarray(VELOCITIES if velocities is None else velocities, float)
+        curve = np.asarray(quasi_static(target, points).force, float)
+        if not np.all(np.isfinite(curve)):
+            _checks.refuse("target", "have a force at every velocity", curve, "Choose others by `velocities`.")
+        return Wanted(points, curve, tuple(_loop(target, start, *motion) for motion in motions))
+    if motions or velocities is not None:
+        must = "be left out unless the target is a law"
+        _checks.refuse("motions" if motions else "velocities", must, motions or velocities)
+    if isinstance(target, tuple):
+        if len(target) != 2 or np.ndim(target[0]) != 1 or np.shape(target[0]) != np.shape(target[1]):
+            _checks.refuse("target", "be velocities and as many forces", _checks.described(target))
+        points, curve = (np.asarray(values, float) for values in target)
+        _checks.finite("target", np.concatenate([points, curve]))
+        return Wanted(points, curve, ())
+    runs = [target] if isinstance(target, BenchRun) else list(target)
+    for run in runs:
+        _checks.instance("target", run, BenchRun, "be a law, a pair of velocities and forces, or records")
+    loops = [(r, float(r.time[-1] - r.time[0]) / (len(r.time) - 1)) for r in runs]
+    cut = tuple(Loop(dt, r.stroke, r.velocity, r.force, int(SETTLING * len(r.time))) for r, dt in loops)
+    return Wanted(none, none, cut)
+
+
+def _loop(target: AbstractDamper, start: MonoTube, frequency: float, amplitude: float) -> Loop:
+    """Two cycles of a sine, the second of which is compared."""
+    _checks.positive("motions", np.array([frequency, amplitude]))
+    steps = max(CYCLE, int(np.ceil(1.0 / (frequency * LONGEST_STEP))))
+    dt = 1.0 / (frequency * steps)
+    angle = 2.0 * np.pi * np.arange(2 * steps + 1) / steps
+    stroke, velocity = amplitude * np.sin(angle), 2.0 * np.pi * frequency * amplitude * np.cos(angle)
+    time = dt * np.arange(len(angle))
+    respond(start, time, stroke, velocity)  # refuses strokes beyond its chambers
+    return Loop(dt, stroke, velocity, np.asarray(respond(target, time, stroke, velocity), float), steps)
+
+
+def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> Any:
+    """Every force of the damper as a function of the values of its free parameters, with derivatives."""
+
+    @eqx.filter_jit
+    def forces(free: FreeParameters, values: Array) -> tuple[Array, Array]:
+        def one(values: Array) -> tuple[Array, Array]:
+            law = free.build(values)
+            still = law.incompressible()
+            curve = jax.vmap(lambda v: still.force(0.0, v, still.initial_state()))(jnp.asarray(wanted.velocity))
+            marched = [
+                march(law, jnp.asarray(loop.dt), jnp.asarray(loop.stroke), jnp.asarray(loop.velocity), substeps)[
+                    loop.first :
+                ]
+                for loop in wanted.loops
+            ]
+            force = jnp.concatenate([curve, *marched])
+            return force, force
+
+        slopes, force = jax.jacfwd(one, has_aux=True)(values)
+        return force, slopes
+
+    def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        found = forces(free, jnp.asarray(values, free.values.dtype))
+        return np.asarray(found[0], np.float64), np.asarray(found[1], np.float64)
+
+    return evaluate
+
+
+def _in_logarithms(space: SearchRange) -> np.ndarray:
+    """Which numbers are searched by their logarithm: those that stay positive."""
+    return space.lower > 0.0
+
+
+def _physical(space: SearchRange, y: np.ndarray) -> np.ndarray:
+    """Physical values of coordinates."""
+    log = _in_logarithms(space)
+    return np.clip(np.where(log, np.exp(np.where(log, y, 0.0)), y * space.unit), space.lower, space.upper)
+
+
+def _coordinates(space: SearchRange, values: np.ndarray) -> np.ndarray:
+    """Coordinates of physical values."""
+    log = _in_logarithms(space)
+    return np.where(log, np.log(np.where(log, values, 1.0)), values / space.unit)
+
+
+def _starts(space: SearchRange, count: int) -> list[np.ndarray]:
+    """The given start, and others around it by a factor of up to `APART`, the same ones each time."""
+    shares = np.random.default_rng(0).uniform(size=(count - 1, len(space.start)))
+    moved = space.start * APART ** (2.0 * shares - 1.0)
+    return [space.start, *np.clip(moved, space.lower, space.upper)]
+
+
+def _search(space: SearchRange, force_of: Any, wanted: np.ndarray, begin: np.ndarray, max_steps: int) -> Any:
+    """Least squares within the bounds from one start."""
+    import scipy.optimize
+
+    log = _in_logarithms(space)
+    last: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+
+    def at(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        if y.tobytes() not in last:
+            values = _physical(space, y)
+            force, slopes = force_of(values)
+            last.clear()
+            last[y.tobytes()] = force - wanted, slopes * np.where(log, values, space.unit)
+        return last[y.tobytes()]
+
+    lower, upper = _coordinates(space, space.lower), _coordinates(space, space.upper)
+    margin = 1e-9 * np.minimum(upper - lower, 1.0)
+    inside = np.clip(_coordinates(space, begin), lower + margin, upper - margin)
+    options: dict[str, Any] = {"bounds": (lower, upper), "x_scale": "jac", "ftol": 1e-12, "xtol": 1e-12, "gtol": 1e-12}
+    slopes: Any = lambda y: at(y)[1]  # noqa: E731
+    return scipy.optimize.least_squares(lambda y: at(y)[0], inside, jac=slopes, max_nfev=max_steps, **options)
+
+
+def _sides(space: SearchRange, values: np.ndarray) -> list[str]:
+    """The bound that each value is at, in words; the search approaches bounds from inside."""
+    y, lower, upper = (_coordinates(space, a) for a in (values, space.lower, space.upper))
+    near = 1e-3
+    return [
+        "at its lower bound" if at - low < near else "at its upper bound" if high - at < near else ""
+        for at, low, high in zip(y, lower, upper, strict=True)
+    ]
+
+
+def _out_of_reach(
+    wanted: Wanted,
+    error: np.ndarray,
+    slopes: np.ndarray,
+    parameters: Sequence[ValveParameter],
+    tolerance: float,
+    size: float,
+) -> tuple[OutOfReach, ...]:
+    """The ranges of velocity in rebound and in compression where the error is large, with what prevents less."""
+    velocity, parts = wanted.all_velocities, []
+    for side, own in (("rebound", velocity > 0.0), ("compression", velocity < 0.0)):
+        far = own & (np.abs(error) > tolerance * size)
+        if not far.any():
+            continue
+        square = float(np.sum(error[far] ** 2))
+        # decrease of the squared error there, relative to it, if a parameter could grow by 100 %
+        gain = {p.name: float(-2.0 * error[far] @ slopes[far, i] * p.value / square) for i, p in enumerate(parameters)}
+        binding = {
+            p.name: abs(gain[p.name])
+            for p in parameters
+            if (("upper" in p.note and gain[p.name] > BINDING) or ("lower" in p.note and gain[p.name] < -BINDING))
+        }
+        worst = int(np.argmax(np.where(far, np.abs(error), 0.0)))
+        speeds = np.abs(velocity[far])
+        order = tuple(sorted(binding, key=lambda name: -binding[name]))
+        parts.append(
+            OutOfReach(
+                side, float(speeds.min()), float(speeds.max()), float(error[worst]), float(velocity[worst]), order
+            )
+        )
+    return tuple(parts)

@@ -1,0 +1,171 @@
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from jaxdamp import dampers, export, metrics, parameters, roads, tune, vehicles
+from jaxdamp.tune.front import non_dominated
+
+
+MS, MU, K, KT = 1200.0, 125.0, 60e3, 220e3  # of paper 000
+M = MS + MU
+COMFORT, TYRE, TRAVEL = "rms_sprung_acceleration", "rms_dynamic_tyre_load", "working_space_rms"
+BEST_COMFORT = K * np.sqrt(M / KT)
+BEST_TYRE = np.sqrt(M * K**2 / KT - 2 * MU * MS * K / M + MU * MS**2 * KT / M**2)
+ROAD = roads.white("C", speed=20.0)
+Q = 2 * np.pi**2 * 256e-6 * 0.1**2 * 20.0
+CAR = vehicles.presets.quarter_car_000()
+
+
+def exact(rate):
+    """The three metrics of the quarter car on a white road, in closed form."""
+    comfort = 0.5 * (KT * rate / MS**2 + M * K**2 / (rate * MS**2))
+    tyre = KT**2 / 2 * (M**3 * K**2 / (KT**2 * rate * MS**2) - 2 * MU * M * K / (KT * rate * MS) + MU / rate)
+    tyre += KT**2 / 2 * M**2 * rate / (KT * MS**2)
+    return np.sqrt(Q * np.stack([comfort, tyre, M / (2 * rate)], axis=-1))
+
+
+@pytest.fixture(scope="module")
+def front():
+    return tune.pareto([COMFORT, TYRE], CAR, ROAD, points=9)
+
+
+def test_front_of_comfort_and_tyre_load_is_that_of_the_closed_forms(front):
+    rates = front.designs[:, 0]
+    assert front.converged and not front.warnings and len(front) == 9
+    assert rates[[0, -1]] == pytest.approx([BEST_COMFORT, BEST_TYRE], rel=3e-4)
+    assert front.objectives == pytest.approx(exact(rates)[:, :2], rel=1e-9)
+    # every rate between the two optima is on the front, and the points divide the line between its ends evenly
+    place = front.shares[:, 0] - front.shares[:, 1]
+    assert place == pytest.approx(np.linspace(-1.0, 1.0, 9), abs=2e-3)
+    assert front.evaluations < 40
+
+
+def test_knee_hypervolume_and_reference(front):
+    fine = exact(np.linspace(BEST_COMFORT, BEST_TYRE, 4001))[:, :2]
+    shares = (fine - fine.min(axis=0)) / np.ptp(fine, axis=0)
+    assert front.shares[front.knee].sum() == pytest.approx(shares.sum(axis=1).min(), abs=0.02)
+    reference = np.array([front.reference[name] for name in front.names])
+    assert reference == pytest.approx(fine.max(axis=0) + 0.1 * np.ptp(fine, axis=0), rel=3e-5)
+    full = tune.hypervolume(fine, reference)
+    assert 0.9 * full < front.hypervolume < full
+
+
+def test_every_point_is_a_vehicle_that_can_be_written(front):
+    vehicle = front.point(front.knee)
+    again = export.from_json(export.to_json(vehicle))
+    assert float(again.damper.rate) == front.designs[front.knee, 0]
+    found = front.metrics_of(vehicle)
+    assert found[COMFORT] == pytest.approx(front.values[COMFORT][front.knee], rel=1e-9)
+    with pytest.raises(ValueError, match=r"index.*0 to 8"):
+        front.point(9)
+
+
+def test_tables_dictionary_and_picture(front):
+    assert json.loads(json.dumps(front.to_dict()))["knee"] == front.knee
+    assert len(front.table().rows) == len(front.parameter_table().rows) == 10
+    assert front.table().records()[front.knee]["note"] == "knee"
+    assert "knee" in repr(front).lower() and "designs simulated" in front.summary
+    figure = front.plot({"stiff": parameters.replace(CAR, {"damper.rate": 7000.0})}, velocities=[-1.0, 0.0, 1.0])
+    assert len(figure.axes) == 2
+    assert len(figure.axes[1].lines) >= 9 + 2  # laws, and lines through zero
+
+
+def test_designs_between_the_points_fill_the_front(front):
+    fine = tune.pareto([COMFORT, TYRE], CAR, ROAD, points=9, between=200)
+    assert 190 < len(fine) <= 209 and fine.interpolated == 200
+    assert fine.evaluations == front.evaluations
+    full = tune.hypervolume(
+        exact(np.linspace(BEST_COMFORT, BEST_TYRE, 4001))[:, :2], np.array([*fine.reference.values()])
+    )
+    assert fine.hypervolume == pytest.approx(full, rel=5e-3)
+    assert fine.objectives == pytest.approx(exact(fine.designs[:, 0])[:, :2], rel=1e-9)
+
+
+def test_two_parameters_agree_with_a_search_under_a_limit():
+    car = vehicles.presets.half_car_002(dampers.Linear(1000.0))
+    chosen = ["rms_sprung_acceleration", "rms_front_dynamic_tyre_load"]
+    options: dict[str, Any] = {"over": {"rate": (300.0, 9000.0)}}
+    front = tune.pareto(chosen, car, ROAD, points=5, **options)
+    inner = len(front) // 2
+    limit = {chosen[1]: float(front.values[chosen[1]][inner])}
+    alone = tune.minimise(chosen[0], front.point(inner), ROAD, limits=limit, **options)
+    assert alone.after[chosen[0]] == pytest.approx(front.values[chosen[0]][inner], rel=2e-6)
+
+
+def test_three_objectives_with_a_limit_and_a_function():
+    def effort(m):
+        return m[TYRE] / 1e3
+
+    least = M / (2 * 0.0117**2) * Q  # rate at which the travel is 11.7 mm
+    front = tune.pareto(
+        [metrics.Metric("sprung_acceleration", "rms"), effort, TRAVEL], CAR, ROAD, points=12, limits={TRAVEL: 0.0117}
+    )
+    assert front.names == (COMFORT, "effort", TRAVEL)
+    assert np.all(front.values[TRAVEL] <= 0.0117) and np.any(front.values[TRAVEL] > 0.01169)
+    assert front.designs.min() == pytest.approx(least, rel=1e-3)
+    assert front.designs.max() == pytest.approx(7500.0, rel=1e-4)  # the bound: less travel at any price
+    assert any("upper bound" in text for text in front.warnings)
+    assert len(front.plot().axes) == 4
+
+
+def test_a_limit_that_no_design_meets_is_named():
+    front = tune.pareto([COMFORT, TYRE], CAR, ROAD, points=3, limits={TRAVEL: 0.005})
+    assert front.status is tune.Status.LIMIT_NOT_MET and len(front) == 1
+    assert f"The limit {TRAVEL} <= 0.005 is not met: 0.009" in front.warnings[0]
+    assert front.designs[0, 0] == pytest.approx(7500.0, rel=1e-4)
+
+
+def test_metrics_without_conflict_have_one_best_design():
+    front = tune.pareto([TYRE, "dynamic_load_coefficient"], CAR, ROAD, points=3)
+    assert len(front) == 1 and "do not conflict" in front.warnings[0]
+    assert front.designs[0, 0] == pytest.approx(BEST_TYRE, rel=1e-3)
+
+
+def test_non_dominated_points_and_their_volume():
+    values = np.array([[1.0, 3.0], [2.0, 2.0], [2.0, 2.0], [3.0, 2.0], [3.0, 1.0]])
+    assert non_dominated(values).tolist() == [True, True, False, False, True]
+    assert tune.hypervolume(values, np.array([4.0, 4.0])) == pytest.approx(6.0)
+    cubes = np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0]])
+    assert tune.hypervolume(cubes, np.full(3, 2.0)) == pytest.approx(4.0)
+    assert tune.hypervolume(cubes, np.zeros(3)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("objectives", "options", "message"),
+    [
+        (COMFORT, {}, "objectives.*list of two or three"),
+        ([COMFORT], {}, "objectives.*list of two or three"),
+        ([COMFORT, COMFORT], {}, "different names"),
+        ([COMFORT, "comfort"], {}, "comfort"),
+        ([COMFORT, TYRE], {"points": 2}, "points.*3 or more"),
+        ([COMFORT, TYRE], {"max_steps": 0}, "max_steps"),
+        ([COMFORT, TYRE], {"limits": {"travel": 0.1}}, "travel"),
+        ([COMFORT, TYRE], {"reference": {TRAVEL: 0.1}}, "reference"),
+        ([COMFORT, TYRE], {"over": ["spring"]}, "spring"),
+    ],
+)
+def test_wrong_calls_are_refused(objectives, options, message):
+    with pytest.raises(ValueError, match=message):
+        tune.pareto(objectives, CAR, ROAD, **options)
+
+
+@pytest.mark.slow
+def test_simulated_front_is_better_than_a_grid():
+    car = vehicles.presets.quarter_car_000(dampers.Bilinear(2600.0, 1400.0))
+    road = roads.iso8608("C", speed=20.0, seed=1)
+    over = {"rebound_rate": (1000.0, 8000.0), "compression_rate": (1000.0, 8000.0)}
+    front = tune.pareto([COMFORT, TYRE], car, road, over=over, points=9, duration=4.0, dt=2e-3)
+    import jaxdamp
+
+    ride = jaxdamp.Ride(car, road, metrics=[COMFORT, TYRE], duration=4.0, dt=2e-3)
+    axis = np.linspace(1000.0, 8000.0, 41)
+    data = jaxdamp.sweep(ride, {"damper.rebound_rate": axis, "damper.compression_rate": axis})
+    grid = np.stack([data[name].values.ravel() for name in front.names], axis=1)
+    reference = np.array([front.reference[name] for name in front.names])
+    assert front.converged
+    # no design of the grid beats a point of the front by more than the search leaves
+    beats = np.all(grid[:, None] < front.objectives[None] - 1e-5 * np.ptp(front.objectives, axis=0), axis=2)
+    assert not beats.any()
+    assert front.hypervolume > 0.9 * tune.hypervolume(grid, reference)

@@ -1,0 +1,112 @@
+import json
+
+import numpy as np
+import pytest
+
+from jaxdamp import bench, dampers, parameters, rig, tune
+from jaxdamp.tune.valving_search import _wanted
+
+
+TRUTH = dampers.MonoTube.reference()
+CHOSEN = {
+    "piston.bleed_area": 2.6e-6,
+    "piston.rebound_opening_pressure": 0.7e6,
+    "piston.rebound_valve_stiffness": 2e11,
+    "piston.compression_opening_pressure": 8e5,
+    "piston.compression_valve_stiffness": 2.5e10,
+    "gas.pressure": 1.5e6,
+}
+START = parameters.replace(TRUTH, CHOSEN)
+CURVE = np.linspace(-1.0, 1.0, 41)
+
+
+@pytest.fixture(scope="module")
+def out_of_reach():
+    """Stiff rebound, and compression softer than the bounds allow."""
+    return tune.valving(dampers.Bilinear(6000.0, 900.0), START, velocities=CURVE, over=list(CHOSEN))
+
+
+def test_the_valving_of_a_known_damper_is_recovered_from_its_curve():
+    force = np.asarray(rig.quasi_static(TRUTH.incompressible(), CURVE).force)
+    result = tune.valving((CURVE, force), START, over=list(CHOSEN), starts=1)
+    assert result.feasible and result.status is tune.Status.CONVERGED and not result.out_of_reach
+    for p in result.parameters:
+        assert p.value == pytest.approx(float(parameters.get(TRUTH, p.name)), rel=1e-5)
+        assert float(parameters.get(result.law, p.name)) == p.value
+    assert result.rmse < 1e-3
+
+
+def test_a_target_beyond_the_bounds_names_them(out_of_reach):
+    result = out_of_reach
+    assert not result.feasible and result.error_percent > 3.0
+    assert {part.side for part in result.out_of_reach} >= {"compression"}
+    soft = next(part for part in result.out_of_reach if part.side == "compression")
+    assert "piston.compression_opening_pressure" in soft.binding and soft.largest_error < 0.0
+    assert "would have to pass" in result.summary and "at its lower bound" in result.summary
+    # the law is the nearest within the bounds: moving any number inwards from its bound makes the error larger
+    wanted = _wanted(dampers.Bilinear(6000.0, 900.0), START, CURVE, ())
+    for p in result.parameters:
+        inwards = p.value * (1.02 if "lower" in p.note else 0.98)
+        law = parameters.replace(result.law, {p.name: inwards}).incompressible()
+        force = np.asarray(rig.quasi_static(law, CURVE).force)
+        assert np.sqrt(np.mean((force - wanted.force) ** 2)) > result.rmse * (1 - 1e-9)
+
+
+def test_a_binding_bound_that_is_widened_helps(out_of_reach):
+    soft = next(part for part in out_of_reach.out_of_reach if part.side == "compression")
+    wider = {name: (0.05 * CHOSEN[name], 20.0 * CHOSEN[name]) for name in soft.binding}
+    again = tune.valving(
+        dampers.Bilinear(6000.0, 900.0), START, velocities=CURVE, over=list(CHOSEN), bounds=wider, starts=1
+    )
+    assert again.rmse < 0.8 * out_of_reach.rmse
+
+
+def test_table_dictionary_and_picture(out_of_reach):
+    assert json.loads(json.dumps(out_of_reach.to_dict()))["feasible"] is False
+    assert len(out_of_reach.table().rows) == 6 and "bleed" in repr(out_of_reach)
+    assert len(out_of_reach.plot().axes) == 2
+
+
+def test_targets_become_points_and_loops():
+    law = dampers.Linear(2000.0)
+    wanted = _wanted(law, START, [-0.5, 0.5], [(2.0, 0.02)])
+    assert wanted.force.tolist() == [-1000.0, 1000.0]
+    (loop,) = wanted.loops
+    assert len(loop.force) - loop.first == 501 and loop.force[loop.first] == pytest.approx(2000 * 0.08 * np.pi)
+    time = np.arange(1000) / 1e3
+    stroke = 0.01 * np.sin(6 * np.pi * time)
+    run = bench.BenchRun.from_arrays("3 Hz", time, stroke, 300 * np.cos(6 * np.pi * time))
+    (measured,) = _wanted([run], START, None, ()).loops
+    assert measured.first == 100 and measured.dt == pytest.approx(1e-3)
+    assert len(_wanted([run], START, None, ()).all_forces) == 900
+
+
+@pytest.mark.slow
+def test_hysteresis_of_a_known_damper_gives_its_gas_pressure_and_valves():
+    time = np.arange(4000) / 4000.0
+    angle = 2 * np.pi * 6.0 * time
+    stroke, velocity = 0.02 * np.sin(angle), 0.02 * 12 * np.pi * np.cos(angle)
+    force = np.asarray(rig.respond(TRUTH, time, stroke, velocity))
+    noise = np.random.default_rng(0).normal(0.0, 10.0, force.size)
+    run = bench.BenchRun("6 Hz", time, stroke, velocity, force + noise)
+    result = tune.valving(run, START, over=list(CHOSEN), starts=1, tolerance=0.02)
+    assert result.feasible and result.rmse == pytest.approx(10.0, rel=0.05)
+    for p in result.parameters:
+        assert p.value == pytest.approx(float(parameters.get(TRUTH, p.name)), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("target", "options", "message"),
+    [
+        ((CURVE, CURVE[:-1]), {}, "target.*velocities and as many forces"),
+        ((CURVE, 0.0 * CURVE), {}, "target.*have a force"),
+        ((CURVE, CURVE), {"motions": [(1.0, 0.01)]}, "motions.*unless the target is a law"),
+        (dampers.Linear(1.0), {"motions": [(1.0, 0.5)]}, "stroke.*MonoTube"),
+        (dampers.Linear(1.0), {"tolerance": 0.0}, "tolerance"),
+        (dampers.Linear(1.0), {"starts": 0}, "starts.*1 or more"),
+        (dampers.Linear(1.0), {"over": ["knee"]}, "knee"),
+    ],
+)
+def test_wrong_calls_are_refused(target, options, message):
+    with pytest.raises(ValueError, match=message):
+        tune.valving(target, START, **options)
