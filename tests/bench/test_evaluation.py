@@ -105,7 +105,9 @@ def test_uncertainty_holds_gas_and_friction_where_damping_bends(law):
         found = separate_gas_and_friction(BenchRun.from_arrays("slow", time, 0.02 * np.sin(np.pi * time), force))
         named = {m.quantity: m for m in found.measurements}
         for quantity, truth, most in (("gas force", -150.0, 16.0), ("friction", 40.0, 36.0)):
-            assert abs(named[quantity].value - truth) <= named[quantity].uncertainty <= most, (quantity, seed)
+            uncertainty = named[quantity].uncertainty
+            assert uncertainty is not None
+            assert abs(named[quantity].value - truth) <= uncertainty <= most, (quantity, seed)
 
 
 def test_gas_and_friction_of_a_slow_record(evaluation):

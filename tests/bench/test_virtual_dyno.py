@@ -257,10 +257,8 @@ def test_bad_programmes():
 
 def test_stamps_that_show_the_jitter_are_resampled():
     test, rate = SineTest(0.02, 2.0, cycles=3), 200.0
-    exact, hidden, stamped = (
-        VirtualDyno(Linear(1500.0), rate, **faults).run(test)[0]
-        for faults in ({}, {"clock_jitter": 5e-4}, {"clock_jitter": 5e-4, "stamped_jitter": True})
-    )
+    cases: list[dict[str, Any]] = [{}, {"clock_jitter": 5e-4}, {"clock_jitter": 5e-4, "stamped_jitter": True}]
+    exact, hidden, stamped = (VirtualDyno(Linear(1500.0), rate, **faults).run(test)[0] for faults in cases)
     errors = [np.std(run.stroke - 0.02 * np.sin(4 * np.pi * run.time)) for run in (exact, hidden, stamped)]
     assert errors[0] < 1e-9 and errors[2] < 0.2 * errors[1]
     assert any("the clock jitters by up to" in note for note in stamped.notes)

@@ -3,6 +3,7 @@
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -62,11 +63,11 @@ def test_sweep_of_a_vehicle_from_a_file_writes_a_table_and_pictures(tmp_path: Pa
 
 def test_vehicles_from_files_take_a_law(tmp_path: Path) -> None:
     file = _toml(tmp_path, 'preset = "half_car_002"\n[parameters]\nsprung_mass = 600.0\nfront.spring_rate = 2e4\n')
-    car = parse_vehicle(str(file))(Bilinear(2000.0, 1000.0))
+    car: Any = parse_vehicle(str(file))(Bilinear(2000.0, 1000.0))
     assert float(car.sprung_mass) == 600.0 and float(car.front.spring_rate) == 2e4
     assert isinstance(car.rear.damper, Bilinear)
     to_json(car, tmp_path / "car.json")
-    again = parse_vehicle(str(tmp_path / "car.json"))
+    again: Any = parse_vehicle(str(tmp_path / "car.json"))
     assert isinstance(again(None).front.damper, Bilinear)
     assert all(isinstance(corner.damper, Linear) for corner in (again(Linear(1.0)).front, again(Linear(1.0)).rear))
 

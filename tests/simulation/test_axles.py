@@ -8,7 +8,8 @@ import pytest
 from jaxdamp import Ride, roads, simulate
 from jaxdamp.parameters import free_parameters, replace
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
-from jaxdamp.tune.minimising import driven
+from jaxdamp.tune.measuring import Measurement
+from jaxdamp.tune.objective import objective_of
 from jaxdamp.vehicles import RollCar, frequency_response, spectral_rms, stationary_rms
 from jaxdamp.vehicles.presets import full_car_jazar, half_car_002, m113_003, quarter_car_000, truck_001
 
@@ -136,11 +137,13 @@ def test_ride_means_the_same_and_follows_axles_that_move():
 
 def test_a_tuning_follows_axles_that_move():
     free = free_parameters(HALF, over=["rear_distance"])
-    measured = driven(Ride(HALF, GROUND, metrics=NAMES, duration=0.5, dt=0.002), free)
+    objective = objective_of(NAMES[0], HALF, NAMES[1:], [], white=False)
+    measured = Measurement(HALF, GROUND, objective, free, duration=0.5, dt=0.002)
     moved = free.build(jnp.array([2.4]))
     expected = simulate(moved, GROUND, duration=0.5, dt=0.002).metrics(NAMES)
-    for name, value in measured(moved).items():
-        assert float(value) == pytest.approx(float(expected[name]), rel=1e-9)
+    values = measured(moved)
+    for name in NAMES:
+        assert float(values[name]) == pytest.approx(float(expected[name]), rel=1e-9)
 
 
 def test_the_speed_can_be_differentiated_through_the_delay():

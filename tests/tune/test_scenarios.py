@@ -1,5 +1,7 @@
 """Scenarios: many roads and conditions as one ride, and tunings over them."""
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -138,10 +140,11 @@ def test_fresh_roads_keep_the_spectrum_and_the_coherence_of_tracks() -> None:
     other = road.reseeded(5)
     np.testing.assert_allclose(other.amplitude, road.amplitude)
     assert not np.allclose(other.phase, road.phase)
-    tracks = roads.two_track(road, track_width=1.5, seed=2)
-    again = tracks.reseeded(5)
+    tracks: Any = roads.two_track(road, track_width=1.5, seed=2)
+    again: Any = tracks.reseeded(5)
     for one in (tracks, again):
         shift = (one.roads[1].phase - one.roads[0].phase) % (2 * np.pi)
         np.testing.assert_allclose(shift, (tracks.roads[1].phase - tracks.roads[0].phase) % (2 * np.pi), atol=1e-9)
     assert DRIVEN["bump"].reseeded(1) is None
-    assert eqx.tree_equal(tune.Scenarios(DRIVEN).on_other_roads(3).scenarios[1].road, DRIVEN["bump"])
+    others = tune.Scenarios(DRIVEN).on_other_roads(3)
+    assert others is not None and eqx.tree_equal(others.scenarios[1].road, DRIVEN["bump"])
