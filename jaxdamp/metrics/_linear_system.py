@@ -4,12 +4,12 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import jax.scipy.linalg
 import numpy as np
 from jax.typing import DTypeLike
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._matrices import phi_functions
 from jaxdamp._types import Scalar, ScalarLike, Signal
 
 
@@ -51,7 +51,7 @@ def respond_exactly(system: StateSpace, signal: Signal, dt: ScalarLike, start: S
     known = _checks.concrete(dt)
     if known is None:
         step = jnp.asarray(dt, signal.dtype)
-        matrix = jax.scipy.linalg.expm(jnp.asarray(growth, signal.dtype) * step + jnp.asarray(shift, signal.dtype))
+        matrix = phi_functions(jnp.asarray(growth, signal.dtype) * step + jnp.asarray(shift, signal.dtype))[0]
     else:
         from scipy.linalg import expm
 

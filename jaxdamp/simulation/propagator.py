@@ -3,16 +3,11 @@
 from typing import final
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from jaxdamp._matrices import phi_functions
 from jaxdamp._types import Scalar
 from jaxdamp.vehicles import LinearMap
-
-
-_HALVINGS = 20
-_TERMS = 13  # of the Taylor series at a norm of one half or less: its rest is below 1e-16
 
 
 @final
@@ -46,38 +41,3 @@ class Propagator(eqx.Module):
             held @ heights,
             ramp @ heights + held @ rate.road_rate,
         )
-
-
-def phi_functions(z: Float[Array, "n n"]) -> tuple[Float[Array, "n n"], ...]:
-    """φ₀ = eᶻ, φ₁ = (eᶻ − 1)/z, φ₂ = (φ₁ − 1)/z and φ₃ = (φ₂ − ½)/z of a matrix, by Taylor series and doublings.
-
-    φ₀(2z) = φ₀², φ₁(2z) = φ₁ (φ₀ + 1)/2, φ₂(2z) = (φ₁² + 2 φ₂)/4, φ₃(2z) = (φ₁ φ₂ + φ₂ + 2 φ₃)/8, from z/2ˢ. The
-    number s of doublings is chosen from the norm of z; the loops have a fixed length, so that batches and derivatives
-    pass through. Valid up to a norm of 2¹⁹.
-    """
-    one = jnp.eye(z.shape[0], dtype=z.dtype)
-    norm = jax.lax.stop_gradient(jnp.max(jnp.sum(jnp.abs(z), axis=0)))
-    count = jnp.clip(jnp.ceil(jnp.log2(jnp.maximum(norm, 1e-3))) + 1.0, 0.0, _HALVINGS)
-    small = z * 2.0**-count
-
-    def nest(series: Array, divisor: Array) -> tuple[Array, None]:
-        return one + small @ series / divisor, None
-
-    series, _ = jax.lax.scan(nest, one, jnp.arange(_TERMS + 3.0, 3.0, -1.0, dtype=z.dtype))
-    bend = series / 6.0
-    ramp = 0.5 * one + small @ bend
-    held = one + small @ ramp
-
-    def double(now: tuple[Array, ...], number: Array) -> tuple[tuple[Array, ...], None]:
-        phi, held, ramp, bend = now
-        twice = (
-            phi @ phi,
-            0.5 * (held @ phi + held),
-            0.25 * (held @ held) + 0.5 * ramp,
-            0.125 * (held @ ramp + ramp) + 0.25 * bend,
-        )
-        return tuple(jnp.where(number < count, new, old) for new, old in zip(twice, now, strict=True)), None
-
-    start = (one + small @ held, held, ramp, bend)
-    found, _ = jax.lax.scan(double, start, jnp.arange(_HALVINGS, dtype=z.dtype))
-    return found

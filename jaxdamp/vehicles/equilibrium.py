@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._matrices import solve
 from jaxdamp.dampers import coverage
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.port_form import PortForm
@@ -32,12 +33,12 @@ def rest_position(system: System, road: Float[Array, " wheels"]) -> Float[Array,
     if not any(law.traits().stroke_dependent_at_rest for law in system.laws):
         still = jnp.zeros(len(system.laws))
         forces = ports.force(still, still, ports.initial())
-        return jnp.linalg.solve(form.stiffness, form.road_stiffness @ road - form.ports.T @ forces)
+        return solve(form.stiffness, form.road_stiffness @ road - form.ports.T @ forces)
     arrays, rest = eqx.partition((form, ports, road), eqx.is_array)
     position = _newton(*eqx.combine(jax.lax.stop_gradient(arrays), rest))
     for _ in range(2):  # differentiable Newton steps: one gives exact first derivatives, two exact second ones
         residual, slope = _residual_force(form, ports, road, position)
-        position = position - jnp.linalg.solve(slope, residual)
+        position = position - solve(slope, residual)
     return position
 
 
@@ -57,7 +58,7 @@ def _newton(form: PortForm, ports: Ports, road: Float[Array, " wheels"]) -> Floa
     def step(now: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
         q, _, count = now
         residual, slope = _residual_force(form, ports, road, q)
-        tries = q[None] - SHARES[:, None] * jnp.linalg.solve(slope, residual)[None]
+        tries = q[None] - SHARES[:, None] * solve(slope, residual)[None]
         sizes = jnp.linalg.norm(jax.vmap(lambda q: _residual_force(form, ports, road, q)[0])(tries), axis=1)
         best = jnp.nanargmin(sizes)
         return tries[best], sizes[best] / scale, count + 1

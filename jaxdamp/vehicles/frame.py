@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._matrices import solve
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper, Sum
 from jaxdamp.vehicles.lift_off import LiftOff, LiftOffWithLaws
@@ -149,7 +150,7 @@ class Frame(eqx.Module):
         form = dataclasses.replace(form, ports=form.ports[: len(own)], port_road=standing)  # without lift-off
         heights = np.array([name in {f"z_{body.name}" for body in self.bodies} for name in self.coordinates])
         stiffness = tangent_stiffness(form, own, jnp.zeros(len(self.coordinates)))
-        deflected = jnp.linalg.solve(stiffness, -jnp.diag(form.mass) * (STANDARD_GRAVITY * heights))
+        deflected = solve(stiffness, -jnp.diag(form.mass) * (STANDARD_GRAVITY * heights))
         tyres = jnp.stack([wheel.stiffness for wheel in self.wheels])
         loads = -tyres * (matrix([wheel.point for wheel in self.wheels], self.coordinates) @ deflected)
         direct = [i for i, (_, part, _) in enumerate(self._elements()) if isinstance(part, Wheel)]

@@ -9,6 +9,7 @@ from jaxtyping import Array, Complex, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import root
+from jaxdamp._matrices import solve
 from jaxdamp._types import Scalar
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear
@@ -76,7 +77,7 @@ def gains_by_wheel(
             linear.feed_through,
         )
     )
-    states = jnp.linalg.solve(s * jnp.eye(a.shape[1], dtype=s.dtype)[None] - a, b + s * e)
+    states = jax.vmap(solve)(s * jnp.eye(a.shape[1], dtype=s.dtype)[None] - a, b + s * e)
     return c @ states + d + s * f
 
 

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._matrices import solve
 from jaxdamp._types import ScalarLike
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position
@@ -52,7 +53,7 @@ class LinearVehicle(eqx.Module):
 
     def settled(self) -> Float[Array, "n wheels"]:
         """−A⁻¹ B: static position of the vehicle for a unit road height under each wheel."""
-        return -jnp.linalg.solve(self.state_matrix, self.road_input)
+        return -solve(self.state_matrix, self.road_input)
 
     def delays(self, speed: ScalarLike | int | None, in_phase: bool = False) -> Float[Array, " wheels"]:
         """Delay of each wheel [s] behind the front axle at a speed [m/s]; zero if `in_phase`.

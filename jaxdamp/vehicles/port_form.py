@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp._matrices import solve
 from jaxdamp._vectors import Matrix, Vector, plus, rows, times
 
 
@@ -39,7 +40,7 @@ class PortForm(eqx.Module):
         """ẋ = A x + B_f f + B_r z_r + B_d ż_r of the motion x = (q, q̇), by one solution with the mass matrix."""
         n, ports, wheels = self.mass.shape[0], self.ports.shape[0], self.road_stiffness.shape[1]
         forces = [-self.stiffness, -self.damping, -self.ports.T, self.road_stiffness, self.road_damping]
-        rates = jnp.linalg.solve(self.mass, jnp.concatenate(forces, axis=1))
+        rates = solve(self.mass, jnp.concatenate(forces, axis=1))
         eye = jnp.eye(n, 2 * n + ports + 2 * wheels, n, dtype=rates.dtype)  # the upper half: q̇ is q̇
         whole = jnp.concatenate([eye, rates])
         ends = [2 * n, 2 * n + ports, 2 * n + ports + wheels]

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from jaxdamp._matrices import phi_functions
 from jaxdamp.parameters import replace
-from jaxdamp.simulation.propagator import Propagator, phi_functions
+from jaxdamp.simulation.propagator import Propagator
 from jaxdamp.vehicles import rest_position
 from jaxdamp.vehicles.presets import quarter_car_000
 
