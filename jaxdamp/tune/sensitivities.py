@@ -74,7 +74,7 @@ def sensitivity(
     >>> car = vehicles.presets.quarter_car_000()
     >>> found = sensitivity("rms_sprung_acceleration", car, roads.white("C", 20.0), over=["damper.rate", "sprung_mass"])
     >>> {name: round(float(value), 3) for name, value in found.elasticities("rms_sprung_acceleration").items()}
-    {'sprung_mass': -0.86, 'damper.rate': -0.276}
+    {'sprung_mass': -0.648, 'damper.rate': -0.276}
     """
     wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
     given = dict(quantities or {})

@@ -63,7 +63,7 @@ def tolerance_effects(
     >>> car = vehicles.presets.quarter_car_000()
     >>> effect, = tolerance_effects("rms_sprung_acceleration", car, roads.white("C", 20.0), {"damper.rate": 0.1})
     >>> print(effect.sentence("comfort"))
-    A 10 % scatter of damper.rate costs 0.34 % of comfort on average, and scatters it by 2.8 %.
+    A 10 % scatter of damper.rate costs 0.35 % of comfort on average, and scatters it by 2.8 %.
     """
     for name, deviation in scatter.items():
         _checks.positive(f"tolerances[{name!r}]", deviation, "0.1 is a standard deviation of 10 %.")

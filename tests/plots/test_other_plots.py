@@ -96,7 +96,10 @@ def test_ladder_has_a_bar_for_each_error(comparison: Comparison) -> None:
     held_out = [rung.held_out_rmse for rung in comparison.rungs]
     assert widths == pytest.approx([*fitted, *held_out])
     assert axes.get_xlabel() == "root of the mean squared force error [N]"
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["linear (1)", "bilinear (2)"]
+    assert [label.get_text() for label in axes.get_yticklabels()] == [
+        "linear (2)",
+        "bilinear (3)",
+    ]  # each with an offset
     bold = [label.get_text() for label in axes.get_yticklabels() if label.get_fontweight() == "bold"]
     assert bold == [f"{comparison.best.name} ({comparison.best.parameters})"]
     assert _legend(figure) == ["fitted records", "held-out records"]
