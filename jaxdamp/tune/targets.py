@@ -22,6 +22,7 @@ class Targets:
     Raises:
         ValueError: no target, or one that is no pair of finite numbers with a positive tolerance.
 
+    >>> import jax.numpy as jnp
     >>> targets = Targets({"rms_sprung_acceleration": (0.9, 0.05), "rms_dynamic_tyre_load": (1450.0, 100.0)})
     >>> values = {"rms_sprung_acceleration": jnp.asarray(1.0), "rms_dynamic_tyre_load": jnp.asarray(1450.0)}
     >>> round(float(targets(values)), 6)
