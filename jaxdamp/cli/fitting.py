@@ -82,8 +82,15 @@ def run_fit(
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
         job = FitJob(screen, names, weighting, machine, results, attempts, found, [*remarks, *found.sentences()])
+        failed = []
         for number, (name, part) in enumerate(groups.items(), 1):
-            job.fit_group(name, part, held, later=list(groups)[number:])
+            try:
+                job.fit_group(name, part, held, later=list(groups)[number:])
+            except ValueError as error:  # no law could be fitted to this group
+                failed.append(f"{name}: {error}")
+                if len(failed) == len(groups):
+                    raise
+        attempts.troubles += failed
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
 

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
+from jaxdamp.cli import fitting
 from jaxdamp.dampers import Bilinear
 from jaxdamp.export import from_json
 
@@ -131,6 +132,22 @@ def test_fits_of_each_value_of_a_setting(folder: Path, tmp_path: Path) -> None:
     assert "Option --held-out leaves no record of command_0.5 to fit" in said
     said = refused(tmp_path, "fit", *files, "--group-by", "clicks", "--out", tmp_path / "none")
     assert "Option --group-by must name a setting that every record states" in said
+
+
+def test_a_group_that_cannot_be_fitted_costs_that_group_alone(folder: Path, tmp_path: Path, monkeypatch) -> None:
+    original = fitting.fit_laws
+
+    def failing(screen, names, runs, held_out, **options):
+        if [run.name for run in runs] == ["10mm_1Hz"]:
+            raise ValueError("None of 1 laws could be fitted.")
+        return original(screen, names, runs, held_out, **options)
+
+    monkeypatch.setattr(fitting, "fit_laws", failing)
+    files = [folder / f"10mm_{speed}Hz.csv" for speed in (1, 2)]
+    words = ("--command", "*_1Hz=0.5,*_2Hz=1", "--group-by", "command", "--law", "linear", "--out", tmp_path / "out")
+    text = " ".join(jaxdamp("fit", *files, *words).output.split())
+    assert "command_0.5: None of 1 laws could be fitted." in text
+    assert (tmp_path / "out" / "command_1" / "best_law.json").is_file()
 
 
 def test_files_without_a_stroke(folder: Path, tmp_path: Path) -> None:
