@@ -13,6 +13,7 @@ _HALVINGS = 20
 _TERMS = 13  # of the Taylor series at a norm of one half or less: its rest is below 1e-16
 
 
+@jax.jit
 def solve(matrix: Inexact[Array, "n n"], right: Inexact[Array, "n *columns"]) -> Inexact[Array, "n *columns"]:
     """X of A X = B for a small regular matrix, by elimination with row exchange; differentiable in both."""
 
