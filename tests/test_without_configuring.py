@@ -14,7 +14,7 @@ import pytest
 ENTRIES = Path(__file__).with_name("every_entry_point.py")
 
 # Relative to the largest number of each entry, some five times what was measured; 1e-4 if it is not named.
-TOLERANCE = {"minimise, parameters": 1e-3, "sweep, derivatives": 5e-4}
+TOLERANCE = {"minimise": 3e-3, "minimise, parameters": 3e-3, "sweep, derivatives": 5e-4}
 
 
 @pytest.mark.slow

@@ -209,7 +209,8 @@ def _of_order(parts: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], order:
         scale = np.linalg.norm(columns, axis=0)
         solution = np.linalg.lstsq(columns / scale, force)[0] / scale
         left, more = float(np.sum((force - columns @ solution) ** 2)), max(len(u) - len(scale), 0)
-        error = np.sqrt(np.diag(np.linalg.pinv((columns / scale).T @ (columns / scale))) * left / max(more, 1)) / scale
+        shares = np.diag(np.linalg.pinv((columns / scale).T @ (columns / scale)))
+        error = np.sqrt(np.maximum(shares, 0.0) * left / max(more, 1)) / scale  # rounding may leave less than zero
         slopes = [
             (1 - LOWEST_SHARE**k) / (1 - LOWEST_SHARE) for k in range(1, order + 1)
         ]  # means of u^k over the range
