@@ -21,18 +21,22 @@ def lyapunov(a: Float[Array, "n n"], q: Float[Array, "n n"]) -> Float[Array, "n 
     """The solution P = ∫ e^{At} Q e^{Aᵀt} dt of A P + P Aᵀ + Q = 0 for a stable A, by doubling of the interval.
 
     The first interval h ends where the exponential of the matrix [[−A, Q], [0, Aᵀ]] h is a short series; then
-    P(2h) = P(h) + F P(h) Fᵀ with F(2h) = F(h)², F = e^{Ah}. Differentiable; n³ operations a step.
+    P(2h) = P(h) + F P(h) Fᵀ and F(2h) = F(h)², F = e^{Ah}. F is stored as E = F − 1, which is small at first: F itself
+    would lose the slow motions to rounding. Differentiable; n³ operations a step.
     """
     n = a.shape[0]
     first, scale = (0.5 / at_least(jax.lax.stop_gradient(jnp.max(jnp.sum(jnp.abs(m), axis=0))), 1e-30) for m in (a, q))
-    ended = phi_functions(jnp.block([[-a * first, q * scale], [jnp.zeros_like(a), a.T * first]]))[0]
-    step = ended[n:, n:].T
+    whole = jnp.block([[-a * first, q * scale], [jnp.zeros_like(a), a.T * first]])
+    grown = whole @ phi_functions(whole)[1]  # its exponential, minus one
+    change = grown[n:, n:].T
 
     def double(now: tuple[Array, Array], _: None) -> tuple[tuple[Array, Array], None]:
-        p, f = now
-        return (p + f @ p @ f.T, f @ f), None
+        p, e = now
+        moved = p + e @ p
+        return (p + moved + moved @ e.T, 2.0 * e + e @ e), None
 
-    (found, _), _ = jax.lax.scan(double, (step @ ended[:n, n:] * (first / scale), step), None, length=_DOUBLINGS)
+    begun = grown[:n, n:] * (first / scale)
+    (found, _), _ = jax.lax.scan(double, (begun + change @ begun, change), None, length=_DOUBLINGS)
     return found
 
 
