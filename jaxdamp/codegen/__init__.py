@@ -8,10 +8,25 @@
 Arrays become names of scalars while printing, so that slicing and reshaping cost nothing. Loops (`lax.while_loop`,
 `lax.scan`) stay loops, branches stay branches, calls and functions with custom derivatives are written out. Elementary
 functions are those of the language's own library. A primitive that cannot be printed is refused by its name.
+
+`printed_scan` prints a loop over time for many points side by side, compiles it and calls it from JAX.
 """
 
 from jaxdamp.codegen._languages import AbstractLanguage, C, JavaScript, PrintedFunction
 from jaxdamp.codegen._lowering import Program, Symbols, lower, symbols
+from jaxdamp.codegen._native import compiler
+from jaxdamp.codegen._scan import printed_scan
 
 
-__all__ = ["AbstractLanguage", "C", "JavaScript", "PrintedFunction", "Program", "Symbols", "lower", "symbols"]
+__all__ = [
+    "AbstractLanguage",
+    "C",
+    "JavaScript",
+    "PrintedFunction",
+    "Program",
+    "Symbols",
+    "compiler",
+    "lower",
+    "printed_scan",
+    "symbols",
+]

@@ -125,7 +125,7 @@ def _assign(writer: Writer, targets: list[Atoms], values: list[Atoms]) -> None:
 
 
 CALLS = (
-    "jit pjit closed_call core_call eval_jaxpr call_hi_primitive remat checkpoint "
+    "jit pjit closed_call core_call eval_jaxpr call_hi_primitive remat remat2 checkpoint "
     "custom_jvp_call custom_vjp_call custom_vjp_call_jaxpr"
 ).split()
 RULES: dict[str, ControlRule] = {**dict.fromkeys(CALLS, _call), "while": _while, "cond": _cond, "scan": _scan}

@@ -59,6 +59,16 @@ def traced(function: Callable[..., Any], inputs: list[tuple[tuple[int, ...], str
     return jax.make_jaxpr(function)(*(jax.ShapeDtypeStruct(*each) for each in inputs))
 
 
+def with_constants_as_inputs(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Inner, list[Any]]:
+    """The jaxpr of a function that closes over arrays, which may be traced; they come first among its inputs."""
+    closed = jax.make_jaxpr(function)(*arguments)
+
+    def outside(constants: list[Any], *flat: Any) -> list[Any]:
+        return core.jaxpr_as_fun(core.ClosedJaxpr(closed.jaxpr, constants))(*flat)
+
+    return jax.make_jaxpr(outside)(closed.consts, *jax.tree.leaves(arguments)), closed.consts
+
+
 def opened(inner: Inner) -> tuple[Any, list[np.ndarray]]:
     """A jaxpr and the values of its constants."""
     jaxpr = inner.jaxpr if hasattr(inner, "consts") else inner

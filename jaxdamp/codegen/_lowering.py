@@ -1,6 +1,7 @@
 """JAX functions of numbers and small arrays as programs of scalars."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,11 @@ from jaxdamp.configuration import Target, compiling_for
 
 # One car on a processor of any kind, with the elementary functions of the C library.
 _SCALAR = Target(fused_loops=False, reciprocal_roots=False, library_functions=True)
+
+
+def printing() -> AbstractContextManager[None]:
+    """Functions traced inside use the elementary functions of the C library."""
+    return compiling_for(_SCALAR)
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,7 @@ def lower(function: Callable[..., Any], *arguments: Any) -> Program:
         return results
 
     writer = Writer()
-    with compiling_for(_SCALAR), jax.enable_x64(any(leaf.dtype.endswith("64") for leaf in inputs)):
+    with printing(), jax.enable_x64(any(leaf.dtype.endswith("64") for leaf in inputs)):
         jaxpr = traced(flat, [(leaf.names.shape, leaf.dtype) for leaf in inputs])
         results = evaluated(writer, jaxpr, [_atoms(leaf) for leaf in inputs])
     needed = {atom.name for array in results for atom in array.ravel() if isinstance(atom, Variable)}

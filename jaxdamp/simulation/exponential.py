@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._jacobian import Mode
 from jaxdamp._types import Scalar, Signal
 from jaxdamp._vectors import (
     Matrix,
@@ -113,6 +114,10 @@ class Exponential(AbstractFixedStep):
         dt: spacing of the instants [s]; that of the run if left out.
         substeps: steps between two instants; as many as the steepest law needs (friction at standstill, a bristle, oil)
             if left out, so that every step is stable. The road stays straight between instants.
+        printed: print the loop over time as C and let the machine's C compiler (gcc, clang) make vector code of it: for
+            a `Ride` in a `sweep` or under `jax.vmap`, in double precision, on a CPU. The same numbers to rounding,
+            1.3 to 1.7 times as fast for laws without a loop inside; derivatives do not pass. What cannot be printed is
+            refused with the reason (`NotImplementedError`).
 
     >>> from jaxdamp import roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)
@@ -122,6 +127,7 @@ class Exponential(AbstractFixedStep):
 
     dt: float | None = eqx.field(static=True, default=None)
     substeps: int | None = eqx.field(static=True, default=None)
+    printed: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self) -> None:
         if self.dt is not None:
@@ -140,10 +146,22 @@ class Exponential(AbstractFixedStep):
         return self.substeps or 1
 
     def layout(self, states: int, *, side_by_side: bool) -> MemoryLayout:
-        """Lanes for many cars; scalars for one small car where loops are compiled as one function."""
+        """Lanes for many cars; scalars for one small car where loops are compiled as one function, and in C."""
+        if self.printed:
+            return MemoryLayout.SCALARS
         if side_by_side:
             return MemoryLayout.LANES
         return MemoryLayout.SCALARS if target().fused_loops and states <= FEW_STATES else MemoryLayout.ARRAY
+
+    @property
+    def runs_printed(self) -> bool:
+        """As asked for."""
+        return self.printed
+
+    @property
+    def derivatives(self) -> tuple[Mode, ...]:
+        """Both, but none through a printed loop."""
+        return () if self.printed else super().derivatives
 
     def stepper(self, equations: Equations, dt: Scalar) -> ExponentialStepper:
         """The matrices of a step of dt [s]."""

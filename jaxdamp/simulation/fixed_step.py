@@ -16,6 +16,7 @@ from jaxtyping import Array, Float
 from jaxdamp._jacobian import Mode
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp._vectors import between, laid_out
+from jaxdamp.codegen import printed_scan
 from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome
 from jaxdamp.simulation.equations import FOR_REVERSE, Equations, RoadInput, StepState
 
@@ -55,6 +56,11 @@ class AbstractFixedStep(AbstractEngine):
     def derivatives(self) -> tuple[Mode, ...]:
         """Both: the loop has a fixed length. A step with a loop of its own may say otherwise."""
         return ("forward", "reverse")
+
+    @property
+    def runs_printed(self) -> bool:
+        """Whether the loop is printed as C and compiled by the machine's C compiler, for many cars side by side."""
+        return False
 
     @abstractmethod
     def stepper(self, equations: Equations, dt: Scalar) -> AbstractStepper:
@@ -108,6 +114,9 @@ class AbstractFixedStep(AbstractEngine):
             road = jnp.concatenate([heights[2:], 2.0 * heights[-1:] - heights[-2:-1]])  # it ends as straight as it came
         now = stepper.start(start, first)
         carry = now, observer.begin(now, first), first, window
+        if self.runs_printed:
+            carry = self._printed(step, carry, road, observer)
+            return Outcome(carry[1], observer.saved(carry[0], carry[1]), equations.ports.by_port(carry[0].states))
         parts = [jax.tree.map(lambda y: y[None], observer.saved(now, carry[1]))]
         whole = 0 if observer.saves_motion or road.shape[0] <= BLOCK else road.shape[0] // BLOCK * BLOCK
         if whole:
@@ -120,6 +129,16 @@ class AbstractFixedStep(AbstractEngine):
         carry, saved = drive(carry, rest)
         records = jax.tree.map(lambda *ys: jnp.concatenate(ys), *parts, saved)
         return Outcome(carry[1], records, equations.ports.by_port(carry[0].states))
+
+    def _printed(self, step: Any, carry: Carry, road: Array, observer: AbstractObserver) -> Carry:
+        """The carry at the end of a loop that is printed; refused where something of each instant is saved."""
+        try:
+            if jax.tree.leaves(observer.saved(carry[0], carry[1])):
+                raise NotImplementedError("Instants are saved, as `simulate` and metrics of a whole record need them.")
+            return printed_scan(step, carry, road)
+        except NotImplementedError as error:
+            message = f"{self} cannot print this run: {error} Leave `printed` out: XLA then compiles the loop."
+            raise NotImplementedError(message) from error
 
 
 def _over(stepper: AbstractStepper, now: StepState, begin: RoadInput, end: RoadInput, substeps: int) -> StepState:

@@ -1,0 +1,161 @@
+"""The body of a loop over steps as C for many points side by side."""
+
+from collections.abc import Iterable, Sequence
+from importlib import resources
+from typing import NamedTuple, final
+
+import numpy as np
+
+from jaxdamp.codegen import _arrays
+from jaxdamp.codegen._jaxprs import Inner
+from jaxdamp.codegen._languages import C
+from jaxdamp.codegen._lowering import evaluated, printing
+from jaxdamp.codegen._program import Atom, Atoms, Define, Statement, Table, Variable, Writer, names, operands_of, pruned
+
+
+OF_POINT, OF_STEP = 1, 2  # what a number depends on: bits, both of them where it differs from point to point and step
+WIDTH = 16  # of the printed block in the template
+
+
+@final
+class Operand(NamedTuple):
+    """An input of the body.
+
+    Attributes:
+        shape: of one point.
+        value: where it is known while printing.
+        level: `OF_POINT`, `OF_STEP`, both or neither.
+    """
+
+    shape: tuple[int, ...]
+    level: int
+    value: np.ndarray | None = None
+
+
+class Loop(NamedTuple):
+    """A printed loop.
+
+    Attributes:
+        text: C.
+        laned: which of the carried values differ from point to point.
+    """
+
+    text: str
+    laned: tuple[bool, ...]
+
+
+def lanes_in_c(body: Inner, constants: Sequence[Operand], carry: Sequence[Operand], row: Sequence[Operand]) -> Loop:
+    """Print a loop whose body maps (constants, carry, row) to the carry of the next step.
+
+    What depends neither on the point nor on the step is computed once, what depends on the point alone before the
+    loop, what depends on the step alone once for all points.
+
+    Raises:
+        NotImplementedError: the body has loops or branches, which vectors cannot follow, or cannot be printed.
+    """
+    carry = list(carry)
+    while True:
+        writer, names_of = Writer(), _Names()
+        operands = [names_of.atoms(operand, "shared", "own") for operand in constants]
+        before = [names_of.atoms(operand, "now", "state") for operand in carry]
+        rows = [names_of.atoms(operand, "row", "row") for operand in row]
+        with printing():
+            after = evaluated(writer, body, [*operands, *before, *rows])
+        results = [atom for array in after for atom in array.ravel()]
+        statements = pruned(writer.statements, names(results))
+        levels = _levels(statements, names_of.levels)
+        grown = [
+            operand._replace(level=operand.level | max((_level(atom, levels) for atom in array.ravel()), default=0))
+            for operand, array in zip(carry, after, strict=True)
+        ]
+        if grown == carry:
+            return Loop(
+                _text(statements, levels, names_of, before, after), tuple(c.level & OF_POINT > 0 for c in carry)
+            )
+        carry = grown  # what seemed the same for all points is not
+
+
+class _Names:
+    """Names of inputs, numbered in the order of the buffers that hold them."""
+
+    def __init__(self) -> None:
+        self.levels: dict[str, int] = {}
+        self.counts = dict.fromkeys(("shared", "own", "now", "state", "row"), 0)
+
+    def atoms(self, operand: Operand, common: str, of_points: str) -> Atoms:
+        if operand.value is not None:
+            return _arrays.constants(operand.value)
+        laned = operand.level & OF_POINT > 0
+        buffer = of_points if laned else common
+        array = np.empty(operand.shape, object)
+        for index in np.ndindex(*operand.shape):
+            name = f"{buffer}[{self.counts[buffer]}]" + ("[lane]" if laned else "")
+            self.counts[buffer] += 1
+            self.levels[name] = operand.level
+            array[index] = Variable(name, "float64")
+        return array
+
+
+def _level(atom: Atom | None, levels: dict[str, int]) -> int:
+    return levels[atom.name] if isinstance(atom, Variable) else 0
+
+
+def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str, int]:
+    levels = dict(known)
+    for statement in statements:
+        if not isinstance(statement, Define | Table):
+            raise NotImplementedError(
+                "A loop or a branch inside a step cannot be printed for many points side by side."
+            )
+        level = 0
+        for atom in operands_of(statement):
+            level |= _level(atom, levels)
+        levels[statement.target.name] = level
+    return levels
+
+
+def _text(
+    statements: list[Statement], levels: dict[str, int], inputs: _Names, before: list[Atoms], after: list[Atoms]
+) -> str:
+    printer = C()
+    parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
+    for statement in statements:
+        parts[levels[statement.target.name]].append(statement)
+    pairs = [
+        (str(old.name), printer.atom(new))
+        for olds, news in zip(before, after, strict=True)
+        for old, new in zip(olds.ravel(), news.ravel(), strict=True)
+        if old != new
+    ]
+    late = names([atom for s in parts[OF_POINT | OF_STEP] for atom in operands_of(s)])
+    late |= names([atom for array in after for atom in array.ravel()])
+    hoisted = [s.target for s in parts[OF_POINT] if s.target.name in late]
+    store = [f"hoisted[{i}][lane] = {v.name};" for i, v in enumerate(hoisted)]
+    load = [f"const {printer.types[v.dtype]} {v.name} = hoisted[{i}][lane];" for i, v in enumerate(hoisted)]
+    counts = inputs.counts
+    return _filled(
+        {
+            **{name: str(counts[name]) for name in ("shared", "own", "now", "state")},
+            "rows": str(counts["row"]),
+            "hoisted": str(len(hoisted)),
+            "once": [*printer.lines(parts[0], 0)],
+            "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
+            "of_step": [*printer.lines(parts[OF_STEP], 0)],
+            "of_both": [*load, *printer.lines(parts[3], 0), *_assigned([p for p in pairs if p[0].startswith("state")])],
+            "next": _assigned([p for p in pairs if p[0].startswith("now")]),
+        }
+    )
+
+
+def _assigned(pairs: list[tuple[str, str]]) -> list[str]:
+    """All at once: values are read before any of them changes."""
+    copies = [f"const double after{i} = {value};" for i, (_, value) in enumerate(pairs)]
+    return copies + [f"{target} = after{i};" for i, (target, _) in enumerate(pairs)]
+
+
+def _filled(marks: dict[str, str | list[str]]) -> str:
+    text = resources.files("jaxdamp.codegen").joinpath("lanes.c").read_text(encoding="utf-8")
+    for mark, lines in marks.items():
+        block = lines if isinstance(lines, str) else "\n".join(" " * WIDTH + line for line in lines)
+        text = text.replace(f"@{mark}@", block)
+    return text

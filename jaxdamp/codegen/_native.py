@@ -1,0 +1,58 @@
+"""Printed C, compiled by the C compiler of this machine and called by XLA."""
+
+import atexit
+import ctypes
+import functools
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import jax
+
+
+# As fast as XLA's own code may be, which fuses and reorders, too; what is not finite stays so.
+_FLAGS = (
+    "-std=gnu11 -O3 -march=native -fPIC -shared -w -fopenmp-simd -fno-math-errno -fno-trapping-math -fno-signed-zeros "
+    "-fassociative-math -freciprocal-math -ffp-contract=fast"
+).split()
+_WIDE = ("-mprefer-vector-width=512", "-mrecip")  # of gcc for x86
+
+
+def compiler() -> str | None:
+    """The C compiler: the environment variable `CC`, or gcc, clang, cc on the path; None without one."""
+    own = os.environ.get("CC", "").split()
+    return next(filter(None, map(shutil.which, [*own[:1], "gcc", "clang", "cc"])), None)
+
+
+@functools.cache
+def _folder() -> Path:
+    """Of this process, removed at its end."""
+    folder = Path(tempfile.mkdtemp(prefix="jaxdamp-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+@functools.cache
+def registered(text: str) -> str:
+    """The name under which XLA calls the function `loop` of a C text, compiled once in a process.
+
+    Raises:
+        NotImplementedError: no C compiler, or one that refuses the text; the message holds what it says.
+    """
+    tool = compiler()
+    if tool is None:
+        raise NotImplementedError("No C compiler is at hand. Install gcc or clang, or name one in the variable CC.")
+    name = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
+    source, target = _folder() / f"{name}.c", _folder() / f"{name}.so"
+    source.write_text(text, encoding="utf-8")
+    where = ["-I", jax.ffi.include_dir(), str(source), "-o", str(target)]
+    for flags, libraries in (([*_FLAGS, *_WIDE], ["-lmvec", "-lm"]), (_FLAGS, ["-lm"])):
+        done = subprocess.run([tool, *flags, *where, *libraries], capture_output=True, text=True)
+        if done.returncode == 0:
+            function = ctypes.CDLL(str(target)).loop
+            jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(function), platform="cpu")
+            return name
+    raise NotImplementedError(f"{tool} does not compile the printed loop: {done.stderr.strip()[-2000:]}")

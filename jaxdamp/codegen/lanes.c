@@ -1,0 +1,97 @@
+/* A loop over steps for many points side by side, called by XLA. The lines between the marks are printed. */
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "xla/ffi/api/c_api.h"
+
+#define LANES 32 /* points of a block, which the compiler turns into vectors */
+#define ROW(name, count) double name[(count) ? (count) : 1][LANES] __attribute__((aligned(64)))
+
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#define VECTORS __attribute__((simd("notinbranch"))) /* of the C library's libmvec */
+VECTORS double exp(double);
+VECTORS double log(double);
+VECTORS double pow(double, double);
+VECTORS double sin(double);
+VECTORS double cos(double);
+VECTORS double tan(double);
+VECTORS double tanh(double);
+VECTORS double sinh(double);
+VECTORS double cosh(double);
+VECTORS double atan(double);
+VECTORS double expm1(double);
+VECTORS double log1p(double);
+#endif
+
+enum { SHARED = @shared@, OWN = @own@, NOW = @now@, STATE = @state@, ROWS = @rows@, HOISTED = @hoisted@ };
+
+/* shared and own: numbers of all points, and of each point; now and state: what is carried from step to step, the same
+   for all points, and of each. Numbers of points lie one after the other, (number, point). */
+static void run(const double *restrict shared, const double *restrict own_in, const double *restrict now_in,
+                const double *restrict state_in, const double *restrict rows, int64_t steps, int64_t points,
+                double *restrict now_out, double *restrict state_out)
+{
+    (void)shared;
+@once@
+    for (int64_t first = 0; first < points; first += LANES) {
+        const int64_t count = points - first < LANES ? points - first : LANES;
+        ROW(own, OWN);
+        ROW(state, STATE);
+        ROW(hoisted, HOISTED);
+        double now[NOW ? NOW : 1];
+        /* lanes without a point of their own repeat the last */
+        for (int i = 0; i < OWN; i++)
+            for (int lane = 0; lane < LANES; lane++)
+                own[i][lane] = own_in[i * points + first + (lane < count ? lane : count - 1)];
+        for (int i = 0; i < STATE; i++)
+            for (int lane = 0; lane < LANES; lane++)
+                state[i][lane] = state_in[i * points + first + (lane < count ? lane : count - 1)];
+        for (int i = 0; i < NOW; i++)
+            now[i] = now_in[i];
+        for (int lane = 0; lane < LANES; lane++) {
+            (void)own;
+@of_point@
+        }
+        for (int64_t step = 0; step < steps; step++) {
+            const double *restrict row = rows + step * ROWS;
+            (void)row;
+@of_step@
+#pragma omp simd
+            for (int lane = 0; lane < LANES; lane++) {
+@of_both@
+            }
+@next@
+        }
+        for (int i = 0; i < STATE; i++)
+            for (int lane = 0; lane < count; lane++)
+                state_out[i * points + first + lane] = state[i][lane];
+        for (int i = 0; i < NOW; i++)
+            now_out[i] = now[i];
+    }
+}
+
+static double *numbers(void *buffer)
+{
+    return (double *)((XLA_FFI_Buffer *)buffer)->data;
+}
+
+static int64_t size(void *buffer, int64_t axis)
+{
+    return ((XLA_FFI_Buffer *)buffer)->dims[axis];
+}
+
+XLA_FFI_Error *loop(XLA_FFI_CallFrame *frame)
+{
+    XLA_FFI_Extension_Base *extension = frame->extension_start;
+    if (extension && extension->type == XLA_FFI_Extension_Metadata) {
+        XLA_FFI_Metadata *about = ((XLA_FFI_Metadata_Extension *)extension)->metadata;
+        about->api_version.major_version = XLA_FFI_API_MAJOR;
+        about->api_version.minor_version = XLA_FFI_API_MINOR;
+        return 0;
+    }
+    void **in = frame->args.args, **out = frame->rets.rets;
+    run(numbers(in[0]), numbers(in[1]), numbers(in[2]), numbers(in[3]), numbers(in[4]), size(in[4], 0), size(in[3], 1),
+        numbers(out[0]), numbers(out[1]));
+    return 0;
+}

@@ -1,0 +1,99 @@
+"""Loops over steps printed as C for many points side by side give the numbers of `jax.lax.scan`."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxdamp import Ride, roads, sweep, vehicles
+from jaxdamp.codegen import _native, compiler, printed_scan
+from jaxdamp.dampers import Besinger, SeriesSpring
+from jaxdamp.simulation import Exponential, simulate
+
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+ROWS = jnp.sin(jnp.arange(40.0)).reshape(20, 2)
+RATE = "damper.rebound_rate"
+
+
+def oscillator(scan):
+    """Carried values of every kind: the same for all points, of each, and of each only after some steps."""
+
+    def run(stiffness, shared=2.0):
+        start = {"x": jnp.array([1.0, 0.0]), "clock": jnp.asarray(0.5), "late": jnp.zeros(3), "largest": 0.0 * shared}
+        # `late` is passed on from entry to entry, so that its last one differs between points from the third step on
+
+        def step(now, row):
+            x, v = now["x"]
+            force = jnp.tanh(stiffness * x) + shared * jnp.sum(row) + jnp.where(v > 0, 0.1, -0.2) * now["clock"]
+            v = v - 0.1 * force
+            late = jnp.stack([x, now["late"][0], now["late"][1]])
+            after = {"x": jnp.stack([x + 0.1 * v, v]), "clock": now["clock"] * 1.01, "late": late}
+            return after | {"largest": jnp.maximum(now["largest"], x)}
+
+        return scan(step, start, ROWS)
+
+    return run
+
+
+def by_jax(step, carry, rows):
+    return jax.lax.scan(lambda c, row: (step(c, row), None), carry, rows)[0]
+
+
+@pytest.mark.parametrize("count", [1, 33])
+def test_equal_to_scan(count):
+    stiffness = jnp.linspace(0.5, 3.0, count)
+    printed, plain = (jax.jit(jax.vmap(oscillator(scan)))(stiffness) for scan in (printed_scan, by_jax))
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12), printed, plain)
+
+
+def test_one_point_alone():
+    jax.tree.map(
+        lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12),
+        jax.jit(oscillator(printed_scan))(1.5),
+        oscillator(by_jax)(1.5),
+    )
+
+
+def test_what_is_not_finite_stays_in_its_lane():
+    stiffness = jnp.linspace(0.5, 3.0, 40).at[7].set(jnp.nan)
+    found = np.asarray(jax.vmap(oscillator(printed_scan))(stiffness)["x"])
+    assert np.isnan(found[7]).all() and np.isfinite(np.delete(found, 7, axis=0)).all()
+
+
+def test_refused_by_name(monkeypatch):
+    def run(step, start, rows=ROWS):
+        return jax.vmap(lambda x: printed_scan(lambda c, row: step(c, row, x), start, rows))(jnp.arange(3.0))
+
+    with pytest.raises(NotImplementedError, match="loop or a branch inside a step"):
+        run(lambda c, row, x: jax.lax.while_loop(lambda c: c < x, lambda c: c + row[0] + 1.0, c), jnp.asarray(0.0))
+    with pytest.raises(NotImplementedError, match="int"):
+        run(lambda c, row, x: c + 1, jnp.asarray(0))
+    with pytest.raises(NotImplementedError, match="rows of a loop"):
+        jax.vmap(lambda rows: printed_scan(lambda c, row: c + row[0], jnp.asarray(0.0), rows))(jnp.ones((3, 5, 1)))
+    monkeypatch.setattr(_native, "compiler", lambda: None)
+    with pytest.raises(NotImplementedError, match="No C compiler"):
+        run(lambda c, row, x: c + 0.123 * row[0] * x, jnp.asarray(0.0))
+
+
+ROAD = roads.iso8608("C", speed=20.0, seed=1)
+CAR = vehicles.presets.quarter_car_000(Besinger(1600.0, 4200.0, 900.0, limit_velocity=0.13, transition_velocity=0.05))
+
+
+def test_a_sweep_of_all_ride_metrics():
+    over = {RATE: np.linspace(2e3, 5e3, 5), "sprung_mass": [250.0, 300.0]}
+    plain, printed = (sweep(Ride(CAR, ROAD, duration=0.4, engine=Exponential(printed=p)), over) for p in (False, True))
+    for name in plain.data_vars:
+        np.testing.assert_allclose(printed[name], plain[name], rtol=1e-11, atol=1e-14, err_msg=str(name))
+
+
+def test_runs_that_cannot_be_printed():
+    ride = Ride(CAR, ROAD, metrics=["rms_sprung_acceleration"], duration=0.4, engine=Exponential(printed=True))
+    with pytest.raises(ValueError, match="passes none in a sweep"):
+        sweep(ride, {RATE: [2e3, 3e3]}, gradients=True)
+    with pytest.raises(NotImplementedError, match=r"Instants are saved.*Leave `printed` out"):
+        simulate(CAR, ROAD, duration=0.4, engine=Exponential(printed=True))
+    spring = vehicles.presets.quarter_car_000(SeriesSpring(CAR.damper, 1e6, 1e8))
+    stiff = Ride(spring, ROAD, metrics=["rms_sprung_acceleration"], duration=0.4, engine=Exponential(printed=True))
+    with pytest.raises(NotImplementedError, match=r"loop or a branch.*Leave `printed` out"):
+        sweep(stiff, {"damper.stiffness": [1e6, 2e6]})
