@@ -5,16 +5,18 @@ import numpy as np
 from benchmarks.peers import problem
 from jaxdamp import Ride, roads
 from jaxdamp.parameters import parameters
+from jaxdamp.simulation import Exponential
 
 
 METRIC = "rms_sprung_acceleration"
 
 
-def ride(case: str, road: problem.Heights, dt: float = 1e-3) -> Ride:
+def ride(case: str, road: problem.Heights, dt: float = 1e-3, *, printed: bool = False) -> Ride:
     """The car of a case, with the law of the first row that is drawn, on a road given at instants."""
     profile = roads.from_profile(np.arange(road.shape[0]) * dt, road)
     car = problem.vehicle(problem.law(case, problem.draw(case, 1)[0]), case)
-    return Ride(car, profile, metrics=[METRIC], duration=(road.shape[0] - 1) * dt, dt=dt)
+    engine = Exponential(dt=dt, printed=printed)
+    return Ride(car, profile, metrics=[METRIC], duration=(road.shape[0] - 1) * dt, engine=engine)
 
 
 def paths(case: str) -> list[str]:

@@ -23,6 +23,7 @@ from benchmarks import ours  # noqa: E402
 from benchmarks._timing import best, report  # noqa: E402
 from benchmarks.peers import c, casadi_map, diffrax_vmapped, problem, scipy_numba  # noqa: E402
 from jaxdamp import sweep  # noqa: E402
+from jaxdamp.codegen import compiler  # noqa: E402
 from jaxdamp.sweeps import points  # noqa: E402
 
 
@@ -31,9 +32,11 @@ STEPS = round(DURATION / DT)
 CARS = {"jaxdamp": 32_768, "c": 4096, "diffrax": 1024, "scipy": 4, "casadi": 64}
 
 
-def swept(case: str, road: problem.Heights, cars: int, devices: int) -> tuple[float, np.ndarray]:
+def swept(
+    case: str, road: problem.Heights, cars: int, devices: int, *, printed: bool = False
+) -> tuple[float, np.ndarray]:
     """Cars a second of a sweep after its first call, best of three, and the results of the first cars."""
-    ride, table = ours.ride(case, road), problem.draw(case, cars)
+    ride, table = ours.ride(case, road, printed=printed), problem.draw(case, cars)
     rates, found = [], np.empty(0)
     for _ in range(3):
         marks: list[tuple[float, int]] = []
@@ -47,6 +50,16 @@ def swept(case: str, road: problem.Heights, cars: int, devices: int) -> tuple[fl
         rates.append((last - first) / (end - begin))
         found = data[ours.METRIC].values
     return max(rates), found
+
+
+def printed_rates(case: str, road: problem.Heights) -> list[float]:
+    """Rates of the loop printed as C, on one core and on all; none of a law that cannot be printed."""
+    counts = (1, DONE.cpu_devices)
+    try:
+        rates = [swept(case, road, CARS["jaxdamp"], n, printed=True)[0] for n in counts]
+    except NotImplementedError:
+        return []
+    return [rate * STEPS / 1e6 for rate in rates]
 
 
 def c_rates(case: str, road: problem.Heights, exact: np.ndarray) -> list[list[Any]]:
@@ -85,6 +98,8 @@ def main() -> None:
         alone, all_cores = both[0][0], both[-1][0]
         error = problem.errors(problem.simulated(case, problem.draw(case, FEW), road, DT), exact).max()
         rows.append([case, "jaxdamp.sweep", alone * STEPS / 1e6, all_cores * STEPS / 1e6, float(error)])
+        if compiler() is not None and (printed := printed_rates(case, road)):
+            rows.append([case, "jaxdamp.sweep, printed as C", *printed, float(error)])
         if c.available():
             rows += c_rates(case, road, exact)
         if "--c-only" not in sys.argv:

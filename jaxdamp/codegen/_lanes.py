@@ -62,7 +62,7 @@ def lanes_in_c(body: Inner, constants: Sequence[Operand], carry: Sequence[Operan
         with printing():
             after = evaluated(writer, body, [*operands, *before, *rows])
         results = [atom for array in after for atom in array.ravel()]
-        statements = pruned(writer.statements, names(results))
+        statements = _straight(pruned(writer.statements, names(results)))
         levels = _levels(statements, names_of.levels)
         grown = [
             operand._replace(level=operand.level | max((_level(atom, levels) for atom in array.ravel()), default=0))
@@ -80,7 +80,7 @@ class _Names:
 
     def __init__(self) -> None:
         self.levels: dict[str, int] = {}
-        self.counts = dict.fromkeys(("shared", "own", "now", "state", "row"), 0)
+        self.counts: dict[str, int] = dict.fromkeys(("shared", "own", "now", "state", "row"), 0)
 
     def atoms(self, operand: Operand, common: str, of_points: str) -> Atoms:
         if operand.value is not None:
@@ -100,13 +100,18 @@ def _level(atom: Atom | None, levels: dict[str, int]) -> int:
     return levels[atom.name] if isinstance(atom, Variable) else 0
 
 
-def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str, int]:
+def _straight(statements: list[Statement]) -> list[Define | Table]:
+    """The statements, among which are no loops and branches."""
+    straight = [statement for statement in statements if isinstance(statement, Define | Table)]
+    if len(straight) < len(statements):
+        message = "A loop or a branch inside a step cannot be printed for many points side by side."
+        raise NotImplementedError(message)
+    return straight
+
+
+def _levels(statements: Iterable[Define | Table], known: dict[str, int]) -> dict[str, int]:
     levels = dict(known)
     for statement in statements:
-        if not isinstance(statement, Define | Table):
-            raise NotImplementedError(
-                "A loop or a branch inside a step cannot be printed for many points side by side."
-            )
         level = 0
         for atom in operands_of(statement):
             level |= _level(atom, levels)
@@ -115,10 +120,10 @@ def _levels(statements: Iterable[Statement], known: dict[str, int]) -> dict[str,
 
 
 def _text(
-    statements: list[Statement], levels: dict[str, int], inputs: _Names, before: list[Atoms], after: list[Atoms]
+    statements: list[Define | Table], levels: dict[str, int], inputs: _Names, before: list[Atoms], after: list[Atoms]
 ) -> str:
     printer = C()
-    parts: dict[int, list[Statement]] = {level: [] for level in range(4)}
+    parts: dict[int, list[Define | Table]] = {level: [] for level in range(4)}
     for statement in statements:
         parts[levels[statement.target.name]].append(statement)
     pairs = [

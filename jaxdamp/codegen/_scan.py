@@ -5,9 +5,9 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array
 
+from jaxdamp import _checks
 from jaxdamp.codegen._jaxprs import with_constants_as_inputs
 from jaxdamp.codegen._lanes import OF_POINT, OF_STEP, Operand, lanes_in_c
 from jaxdamp.codegen._lowering import printing
@@ -34,13 +34,13 @@ def printed_scan(step: Callable[[Any, Any], Any], carry: Any, rows: Any) -> Any:
     with printing():
         body, constants = with_constants_as_inputs(step, (carry, row))
     start, tree = jax.tree.flatten(carry)
-    values = [None if isinstance(c, jax.core.Tracer) else np.asarray(c) for c in constants]
+    values = [_checks.concrete(c) for c in constants]
     moving = [c for c, value in zip(constants, values, strict=True) if value is None]
     for leaf in [*moving, *start, *jax.tree.leaves(rows)]:
         if leaf.dtype != jnp.float64:
             raise NotImplementedError(f"A loop over numbers of type {leaf.dtype} cannot be printed, only over float64.")
 
-    def call(size: int, laned: Any, moving: list[Array], start: list[Array], rows: list[Array]) -> Any:
+    def call(size: int, laned: Any, moving: list[Any], start: list[Any], rows: list[Any]) -> Any:
         inputs = iter([_operand(v, lane) for v, lane in zip(moving, laned[0], strict=True)])
         known = [next(inputs) if v is None else Operand(v.shape, 0, v) for v in values]
         carried = [_operand(v, lane, OF_STEP) for v, lane in zip(start, laned[1], strict=True)]
@@ -53,15 +53,18 @@ def printed_scan(step: Callable[[Any, Any], Any], carry: Any, rows: Any) -> Any:
         now, state = _stacked(start, loop.laned, size)
         table = jnp.concatenate([jnp.reshape(x, (x.shape[0], -1)) for x in rows], axis=1)
         kinds = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in (now, state)]
-        printed = jax.ffi.ffi_call(registered(loop.text), kinds, vmap_method="sequential")
-        return _unstacked(*printed(shared, own, now, state, table), start, loop.laned), list(loop.laned)
+        printed: Any = jax.ffi.ffi_call(registered(loop.text), kinds, vmap_method="sequential")
+        now, state = printed(shared, own, now, state, table)
+        return _unstacked(now, state, start, loop.laned), list(loop.laned)
 
-    @jax.custom_batching.custom_vmap
-    def run(moving: list[Array], start: list[Array], rows: list[Array]) -> list[Array]:
+    def alone(moving: list[Any], start: list[Any], rows: list[Any]) -> list[Any]:
         return call(1, ([False] * len(moving), [False] * len(start)), moving, start, rows)[0]
 
+    run: Any = jax.custom_batching.custom_vmap(alone)
+
     @run.def_vmap
-    def side_by_side(size: int, laned: Any, moving: list[Array], start: list[Array], rows: list[Array]) -> Any:
+    def side_by_side(size: int, laned: Any, *operands: Any) -> Any:
+        moving, start, rows = operands
         if any(laned[2]):
             raise NotImplementedError("The rows of a loop, such as a road, must be the same for all points.")
         return call(size, laned[:2], moving, start, rows)
@@ -81,7 +84,7 @@ def _stacked(values: list[Any], laned: Any, size: int) -> tuple[Array, Array]:
     return jnp.concatenate([none[0], *shared]), jnp.concatenate([none[1], *own])
 
 
-def _unstacked(shared: Array, own: Array, like: list[Any], laned: Any) -> list[Array]:
+def _unstacked(shared: Array, own: Array, like: list[Any], laned: Any) -> list[Any]:
     found, places = [], [0, 0]
     for value, lane in zip(like, laned, strict=True):
         count = value.size // (value.shape[0] if lane else 1)
