@@ -281,11 +281,10 @@ def _search(space: SearchRange, force_of: Any, wanted: np.ndarray, begin: np.nda
     options: dict[str, Any] = {"bounds": (lower, upper), "x_scale": "jac", "ftol": 1e-12, "xtol": 1e-12, "gtol": 1e-12}
     steps = np.array([*HOPS, *(-hop for hop in HOPS)])[:, None, None] * np.eye(len(begin))
     y = _coordinates(space, begin)
+    jacobian: Any = lambda y: at(y)[1]  # noqa: E731
     while True:
         inside = np.clip(y, lower + margin, upper - margin)
-        end = scipy.optimize.least_squares(
-            lambda y: at(y)[0], inside, jac=lambda y: at(y)[1], max_nfev=max_steps, **options
-        )
+        end = scipy.optimize.least_squares(lambda y: at(y)[0], inside, jac=jacobian, max_nfev=max_steps, **options)
         beside = np.clip(end.x + steps.reshape(-1, len(begin)), lower + margin, upper - margin)
         costs = [0.5 * float(np.sum(at(point)[0] ** 2)) for point in beside]
         if not min(costs) < (1.0 - LOWER) * end.cost:
