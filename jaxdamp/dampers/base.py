@@ -88,6 +88,17 @@ class AbstractDamper(Module):
             return Traits()
         return combined_traits(inside)._replace(extrapolable_states=False, linear_in_parameters=False)
 
+    def at_temperature(self, temperature: ScalarLike) -> "AbstractDamper":
+        """This law with its oil at a known temperature [K]; by default with the laws inside at this temperature.
+
+        Unless `traits().temperature_dependent`, it is this law. The states may be fewer: a temperature that is known is
+        no state.
+        """
+        if not any(law.traits().temperature_dependent for law in self.inner_laws()):
+            return self
+        known = [law.at_temperature(temperature) for law in self.inner_laws()]
+        return eqx.tree_at(lambda law: law.inner_laws(), self, known)
+
     def side_by_side(self) -> tuple["AbstractDamper", ...]:
         """Laws whose forces add up to the force of this law; the law itself if it is no sum."""
         return (self,)
@@ -184,7 +195,14 @@ class AbstractStateless(AbstractDamper):
         inside = self.inner_laws()
         feed_through = not inside or any(law.traits().has_feed_through for law in inside)
         offset = any(law.traits().contains_offset for law in inside)
-        return Traits(feed_through, extrapolable_states=True, linear_in_parameters=not inside, contains_offset=offset)
+        temperature = any(law.traits().temperature_dependent for law in inside)
+        return Traits(
+            feed_through,
+            extrapolable_states=True,
+            linear_in_parameters=not inside,
+            contains_offset=offset,
+            temperature_dependent=temperature,
+        )
 
     @abstractmethod
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:

@@ -20,6 +20,25 @@ def temperature_step(
     return final_rise + (rise - final_rise) * jnp.exp(-dt / cooling_time)
 
 
+def fade(rise: ScalarLike, sensitivity: ScalarLike) -> Scalar:
+    """exp(−κ ϑ), the share of the damping force that is left."""
+    return jnp.exp(-sensitivity * rise)
+
+
+@final
+class AtRise(AbstractWrapper):
+    """F = F_law exp(−κ ϑ) + s ϑ with a known rise ϑ of the temperature: what `Heated` is where one is measured."""
+
+    law: AbstractDamper
+    rise: Number = setting("K", "ϑ, rise of the temperature")
+    sensitivity: Number = parameter("1/K", "κ, relative loss of damping force per kelvin")
+    static_force_slope: Number = parameter("N/K", "s, change of the static force per kelvin")
+
+    def outer_force(self, force: Scalar) -> Scalar:
+        """Force [N] at this temperature."""
+        return fade(self.rise, self.sensitivity) * force + self.static_force_slope * self.rise
+
+
 @final
 class Heated(AbstractWrapper):
     """F = F_d + s ϑ, F_d = F_law exp(−κ ϑ), C ϑ' = F_d v − C ϑ/τ: the damping fades with the heat of the damper.
@@ -28,6 +47,10 @@ class Heated(AbstractWrapper):
     that the law dissipates and decays with the cooling time τ. A hydraulic damper loses 0.1 to 0.4 % of its force for
     each kelvin (`TemperatureScaled` is the same for a constant temperature), and its gas pushes harder: s is negative.
     Passive if the law is and s is zero.
+
+    Where a temperature T is measured, ϑ = T − T₀ instead, and is no state: fits take it from the temperature channel of
+    the records, sample by sample, and `respond` takes it as an argument. Then τ, C and the initial ϑ have no effect:
+    freeze `cooling_time` and `initial_rise`.
 
     Records without a temperature determine only κ/C and s/C; the heat capacity is therefore a setting, by default that
     of 2 kg of steel, and then ϑ is an estimate. Records that begin warm have their own start:
@@ -42,6 +65,7 @@ class Heated(AbstractWrapper):
         static_force_slope: s [N/K].
         initial_rise: ϑ at the start [K].
         heat_capacity: C [J/K].
+        reference_temperature: T₀ [K].
 
     >>> from jaxdamp.dampers import Linear
     >>> law = Heated(Linear(2000.0), sensitivity=0.002, cooling_time=600.0)
@@ -55,6 +79,9 @@ class Heated(AbstractWrapper):
     static_force_slope: Number = parameter("N/K", "s, change of the static force per kelvin", default=0.0)
     initial_rise: Number = parameter("K", "ϑ at the start", default=0.0)
     heat_capacity: Number = setting("J/K", "C, heat capacity of oil and body", positive, default=1000.0)
+    reference_temperature: Number = setting(
+        "K", "T₀, temperature of the law's own parameters", positive, default=293.15
+    )
 
     def own_state_count(self) -> int:
         """The rise of the temperature [K]."""
@@ -62,7 +89,12 @@ class Heated(AbstractWrapper):
 
     def traits(self) -> Traits:
         """The heating power has a kink where the velocity has one."""
-        return super().traits()._replace(extrapolable_states=False)
+        return super().traits()._replace(extrapolable_states=False, temperature_dependent=True)
+
+    def at_temperature(self, temperature: ScalarLike) -> AtRise:
+        """The law with a known temperature [K] in place of that which its losses give."""
+        rise = temperature - self.reference_temperature
+        return AtRise(self.law.at_temperature(temperature), rise, self.sensitivity, self.static_force_slope)
 
     def motion_inside(self, motion: Motion) -> list[tuple[AbstractDamper, Motion]]:
         """The same motion; the force inside is not known."""
@@ -75,7 +107,7 @@ class Heated(AbstractWrapper):
     def damping_force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """F_d [N], the part of the force that heats the damper."""
         (rise,), inner = self.split(state)
-        return self.law.force(x, v, inner) * jnp.exp(-self.sensitivity * rise)
+        return self.law.force(x, v, inner) * fade(rise, self.sensitivity)
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N]."""

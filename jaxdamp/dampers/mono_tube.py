@@ -9,11 +9,12 @@ from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp.dampers._mono_tube_start import charge_start, static_force, valve_start
 from jaxdamp.dampers._sdirk2 import GAMMA, sdirk2
 from jaxdamp.dampers.base import AbstractDamper, own_states
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
 from jaxdamp.dampers.gas_spring import LEAST_SHARE, GasSpring, gas_pressure
-from jaxdamp.dampers.piston_flow import PistonFlow
+from jaxdamp.dampers.piston_flow import PistonFlow, flow_per_area
 from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import parameter, positive, setting
 
@@ -28,6 +29,10 @@ def stroke_within(
 ) -> ScalarLike:
     """Stroke [m] at a fraction of a step over which the velocity is linear from v₀ to v₁."""
     return x0 + share * (x1 - x0) - 0.5 * share * dt * (1.0 - share) * (v1 - v0)
+
+
+EXPONENT, ATMOSPHERE, BULK_MODULUS = 1.3, 101_325.0, 1e9  # n, Pa and Pa where nothing is known
+LEAK_SHARE = 0.01  # of the flow through the bleed when a valve opens
 
 
 @final
@@ -169,6 +174,69 @@ class MonoTube(AbstractDamper):
     def incompressible(self) -> AbstractDamper:
         """`piston + gas + friction`, the limit B → ∞ without cavities: no states, for sweeps and for slow motion."""
         return self.piston + self.gas + self.friction
+
+    @classmethod
+    def guess(
+        cls,
+        velocity: np.ndarray,
+        force: np.ndarray,
+        stroke: np.ndarray,
+        *,
+        piston_diameter: float | None = None,
+        rod_diameter: float | None = None,
+        gas_pressure: float | None = None,
+        gas_volume: float | None = None,
+        rebound_volume: float | None = None,
+    ) -> "MonoTube":
+        """Starting values of a fit from measured samples and the geometry.
+
+        Gas pressure and volume come from the mean force near rest and its slope over the stroke; bleed, opening
+        pressure and stiffness of the valves from the knee of the mean force in each direction. Records without a slow
+        test show little of the gas: state it. For `fit`, give the geometry in advance: `fit(functools.partial(
+        MonoTube.guess, piston_diameter=0.046, rod_diameter=0.011), runs)`.
+
+        Arguments:
+            velocity: all samples [m/s].
+            force: [N], with the gas force.
+            stroke: [m].
+            piston_diameter: of the tube [m].
+            rod_diameter: [m].
+            gas_pressure: p₀, absolute, at stroke zero [Pa], if it is known.
+            gas_volume: V_g at stroke zero [m³], if it is known.
+            rebound_volume: V_r, oil above the piston at stroke zero [m³]; if left out, that of the largest extension
+                and one travel more. Only B/V_r shows in records.
+
+        Raises:
+            ValueError: no geometry; a rod as thick as the piston.
+        """
+        for name, given in (("piston_diameter", piston_diameter), ("rod_diameter", rod_diameter)):
+            if given is None:
+                example = "functools.partial(MonoTube.guess, piston_diameter=0.046, rod_diameter=0.011)"
+                remedy = f"Write `fit({example}, runs)`."
+                _checks.refuse(name, "be stated [m]", None, remedy)
+            _checks.positive(name, given)
+        assert piston_diameter is not None and rod_diameter is not None
+        if not rod_diameter < piston_diameter:
+            _checks.refuse("rod_diameter", f"be below the piston's {piston_diameter} m", rod_diameter)
+        velocity, force, stroke = (np.asarray(a, dtype=float) for a in (velocity, force, stroke))
+        rod_area = 0.25 * np.pi * rod_diameter**2
+        area = 0.25 * np.pi * piston_diameter**2 - rod_area
+        travel = max(float(np.ptp(stroke)), 1e-3)
+        level, stiffness, friction = static_force(velocity, force, stroke)
+        charge = charge_start(level, stiffness, travel, rod_area, EXPONENT, ATMOSPHERE)
+        oil = force - level - stiffness * stroke
+        rebound, compression = (valve_start(velocity, oil, side, area, float(flow_per_area())) for side in (1, -1))
+        bleed = float(np.sqrt(rebound.bleed_area * compression.bleed_area))
+        friction = min(friction, rebound.friction, compression.friction)  # hysteresis adds to each
+        opening = min(rebound.opening_pressure, compression.opening_pressure)
+        leak = LEAK_SHARE * float(flow_per_area()) * bleed / np.sqrt(opening)
+        return cls(
+            PistonFlow(area, bleed, *rebound[1:4], *compression[1:4], leak=leak),
+            GasSpring(gas_pressure or charge.pressure, gas_volume or charge.volume, rod_area, EXPONENT),
+            CoulombFriction(max(friction, 1.0), 0.01 * float(np.max(np.abs(velocity)))),
+            rebound_volume or area * (max(float(np.max(stroke)), 0.0) + travel),
+            BULK_MODULUS,
+        )
 
     @classmethod
     def reference(cls) -> "MonoTube":

@@ -24,6 +24,14 @@ def orifice_drop(root: ScalarLike, transition: ScalarLike) -> Scalar:
     return root * jnp.sqrt(0.5 * (square + jnp.sqrt(square * square + 4.0 * transition * transition)))
 
 
+DENSITY, DISCHARGE = 850.0, 0.7  # kg/m³ of the oil, and C_d, where nothing else is stated
+
+
+def flow_per_area(density: ScalarLike = DENSITY, discharge: ScalarLike = DISCHARGE) -> Scalar:
+    """C_d √(2/ρ) [m/s/√Pa], volume flow of an orifice per area and root of the pressure drop."""
+    return discharge * jnp.sqrt(2.0 / density)
+
+
 class Valve(NamedTuple):
     """A spring-loaded valve: opening pressure [Pa], pressure per area [Pa/m²] and largest area [m²]."""
 
@@ -68,8 +76,8 @@ class PistonFlow(AbstractMemoryless):
     compression_valve_stiffness: Number = parameter("Pa/m²", "k, pressure per area of the compression valve", positive)
     compression_valve_area: Number = parameter("m²", "A_max, largest area of the compression valve", positive)
     leak: Number = parameter("m³/s/Pa", "k_l, laminar leak past the piston", nonnegative, default=0.0)
-    density: Number = setting("kg/m³", "ρ, of the oil", positive, default=850.0)
-    discharge: Number = setting("", "C_d, discharge coefficient", positive, default=0.7)
+    density: Number = setting("kg/m³", "ρ, of the oil", positive, default=DENSITY)
+    discharge: Number = setting("", "C_d, discharge coefficient", positive, default=DISCHARGE)
     transition_pressure: Number = setting("Pa", "ε, drop below which orifice flow is laminar", positive, default=1e3)
 
     def valve(self, rebound: Bool[Array, ""]) -> Valve:
@@ -90,7 +98,7 @@ class PistonFlow(AbstractMemoryless):
 
     def _per_root(self, open_area: ScalarLike) -> Scalar:
         """Q/(A S) [m/s per √Pa] through an open area [m²]."""
-        return self.discharge * jnp.sqrt(2.0 / self.density) * open_area / self.area
+        return flow_per_area(self.density, self.discharge) * open_area / self.area
 
     def flow_velocity(self, root: ScalarLike, valve: Valve) -> Scalar:
         """Q/A [m/s] at S [√Pa]: the velocity of a piston that displaces this flow. `valve` is that of the direction."""

@@ -2,10 +2,13 @@
 
 from typing import final
 
+import equinox as eqx
+
 from jaxdamp import _checks
-from jaxdamp._types import Number, Scalar
+from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.traits import Traits
 from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import parameter, positive, setting
 
@@ -18,6 +21,10 @@ class TemperatureScaled(AbstractWrapper):
     which decreases faster and nonlinearly. The linear approximation is valid for about 40 K around T₀. The factor must
     be positive (κ (T − T₀) < 1), otherwise the law would add energy to the motion; the constructor refuses this.
 
+    Fits take T from the temperature channel of the records, sample by sample, and `respond` takes it as an argument.
+    The stated temperature is for motions where none was measured; records of which only some have the channel are
+    refused.
+
     Scale only the oil forces: gas pressure increases with temperature, and springs do not depend on it, so write
     `SeriesSpring(TemperatureScaled(law, ...), ...)` and `TemperatureScaled(law, ...) + GasSpring(...)`. κ is
     determined by tests at two or more temperatures; at one temperature it cannot be distinguished from the law's own
@@ -25,7 +32,7 @@ class TemperatureScaled(AbstractWrapper):
 
     Arguments:
         law: the law at T₀.
-        temperature: T, oil temperature [K].
+        temperature: T, oil temperature [K] where none is measured.
         reference_temperature: T₀ [K].
         sensitivity: κ [1/K].
 
@@ -39,6 +46,15 @@ class TemperatureScaled(AbstractWrapper):
     temperature: Number = setting("K", "oil temperature", positive)
     reference_temperature: Number = setting("K", "temperature at which the law was measured", positive, default=293.15)
     sensitivity: Number = parameter("1/K", "κ, relative loss of force per kelvin", default=0.002)
+
+    def traits(self) -> Traits:
+        """Those of the law, and a dependence on the temperature."""
+        return super().traits()._replace(temperature_dependent=True)
+
+    def at_temperature(self, temperature: ScalarLike) -> "TemperatureScaled":
+        """This law at a known oil temperature [K]."""
+        law = (self.law.at_temperature(temperature), temperature)
+        return eqx.tree_at(lambda whole: (whole.law, whole.temperature), self, law)
 
     def is_linear_in_law(self) -> bool:
         """A factor is linear."""

@@ -23,6 +23,8 @@ class Traits(NamedTuple):
         has_explicit_step: some states have an explicit step, which must be shorter than their time constants.
         contains_offset: a parameter adds a constant to the force, as a zero error of a load cell does, so that a fit
             cannot tell the two apart.
+        temperature_dependent: the force depends on the temperature of the oil, which a measured one may replace
+            (`at_temperature`).
     """
 
     has_feed_through: bool = True
@@ -32,10 +34,11 @@ class Traits(NamedTuple):
     stroke_dependent_at_rest: bool = True
     has_explicit_step: bool = False
     contains_offset: bool = False
+    temperature_dependent: bool = False
 
 
 def combined_traits(traits: Iterable[Traits]) -> Traits:
     """The traits of a sum of laws."""
-    feed_through, extrapolable, linear, stroke, at_rest, explicit, offset = zip(*traits, strict=True)
-    either = (any(stroke), any(at_rest), any(explicit), any(offset))
+    feed_through, extrapolable, linear, *others = zip(*traits, strict=True)
+    either = map(any, others)
     return Traits(any(feed_through), all(extrapolable), all(linear), *either)

@@ -70,5 +70,5 @@ def marched(
 ) -> Float[Array, " time"]:
     """Force [N] in a record with this motion, for use inside compiled functions."""
     if isinstance(model, AbstractDamper):
-        return march(model, dt, stroke, velocity, substeps)
+        return march(model, dt, stroke, velocity, substeps, temperature)
     return model.rig.march(model.law, effects, dt, stroke, velocity, temperature, substeps).force

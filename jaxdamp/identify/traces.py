@@ -245,7 +245,8 @@ def _refuse_some(what: str, runs: Sequence[BenchRun], remedy: str) -> None:
 def _channels(model: Model, runs: Sequence[BenchRun]) -> list[str]:
     """The channels that a model is compared with, the temperature among them if it says something of the force."""
     channels, rig = ["stroke", "velocity", "force"], rig_of(model)
-    if rig is None or not (np.any(rig.temperature_slope) or np.any(rig.gas_temperature_slope)):
+    of_rig = rig is not None and (np.any(rig.temperature_slope) or np.any(rig.gas_temperature_slope))
+    if not (of_rig or law_of(model).traits().temperature_dependent):
         return channels
     if all(run.temperature is None for run in runs):
         return channels

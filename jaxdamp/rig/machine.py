@@ -134,7 +134,8 @@ class Rig(Module):
             ValueError: what `jaxdamp.respond` refuses; a temperature that is not finite or of another length.
         """
         time, stroke = as_float(time, "time"), as_float(stroke, "stroke")
-        law_force = respond(law, time, stroke - self.stroke_offset, velocity, substeps=substeps)
+        own = temperature if law.traits().temperature_dependent else None
+        law_force = respond(law, time, stroke - self.stroke_offset, velocity, temperature=own, substeps=substeps)
         dt = (time[-1] - time[0]) / (time.size - 1)
         rate = jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else as_float(velocity, "velocity")
         if temperature is not None:
@@ -156,7 +157,7 @@ class Rig(Module):
         substeps: int = 1,
     ) -> Readings:
         """`readings` without its checks, for use inside compiled functions, with the `effects` known outside."""
-        force = march(law, dt, stroke - self.stroke_offset, velocity, substeps)
+        force = march(law, dt, stroke - self.stroke_offset, velocity, substeps, temperature)
         return _readings(self, effects, force, dt, stroke, velocity, temperature)
 
     def effects(self) -> tuple[str, ...]:

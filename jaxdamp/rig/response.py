@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
@@ -48,6 +48,7 @@ def respond(
     stroke: SignalLike,
     velocity: SignalLike | None = None,
     *,
+    temperature: Float[ArrayLike, "..."] | None = None,
     substeps: int = 1,
     engine: AbstractLawEngine | None = None,
     method: "str | diffrax.AbstractSolver | None" = None,
@@ -67,6 +68,8 @@ def respond(
         stroke: stroke [m] at these instants, positive in extension, shape (time,).
         velocity: velocity [m/s], shape (time,). If it is left out, the stroke is differentiated by central
             differences, which is only good for a stroke without noise.
+        temperature: measured temperature of the oil [K], one value or shape (time,), in place of that which a
+            `TemperatureScaled` states and that which a `Heated` computes.
         substeps: steps from one instant to the next for laws with states, between which stroke and velocity are
             interpolated by cubics. The error of a step falls with its square.
         engine: `simulation.Exponential(substeps=...)`, the steps that the laws bring, as when it is left out; or
@@ -82,7 +85,8 @@ def respond(
     Raises:
         ValueError: time not uniform or not increasing, shapes that differ, fewer than two instants; a stroke outside
             the limits of a law (`law.stroke_limits`); a force that is not finite, as where the motion leaves the data
-            that a law was made from; a solver that gives up.
+            that a law was made from; a solver that gives up; a temperature beside a law that does
+            not depend on it, or beside an engine.
 
     >>> from jaxdamp.dampers import Linear
     >>> time = np.linspace(0.0, 1.0, 1001)
@@ -118,16 +122,31 @@ def respond(
     if (engine is not None or solver is not None) and substeps != 1:
         must = "be left out beside an engine, which has its own or chooses them"
         _checks.refuse("substeps", must, substeps, "Write `engine=simulation.Exponential(substeps=...)`.")
+    if temperature is not None:
+        if engine is not None or solver is not None:
+            _checks.refuse("temperature", "be left out beside an engine", temperature, "Leave out `engine`.")
+        temperature = _of_instants(law, temperature, time)
     if engine is not None:
         check_module("engine", engine, (AbstractLawEngine,), "respond(law, time, stroke, engine=...)")
         force = engine.respond(law, time, stroke, rate)
     elif solver is not None:
         force = solve_law(law, time, stroke, rate, solver, rtol, atol)
     else:
-        force = march(law, dt, stroke, rate, substeps)
+        force = march(law, dt, stroke, rate, substeps, temperature)
     require_finite_force(law, force, "over the whole motion")
     _warn_of_range(fitted, stroke, rate, force)
     return force
+
+
+def _of_instants(law: AbstractDamper, temperature: Float[ArrayLike, "..."], time: Signal) -> Signal:
+    """A temperature [K] at every instant, for a law that depends on it."""
+    if not law.traits().temperature_dependent:
+        remedy = "Write `TemperatureScaled(law, ...)` or `Heated(law)`."
+        _checks.refuse("temperature", "be left out beside a law that does not depend on it", repr(law), remedy)
+    if jnp.shape(temperature) not in ((), time.shape):
+        _checks.refuse("temperature", "be one value or as long as `time`", f"of shape {jnp.shape(temperature)}")
+    _checks.positive("temperature", temperature, "It is in kelvin.")
+    return jnp.broadcast_to(as_float(temperature), time.shape)
 
 
 def _warn_of_range(law: AbstractDamper, *channels: Signal) -> None:
@@ -190,20 +209,40 @@ def solve_law(
 
 
 @eqx.filter_jit
-def march(law: AbstractDamper, dt: Array, stroke: Signal, velocity: Signal, substeps: int) -> Signal:
-    """`respond` without its checks, for use inside compiled functions."""
-    state = law.initial_state()
+def march(
+    law: AbstractDamper,
+    dt: Array,
+    stroke: Signal,
+    velocity: Signal,
+    substeps: int,
+    temperature: Signal | None = None,
+) -> Signal:
+    """`respond` without its checks, for use inside compiled functions.
+
+    A temperature [K] counts for laws that depend on one; within a step it is the mean of both ends.
+    """
+    warm = None if temperature is None or not law.traits().temperature_dependent else temperature
+
+    def at(temperature: Array | None) -> AbstractDamper:
+        return law if temperature is None else law.at_temperature(temperature)
+
+    def force(x: Array, v: Array, state: Array, temperature: Array | None) -> Array:
+        return at(temperature).force(x, v, state)
+
+    state = at(None if warm is None else warm[0]).initial_state()
     if state.size == 0:
-        return jax.vmap(lambda x, v: law.force(x, v, state))(stroke, velocity)
+        return jax.vmap(force, (0, 0, None, 0))(stroke, velocity, state, warm)
     fine_x = _refine(stroke, dt * velocity, substeps)
     fine_v = _refine(velocity, dt * slopes(velocity, dt), substeps)
     h = dt / substeps
 
-    def step(state: Array, ends: tuple[Array, Array, Array, Array]) -> tuple[Array, None]:
-        x0, v0, x1, v1 = ends
-        return law.advance(x0, v0, x1, v1, state, h), None
+    def sample(state: Array, inputs: tuple[tuple[Array, Array, Array, Array], Array | None]) -> tuple[Array, Array]:
+        ends, own = inputs[0], at(inputs[1])
 
-    def sample(state: Array, ends: tuple[Array, Array, Array, Array]) -> tuple[Array, Array]:
+        def step(state: Array, ends: tuple[Array, Array, Array, Array]) -> tuple[Array, None]:
+            x0, v0, x1, v1 = ends
+            return own.advance(x0, v0, x1, v1, state, h), None
+
         if substeps == 1:
             state = step(state, (ends[0][0], ends[1][0], ends[2][0], ends[3][0]))[0]
         else:
@@ -214,9 +253,10 @@ def march(law: AbstractDamper, dt: Array, stroke: Signal, velocity: Signal, subs
         return values.reshape(-1, substeps)
 
     grid = (grouped(fine_x[:-1]), grouped(fine_v[:-1]), grouped(fine_x[1:]), grouped(fine_v[1:]))
-    _, states = jax.lax.scan(sample, state, grid)
+    between = None if warm is None else 0.5 * (warm[:-1] + warm[1:])
+    _, states = jax.lax.scan(sample, state, (grid, between))
     states = jnp.concatenate([state[None], states])
-    return jax.vmap(law.force)(stroke, velocity, states)
+    return jax.vmap(force)(stroke, velocity, states, warm)
 
 
 def slopes(values: Signal, dt: Array) -> Signal:

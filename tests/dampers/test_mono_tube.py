@@ -11,7 +11,7 @@ from jaxdamp import respond, roads, simulate
 from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import CoulombFriction, GasSpring, MonoTube, SeriesSpring
 from jaxdamp.identify import fit
-from jaxdamp.parameters import free_parameters, parameters, replace
+from jaxdamp.parameters import free_parameters, get, parameters, replace
 from jaxdamp.rig import quasi_static
 from jaxdamp.simulation import Adaptive
 from jaxdamp.vehicles import QuarterCar
@@ -249,6 +249,25 @@ def test_both_engines_in_a_quarter_car():
     assert np.max(expected) > 1500.0
     assert np.max(np.abs(stroke - expected_stroke)) < 2e-3 * np.max(np.abs(expected_stroke))
     assert np.sqrt(np.mean((force - expected) ** 2)) < 0.005 * np.max(np.abs(expected))
+
+
+def test_start_from_records_and_geometry():
+    """Within a factor of two of the numbers that records show; stated ones as stated."""
+    tests = [SineTest(0.03, 0.1, cycles=1), SineTest(0.02, 4.0, cycles=2), SineTest(0.005, 12.0, cycles=4)]
+    runs = VirtualDyno(LAW.incompressible(), 1000.0, force_noise=10.0, seed=3).run(tests)
+    geometry = {"piston_diameter": float(np.sqrt(4 * PISTON / np.pi)), "rod_diameter": float(np.sqrt(4 * ROD / np.pi))}
+    samples = [np.concatenate([getattr(run, name) for run in runs]) for name in ("velocity", "force", "stroke")]
+    start = MonoTube.guess(*samples, **geometry)
+    shown = ["piston.bleed_area", "*_opening_pressure", "*_valve_stiffness", "gas.pressure", "gas.volume"]
+    for p, value in zip(free_parameters(LAW, over=shown).names, free_parameters(start, over=shown).values, strict=True):
+        assert 0.5 < value / float(get(LAW, p)) < 2.0, p
+    assert float(start.piston.area) == pytest.approx(ANNULUS) and 10.0 < float(start.friction.friction_force) < 60.0
+    stated = MonoTube.guess(*samples, **geometry, gas_pressure=1.8e6, gas_volume=7e-5, rebound_volume=CHAMBER)
+    assert [float(a) for a in (stated.gas.pressure, stated.gas.volume, stated.rebound_volume)] == [1.8e6, 7e-5, CHAMBER]
+    with pytest.raises(ValueError, match=r"`piston_diameter` must be stated .*functools\.partial"):
+        MonoTube.guess(*samples)
+    with pytest.raises(ValueError, match=r"`rod_diameter` must be below the piston's 0\.02 m"):
+        MonoTube.guess(*samples, piston_diameter=0.02, rod_diameter=0.03)
 
 
 @pytest.mark.slow

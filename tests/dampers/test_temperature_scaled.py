@@ -1,12 +1,16 @@
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxdamp import respond
-from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.bench import BenchRun, SineTest, VirtualDyno
 from jaxdamp.dampers import Bilinear, Lag, Linear, TemperatureScaled
 from jaxdamp.identify import fit
 from jaxdamp.parameters import get
+from jaxdamp.rig import Rig
+from jaxdamp.simulation import Exponential
 
 
 @pytest.mark.parametrize(("temperature", "share"), [(293.15, 1.0), (343.15, 0.85), (273.15, 1.06)])
@@ -54,3 +58,62 @@ def test_single_precision():
     force = law.force(jnp.float32(0.0), jnp.float32(0.5), law.initial_state())
     assert force.dtype == jnp.float32
     np.testing.assert_allclose(force, 460.0, rtol=1e-5)
+
+
+WARM = TemperatureScaled(Bilinear(2600.0, 1200.0), 293.15, sensitivity=0.003)
+
+
+def records(rng=0):
+    """Two records at temperatures that rise; their force decreases with it."""
+    t = np.arange(4000) / 500.0
+    noise = np.random.default_rng(rng)
+    runs = []
+    for frequency, first in ((1.0, 290.0), (3.0, 320.0)):
+        x, v = 0.02 * np.sin(2 * np.pi * frequency * t), 0.04 * np.pi * frequency * np.cos(2 * np.pi * frequency * t)
+        temperature = first + 5.0 * t
+        force = np.where(v > 0, 2600.0, 1200.0) * v * (1.0 - 0.003 * (temperature - 293.15))
+        noisy = force + noise.normal(0.0, 3.0, len(t))
+        runs.append(BenchRun(f"{frequency:g} Hz", t, x, v, noisy, temperature))
+    return runs
+
+
+@pytest.mark.parametrize(
+    ("inner", "freeze"),
+    [(Bilinear(900.0, 900.0), []), (Lag(Bilinear(900.0, 900.0), 1e-6), ["lag_time"])],
+    ids=["curve", "states"],
+)
+def test_fits_take_the_temperature_channel_of_the_records(inner, freeze):
+    start = TemperatureScaled(inner, 400.0, sensitivity=0.001)
+    result = fit(start, records(), freeze=freeze, starts=1, samples_per_cycle=100)
+    assert result.fit_percent > 99.0
+    found = [result[name].value for name in ("rebound_rate", "compression_rate", "sensitivity")]
+    np.testing.assert_allclose(found, [2600.0, 1200.0, 0.003], rtol=3e-3)
+    later = records(1)[1]
+    np.testing.assert_allclose(result.predict([later])[0][200:-200], later.force[200:-200], atol=20.0)
+
+
+def test_records_of_which_some_lack_the_channel_are_refused_by_name():
+    with_it, without = records()
+    without = dataclasses.replace(without, temperature=None)
+    with pytest.raises(ValueError, match=r"`runs` must all state their temperature, but is without one: 3 Hz"):
+        fit(WARM, [with_it, without], starts=1)
+
+
+def test_a_measured_temperature_in_a_response():
+    t = np.linspace(0.0, 1.0, 501)
+    v = np.full_like(t, 0.1)
+    law, temperature = WARM + Linear(100.0), 293.15 + 100.0 * t
+    expected = 260.0 * (1.0 - 0.3 * t) + 10.0
+    np.testing.assert_allclose(respond(law, t, 0.1 * t, v, temperature=temperature), expected, rtol=1e-9)
+    np.testing.assert_allclose(respond(law, t, 0.1 * t, v, temperature=303.15), 262.2, rtol=1e-9)
+    np.testing.assert_allclose(Rig().force(law, t, 0.1 * t, v, temperature=temperature), expected, rtol=1e-9)
+    wrong = [
+        (Linear(1.0), temperature, "beside a law that does not depend"),
+        (law, temperature[1:], "as long as `time`"),
+        (law, -1.0, "positive"),
+    ]
+    for other, value, message in wrong:
+        with pytest.raises(ValueError, match=f"`temperature` must be .*{message}"):
+            respond(other, t, 0.1 * t, v, temperature=value)
+    with pytest.raises(ValueError, match=r"`temperature` must be left out beside an engine"):
+        respond(law, t, 0.1 * t, v, temperature=300.0, engine=Exponential())
