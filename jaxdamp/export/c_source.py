@@ -209,7 +209,7 @@ def _member(number: LawNumber, real: str) -> Iterable[str]:
     size = f"[{number.value.size}]" if number.value.ndim else ""
     shape = f", {' x '.join(map(str, number.value.shape))}, row by row" if number.value.ndim > 1 else ""
     kind = "" if number.kind == "parameter" else f", {number.kind}"
-    about = f"[{number.unit or '-'}] {number.domain}{kind}{shape}: {number.meaning}"
+    about = f"[{number.unit or '-'}] {number.domain.name}{kind}{shape}: {number.meaning}"
     yield f"/* {number.path} {_comment(about)} */"
     yield f"{real} {number.name}{size};"
 

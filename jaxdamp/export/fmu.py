@@ -128,7 +128,9 @@ def _of_number(number: LawNumber) -> Iterator[Variable]:
     about = causes[number.kind] | {"description": number.meaning}
     for index in np.ndindex(*number.value.shape):
         place = f"[{','.join(map(str, index))}]" if index else ""
-        yield Variable(name + place, number.unit, about, float(number.value[index]), (number.lower, number.upper))
+        yield Variable(
+            name + place, number.unit, about, float(number.value[index]), (number.domain.lower, number.domain.upper)
+        )
 
 
 def _description(program: LawProgram, known: list[Variable], name: str, guid: str) -> str:
