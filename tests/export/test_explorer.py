@@ -244,6 +244,6 @@ def test_refusals(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LAWS)
-def test_every_law_has_a_page(tmp_path, name):
+@pytest.mark.parametrize("name", ["series spring, sum", "LuGre", "mono-tube", "neural hysteresis", "stroke table"])
+def test_laws_of_all_kinds_have_a_page(tmp_path, name):
     page(LAWS[name](), tmp_path, duration=0.5)
