@@ -23,7 +23,7 @@ def _gather(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[A
         _refuse("gather", "whole rows along the first axes")
     result = np.empty((*places.shape[:-1], *array.shape[first:]), object)
     for index in np.ndindex(*places.shape[:-1]):
-        rows = array
+        rows: Any = array
         for place in places[index]:
             rows = _row(writer, rows, place, equation.dtype)
         result[index] = rows

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, respond, simulate
+from jaxdamp._types import Number
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import (
     AbstractMemoryless,
@@ -41,8 +42,8 @@ def browser():
         yield browser
 
 
-def page(law, folder, browser=None, **options):
-    file = to_explorer(law, folder / "law.html", **{"duration": DURATION} | options)
+def page(law, folder, browser=None, *, duration=DURATION, **options):
+    file = to_explorer(law, folder / "law.html", duration=duration, **options)
     if browser is not None:
         browser.open(file)
     return file
@@ -187,7 +188,8 @@ def test_a_file_dropped_onto_the_page(tmp_path, browser):
 
 @pytest.mark.slow
 def test_the_saved_law_is_read_back_exactly(tmp_path, browser):
-    schedule = Scheduled((LAWS["slopes, rounded"](), LAWS["slopes, rounded"]()), [0.0, 1.0], 0.3)
+    valve = LAWS["slopes, rounded"]()
+    schedule = Scheduled((valve, valve), [0.0, 1.0], 0.3)
     law = MotionRatio(schedule, 0.7) + CoulombFriction(30.0, 0.01)
     page(law, tmp_path, browser, records=[record(VALVE)])
     assert from_json(browser.evaluate("lawDocument()")) == law
@@ -202,7 +204,7 @@ def test_the_saved_law_is_read_back_exactly(tmp_path, browser):
     for _ in itertools.takewhile(lambda _: not saved.exists(), range(200)):
         browser.evaluate("new Promise((done) => setTimeout(done, 50))")
     changed = from_json(saved)
-    slopes = np.asarray(law.terms[0].law.laws[1].slopes).copy()
+    slopes = np.array(valve.slopes)
     slopes[2] = 1234.5678901234567
     expected = with_command(replace(law, {"terms.0.law.laws.1.slopes": slopes}), 0.625)
     assert json.loads(to_json(changed)) == json.loads(to_json(expected))
@@ -223,7 +225,7 @@ def test_a_page_is_the_same_every_time_and_needs_nothing_else(tmp_path):
 class Sorted(AbstractMemoryless):
     """A law that cannot be printed."""
 
-    rate: jax.Array = parameter("N s/m", "damping coefficient")
+    rate: Number = parameter("N s/m", "damping coefficient")
 
     def force_velocity(self, v):
         return jax.numpy.sort(jax.numpy.stack([self.rate * v, 2.0 * self.rate * v]))[0]

@@ -40,7 +40,7 @@ function ticks(low, high, log, wanted) {
     return found.filter((tick) => tick >= low * 0.999 && tick <= high * 1.001);
   }
   const rough = (high - low) / wanted, unit = 10 ** Math.floor(Math.log10(rough));
-  const step = unit * [1, 2, 5, 10].find((factor) => factor * unit >= rough);
+  const step = unit * [1, 2, 5, 10].find((factor) => factor * unit >= 0.7 * rough);
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) found.push(k * step);
   return found;

@@ -224,7 +224,7 @@ function showChannel() {
     drawn.spectrum.push({ ...own, x: frequency.subarray(1), y: psd.subarray(1) });
     drawn.trace.push({ ...own, width: 1.2, x: record.map((_, i) => i * DATA.dt), y: record });
   }
-  const squared = `(${unit})²/Hz`;
+  const squared = /[/ ]/.test(unit) ? `(${unit})²/Hz` : unit === "-" ? "1/Hz" : `${unit}²/Hz`;
   charts.spectrum.show({ x: { label: "frequency", unit: "Hz", log: true, range: [0.4, 50] }, y: { label: "density", unit: squared, log: true, decades: 6, scale: scale ** 2 } }, drawn.spectrum);
   charts.trace.show({ x: { label: "time", unit: "s", tight: true }, y: { label: channel.name.replaceAll("_", " "), unit, scale } }, drawn.trace);
   get("channelMeaning").textContent = channel.meaning;
