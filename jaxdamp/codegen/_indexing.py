@@ -60,7 +60,7 @@ def _scatter(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[
     result = np.empty(array.shape, object)
     for index in np.ndindex(*array.shape):
         here = writer.define("eq", (place, constant(index[0], place.dtype)), "bool")
-        chosen = here, rows[(0, *index[1:])], array[index]
+        chosen: Any = here, rows[(0, *index[1:])], array[index]
         result[index] = writer.define("select", chosen, equation.dtype)
     return [result]
 

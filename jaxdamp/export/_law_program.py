@@ -128,6 +128,11 @@ class LawProgram:
         return self._derivative(self._force, self._point(), self._point("d"))
 
     @cached_property
+    def state_rate_derivative(self) -> Program:
+        """The change of the rate of the states for changes of the arguments of `state_rate`."""
+        return self._derivative(self._state_rate, self._point(), self._point("d"))
+
+    @cached_property
     def advance_derivative(self) -> Program:
         """The change of the states after a step for changes of its arguments but the duration."""
         arguments, changes = self._step(), self._step("d")
