@@ -218,7 +218,7 @@ def _of_record(run: BenchRun) -> dict[str, Any]:
     stride = max(1, min(int(per_cycle / _PER_CYCLE), -(-len(run) // _SAMPLES)))
     chosen = slice(0, _SAMPLES * stride, stride)
     shown = {"x": run.stroke[chosen], "v": run.velocity[chosen], "force": run.force[chosen]}
-    every = "every sample" if stride == 1 else f"every {stride}. sample"
+    every = "every sample" if stride == 1 else f"one sample in {stride}"
     note = f"{every} of {len(run)}" + ("" if len(run) <= _SAMPLES * stride else f", up to the {_SAMPLES * stride}th")
     about = {"name": run.name, "dt": stride / run.sampling_rate, "command": run.command, "note": note}
     return about | {key: _packed(values) for key, values in shown.items()}

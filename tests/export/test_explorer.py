@@ -90,10 +90,15 @@ def test_a_moved_slider_is_followed_by_the_numbers_of_the_library(tmp_path, brow
     browser.type('[data-path="sprung_mass"]', "900")
     is_ride(cells(browser), replace(car(changed), {"sprung_mass": 900.0}), road)
     is_ride(cells(browser, side=1), replace(car(VALVE), {"sprung_mass": 900.0}), road)
+    browser.type('[data-path="compression_rate"]', "10")
+    assert "compression_rate must be greater than" in browser.evaluate(
+        "document.getElementById('lawError').textContent"
+    )
     browser.click('[data-reset="rebound_rate"]')
     assert number(browser, "rebound_rate") == 2800.0
     browser.click("#reset")
     assert cells(browser) == before and number(browser, "sprung_mass") == 1200.0
+    assert browser.evaluate("document.getElementById('lawError').textContent") == ""
     assert not browser.troubles()
 
 
