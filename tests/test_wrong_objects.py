@@ -117,6 +117,7 @@ ANSWERS = {  # call: words that its refusal holds
     "export.to_csv(1500.0, 'law.csv', [0.0, 1.0])": ("`law` must be a damper law", "to_csv(law, path, velocities)"),
     "export.to_c(1500.0, 'law.c')": ("`law` must be a damper law", "to_c(law, path)"),
     "export.to_fmu(1500.0, 'law.fmu')": ("`law` must be a damper law", "to_fmu(law, path)"),
+    "export.to_explorer(1500.0, 'law.html')": ("`law` must be a damper law", "to_explorer(law, path)"),
     "export.to_adams(1500.0, 'a.dpr', [0.0, 1.0])": ("`law` must be a damper law", "to_adams(law, path, velocities)"),
     "plots.ride(car)": ("`responses` must be a response", "is a QuarterCar", "jaxdamp.simulate(vehicle, road)"),
     "plots.force_velocity({'a': 1500.0})": ("`laws['a']` must be a damper law", "the number 1500.0"),

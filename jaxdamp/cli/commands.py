@@ -297,6 +297,47 @@ def export(
         exporting.run_export(console.Screen(), law, to, out=out, velocities=velocities, replace=replace)
 
 
+@app.command()
+@spread
+def explore(
+    law: Annotated[Path, typer.Argument(help="A law as JSON, such as best_law.json of jaxdamp fit.")],
+    files: Annotated[
+        list[Path] | None, typer.Argument(help="Files with records to overlay, patterns, or folders.")
+    ] = None,
+    *,
+    reading: ReadOptions,
+    processing: ProcessOptions,
+    vehicle: Annotated[
+        str, typer.Option(help='A quarter car, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.')
+    ] = "quarter_car_000",
+    road: Annotated[
+        str, typer.Option(help="iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.")
+    ] = "iso:C",
+    speed: Speed = 20.0,
+    baseline: Annotated[Path | None, typer.Option(help="Another law to compare with, as JSON.")] = None,
+    duration: Duration = None,
+    seed: Seed = 0,
+    out: Annotated[Path | None, typer.Option(help="File to write; the name of the law with .html.")] = None,
+    replace: Replace = False,
+    debug: Debug = False,
+) -> None:
+    """Write a law as one page for the browser: sliders, loops, records and a ride, live and without a network."""
+    from jaxdamp.cli import console, exploring
+
+    with console.plain_errors(debug):
+        console.prepare()
+        exploring.run_explore(
+            console.Screen(),
+            law,
+            files or [],
+            reading,
+            processing,
+            exploring.RideOptions(vehicle, road, speed, duration, seed, baseline),
+            out=out,
+            replace=replace,
+        )
+
+
 @app.command(name="vehicles")
 def list_vehicles() -> None:
     """List the vehicles that a law can be put into."""

@@ -32,11 +32,8 @@ def run_export(
     """
     _checks.one_of("to", to, sorted(PROGRAMS | TABLES))
     ending, write = (PROGRAMS | TABLES)[to]
-    damper: Any = export.from_json(law)
-    _checks.instance("path_or_text", damper, AbstractDamper, "hold a damper law", "Give the JSON of a law.")
-    file = Path(law.stem.replace("-", "_") + ending) if out is None else out
-    if file.exists() and not replace and not file.is_dir():
-        _checks.refuse("out", "be a new file", file, "Give another name, or --replace.")
+    damper = read_law(law)
+    file = new_file(Path(law.stem.replace("-", "_") + ending) if out is None else out, replace)
     if to in PROGRAMS:
         if velocities is not None:
             _checks.refuse("velocities", f"be left out for {to}", velocities, "It has the law itself, not a table.")
@@ -47,6 +44,20 @@ def run_export(
         written = write(damper, file, grid)
     files: Sequence[Path] = written if isinstance(written, list) else [written]
     screen.points([f"written: {each}" for each in files])
+
+
+def read_law(path: Path) -> AbstractDamper:
+    """The law of a file."""
+    law = export.from_json(path)
+    _checks.instance("path_or_text", law, AbstractDamper, "hold a damper law", "Give the JSON of a law.")
+    return law
+
+
+def new_file(file: Path, replace: bool) -> Path:
+    """A file to write, refused if it exists and is not to be replaced."""
+    if file.exists() and not replace and not file.is_dir():
+        _checks.refuse("out", "be a new file", file, "Give another name, or --replace.")
+    return file
 
 
 def _grid(law: AbstractDamper, text: str | None) -> np.ndarray:

@@ -145,19 +145,6 @@ def _split(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[At
     return list(np.split(operands[0], ends, equation.parameters["axis"]))
 
 
-def _scatter(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
-    """`vector.at[i].set(...)` at a place that is known."""
-    vector, indices, update = operands
-    place = indices.item() if indices.size == 1 else None
-    if vector.ndim != 1 or not isinstance(place, Constant):
-        raise NotImplementedError("The primitive 'scatter' can be printed for a vector and a known place only.")
-    first, result = int(place.text), vector.copy()
-    if not 0 <= first <= vector.size - update.size:
-        raise NotImplementedError(f"The primitive 'scatter' cannot be printed at place {first} of {vector.size}.")
-    result[first : first + update.size] = update.ravel()
-    return [result]
-
-
 def _unstack(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
     rows = np.moveaxis(operands[0], equation.parameters["axis"], 0)
     return [rows[k : k + 1].reshape(shape) for k, shape in enumerate(equation.shapes)]
@@ -175,7 +162,6 @@ RULES: dict[str, Rule] = {
     "dot_general": _dot,
     "split": _split,
     "unstack": _unstack,
-    "scatter": _scatter,
     "transpose": lambda writer, e, operands: [operands[0].transpose(e.parameters["permutation"])],
     "rev": lambda writer, e, operands: [np.flip(operands[0], e.parameters["dimensions"])],
     "concatenate": lambda writer, e, operands: [np.concatenate(operands, e.parameters["dimension"])],

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from jaxdamp.codegen._jaxprs import Equation, Inner, scan_sizes
-from jaxdamp.codegen._program import Assign, Atom, Atoms, Branch, Leave, Loop, Writer, constant
+from jaxdamp.codegen._program import Assign, Atom, Atoms, Branch, Constant, Leave, Loop, Writer, constant
 
 
 Evaluate = Callable[[Writer, Inner, list[Atoms]], list[Atoms]]
@@ -16,6 +16,21 @@ COUNTER = "int32"
 
 def _call(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: Evaluate) -> list[Atoms]:
     return evaluate(writer, equation.called(), operands)
+
+
+def _linear_solve(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: Evaluate) -> list[Atoms]:
+    """`custom_linear_solve`: the program that solves, with its own constants and the right-hand sides."""
+    counts, programs = equation.parameters["const_lengths"], equation.parameters["jaxprs"]
+    first = counts.matvec + counts.vecmat
+    right = operands[first + counts.solve + counts.transpose_solve :]
+    return evaluate(writer, programs.solve, [*operands[first : first + counts.solve], *right])
+
+
+def _platform(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: Evaluate) -> list[Atoms]:
+    """`platform_dependent`: what is meant for a CPU, or else for all platforms that are not named."""
+    named = equation.parameters["platforms"]
+    chosen = next((i for i, names in enumerate(named) if names is None or "cpu" in names), len(named) - 1)
+    return [np.array(constant(chosen, equation.dtype), object)]
 
 
 def _while(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: Evaluate) -> list[Atoms]:
@@ -32,13 +47,16 @@ def _while(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: 
 
 
 def _cond(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: Evaluate) -> list[Atoms]:
+    case, branches = operands[0].item(), equation.parameters["branches"]
+    if isinstance(case, Constant) and case.dtype != "bool":
+        return evaluate(writer, branches[min(max(int(case.text), 0), len(branches) - 1)], operands[1:])
     results = _declared(writer, equation, None)
     bodies = []
-    for branch in equation.parameters["branches"]:
+    for branch in branches:
         with writer.block() as body:
             _assign(writer, results, evaluate(writer, branch, operands[1:]))
         bodies.append(body)
-    writer.put(Branch(operands[0].item(), bodies))
+    writer.put(Branch(case, bodies))
     return results
 
 
@@ -128,4 +146,11 @@ CALLS = (
     "jit pjit closed_call core_call eval_jaxpr call_hi_primitive remat remat2 checkpoint "
     "custom_jvp_call custom_vjp_call custom_vjp_call_jaxpr"
 ).split()
-RULES: dict[str, ControlRule] = {**dict.fromkeys(CALLS, _call), "while": _while, "cond": _cond, "scan": _scan}
+RULES: dict[str, ControlRule] = {
+    **dict.fromkeys(CALLS, _call),
+    "custom_linear_solve": _linear_solve,
+    "platform_index": _platform,
+    "while": _while,
+    "cond": _cond,
+    "scan": _scan,
+}

@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jaxdamp.codegen import _arrays, _control, _elementwise
+from jaxdamp.codegen import _arrays, _control, _elementwise, _indexing
 from jaxdamp.codegen._jaxprs import Inner, equations, literal, opened, traced
 from jaxdamp.codegen._program import Atoms, Statement, Variable, Writer, pruned
 from jaxdamp.configuration import Target, compiling_for
@@ -111,7 +111,7 @@ def evaluated(writer: Writer, inner: Inner, operands: list[Atoms]) -> list[Atoms
 
 
 def _rule(name: str) -> _elementwise.Rule:
-    rule = _elementwise.RULES.get(name) or _arrays.RULES.get(name)
+    rule = _elementwise.RULES.get(name) or _arrays.RULES.get(name) or _indexing.RULES.get(name)
     if rule is None:
         raise NotImplementedError(
             f"The primitive {name!r} of JAX cannot be printed. Write the function with others, such as "

@@ -1,6 +1,7 @@
-"""Laws, vehicles and roads written to files and read back; laws as C, as FMU and as tables of simulators."""
+"""Laws, vehicles and roads written to files and read back; laws as C, as FMU, as tables of simulators and as a page."""
 
 from jaxdamp.export.c_source import to_c
+from jaxdamp.export.explorer_page import to_explorer
 from jaxdamp.export.fmu import to_fmu
 from jaxdamp.export.force_velocity import to_csv
 from jaxdamp.export.module_file import from_json, to_json
@@ -14,6 +15,7 @@ __all__ = [
     "to_c",
     "to_carsim",
     "to_csv",
+    "to_explorer",
     "to_fmu",
     "to_json",
     "to_matlab",

@@ -13,8 +13,8 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.codegen import Program, Symbols, lower, symbols
-from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
-from jaxdamp.parameters import domain_of, modules_inside, with_values
+from jaxdamp.dampers import AbstractDamper, laws_inside, without_fitted_ranges
+from jaxdamp.parameters import Domain, domain_of, modules_inside, with_values
 
 
 # Words that C, C++ and JavaScript keep for themselves and that a field could have as its name.
@@ -34,9 +34,7 @@ class LawNumber:
         name: the path as an identifier of C and JavaScript.
         unit: SI unit.
         meaning: one line.
-        domain: the allowed values in words.
-        lower: lower limit of every number, minus infinity without one.
-        upper: upper limit.
+        domain: the allowed values.
         value: the numbers of the law.
         kind: "parameter", "setting", or "command", which is set from outside.
     """
@@ -45,15 +43,13 @@ class LawNumber:
     name: str
     unit: str
     meaning: str
-    domain: str
-    lower: float
-    upper: float
+    domain: Domain
     value: np.ndarray
     kind: str
 
 
-def law_numbers(law: AbstractDamper) -> list[LawNumber]:
-    """All parameters and settings of a law but empty ones, those of the law before those of laws inside."""
+def law_numbers(law: eqx.Module) -> list[LawNumber]:
+    """All parameters and settings of a law or a vehicle but empty ones, its own before those of laws inside."""
     found = []
     for prefix, module in modules_inside(law):
         for field in dataclasses.fields(module):
@@ -68,9 +64,14 @@ def law_numbers(law: AbstractDamper) -> list[LawNumber]:
             if not value.size:
                 continue
             kind = "command" if declared.get("command") else "setting" if "setting" in field.metadata else "parameter"
-            about = declared["unit"], declared["meaning"], domain.name, domain.lower, domain.upper
+            about = declared["unit"], declared["meaning"], domain
             found.append(LawNumber(path, identifier(path), *about, np.asarray(value, float), kind))
     return found
+
+
+def _conditions(law: AbstractDamper) -> list[tuple[AbstractDamper, Any]]:
+    """Every condition between parameters, with the law that it is about."""
+    return [(own, c) for _, own in laws_inside(law) if own.has_conditions() for c in own.conditions()]
 
 
 def identifier(path: str) -> str:
@@ -91,14 +92,15 @@ class LawProgram:
         numbers: its parameters and settings.
         states: the number of its states.
         dtype: the type of all numbers, "float64" or "float32".
+        member: what the language writes between `p` and the name of a number: "->" in C, "." in JavaScript.
     """
 
-    def __init__(self, law: AbstractDamper, dtype: str = "float64") -> None:
+    def __init__(self, law: AbstractDamper, dtype: str = "float64", member: str = "->") -> None:
         _checks.one_of("precision", dtype, ("float64", "float32"))
         self.law = without_fitted_ranges(law)
         self.numbers = law_numbers(self.law)
         self.states = int(law.initial_state().size)
-        self.dtype = dtype
+        self.dtype, self.member = dtype, member
 
     @cached_property
     def force(self) -> Program:
@@ -118,12 +120,17 @@ class LawProgram:
     @cached_property
     def initial_state(self) -> Program:
         """`initial_state(p)`."""
-        return lower(lambda values: self._with(values).initial_state(), self._values("p->"))
+        return lower(lambda values: self.law_of(values).initial_state(), self.values())
 
     @cached_property
     def force_derivative(self) -> Program:
         """The change of the force for changes `dp->...`, `dx`, `dv`, `dstate` of its arguments."""
         return self._derivative(self._force, self._point(), self._point("d"))
+
+    @cached_property
+    def state_rate_derivative(self) -> Program:
+        """The change of the rate of the states for changes of the arguments of `state_rate`."""
+        return self._derivative(self._state_rate, self._point(), self._point("d"))
 
     @cached_property
     def advance_derivative(self) -> Program:
@@ -143,28 +150,45 @@ class LawProgram:
     def _derivative(self, function: Callable, arguments: tuple, changes: tuple) -> Program:
         return lower(lambda point, change: jax.jvp(function, point, change)[1], arguments, changes)
 
-    def _with(self, values: list[Any]) -> AbstractDamper:
+    @cached_property
+    def margins(self) -> Program:
+        """`margins(p)`: by how much each condition between parameters holds, in the order of `conditions`."""
+
+        def margins(values: list[Any]) -> list[Any]:
+            law = self.law_of(values)
+            return [jnp.min(getattr(owner, c.parameter) - c.least) for owner, c in _conditions(law)]
+
+        return lower(margins, self.values())
+
+    @property
+    def conditions(self) -> list[str]:
+        """The conditions between parameters in words."""
+        return [f"{c.parameter} must be greater than {c.formula}. {c.reason}" for _, c in _conditions(self.law)]
+
+    def law_of(self, values: list[Any]) -> AbstractDamper:
+        """The law with other numbers, in the order of `numbers`."""
         law = jax.tree.map(lambda a: jnp.asarray(a, self.dtype) if eqx.is_inexact_array(a) else a, self.law)
         return with_values(law, {n.path: value for n, value in zip(self.numbers, values, strict=True)})
 
     def _force(self, values: list[Any], x: Any, v: Any, state: Any) -> Any:
-        return self._with(values).force(x, v, state)
+        return self.law_of(values).force(x, v, state)
 
     def _state_rate(self, values: list[Any], x: Any, v: Any, state: Any) -> Any:
-        return self._with(values).state_rate(x, v, state)
+        return self.law_of(values).state_rate(x, v, state)
 
     def _advance(self, values: list[Any], x0: Any, v0: Any, x1: Any, v1: Any, dt: Any, state: Any) -> Any:
-        return self._with(values).advance(x0, v0, x1, v1, state, dt)
+        return self.law_of(values).advance(x0, v0, x1, v1, state, dt)
 
     def _point(self, d: str = "") -> tuple[Any, ...]:
-        return self._values(f"{d}p->"), self._symbols(f"{d}x"), self._symbols(f"{d}v"), self._state(d)
+        return self.values(f"{d}p"), self._symbols(f"{d}x"), self._symbols(f"{d}v"), self._state(d)
 
     def _step(self, d: str = "") -> tuple[Any, ...]:
         names = (f"{d}{name}" for name in ("x0", "v0", "x1", "v1"))
-        return self._values(f"{d}p->"), *map(self._symbols, names), self._symbols("dt"), self._state(d)
+        return self.values(f"{d}p"), *map(self._symbols, names), self._symbols("dt"), self._state(d)
 
-    def _values(self, prefix: str) -> list[Symbols]:
-        return [symbols(f"{prefix}{n.name}", n.value.shape, self.dtype) for n in self.numbers]
+    def values(self, owner: str = "p") -> list[Symbols]:
+        """All numbers, as members of an object of the program."""
+        return [symbols(f"{owner}{self.member}{n.name}", n.value.shape, self.dtype) for n in self.numbers]
 
     def _state(self, d: str) -> Symbols:
         return symbols(f"{d}state", (self.states,), self.dtype)

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from jaxdamp.export._write import write_whole
 
 
 _LANGUAGE = C()
+DERIVATIVES = ("force", "advance", "state_rate")  # functions of a law whose derivatives can be printed
 INCLUDES = """\
 #include <math.h>
 #include <stdbool.h>
@@ -44,8 +45,8 @@ def to_c(
         law: any law or composition.
         path: the source file `NAME.c` to write, beside which `NAME.h` and `NAME_test.c` are written, or a folder for
             files named after the class. Existing files are replaced.
-        derivatives: also write `NAME_force_derivative` and `NAME_advance_derivative`: the change of the results for
-            given changes of parameters, motion and states.
+        derivatives: also write `NAME_force_derivative`, `NAME_advance_derivative` and `NAME_state_rate_derivative`:
+            the change of the results for given changes of parameters, motion and states.
         precision: "float64", or "float32" for processors that compute in single precision.
 
     Returns:
@@ -57,10 +58,10 @@ def to_c(
     """
     check_module("law", law, (AbstractDamper,), "to_c(law, path)")
     source = source_path(law, path)
-    program, name = LawProgram(law, precision), source.stem
+    program, name, chosen = LawProgram(law, precision), source.stem, DERIVATIVES if derivatives else ()
     texts = {
-        source.with_suffix(".h"): header(program, name, derivatives),
-        source: f'#include "{name}.h"\n\n{INCLUDES}\n{functions(program, name, derivatives)}',
+        source.with_suffix(".h"): header(program, name, chosen),
+        source: f'#include "{name}.h"\n\n{INCLUDES}\n{functions(program, name, chosen)}',
         source.with_name(f"{name}_test.c"): self_test(program, name),
     }
     return [write_whole(file, text) for file, text in texts.items()]
@@ -77,7 +78,7 @@ def source_path(law: AbstractDamper, path: str | os.PathLike[str]) -> Path:
     return given
 
 
-def header(program: LawProgram, name: str, derivatives: bool) -> str:
+def header(program: LawProgram, name: str, derivatives: Sequence[str] = ()) -> str:
     """The header: the struct of the numbers and the functions."""
     real = _LANGUAGE.types[program.dtype]
     members = [f"    {line}" for number in program.numbers for line in _member(number, real)]
@@ -115,7 +116,7 @@ def header(program: LawProgram, name: str, derivatives: bool) -> str:
     )
 
 
-def heads(name: str, real: str, derivatives: bool) -> dict[str, str]:
+def heads(name: str, real: str, derivatives: Sequence[str]) -> dict[str, str]:
     """The heads of the functions, each with the comment above it, by their names."""
     p, state = f"const {name}_parameters *p", f"const {real} *state"
     dp = f"const {name}_parameters *dp"
@@ -144,15 +145,20 @@ def heads(name: str, real: str, derivatives: bool) -> dict[str, str]:
             f"void {name}_advance_derivative({p}, {dp}, {numbers('x0 dx0 v0 dv0 x1 dx1 v1 dv1 dt')}, {state}, "
             f"{real} *dstate)",
         ),
+        "state_rate_derivative": (
+            "The change of the time derivative of the states.",
+            f"void {name}_state_rate_derivative({p}, {dp}, {numbers('x dx v dv')}, {state}, const {real} *dstate, "
+            f"{real} *drate)",
+        ),
     }
     return {
         key: f"/* {comment} */\n{head}"
         for key, (comment, head) in known.items()
-        if derivatives or not key.endswith("derivative")
+        if not key.endswith("derivative") or key.removesuffix("_derivative") in derivatives
     }
 
 
-def functions(program: LawProgram, name: str, derivatives: bool, static: bool = False) -> str:
+def functions(program: LawProgram, name: str, derivatives: Sequence[str] = (), static: bool = False) -> str:
     """The definitions of the functions that the header declares; visible in their file only if `static`."""
     known = heads(name, _LANGUAGE.types[program.dtype], derivatives)
     printed = [
@@ -162,10 +168,12 @@ def functions(program: LawProgram, name: str, derivatives: bool, static: bool = 
         _filled(known["advance"], program.advance, program.advance.results, "state"),
         _filled(known["state_rate"], program.state_rate, program.state_rate.results, "rate"),
     ]
-    if derivatives:
+    if "force" in derivatives:
         printed.append(_returned(known["force_derivative"], program.force_derivative))
-        changed = program.advance_derivative
-        printed.append(_filled(known["advance_derivative"], changed, changed.results, "dstate"))
+    for of, target in (("advance", "dstate"), ("state_rate", "drate")):
+        if of in derivatives:
+            changed: Program = getattr(program, f"{of}_derivative")
+            printed.append(_filled(known[f"{of}_derivative"], changed, changed.results, target))
     text = "\n".join(printed)
     return re.sub(r"(?m)^(void|double|float) (?=\w+\()", r"static \1 ", text) if static else text
 
@@ -209,7 +217,7 @@ def _member(number: LawNumber, real: str) -> Iterable[str]:
     size = f"[{number.value.size}]" if number.value.ndim else ""
     shape = f", {' x '.join(map(str, number.value.shape))}, row by row" if number.value.ndim > 1 else ""
     kind = "" if number.kind == "parameter" else f", {number.kind}"
-    about = f"[{number.unit or '-'}] {number.domain}{kind}{shape}: {number.meaning}"
+    about = f"[{number.unit or '-'}] {number.domain.name}{kind}{shape}: {number.meaning}"
     yield f"/* {number.path} {_comment(about)} */"
     yield f"{real} {number.name}{size};"
 

@@ -50,8 +50,9 @@ def to_fmu(law: AbstractDamper, path: str | os.PathLike[str], *, compiler: str |
     current; the output is the force `F`, positive when it resists extension. Parameters of the law are tunable
     parameters with units, settings are fixed ones. In co-simulation the law makes its own steps (`advance`), at most
     `longest_step` long, without the delay of a communication step that inputs held over a step would bring. In model
-    exchange the importing tool integrates the states (`state_rate`). The file has C sources, and a binary for this
-    platform if there is a compiler.
+    exchange the importing tool integrates the states (`state_rate`), with exact directional derivatives of forces and
+    rates by inputs, states and parameters, as implicit solvers and linearisations want them. The file has C sources,
+    and a binary for this platform if there is a compiler.
 
     Arguments:
         law: any law or composition.
@@ -88,9 +89,10 @@ def to_fmu(law: AbstractDamper, path: str | os.PathLike[str], *, compiler: str |
 
 def _law_text(program: LawProgram) -> str:
     """The functions of the law, visible in their file only."""
-    declared = header(program, "law", derivatives=False)
+    derivatives = ("force", "state_rate")  # what model exchange asks for
+    declared = header(program, "law", derivatives)
     declared = re.sub(r"(?m)^(void|double) (?=\w+\()", r"static \1 ", declared)
-    return f"{declared}\n{INCLUDES}\n{functions(program, 'law', False, static=True)}"
+    return f"{declared}\n{INCLUDES}\n{functions(program, 'law', derivatives, static=True)}"
 
 
 def _variables(program: LawProgram) -> Iterator[Variable]:
@@ -128,7 +130,9 @@ def _of_number(number: LawNumber) -> Iterator[Variable]:
     about = causes[number.kind] | {"description": number.meaning}
     for index in np.ndindex(*number.value.shape):
         place = f"[{','.join(map(str, index))}]" if index else ""
-        yield Variable(name + place, number.unit, about, float(number.value[index]), (number.lower, number.upper))
+        yield Variable(
+            name + place, number.unit, about, float(number.value[index]), (number.domain.lower, number.domain.upper)
+        )
 
 
 def _description(program: LawProgram, known: list[Variable], name: str, guid: str) -> str:
@@ -145,7 +149,7 @@ def _description(program: LawProgram, known: list[Variable], name: str, guid: st
     )
     can = {"canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true", "canNotUseMemoryManagementFunctions": "true"}
     steps = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
-    for kind, more in (("ModelExchange", {}), ("CoSimulation", steps)):
+    for kind, more in (("ModelExchange", {"providesDirectionalDerivative": "true"}), ("CoSimulation", steps)):
         files = ET.SubElement(ET.SubElement(root, kind, {"modelIdentifier": name} | can | more), "SourceFiles")
         ET.SubElement(files, "File", {"name": f"{name}.c"})
     _units(ET.SubElement(root, "UnitDefinitions"), {variable.unit for variable in known} - {""})

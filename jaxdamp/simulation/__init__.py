@@ -8,6 +8,7 @@ from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState, settled
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
+from jaxdamp.simulation.observer import MetricObserver
 from jaxdamp.simulation.range_notes import named_laws, range_sentences
 from jaxdamp.simulation.recorder import recorded
 from jaxdamp.simulation.response import Response
@@ -30,6 +31,7 @@ __all__ = [
     "CoarseStepWarning",
     "Equations",
     "Exponential",
+    "MetricObserver",
     "Outcome",
     "Response",
     "Ride",

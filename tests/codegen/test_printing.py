@@ -12,6 +12,7 @@ import pytest
 from jax import lax
 
 from jaxdamp._elementary import power
+from jaxdamp._matrices import phi_functions, solve
 from jaxdamp.codegen import C, JavaScript, PrintedFunction, lower, symbols
 
 
@@ -45,6 +46,21 @@ def entry(x):
 
 def replaced(x):
     return x.at[0].set(2.0 * x[1]), x.at[1:].set(x[:2]), x.at[-1].set(0.0)
+
+
+def places(x):
+    """Entries at places that are known only when the program runs."""
+    k = (x[2] * 10).astype(int)
+    table = jnp.stack([x, 2.0 * x, x - 1.0])
+    rows = table[jnp.stack([k, k - 1])], table[np.array([2, 0]), np.array([1, 1])]
+    extremes = [f(y) for f in (jnp.argmax, jnp.argmin, jnp.nanargmin) for y in (x, -x, x[::-1] * jnp.nan, x * 0.0)]
+    return rows, table.at[k].set(x * x), x.at[k + 5].set(1.0), x.at[k].set(7.0), jnp.stack(extremes)
+
+
+def solved(x):
+    """A linear system by elimination with row exchange, and a matrix exponential."""
+    matrix = jnp.stack([jnp.zeros_like(x).at[1].set(2.0), x, 1.0 + x[::-1]])
+    return solve(matrix, x), *phi_functions(0.3 * matrix)
 
 
 def matrix(x):
@@ -98,11 +114,11 @@ def known(x):
     return x * (jnp.asarray(-0.0) + jnp.exp(jnp.asarray(0.25)) * jnp.asarray(1e300) * 1e-300)
 
 
-IN_DOUBLE = [root, slopes, known]
+IN_DOUBLE = [root, slopes, known, solved]
 FUNCTIONS = {
     f.__name__: f
     for f in [
-        *(series, swapped, branch, entry, replaced, matrix, padded, reduced, limits),
+        *(series, swapped, branch, entry, replaced, places, matrix, padded, reduced, limits),
         *(rounded, powers, functions, whole, chosen, *IN_DOUBLE),
     ]
 }
@@ -184,7 +200,10 @@ def test_each_operation_is_computed_once_and_nothing_in_vain():
         (lambda x: jnp.linalg.solve(jnp.eye(3), x), "'lu'"),
         (lambda x: lax.dot_general(x[None], x[None], (((), ()), ((0,), (0,)))), "batch"),
         (lambda x: lax.pad(x, 0.0, [(-1, 0, 0)]), "'pad'"),
-        (lambda x: x.at[x[0].astype(int)].set(1.0), "'scatter'"),
+        (lambda x: lax.dynamic_update_slice(jnp.outer(x, x), x[None], (0, 0)), "'dynamic_update_slice'"),
+        (lambda x: x.at[jnp.array([0, 2])].set(1.0), "'scatter' can be printed for one row"),
+        (lambda x: jnp.argmax(jnp.outer(x, x), axis=0), "'argmax' can be printed for vectors"),
+        (lambda x: jnp.outer(x, x)[:, jnp.array([2, 0])], "'gather' can be printed for whole rows"),
     ],
 )
 def test_what_cannot_be_printed_is_refused_by_name(function, said):

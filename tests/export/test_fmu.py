@@ -188,6 +188,42 @@ def test_model_exchange(unit):
     assert errors[0] < 10.0 and errors[1] < 0.35 * errors[0] and errors[2] < 0.35 * errors[1], errors
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_directional_derivatives_are_the_slopes(unit, name):
+    one = unit(name, fmpy.fmi2.FMU2Model)
+    count = one.description.numberOfContinuousStates
+    unknown = ["F", *(f"der(state[{k}])" for k in range(count))]
+    law = LAWS[name]
+    number = next(v for v in one.description.modelVariables if v.variability == "tunable").name
+    start = dict(zip(("x", "v"), map(float, motion(0.013)), strict=True)) | {number: one.get(number)}
+    known = [*start, *(f"state[{k}]" for k in range(count))]
+    state = np.asarray(law.advance(0.0, 0.1, 2e-4, 0.11, law.initial_state(), 2e-3)).tolist()
+    sizes = np.array([1e-6, 1e-5, 1e-6 * start[number], *(1e-6 * max(abs(s), 1e-3) for s in state)])
+
+    def values(changed):
+        one.set(**dict(zip(start, changed[:3], strict=True)))
+        one.fmu.setContinuousStates((ctypes.c_double * count)(*changed[3:]), count)
+        return np.array([one.get(each) for each in unknown])
+
+    point, references = np.array([*start.values(), *state]), ([one.at[n] for n in unknown], [one.at[n] for n in known])
+    for k, size in enumerate(sizes):
+        change = np.zeros(len(known))
+        change[k] = size
+        expected = 0.5 * (values(point + change) - values(point - change))
+        values(point)
+        found = one.fmu.getDirectionalDerivative(*references, list(change))
+        np.testing.assert_allclose(found, expected, 1e-4, 1e-9 * np.abs(values(point)).max(), err_msg=known[k])
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        one.fmu.getDirectionalDerivative([one.at["x"]], [one.at["F"]], [1.0])
+
+
+def test_directional_derivatives_are_for_model_exchange(unit):
+    one = unit("series")
+    one.fmu.doStep(0.0, 1e-3)
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        one.fmu.getDirectionalDerivative([one.at["F"]], [one.at["x"]], [1.0])
+
+
 @pytest.mark.slow
 def test_state_can_be_saved_and_restored(unit):
     one = unit("sum")

@@ -1,5 +1,6 @@
 /* FMI 2.0, model exchange and co-simulation, of a damper law. It stands behind the functions of the law: law_parameters,
- * LAW_STATES, law_defaults, law_init, law_force, law_advance, law_state_rate; GUID is a text.
+ * LAW_STATES, law_defaults, law_init, law_force, law_advance, law_state_rate and the derivatives of force and rate; GUID
+ * is a text.
  *
  * Co-simulation has no delay of a step. A step ends at a stroke and a velocity that the importer knows only afterwards:
  * after fmi2DoStep they are extrapolated (or follow from fmi2SetRealInputDerivatives), and as soon as the inputs of the
@@ -195,11 +196,34 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     return fmi2OK;
 }
 
+/* Changes of the force and of the rates of the states, for model exchange: in co-simulation the states at the end of a
+ * step depend on the inputs. */
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n,
-                                        const fmi2ValueReference known[], size_t k, const fmi2Real change[],
+                                        const fmi2ValueReference known[], size_t count, const fmi2Real change[],
                                         fmi2Real value[]) {
-    UNUSED(c), UNUSED(unknown), UNUSED(n), UNUSED(known), UNUSED(k), UNUSED(change), UNUSED(value);
-    return fmi2Error;
+    const Model *m = (const Model *)c;
+    const double x = m->motion[0], v = m->motion[1];
+    double d[2] = {0.0, 0.0}, dstate[LAW_STATES + 1], drate[LAW_STATES + 1];
+    law_parameters dp;
+    size_t i;
+    if (m->h > 0.0) return fmi2Error;
+    memset(&dp, 0, sizeof dp);
+    memset(dstate, 0, sizeof dstate);
+    for (i = 0; i < count; ++i) {
+        const size_t k = known[i];
+        if (k < FORCE) d[k] += change[i];
+        else if (k >= FIRST_NUMBER && k < FIRST_STATE) ((double *)&dp)[k - FIRST_NUMBER] += change[i];
+        else if (k >= FIRST_STATE && k < FIRST_RATE) dstate[k - FIRST_STATE] += change[i];
+        else return fmi2Error;
+    }
+    law_state_rate_derivative(&m->p, &dp, x, d[0], v, d[1], m->state, dstate, drate);
+    for (i = 0; i < n; ++i) {
+        const size_t k = unknown[i];
+        if (k == FORCE) value[i] = law_force_derivative(&m->p, &dp, x, d[0], v, d[1], m->state, dstate);
+        else if (k >= FIRST_RATE && k < FIRST_RATE + LAW_STATES) value[i] = drate[k - FIRST_RATE];
+        else return fmi2Error;
+    }
+    return fmi2OK;
 }
 
 /* ---- model exchange */

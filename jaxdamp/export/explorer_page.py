@@ -1,0 +1,229 @@
+"""A law as one page for the browser: sliders, loops, records and a quarter car, computed by printed functions."""
+
+import base64
+import importlib.metadata
+import json
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._field_types import check_module
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import AbstractDamper, laws_inside
+from jaxdamp.export._javascript import bump_function, closed, law_functions, vehicle_functions
+from jaxdamp.export._law_program import LawNumber, LawProgram
+from jaxdamp.export._vehicle_program import VehicleProgram
+from jaxdamp.export._write import write_whole
+from jaxdamp.export.module_file import to_json
+from jaxdamp.parameters import weight
+from jaxdamp.roads import AbstractRoad, iso8608
+from jaxdamp.simulation import Ride
+from jaxdamp.vehicles import AbstractVehicle, presets
+
+
+_PARTS = Path(__file__).parent / "explorer"
+_SCRIPTS = ("model.js", "chart.js", "records.js", "controls.js", "page.js")
+_STEP = 1e-3  # s, as of a Ride
+_SEEDS = 3  # realisations of a random road, to be chosen from in the page
+_FASTEST = 60.0  # m/s, up to which a random road does not repeat within the run
+_SAMPLES, _PER_CYCLE = 8000, 250  # of a record in the page; the law is driven by these samples
+_FACTOR = 3.0  # of the ranges of sliders, as in a tuning
+_MAIN = re.compile(
+    r"weighted_rms_|rms_.*acceleration|vibration_dose_value|working_space_rms|working_space_peak_to_peak|"
+    r"rms_dynamic_tyre_load|dynamic_load_coefficient|peak_damper_velocity|.*dissipated_power"
+)
+
+
+def to_explorer(
+    law: AbstractDamper,
+    path: str | os.PathLike[str],
+    *,
+    records: Iterable[BenchRun] = (),
+    vehicle: AbstractVehicle | None = None,
+    road: AbstractRoad | str = "C",
+    speed: float = 20.0,
+    baseline: AbstractDamper | None = None,
+    duration: float | None = None,
+    seed: int = 0,
+) -> Path:
+    """Write a law as one HTML file that shows what its parameters do, in any browser, without server or network.
+
+    Sliders move the parameters of the law and of the vehicle. At once the page shows force over velocity and over
+    stroke, in sines or under the motion of a record with RMSE and fit; a ride on a road, with the metrics of `Ride`,
+    spectra and channels beside the baseline. A CSV dropped onto the page is another record. "Save law as JSON" gives
+    a file that `from_json` reads. Law, step of the vehicle and metrics are functions of this library, printed as
+    JavaScript: the numbers are those of `respond` and `Ride` to rounding.
+
+    Arguments:
+        law: any law or composition.
+        path: the file to write, NAME.html; an existing one is replaced, and never left incomplete.
+        records: bench records to overlay, such as `bench.read(...)`. Of long ones the page takes every so many-th
+            sample, and says so.
+        vehicle: a vehicle with one wheel that holds the law as a damper; `presets.quarter_car_000(law)` if left out.
+        road: the class of ISO 8608 that the page begins with, "A" to "H"; or a road, which can be chosen beside them.
+        speed: at which random roads are driven at first [m/s].
+        baseline: what the law is compared with; the law itself, as it is here, if left out.
+        duration: of the ride [s]; that of the road, or 10 s.
+        seed: of the first of three realisations of random roads.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        ValueError: a folder that does not exist, a vehicle of several wheels or without the law, what a `Ride` refuses.
+        NotImplementedError: an operation of the law that cannot be printed; the message names it.
+    """
+    check_module("law", law, (AbstractDamper,), "to_explorer(law, path)")
+    file = Path(path).expanduser()
+    if file.suffix != ".html":
+        _checks.refuse("path", "be a file NAME.html", str(file))
+    vehicle = presets.quarter_car_000(law) if vehicle is None else vehicle
+    check_module("vehicle", vehicle, (AbstractVehicle,), "to_explorer(law, path, vehicle=QuarterCar(..., damper=law))")
+    _checks.positive("speed", speed)
+    profile = road if isinstance(road, AbstractRoad) else None
+    duration = (profile and profile.duration) or 10.0 if duration is None else duration
+    drawn = iso8608("C" if profile else str(road), speed, duration, seed=seed)
+    count = round(duration / _STEP) + 1
+    program = LawProgram(law, member=".")
+    car = VehicleProgram(program, vehicle, _STEP, count)
+    ride = Ride(vehicle, profile or drawn, metrics=car.metrics[:1], duration=duration, dt=_STEP)
+    functions = {"LAW": law_functions(program) | vehicle_functions(car)}
+    about = _of_law(program, car, "as loaded")
+    compared, substeps = about, ride.substeps
+    if baseline is not None:
+        check_module("baseline", baseline, (AbstractDamper,), "to_explorer(law, path, baseline=law)")
+        other = LawProgram(baseline, member=".")
+        other_car = VehicleProgram(other, car.with_law(other.law), _STEP, count)
+        other_ride = Ride(other_car.vehicle, profile or drawn, metrics=car.metrics[:1], duration=duration, dt=_STEP)
+        functions["BASELINE"] = law_functions(other) | vehicle_functions(other_car)
+        compared, substeps = _of_law(other, other_car, "baseline"), max(substeps, other_ride.substeps)
+    roads = _of_roads(speed, duration, seed, "C" if profile else str(road))
+    if profile is not None:
+        assert ride.heights is not None
+        roads["profile"] = {"title": f"given road ({type(profile).__name__})", "heights": _packed(ride.heights[:, 0])}
+    data = {
+        "title": " › ".join(dict.fromkeys(type(each).__name__ for _, each in laws_inside(law))),
+        "file": file.stem,
+        "law": about | {"document": json.loads(to_json(law)), "conditions": program.conditions},
+        "baseline": compared,
+        "vehicle": {"title": type(vehicle).__name__, "numbers": [_of_number(n) for n in car.numbers]},
+        "metrics": [_of_metric(m, vehicle) for m in car.metrics],
+        "channels": [
+            {"name": name, "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]} for name in car.channels
+        ],
+        "dt": _STEP,
+        "count": count,
+        "substeps": substeps,
+        "road": roads,
+        "records": [_of_record(run) for run in records],
+    }
+    programs = "".join(closed(name, own) for name, own in functions.items()) + closed("ROAD", {"bump": bump_function()})
+    return write_whole(
+        file, _assembled(data, programs if baseline is not None else f"{programs}const BASELINE = LAW;\n")
+    )
+
+
+def _assembled(data: dict[str, Any], programs: str) -> str:
+    """The page of its parts."""
+    text = {name: (_PARTS / name).read_text(encoding="utf-8") for name in ("page.html", "style.css", *_SCRIPTS)}
+    parts = {
+        "style": text["style.css"],
+        "version": importlib.metadata.version("jaxdamp"),
+        "data": json.dumps(data, allow_nan=False).replace("</", "<\\/"),
+        "programs": programs,
+        "scripts": "\n".join(text[name] for name in _SCRIPTS),
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], text["page.html"])
+
+
+def _of_law(program: LawProgram, car: VehicleProgram, title: str) -> dict[str, Any]:
+    commands = [n.name for n in program.numbers if n.kind == "command"]
+    return {
+        "title": title,
+        "states": program.states,
+        "numbers": [_of_number(n) for n in program.numbers],
+        "command": commands[0] if len(commands) == 1 else None,
+        "sizes": car.sizes | {"firstChannel": car.first_channel},
+    }
+
+
+def _of_number(number: LawNumber) -> dict[str, Any]:
+    """A parameter for the page: what it is, the allowed values, and the ranges of its sliders."""
+    domain, values = number.domain, number.value.ravel()
+    return {
+        "path": number.path,
+        "name": number.name,
+        "unit": number.unit,
+        "meaning": number.meaning,
+        "domain": domain.name,
+        "kind": number.kind,
+        "scalar": number.value.ndim == 0,
+        "shape": list(number.value.shape),
+        "start": values.tolist(),
+        "ranges": [_range(number, float(value), float(np.abs(values).max())) for value in values],
+        "ordered": domain.ordered,
+        "lower": _limit(domain.lower),
+        "upper": _limit(domain.upper),
+        "lowerOpen": not domain.ordered and not domain.contains(np.asarray(domain.lower)),
+        "upperOpen": not domain.ordered and not domain.contains(np.asarray(domain.upper)),
+    }
+
+
+def _limit(value: float) -> float:
+    """A limit that JSON can hold."""
+    return float(np.clip(value, -np.finfo(float).max, np.finfo(float).max))
+
+
+def _range(number: LawNumber, value: float, largest: float) -> tuple[float, float]:
+    """The range of a slider: the domain if it has two ends, else from a third to three times a number of one sign."""
+    domain = number.domain
+    if np.isfinite(domain.upper - domain.lower):
+        return domain.lower, domain.upper
+    size = abs(value) or largest or 1.0
+    one_sign = domain.lower >= 0.0 or domain.upper <= 0.0 or domain.ordered
+    if one_sign and value and domain is not weight:
+        return min(value / _FACTOR, value * _FACTOR), max(value / _FACTOR, value * _FACTOR)
+    return max(value - 2.0 * size, domain.lower), min(value + 2.0 * size, domain.upper)
+
+
+def _of_metric(metric: Any, vehicle: AbstractVehicle) -> dict[str, Any]:
+    title = metric.name.replace("_", " ") + (f", {metric.weighting}" if metric.weighting else "")
+    unit, main = metric.unit(vehicle.units), bool(_MAIN.match(metric.name))
+    return {"name": metric.name, "title": title, "unit": unit, "main": main, "signed": metric.statistic.signed}
+
+
+def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> dict[str, Any]:
+    """Amplitudes of class A and phases of random roads, of which those of all classes and speeds follow."""
+    longest = max(speed, _FASTEST) * duration
+    made = [iso8608("A", 1.0, seed=seed + k, length=max(1000.0, longest)) for k in range(_SEEDS)]
+    lines = {
+        "first": round(float(made[0].spatial_frequency[0]) * made[0].length),
+        "length": made[0].length,
+        "ramp": made[0].ramp,
+        "seed": seed,
+        "amplitude": _packed(made[0].amplitude),
+        "phases": [_packed(road.phase) for road in made],
+    }
+    return {"class": road_class, "speed": speed, "iso": lines, "profile": None}
+
+
+def _of_record(run: BenchRun) -> dict[str, Any]:
+    """A record for the page: every sample, or so few of them as it takes to drive the law, from the beginning."""
+    per_cycle = run.sampling_rate / max(run.frequency, 1.0 / run.duration)
+    stride = max(1, min(int(per_cycle / _PER_CYCLE), -(-len(run) // _SAMPLES)))
+    chosen = slice(0, _SAMPLES * stride, stride)
+    shown = {"x": run.stroke[chosen], "v": run.velocity[chosen], "force": run.force[chosen]}
+    every = "every sample" if stride == 1 else f"one sample in {stride}"
+    note = f"{every} of {len(run)}" + ("" if len(run) <= _SAMPLES * stride else f", up to the {_SAMPLES * stride}th")
+    about = {"name": run.name, "dt": stride / run.sampling_rate, "command": run.command, "note": note}
+    return about | {key: _packed(values) for key, values in shown.items()}
+
+
+def _packed(values: Any) -> str:
+    """Numbers in 64 bits as text of 64 characters."""
+    return base64.b64encode(np.asarray(values, "<f8").tobytes()).decode("ascii")

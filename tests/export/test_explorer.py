@@ -1,0 +1,256 @@
+"""The page of a law: written for every law, and driven in a browser, where its numbers are those of the library."""
+
+import itertools
+import json
+
+import jax
+import numpy as np
+import pytest
+
+from jaxdamp import Ride, respond, simulate
+from jaxdamp._types import Number
+from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import (
+    AbstractMemoryless,
+    Besinger,
+    BoucWen,
+    CoulombFriction,
+    GasSpring,
+    Lag,
+    Linear,
+    MotionRatio,
+    Scheduled,
+    with_command,
+)
+from jaxdamp.export import from_json, to_explorer, to_json
+from jaxdamp.identify import fit_percent
+from jaxdamp.metrics import power_spectral_density
+from jaxdamp.parameters import parameter, replace
+from jaxdamp.roads import cosine_bump, from_profile, iso8608
+from jaxdamp.vehicles import presets
+from tests.dampers.test_contract import LAWS
+from tests.export.browser import started
+
+
+DURATION, CLOSE = 4.0, 1e-9
+VALVE = Besinger(900.0, 2800.0, 700.0, 0.25, 0.05)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with started() as browser:
+        yield browser
+
+
+def page(law, folder, browser=None, *, duration=DURATION, **options):
+    file = to_explorer(law, folder / "law.html", duration=duration, **options)
+    if browser is not None:
+        browser.open(file)
+    return file
+
+
+def cells(browser, side=0):
+    """The metrics that the page shows, by name."""
+    rows = "[...document.querySelectorAll('tr[data-metric]')]"
+    value = f"Number(row.querySelectorAll('[data-value]')[{side}].dataset.value)"
+    return dict(browser.evaluate(f"{rows}.map((row) => [row.dataset.metric, {value}])"))
+
+
+def number(browser, path):
+    return float(browser.evaluate(f"document.querySelector('[data-path=\"{path}\"]').value"))
+
+
+def is_ride(shown, vehicle, road, **options):
+    expected = Ride(vehicle, road, metrics=list(shown), duration=DURATION, **options)()
+    for name, value in shown.items():
+        np.testing.assert_allclose(value, float(expected[name]), CLOSE, 1e-12, err_msg=name)
+
+
+def record(law, name="measured", time=None):
+    time = np.arange(0.0, 1.5, 1e-3) if time is None else time
+    turn = 2.0 * np.pi * 2.0 * time
+    x, v = 0.02 * np.sin(turn), 0.02 * 4.0 * np.pi * np.cos(turn)
+    return BenchRun.from_arrays(name, time, x, np.asarray(respond(law, time, x, v)) + 5.0 * np.sin(50.0 * turn), v)
+
+
+def test_a_moved_slider_is_followed_by_the_numbers_of_the_library(tmp_path, browser):
+    car = presets.quarter_car_000
+    page(VALVE, tmp_path, browser)
+    road = iso8608("C", 20.0, DURATION, seed=0)
+    before = cells(browser)
+    assert {"weighted_rms_sprung_acceleration", "dynamic_load_coefficient", "working_space_rms"} < set(before)
+    is_ride(before, car(VALVE), road)
+    browser.click('[data-slider="rebound_rate"]')
+    browser.press("ArrowRight", 39, times=40)
+    rebound = number(browser, "rebound_rate")
+    assert rebound > 3000.0
+    changed = replace(VALVE, {"rebound_rate": rebound})
+    is_ride(cells(browser), car(changed), road)
+    assert cells(browser, side=1) == before  # the baseline stays
+    browser.type('[data-path="sprung_mass"]', "900")
+    is_ride(cells(browser), replace(car(changed), {"sprung_mass": 900.0}), road)
+    is_ride(cells(browser, side=1), replace(car(VALVE), {"sprung_mass": 900.0}), road)
+    browser.type('[data-path="compression_rate"]', "10")
+    assert "compression_rate must be greater than" in browser.evaluate(
+        "document.getElementById('lawError').textContent"
+    )
+    browser.click('[data-reset="rebound_rate"]')
+    assert number(browser, "rebound_rate") == 2800.0
+    browser.click("#reset")
+    assert cells(browser) == before and number(browser, "sprung_mass") == 1200.0
+    assert browser.evaluate("document.getElementById('lawError').textContent") == ""
+    assert not browser.troubles()
+
+
+@pytest.mark.slow
+def test_roads_spectra_and_channels(tmp_path, browser):
+    law = Lag(VALVE, 0.004) + GasSpring(2e6, 6e-5, 1e-4, 1.3)  # its rest depends on its numbers
+    profile = from_profile(np.linspace(0.0, 100.0, 401), 0.01 * np.sin(np.linspace(0.0, 60.0, 401)), 10.0)
+    page(law, tmp_path, browser, road=profile, seed=3)
+    car = presets.quarter_car_000(law)
+    is_ride(cells(browser), car, profile)
+    browser.choose("#roadKind", "D")
+    browser.choose("#seed", "1")
+    browser.type("#speed", "12.5")
+    road = iso8608("D", 12.5, DURATION, seed=4)
+    is_ride(cells(browser), car, road)
+    response = simulate(car, road, duration=DURATION)
+    channel = np.asarray(response["sprung_acceleration"])
+    place = browser.evaluate("DATA.channels.findIndex((channel) => channel.name === 'sprung_acceleration')")
+    shown = browser.evaluate(f"[...state.results.law.records[{place}]]")
+    np.testing.assert_allclose(shown, channel, CLOSE, CLOSE * np.abs(channel).max())
+    frequency, density = power_spectral_density(channel, 1e-3, 2048)
+    ours = browser.evaluate(f"(() => {{ const d = density(state.results.law.records[{place}], 1e-3, 2048);"
+                            " return [[...d.frequency], [...d.psd]]; })()")  # fmt: skip
+    np.testing.assert_allclose(ours[0], frequency, CLOSE)
+    np.testing.assert_allclose(ours[1], density, 1e-6, CLOSE * float(np.max(density)))
+    browser.choose("#roadKind", "bump")
+    is_ride(cells(browser), car, cosine_bump(0.06, start=1.0, length=5.0, speed=12.5))
+    browser.type("#bumpLength", "0")
+    assert "must be positive" in browser.evaluate("document.getElementById('roadError').textContent")
+    assert not browser.troubles()
+
+
+@pytest.mark.slow
+def test_loops_records_and_their_fit(tmp_path, browser):
+    law = 0.9 * Lag(BoucWen(800.0, 2000.0, 300.0, 1e-3, 0.75, 1.5), 0.003)
+    measured = record(Linear(1500.0))
+    page(law, tmp_path, browser, records=[measured], baseline=VALVE)
+    force = np.asarray(respond(law, measured.time, measured.stroke, measured.velocity))
+    fits = browser.evaluate("[state.fits.law, state.fits.baseline]")
+    first = browser.evaluate("firstCounted(records[0], DATA.law.states)")  # a cycle of 2 Hz
+    assert first in (500, 501)
+    assert fits[0]["fit"] == pytest.approx(fit_percent([measured.force[first:]], [force[first:]]), CLOSE)
+    other = np.asarray(respond(VALVE, measured.time, measured.stroke, measured.velocity))
+    assert fits[1]["rmse"] == pytest.approx(np.sqrt(np.mean((other - measured.force) ** 2)), CLOSE)
+    assert "every sample of 1500" in browser.evaluate("document.getElementById('fitNote').textContent")
+    browser.choose("#motion", "sines")
+    browser.type("#frequencies", "2, 8")
+    motion, shown = browser.evaluate(
+        "(() => { const m = sine(0.025, 8, DATA.law.states); return [[m.dt, [...m.x], [...m.v], m.first],"
+        " [...state.loops[3].loop.force]]; })()"
+    )
+    dt, x, v, start = motion
+    np.testing.assert_allclose(v, np.gradient(x, dt), atol=1e-2)
+    expected = np.asarray(respond(law, dt * np.arange(len(x)), np.array(x), np.array(v)))[start:]
+    np.testing.assert_allclose(shown, expected, CLOSE, 1e-9)
+    browser.type("#frequencies", "fast")
+    assert "positive numbers" in browser.evaluate("document.getElementById('loopError').textContent")
+    assert not browser.troubles()
+
+
+@pytest.mark.slow
+def test_a_file_dropped_onto_the_page(tmp_path, browser):
+    page(VALVE, tmp_path, browser)
+    measured = record(VALVE)
+    file = tmp_path / "run.csv"
+
+    def drop(header, columns):
+        np.savetxt(file, np.stack(columns, 1), fmt="%.17g", delimiter=",", header=header, comments="")
+        browser.drop(file)
+        browser.wait("state.text !== undefined")
+        browser.evaluate("new Promise((done) => setTimeout(done, 100))")
+        return browser.evaluate("document.getElementById('dropError').textContent")
+
+    assert "like: time [s],stroke [mm]" in drop("a,b,c", [measured.stroke] * 3)
+    columns = [-1e3 * measured.stroke, -measured.velocity, -1e-3 * measured.force]
+    assert "no unit" in drop("stroke,velocity [m/s],force [kN]", columns)
+    assert '"furlong"' in drop("stroke [furlong],velocity [m/s],force [kN]", columns)
+    assert "no column of force" in drop("stroke [mm],velocity [m/s],sensor 1", columns)
+    header = "time (ms),stroke [mm],velocity_m/s,Force [kN]"
+    assert "drive the machine" in drop(header, [1e3 * measured.time, *columns[:2], -columns[2]])
+    assert drop(header, [1e3 * measured.time, *columns]) == ""
+    browser.choose("#dropSign", "compression")
+    assert browser.evaluate("document.getElementById('motion').value") == "dropped"
+    force = np.asarray(respond(VALVE, measured.time, measured.stroke, measured.velocity))
+    expected = np.sqrt(np.mean((force - measured.force) ** 2))
+    assert browser.evaluate("state.fits.law.rmse") == pytest.approx(expected, CLOSE)
+    file.write_text(file.read_text().replace("\n", "\nx,1,2,3\n", 1))
+    browser.drop(file)
+    browser.wait("document.getElementById('dropError').textContent.includes('line 2, time: \"x\" is not a number')")
+    assert not browser.troubles()
+
+
+@pytest.mark.slow
+def test_the_saved_law_is_read_back_exactly(tmp_path, browser):
+    valve = LAWS["slopes, rounded"]()
+    schedule = Scheduled((valve, valve), [0.0, 1.0], 0.3)
+    law = MotionRatio(schedule, 0.7) + CoulombFriction(30.0, 0.01)
+    page(law, tmp_path, browser, records=[record(VALVE)])
+    assert from_json(browser.evaluate("lawDocument()")) == law
+    command = next(n for n in browser.evaluate("DATA.law.numbers") if n["kind"] == "command")
+    browser.type(f'[data-path="{command["path"]}"]', "0.625")
+    slope = "terms.0.law.laws.1.slopes[2]"
+    browser.type(f'[data-path="{slope}"]', "1234.5678901234567")
+    download = {"behavior": "allow", "downloadPath": str(tmp_path)}
+    browser.call("Page.setDownloadBehavior", **download)
+    browser.click("#export")
+    saved = tmp_path / "law_changed.json"
+    for _ in itertools.takewhile(lambda _: not saved.exists(), range(200)):
+        browser.evaluate("new Promise((done) => setTimeout(done, 50))")
+    changed = from_json(saved)
+    slopes = np.array(valve.slopes)
+    slopes[2] = 1234.5678901234567
+    expected = with_command(replace(law, {"terms.0.law.laws.1.slopes": slopes}), 0.625)
+    assert json.loads(to_json(changed)) == json.loads(to_json(expected))
+    browser.type(f'[data-path="{slope}"]', "-1")
+    assert number(browser, slope) == -1.0 and json.loads(browser.evaluate("lawDocument()")) == json.loads(
+        saved.read_text()
+    )
+    assert "must be" in browser.evaluate("document.querySelector('.control .error:not(:empty)').textContent")
+    assert not browser.troubles()
+
+
+def test_a_page_is_the_same_every_time_and_needs_nothing_else(tmp_path):
+    text = page(LAWS["sum of lags"](), tmp_path).read_text(encoding="utf-8")
+    assert "{{" not in text and "http" not in text.replace("http-equiv", "") and "src=" not in text
+    assert text == page(LAWS["sum of lags"](), tmp_path).read_text(encoding="utf-8")
+
+
+class Sorted(AbstractMemoryless):
+    """A law that cannot be printed."""
+
+    rate: Number = parameter("N s/m", "damping coefficient")
+
+    def force_velocity(self, v):
+        return jax.numpy.sort(jax.numpy.stack([self.rate * v, 2.0 * self.rate * v]))[0]
+
+
+def test_refusals(tmp_path):
+    with pytest.raises(NotImplementedError, match="'sort'"):
+        to_explorer(Sorted(1000.0), tmp_path / "law.html")
+    with pytest.raises(ValueError, match=r"NAME\.html"):
+        to_explorer(VALVE, tmp_path)
+    with pytest.raises(ValueError, match="one wheel"):
+        to_explorer(VALVE, tmp_path / "law.html", vehicle=presets.half_car_002(VALVE))
+    with pytest.raises(ValueError, match="hold the law as a damper"):
+        to_explorer(VALVE, tmp_path / "law.html", vehicle=presets.quarter_car_000(Linear(1.0)))
+    with pytest.raises(ValueError, match="road_class"):
+        to_explorer(VALVE, tmp_path / "law.html", road="Z")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["series spring, sum", "LuGre", "mono-tube", "neural hysteresis", "stroke table"])
+def test_laws_of_all_kinds_have_a_page(tmp_path, name):
+    page(LAWS[name](), tmp_path, duration=0.5)
