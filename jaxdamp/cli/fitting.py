@@ -81,7 +81,10 @@ def run_fit(
         remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
-        job = FitJob(screen, names, weighting, machine, results, attempts, found, [*remarks, *found.sentences()])
+        scheduled = group_by is None and len({run.command for run in runs}) > 1
+        job = FitJob(
+            screen, names, weighting, machine, scheduled, results, attempts, found, [*remarks, *found.sentences()]
+        )
         failed = []
         for number, (name, part) in enumerate(groups.items(), 1):
             try:
@@ -102,6 +105,7 @@ class FitJob(NamedTuple):
     names: Sequence[str]
     weighting: str
     rig: Sequence[str]
+    scheduled: bool
     results: Results
     attempts: Attempts
     found: Preflight
@@ -120,7 +124,8 @@ class FitJob(NamedTuple):
         if name:
             self.screen.heading(name)
         held, fitted = (runs.where(lambda run, yes=yes: (run in held_out.runs) == yes) for yes in (True, False))
-        fits = fit_laws(self.screen, self.names, fitted, held, weighting=self.weighting, rig=self.rig)
+        how = {"weighting": self.weighting, "rig": self.rig, "scheduled": self.scheduled}
+        fits = fit_laws(self.screen, self.names, fitted, held, **how)
         show(self.screen, fits)
         following = f" and the fits of {', '.join(later)}" if later else ""
         with interrupt.saving(), self.screen.stage("Laws and tables"):
@@ -147,8 +152,11 @@ def fit_laws(
     *,
     weighting: str = "samples",
     rig: Sequence[str] = (identify.OFFSET,),
+    scheduled: bool = False,
 ) -> Fitted:
     """Fit the laws of these names on a test machine, one after the other. Ctrl-C keeps those that are finished.
+
+    Laws may be `scheduled`: their parameters are then functions of what the records state as their command.
 
     Raises:
         ValueError: not one law could be fitted.
@@ -165,6 +173,7 @@ def fit_laws(
                 progress=lambda name: advance(name, len(outcomes)),
                 weighting=weighting,
                 rig=rig,
+                scheduled=scheduled,
             ):
                 outcomes.append(outcome)
                 if isinstance(outcome, Rung):
@@ -173,7 +182,11 @@ def fit_laws(
             if not any(isinstance(outcome, Rung) for outcome in outcomes):
                 raise
     done = {outcome.name for outcome in outcomes}
-    return Fitted(Comparison.of(outcomes, tuple(held_out)), [name for name in names if name not in done])
+    comparison = Comparison.of(outcomes, tuple(held_out))
+    if comparison.best.by_setting:
+        with screen.stage("Leaving out settings"):
+            _ = comparison.best.by_setting.between
+    return Fitted(comparison, [name for name in names if name not in done])
 
 
 def show(screen: Screen, fits: Fitted) -> None:
@@ -184,6 +197,8 @@ def show(screen: Screen, fits: Fitted) -> None:
     screen.table(parameters_of(best))
     if best.result.law.fitted_to is not None:
         screen.table(fitted_range_table(best.result.law.fitted_to))
+    if best.by_setting:
+        screen.table(best.by_setting.table())
     screen.say(" ".join(fits.comparison.verdict))
     screen.points(best.result.warnings, style="yellow")
 
@@ -202,10 +217,15 @@ def write_fits(folder: Path, comparison: Comparison, runs: BenchSet, attempts: A
             if rung.result.rig is not None:
                 (folder / "machines").mkdir(exist_ok=True)
                 export.to_json(rung.result.rig, folder / "machines" / f"{rung.name}.json")
+    if comparison.best.by_setting:
+        write_table(folder, "settings", comparison.best.by_setting.table())
     with attempts.part("best_law.json"):
         export.to_json(best, folder / "best_law.json")
-    with attempts.part("best_law_force_velocity.csv"):
-        export.to_csv(best, folder / "best_law_force_velocity.csv", fitted_velocities(comparison))
+    for name, law in comparison.best.laws().items():
+        at = name.removeprefix(comparison.best.name).replace(" at ", "_")
+        file = f"best_law_force_velocity{at}.csv"
+        with attempts.part(file):
+            export.to_csv(law, folder / file, fitted_velocities(comparison))
 
 
 def write_table(folder: Path, name: str, table: Table) -> None:

@@ -15,7 +15,7 @@ ROLES = ("time", "stroke", "velocity", "force", "temperature")
 
 
 def law_names(asked: Sequence[str]) -> list[str]:
-    """The laws to fit: all, or those named, each once; "linear,besinger" names two.
+    """The laws to fit: all that are not optional, or those named, each once; "linear,besinger" names two.
 
     >>> law_names(["linear, besinger", "linear"])
     ['linear', 'besinger']
@@ -24,7 +24,7 @@ def law_names(asked: Sequence[str]) -> list[str]:
     if not asked:
         _checks.refuse("law", "name a law", "empty", 'See "jaxdamp laws".')
     for name in asked:
-        _checks.one_of("law", name, ("all", *identify.LAWS))
+        _checks.one_of("law", name, ("all", *identify.NAMED_LAWS))
     return list(identify.LAWS) if "all" in asked else list(dict.fromkeys(asked))
 
 

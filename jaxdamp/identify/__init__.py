@@ -11,6 +11,7 @@ from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.ladder import LAWS, default_ladder, ladder_starts
 from jaxdamp.identify.laws import NAMED_LAWS, NamedLaw, laws_table
+from jaxdamp.identify.learnt import LearntStart
 from jaxdamp.identify.machine import OFFSET, machine_names, without_machine
 from jaxdamp.identify.many import fit_many
 from jaxdamp.identify.many_result import ManyFits
@@ -21,6 +22,7 @@ from jaxdamp.identify.propagation import Band, Evidence, Propagated
 from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.result import FitResult, Score, fit_percent
 from jaxdamp.identify.rungs import Failure, Rung
+from jaxdamp.identify.scheduling import LeftOutSetting, ScheduledFit, fit_scheduled
 from jaxdamp.identify.targets import TargetFit, fit_targets
 from jaxdamp.identify.training import Training, train
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
@@ -45,6 +47,8 @@ __all__ = [
     "Failure",
     "FitResult",
     "InitialMotion",
+    "LearntStart",
+    "LeftOutSetting",
     "MachineLimits",
     "ManyFits",
     "NamedLaw",
@@ -53,6 +57,7 @@ __all__ = [
     "ProfileCurve",
     "Propagated",
     "Rung",
+    "ScheduledFit",
     "Score",
     "Spread",
     "Status",
@@ -70,6 +75,7 @@ __all__ = [
     "fit_each",
     "fit_many",
     "fit_percent",
+    "fit_scheduled",
     "fit_targets",
     "fit_vehicle",
     "judge",

@@ -16,6 +16,7 @@ from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.machine import OFFSET, Machine
 from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.rungs import Failure, Rung, best_of, ladder_table
+from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
 from jaxdamp.identify.starting import Start, check_starts
 from jaxdamp.identify.verdict import verdict
 
@@ -79,7 +80,8 @@ class Comparison:
     @property
     def verdict(self) -> tuple[str, ...]:
         """Sentences on the error of the best law and on the shares of the errors (shape, hysteresis, noise)."""
-        return verdict(self.rungs, self.held_out)
+        between = self.best.by_setting.between if self.best.by_setting else ()
+        return (*verdict(self.rungs, self.held_out), *(left.sentence(self.best.name) for left in between))
 
     def table(self) -> Table:
         """Each law with its number of free parameters, its errors, their shares, and remarks."""
@@ -130,6 +132,7 @@ def compare(
     *,
     held_out: Iterable[BenchRun] = (),
     rig: Machine = OFFSET,
+    scheduled: bool = False,
     progress: Callable[[str], None] | None = None,
     **options: Any,
 ) -> Comparison:
@@ -143,11 +146,13 @@ def compare(
         held_out: records to score on, not fitted.
         rig: the test machine of all fits, as in `fit`; a zero error of the load cell if left out, since a law that must
             explain it comes out wrong. `None` is a machine that adds nothing.
+        scheduled: whether the parameters of each law are functions of the records' command, as in `fit_scheduled`;
+            starts are carried over from neighbouring settings, and the best law is also scored between settings.
         progress: called with each name before its fit; a line in the terminal if it is left out.
         options: passed on to `fit`.
 
     Raises:
-        ValueError: no laws, or none that could be fitted.
+        ValueError: no laws, or none that could be fitted; with `scheduled`, records of one command only.
 
     >>> from jaxdamp import bench, dampers
     >>> runs = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=5.0).run(
@@ -167,8 +172,10 @@ def compare(
             number += 1
             shown(f"{name}, {number} of {len(laws)}")
 
-        outcomes = fit_each(laws, runs, held_out, rig=rig, progress=progress or counted, **options)
-        return Comparison.of(outcomes, held_out)
+        how = {"rig": rig, "scheduled": scheduled, "progress": progress or counted}
+        comparison = Comparison.of(fit_each(laws, runs, held_out, **how, **options), held_out)
+    _ = comparison.verdict  # which leaves out settings if there are any: that is part of this work
+    return comparison
 
 
 def fit_each(
@@ -177,6 +184,7 @@ def fit_each(
     held_out: Sequence[BenchRun] = (),
     *,
     rig: Machine = OFFSET,
+    scheduled: bool = False,
     progress: Callable[[str], None] = lambda name: None,
     **options: Any,
 ) -> Iterator[Rung | Failure]:
@@ -189,20 +197,29 @@ def fit_each(
         runs: records to fit.
         held_out: records to score on, not fitted.
         rig: the test machine of all fits, as in `compare`.
+        scheduled: whether the parameters are functions of the command, as in `compare`.
         progress: called with each name before its result is waited for.
         options: passed on to `fit`.
+
+    Raises:
+        ValueError: with `scheduled`, records without a command or of one command only.
     """
+    if scheduled:
+        runs = settings_stated(runs)
     # A thread begins with the precision of the process, not with that of its caller.
     double = jnp.result_type(float) == jnp.float64
 
     def fitted(name: str, start: Start) -> Rung | Failure:
         try:
             with jax.enable_x64(double):
-                result = fit(start, runs, rig=rig, **options)
-                percent, rmse = result.score(held_out)[:2] if held_out else (None, None)
+                by_setting = fit_scheduled(start, runs, rig=rig, progress=_silent, **options) if scheduled else None
+                result = by_setting.result if by_setting else fit(start, runs, rig=rig, **options)
+                percent, rmse, scores = result.score(held_out) if held_out else (None, None, result.scores)
         except NUMERICAL as error:
             return Failure(name, str(error))
-        return Rung(name, len(result.parameters), result.fit_percent, result.rmse, percent, rmse, result)
+        return Rung(
+            name, len(result.parameters), result.fit_percent, result.rmse, percent, rmse, result, scores, by_setting
+        )
 
     pool = ThreadPoolExecutor(max_workers=min(os.cpu_count() or 1, MOST_THREADS))
     try:
@@ -212,3 +229,8 @@ def fit_each(
             yield outcome.result()
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _silent(text: str) -> None:
+    """Shows nothing: laws are fitted side by side, each in its thread."""
+    del text

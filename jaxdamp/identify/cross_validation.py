@@ -1,6 +1,7 @@
 """`cross_validate`: every record is predicted by laws fitted to the others."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,8 +13,10 @@ from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import fit
 from jaxdamp.identify.machine import OFFSET, Machine
+from jaxdamp.identify.preparing import weights
 from jaxdamp.identify.result import AbstractFitted
 from jaxdamp.identify.starting import Start, check_starts
+from jaxdamp.identify.verdict import cannot_choose
 from jaxdamp.parameters import parameters
 
 
@@ -22,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class Fold(NamedTuple):
-    """One law fitted without one record."""
+    """One law fitted without one record, or without two for a nested choice."""
 
     law: str
     group: Hashable
@@ -30,6 +33,17 @@ class Fold(NamedTuple):
     fit_percent: float  # of the record held out
     rmse: float  # of the record held out, N
     result: Any
+    also_out: str | None = None  # a second record without part in the fit, for which a law is chosen by this score
+
+
+class Choice(NamedTuple):
+    """The law that a record is predicted by, chosen without this record."""
+
+    held_out: str
+    group: Hashable
+    law: str
+    fit_percent: float  # of the record held out
+    rmse: float  # of the record held out, N
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -37,6 +51,7 @@ class CrossValidation:
     """How well laws predict records that they were not fitted to. Results of the same records are joined with `+`."""
 
     folds: tuple[Fold, ...]
+    inner: tuple[Fold, ...] = ()  # of a nested choice
 
     @property
     def laws(self) -> tuple[str, ...]:
@@ -61,6 +76,48 @@ class CrossValidation:
         """The law with the highest mean fit percent."""
         return max(self.laws, key=self.fit_percent)
 
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """Sentences on the best law, and on those that the records cannot tell from it."""
+        errors = {law: [fold.rmse for fold in self._of(law, None)] for law in self.laws}
+        numbers = {law: sum(p.value.size for p in parameters(self._of(law, None)[0].result.law)) for law in self.laws}
+        best = self.best
+        lead = f"Best on records that were held out: {best}, fit {self.fit_percent(best):.1f} % in the mean."
+        sentences = [lead, *cannot_choose(errors, best, numbers)]
+        if self.inner:
+            laws = ", ".join(dict.fromkeys(choice.law for choice in self.choices))
+            sentences.append(
+                f"Chosen without the record that is scored ({laws}): fit {self.chosen_fit_percent:.1f} % in the mean."
+            )
+        return tuple(sentences)
+
+    @property
+    def choices(self) -> tuple[Choice, ...]:
+        """For each record the law with the highest mean fit on all other records, and the score of this law on it.
+
+        In the group of the record, the fits to choose by leave out the record itself besides the one they are scored
+        on; fits of other groups never contain it. Needs `cross_validate(..., nested=True)`.
+        """
+        if not self.inner:
+            raise ValueError("There are no fits to choose by: call `cross_validate(..., nested=True)`.")
+        chosen = []
+        for first in self._of(self.laws[0], None):
+
+            def score(law: str, first: Fold = first) -> float:
+                means = [self.fit_percent(law, group) for group in self.groups if group != first.group]
+                own = [f for f in self.inner if (f.law, f.group, f.also_out) == (law, first.group, first.held_out)]
+                return float(np.mean([*means, np.mean([fold.fit_percent for fold in own])]))
+
+            law = max(self.laws, key=score)
+            (fold,) = (f for f in self._of(law, first.group) if f.held_out == first.held_out)
+            chosen.append(Choice(fold.held_out, fold.group, law, fold.fit_percent, fold.rmse))
+        return tuple(chosen)
+
+    @property
+    def chosen_fit_percent(self) -> float:
+        """Mean fit of records predicted by laws that were chosen, as well as fitted, without them."""
+        return float(np.mean([choice.fit_percent for choice in self.choices]))
+
     def _of(self, law: str, group: Hashable) -> list[Fold]:
         folds = [f for f in self.folds if f.law == law and (group is None or f.group == group)]
         if not folds:
@@ -68,7 +125,7 @@ class CrossValidation:
         return folds
 
     def __add__(self, other: "CrossValidation") -> "CrossValidation":
-        return CrossValidation(self.folds + other.folds)
+        return CrossValidation(self.folds + other.folds, self.inner + other.inner)
 
     def plot(self, **options: Any) -> "Figure":
         """The fit of every held-out record, law by law."""
@@ -99,7 +156,9 @@ class CrossValidation:
             }
             for fold in self.folds
         ]
-        return {"best": self.best, "folds": folds}
+        return {"best": self.best, "verdict": list(self.verdict), "folds": folds} | (
+            {"choices": [plain(choice._asdict()) for choice in self.choices]} if self.inner else {}
+        )
 
     def __repr__(self) -> str:
         return f"{self.table().to_text()}\nbest: {self.best}"
@@ -112,6 +171,8 @@ def cross_validate(
     by: Callable[[BenchRun], Hashable] | None = None,
     method: Callable[..., AbstractFitted] = fit,
     rig: Machine = OFFSET,
+    weighting: str = "samples",
+    nested: bool = False,
     **options: Any,
 ) -> CrossValidation:
     """Hold out each record in turn, fit every law to the others, and score it on the record held out.
@@ -124,6 +185,10 @@ def cross_validate(
         method: called as `method(start, runs, weighting=..., **options)`, with an infinite weighting for the record
             held out; the result has a `law`. `fit`, or for networks a function that calls `train`.
         rig: the test machine as in `compare`. Another method than `fit` gets it only if it is not the default.
+        weighting: of the records that are fitted: `"samples"`, or `"runs"`, with which every record counts the same, as
+            it does in the mean fit.
+        nested: whether to fit without every pair of records too, so that `choices` can choose the law for each record
+            without this record; each group then needs three records.
         options: passed on to the method.
 
     Raises:
@@ -140,20 +205,30 @@ def cross_validate(
     groups: dict[Hashable, list[BenchRun]] = {}
     for run in as_runs(runs, call=call):
         groups.setdefault(None if by is None else by(run), []).append(run)
+    fewest, few = (3, "three") if nested else (2, "two")
     for group, members in groups.items():
-        if len(members) < 2:
+        if len(members) < fewest:
             name, must = ("runs", "hold") if by is None else ("by", f"put into group {group}")
-            _checks.refuse(name, f"{must} two records or more", [run.name for run in members])
+            _checks.refuse(name, f"{must} {few} records or more", [run.name for run in members])
     if method is fit or rig != OFFSET:
         options["rig"] = rig
-    total, folds = len(laws) * sum(map(len, groups.values())), []
+    jobs = [
+        (name, group, out)
+        for name in laws
+        for group, members in groups.items()
+        for out in itertools.chain(*(itertools.combinations(range(len(members)), k) for k in (1, 2)[: 1 + nested]))
+    ]
+    folds: list[Fold] = []
     with Progress("Cross-validating") as shown:
-        for name, start in laws.items():
-            for group, members in groups.items():
-                for out, run in enumerate(members):
-                    shown(f"{name} without {run.name}, {len(folds) + 1} of {total}")
-                    weighting = [np.inf if i == out else 1.0 for i in range(len(members))]
-                    result = method(start, members, weighting=weighting, **options)
-                    held_out = result.score(members)[2][out]
-                    folds.append(Fold(name, group, run.name, held_out.fit_percent, held_out.rmse, result))
-    return CrossValidation(tuple(folds))
+        for number, (name, group, out) in enumerate(jobs, 1):
+            members = groups[group]
+            left_out = [members[i].name for i in out]
+            shown(f"{name} without {' and '.join(left_out)}, {number} of {len(jobs)}")
+            sigma = [np.inf if i in out else s for i, s in enumerate(weights(weighting, members))]
+            result = method(laws[name], members, weighting=sigma, **options)
+            scores = result.score(members)[2]
+            for i, others in zip(out, (left_out[1:], left_out[:1]), strict=False):
+                held_out = scores[i]
+                folds.append(Fold(name, group, held_out.name, held_out.fit_percent, held_out.rmse, result, *others))
+    outer, inner = (tuple(fold for fold in folds if (fold.also_out is None) == whole) for whole in (True, False))
+    return CrossValidation(outer, inner)

@@ -30,6 +30,7 @@ from jaxdamp.dampers import (
 )
 from jaxdamp.identify.fitting import NUMERICAL
 from jaxdamp.identify.laws import NAMED_LAWS
+from jaxdamp.identify.learnt import LearntStart
 from jaxdamp.identify.machine import OFFSET, Machine, lag_time, started_on
 from jaxdamp.identify.starting import Start
 
@@ -58,7 +59,8 @@ _MEMORYLESS = {
     "linear_friction": _friction,
 }
 _BESIDE_SPRING = {"lugre_spring": LuGre.guess, "visco_plastic_spring": ViscoPlastic.guess}
-LAWS = tuple(NAMED_LAWS)
+LEARNT = "neural_hysteresis_spring"
+LAWS = tuple(name for name, law in NAMED_LAWS.items() if not law.optional)
 
 
 def ladder_starts(names: Sequence[str] = LAWS) -> dict[str, Start]:
@@ -74,8 +76,8 @@ def ladder_starts(names: Sequence[str] = LAWS) -> dict[str, Start]:
     """
     names = [names] if isinstance(names, str) else names
     for name in names:
-        _checks.one_of("law", name, LAWS)
-    return {name: functools.partial(_start, name) for name in names}
+        _checks.one_of("law", name, tuple(NAMED_LAWS))
+    return {name: LearntStart() if name == LEARNT else functools.partial(_start, name) for name in names}
 
 
 def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS, *, rig: Machine = OFFSET) -> dict[str, Start]:
@@ -86,7 +88,8 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS, *, rig
     hysteresis: `besinger_lag`, `besinger_series_spring` (paper 001), `linear_friction_lag`, and for friction with
     elastic deformation before sliding, as in magnetorheological dampers, `bouc_wen`, `lugre_spring` and
     `visco_plastic_spring` (with a parallel spring). `besinger_play` has a clearance in series, and `series_spring_dahl`
-    a piecewise-linear law behind a spring, beside friction and a spring.
+    a piecewise-linear law behind a spring, beside friction and a spring. Only if it is named:
+    `neural_hysteresis_spring`, trained on the records (`LearntStart`).
 
     If a start cannot be computed from these records, the entry is a function that raises the reason when a fit calls
     it; `compare` continues with the other laws.
@@ -102,6 +105,9 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS, *, rig
     runs = as_runs(runs, call="default_ladder(runs, names)")
     ladder: dict[str, Start] = {}
     for name, start in ladder_starts(names).items():
+        if isinstance(start, LearntStart):
+            ladder[name] = start  # its training is the work of the fit
+            continue
         try:
             ladder[name] = started_on(start, runs, rig)[0]
         except NUMERICAL as error:

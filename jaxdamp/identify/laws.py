@@ -10,6 +10,7 @@ class NamedLaw(NamedTuple):
 
     hysteresis: bool
     meaning: str
+    optional: bool = False  # fitted only where it is asked for by name
 
 
 NAMED_LAWS = {
@@ -30,6 +31,9 @@ NAMED_LAWS = {
     "besinger_play": NamedLaw(True, "besinger behind a clearance: worn joint, loose mount, void in the oil"),
     "series_spring_dahl": NamedLaw(True, "piecewise_linear in series with a spring, elastic friction, a spring"),
     "visco_plastic_spring": NamedLaw(True, "concave viscous force, two yielding elements, a spring"),
+    "neural_hysteresis_spring": NamedLaw(
+        True, "one coefficient, hysteresis learnt by a network, a spring; takes minutes, only by name", optional=True
+    ),
 }
 
 

@@ -12,7 +12,7 @@ from jaxdamp.identify.criteria import FIRST_NOISE, priors_on
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
 from jaxdamp.identify.model import Model, on_rig
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.starting import Start
+from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.traces import batches, owners
 from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
 
@@ -55,7 +55,7 @@ def prepare(
     begin, machine = started_on(law, fitted_to, rig)
     model, absent = on_rig(begin, machine), absent_paths(machine)
     own = _per_record(model, per_record, sigma, absent)
-    frozen = [*name_patterns("freeze", freeze), *absent]
+    frozen = [*name_patterns("freeze", freeze), *frozen_by(law), *absent]
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
     residuals, ranges = batches(model, runs, sigma, samples_per_cycle, own)

@@ -4,8 +4,10 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from jaxdamp._tables import Cell, Column, Table
+from jaxdamp.dampers import AbstractDamper, with_command
 from jaxdamp.identify.residual import ErrorShares
-from jaxdamp.identify.result import FitResult
+from jaxdamp.identify.result import FitResult, Score
+from jaxdamp.identify.scheduling import ScheduledFit
 
 
 class Rung(NamedTuple):
@@ -18,11 +20,19 @@ class Rung(NamedTuple):
     held_out_fit_percent: float | None
     held_out_rmse: float | None  # N
     result: FitResult
+    scores: tuple[Score, ...]  # on the held-out records one by one, or on the fitted ones if there are none
+    by_setting: ScheduledFit | None = None  # where the parameters are functions of the command
 
     @property
     def error(self) -> float:
         """RMSE [N] by which laws are ranked: on the held-out records, or on the fitted ones if there are none."""
         return self.rmse if self.held_out_rmse is None else self.held_out_rmse
+
+    def laws(self) -> dict[str, AbstractDamper]:
+        """The law by its name; one that depends on the command at each, by a name of its own."""
+        law = self.result.law
+        settings = self.by_setting.alone if self.by_setting else ()
+        return {f"{self.name} at {setting:g}": with_command(law, setting) for setting in settings} or {self.name: law}
 
 
 class Failure(NamedTuple):

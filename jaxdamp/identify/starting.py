@@ -2,6 +2,7 @@
 
 import inspect
 import warnings
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -11,6 +12,19 @@ import numpy as np
 from jaxdamp import _checks, dampers
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, from_samples, without_fitted_ranges
+
+
+class AbstractTrainedStart(ABC):
+    """A function of records that trains a law, of which a fit then changes only a part."""
+
+    @property
+    @abstractmethod
+    def freeze(self) -> tuple[str, ...]:
+        """The parameters that a fit holds at the values of the training."""
+
+    @abstractmethod
+    def __call__(self, runs: Sequence[BenchRun]) -> AbstractDamper:
+        """The trained law."""
 
 
 Start = AbstractDamper | type[AbstractDamper] | Callable[..., AbstractDamper]
@@ -31,6 +45,11 @@ def started(law: Start, runs: Sequence[BenchRun]) -> AbstractDamper:
             return without_fitted_ranges(law.from_runs(tuple(runs)))
         takes_runs = "runs" in inspect.signature(law).parameters
         return without_fitted_ranges(law(tuple(runs)) if takes_runs else from_samples(law, runs))
+
+
+def frozen_by(law: Start) -> tuple[str, ...]:
+    """The parameters that a start asks a fit to hold."""
+    return law.freeze if isinstance(law, AbstractTrainedStart) else ()
 
 
 def check_start(argument: str, law: Any) -> None:

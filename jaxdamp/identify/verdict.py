@@ -1,14 +1,64 @@
 """The errors of fitted laws, explained in words."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.special import stdtrit
 
 from jaxdamp.bench import BenchRun
+from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.model import is_memoryless
 from jaxdamp.identify.rungs import Rung, best_of
+from jaxdamp.parameters import parameters
 
 
 HYSTERESIS = 0.05  # share of the squared error above which a law with states is worthwhile
 SHAPE = 0.3  # share of the squared error above which another curve is worthwhile
+
+FEWEST_RECORDS = 3  # whose errors show by how much they vary from record to record
+ALIKE = 0.01  # relative difference of errors that is never a reason to prefer a law
+
+
+def not_worse(errors: Mapping[str, Sequence[float]], best: str) -> list[str]:
+    """Laws whose errors on the same records do not tell them from the best one, in the order given.
+
+    A law is worse if the logarithms of the ratios of its errors to those of the best one have a mean that is above
+    zero by more than chance: by Student's t at 95 %, two-sided, every record being one observation. Fewer than three
+    records cannot show this: then only `ALIKE` counts.
+
+    Arguments:
+        errors: RMSE [N] on each record by law.
+        best: one of these laws.
+
+    >>> not_worse({"a": [10.0, 20.0, 15.0], "b": [11.0, 18.0, 16.0], "c": [20.0, 41.0, 29.0]}, "a")
+    ['b']
+    """
+    alike = []
+    for name, own in errors.items():
+        ratios = np.log(np.maximum(own, 1e-300) / np.maximum(errors[best], 1e-300))
+        n = ratios.size
+        spread = float(stdtrit(n - 1, 0.975) * np.std(ratios, ddof=1) / np.sqrt(n)) if n >= FEWEST_RECORDS else 0.0
+        if name != best and float(np.mean(ratios)) < max(spread, ALIKE):
+            alike.append(name)
+    return alike
+
+
+def cannot_choose(errors: Mapping[str, Sequence[float]], best: str, numbers: Mapping[str, int]) -> list[str]:
+    """A sentence on laws that the records cannot tell from the best one, if there are any.
+
+    Arguments:
+        errors: RMSE [N] on each record by law.
+        best: the law with the smallest error.
+        numbers: of free parameters of each law.
+    """
+    alike = [best, *not_worse(errors, best)]
+    if len(alike) == 1:
+        return []
+    simplest = min(alike, key=lambda name: numbers[name])
+    return [
+        f"The records cannot choose between {', '.join(alike[:-1])} and {alike[-1]}: their errors differ by no more "
+        f"than they vary from record to record. The simplest of them is {simplest}, with {numbers[simplest]} numbers."
+    ]
 
 
 def verdict(rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> tuple[str, ...]:
@@ -43,7 +93,14 @@ def verdict(rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> tuple[str, .
     if remaining.shape >= SHAPE:
         part = 100 * remaining.shape
         sentences.append(f"{part:.0f} % of the squared error of {best.name} is shape: another curve would fit better.")
+    errors = {rung.name: [score.rmse for score in rung.scores] for rung in rungs}
+    numbers = {rung.name: max(rung.parameters, _numbers_of(rung.result.law)) for rung in rungs}  # some may be frozen
+    sentences += cannot_choose(errors, best.name, numbers)
     return tuple(sentences)
+
+
+def _numbers_of(law: AbstractDamper) -> int:
+    return sum(np.size(p.value) for p in parameters(law))
 
 
 def _error_of(best: Rung, rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> str:

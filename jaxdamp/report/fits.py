@@ -75,6 +75,11 @@ def add_fits(report: Report, comparison: Comparison, failures: Sequence[str] | N
     if comparison.held_out:
         caption = f"{best.name} over the held-out records"
         report.picture(lambda: plots.fit_loops(best.result, comparison.held_out), caption, "best_law_held_out.png")
+    if best.by_setting:
+        report.table(best.by_setting.table())
+        for left in best.by_setting.between:
+            caption = f"{best.name} interpolated to {left.setting:g}, over records that it was not fitted to"
+            report.picture(left.plot, caption, f"best_law_interpolated_to_{left.setting:g}.png")
     _add_curves(report, comparison)
     for rung in comparison.rungs:
         if rung is not best:
@@ -123,7 +128,7 @@ def _add_curves(report: Report, comparison: Comparison) -> None:
     best = comparison.best
     order = sorted(comparison.rungs, key=lambda rung: rung.error)
     points = fitted_velocities(comparison)
-    laws = _with_curves(report, {rung.name: rung.result.law for rung in order}, points)
+    laws = _with_curves(report, {name: law for rung in order for name, law in rung.laws().items()}, points)
     bands: dict[str, Band] = {}
     with report.part(f"The band of {best.name} in force_velocity.png"):
         bands |= {best.name: best.result.band(points[::BAND_STEP])} if best.name in laws else {}

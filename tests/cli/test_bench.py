@@ -8,7 +8,7 @@ import pytest
 
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.cli import fitting
-from jaxdamp.dampers import Bilinear
+from jaxdamp.dampers import Bilinear, Scheduled
 from jaxdamp.export import from_json
 
 from .invoking import jaxdamp, refused
@@ -132,6 +132,23 @@ def test_fits_of_each_value_of_a_setting(folder: Path, tmp_path: Path) -> None:
     assert "Option --held-out leaves no record of command_0.5 to fit" in said
     said = refused(tmp_path, "fit", *files, "--group-by", "clicks", "--out", tmp_path / "none")
     assert "Option --group-by must name a setting that every record states" in said
+
+
+@pytest.mark.slow
+def test_records_of_several_currents_are_fitted_as_one_law(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    files = [folder / f"10mm_{speed}Hz.csv" for speed in (1, 2, 4)]
+    words = ("--command", "*_1Hz=0,*_2Hz=1,*_4Hz=2", "--law", "linear", "--out", out)
+    said = " ".join(jaxdamp("fit", *files, *words).output.split())
+    assert "linear interpolated to 1, whose records it was not fitted to: RMSE" in said
+    law = from_json(out / "best_law.json")
+    assert isinstance(law, Scheduled) and [float(level) for level in law.levels] == [0.0, 1.0, 2.0]
+    between = rows(out / "tables" / "settings.csv")[1]
+    assert float(between["setting"]) == 1.0 and float(between["interpolated [%]"]) > 50.0
+    assert {path.name for path in out.glob("*_velocity_*.csv")} == {
+        f"best_law_force_velocity_{level}.csv" for level in (0, 1, 2)
+    }
+    assert "best_law_interpolated_to_1.png" in {path.name for path in out.rglob("*.png")}
 
 
 def test_a_group_that_cannot_be_fitted_costs_that_group_alone(folder: Path, tmp_path: Path, monkeypatch) -> None:

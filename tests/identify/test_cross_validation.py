@@ -1,5 +1,6 @@
 """Held-out scores are those of laws that never saw the record."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -62,3 +63,26 @@ def test_groups_are_fitted_on_their_own(runs):
         identify.cross_validate({"bilinear": Bilinear}, both[:3], by=group)
     with pytest.raises(KeyError, match="No folds of 'bi'"):
         found.fit_percent("bi")
+
+
+def test_the_law_for_a_record_is_chosen_without_it(runs):
+    laws = {"linear": Linear, "bilinear": Bilinear}
+    found = identify.cross_validate(laws, runs, nested=True, weighting="runs")
+    assert len(found.folds) == 6 and len(found.inner) == 12
+    names = [run.name for run in runs]
+    for fold in found.inner:
+        known = [i for i, name in enumerate(names) if name not in (fold.held_out, fold.also_out)]
+        assert len(known) == 1 and fold.held_out != fold.also_out
+    fold = next(f for f in found.inner if (f.law, f.held_out, f.also_out) == ("bilinear", names[1], names[0]))
+    expected = identify.fit(Bilinear, runs[2:], rig="offset").score([runs[1]])
+    np.testing.assert_allclose((fold.fit_percent, fold.rmse), expected[:2], rtol=1e-5)
+    assert [(c.held_out, c.law) for c in found.choices] == [(name, "bilinear") for name in names]
+    assert found.chosen_fit_percent == pytest.approx(found.fit_percent("bilinear"))
+    # Scores in the record that is scored do not matter: with them turned round, the same laws are chosen.
+    turned = dataclasses.replace(found, folds=tuple(f._replace(fit_percent=-f.fit_percent) for f in found.folds))
+    assert [choice.law for choice in turned.choices] == ["bilinear"] * 3
+    assert "Chosen without the record that is scored (bilinear)" in found.verdict[-1]
+    with pytest.raises(ValueError, match="three records or more"):
+        identify.cross_validate(laws, runs[:2], nested=True)
+    with pytest.raises(ValueError, match="nested=True"):
+        _ = identify.cross_validate({"linear": Linear}, runs[:2]).choices

@@ -88,3 +88,27 @@ def test_refusals(lagged):
         identify.train(start, lagged[:1], held_out=lagged[1], patience=0)
     with pytest.raises(ValueError, match="`learning_rate` must be positive"):
         identify.train(start, lagged[:1], held_out=lagged[1], learning_rate=-0.1)
+
+
+@pytest.mark.slow
+def test_the_learnt_rung_is_trained_without_the_record_it_stops_by(lagged):
+    start = identify.ladder_starts(["neural_hysteresis_spring"])["neural_hysteresis_spring"]
+    assert isinstance(start, identify.LearntStart) and "neural_hysteresis_spring" not in identify.LAWS
+    start = identify.LearntStart(keys=2, options={"steps": 50})
+    first, second = start.trainings(lagged)
+    assert [run.name for run in first.held_out] == [lagged[1].name] and first.runs == (lagged[0], lagged[2])
+    assert first.held_out_rmse != second.held_out_rmse  # another key
+    best = min((first, second), key=lambda training: training.held_out_rmse)
+    sigma = [1.0, 1.0, 1.0]
+    result = identify.fit(start, lagged, rig=None, weighting=sigma, max_steps=20)
+    for name in start.freeze:
+        np.testing.assert_array_equal(get(result.law, f"terms.1.{name}"), get(best.law, f"terms.1.{name}"))
+    assert {e.name for e in result.parameters} == {
+        "terms.0.rate",
+        "terms.1.stiffness[0]",
+        "terms.1.stiffness[1]",
+        "terms.2.stiffness",
+        "terms.2.preload",
+    }
+    with pytest.raises(ValueError, match="two records or more"):
+        identify.fit(start, lagged[:1])

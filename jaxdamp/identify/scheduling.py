@@ -1,0 +1,284 @@
+"""`fit_scheduled`: one law for records at several settings, such as coil currents or clicks of an adjuster."""
+
+import dataclasses
+import functools
+import itertools
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._progress import Progress
+from jaxdamp._tables import Column, Table, plain
+from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.dampers import AbstractDamper, Scheduled, takes_command
+from jaxdamp.identify.fitting import fit, solve
+from jaxdamp.identify.machine import OFFSET, Machine
+from jaxdamp.identify.model import law_of, rig_of
+from jaxdamp.identify.preparing import prepare
+from jaxdamp.identify.result import FitResult, score
+from jaxdamp.identify.starting import Start, frozen_by
+from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
+from jaxdamp.rig import Rig
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+CALL = "fit_scheduled(law, runs)"
+OF_THE_RESULT = ("loss", "force_noise", "input_noise")  # options of `fit` without a part in starts
+
+
+class AtSetting(NamedTuple):
+    """A law fitted to the records of one setting alone.
+
+    Attributes:
+        law: the fitted law.
+        rig: the fitted test machine, if one was fitted.
+        runs: the records.
+        fit_percent: over all records.
+        rmse: the same [N].
+        is_only_minimum: whether no other start can lead elsewhere.
+    """
+
+    law: AbstractDamper
+    rig: Rig | None
+    runs: tuple[BenchRun, ...]
+    fit_percent: float
+    rmse: float
+    is_only_minimum: bool
+
+
+Alone = dict[float, AtSetting]
+
+
+class LeftOutSetting(NamedTuple):
+    """How well a law interpolates to a setting whose records it was not fitted to.
+
+    Attributes:
+        setting: the command that was left out.
+        runs: its records.
+        result: the law fitted to the records of all other settings.
+        fit_percent: of the interpolated law on the records left out.
+        rmse: of the same [N].
+        own_fit_percent: of the law fitted to these records alone.
+        own_rmse: of the same [N].
+    """
+
+    setting: float
+    runs: tuple[BenchRun, ...]
+    result: FitResult
+    fit_percent: float
+    rmse: float
+    own_fit_percent: float
+    own_rmse: float
+
+    def sentence(self, name: str) -> str:
+        """The comparison with a law fitted at this setting, in words."""
+        return (
+            f"{name} interpolated to {self.setting:g}, whose records it was not fitted to: RMSE {self.rmse:.1f} N"
+            f" (fit {self.fit_percent:.1f} %), {self.rmse / self.own_rmse:.2f} times that of the law fitted there alone"
+            f" ({self.own_rmse:.1f} N, {self.own_fit_percent:.1f} %)."
+        )
+
+    def plot(self) -> "Figure":
+        """Loops at the setting left out, measured and interpolated, with residuals."""
+        return self.result.plot(self.runs)
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class ScheduledFit:
+    """One law for several settings.
+
+    Attributes:
+        result: the fit of all records together; its law is a `Scheduled`.
+        alone: the fit of the records of each setting alone, whose laws the common fit started from.
+        chain: the fits behind it.
+    """
+
+    result: FitResult
+    alone: Alone
+    chain: "Chain"
+
+    @functools.cached_property
+    def between(self) -> tuple[LeftOutSetting, ...]:
+        """How well the law interpolates, for each setting between others; fitted when first asked for."""
+        with Progress("Leaving out settings") as shown:
+            return tuple(self.chain.without(setting, shown) for setting in self.chain.settings[1:-1])
+
+    @property
+    def law(self) -> Scheduled:
+        """The law of all settings; `dampers.with_command(law, setting)` is that of one."""
+        assert isinstance(self.result.law, Scheduled)
+        return self.result.law
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """Sentences on the common fit and on the interpolation."""
+        settings = ", ".join(f"{setting:g}" for setting in self.alone)
+        head = (
+            f"One law for the settings {settings}: fit {self.result.fit_percent:.1f} %, RMSE {self.result.rmse:.1f} N."
+        )
+        none = "No setting lies between two others, so the interpolation cannot be scored: measure a third one."
+        return head, *([left.sentence("The law") for left in self.between] or [none])
+
+    def table(self) -> Table:
+        """For each setting, the fit of the law of this setting alone, of the common law, and of an interpolated one."""
+        columns = [Column("setting", spec="g"), Column("records", spec="d"), Column("alone", "%", ".1f")]
+        columns += [Column("as one law", "%", ".1f"), Column("interpolated", "%", ".1f")]
+        between = {left.setting: left.fit_percent for left in self.between}
+        rows = []
+        for setting, own in self.alone.items():
+            percent = self.result.score(own.runs)[0]
+            rows.append((setting, len(own.runs), own.fit_percent, percent, between.get(setting)))
+        return Table("Fit by setting", tuple(columns), tuple(rows))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fits as numbers with units and words, ready for JSON."""
+        return {
+            "verdict": list(self.verdict),
+            "result": self.result.to_dict(),
+            "settings": plain(self.table().records()),
+        }
+
+    def plot(self) -> "Figure":
+        """Loops at the first setting left out, interpolated; without one, those of the common fit."""
+        return self.between[0].plot() if self.between else self.result.plot()
+
+    def __repr__(self) -> str:
+        return "\n".join([self.table().to_text(), *self.verdict])
+
+
+def fit_scheduled(
+    law: Start,
+    runs: Iterable[BenchRun],
+    *,
+    common: Sequence[str] = (),
+    rig: Machine = OFFSET,
+    weighting: str = "samples",
+    freeze: Sequence[str] = (),
+    progress: Callable[[str], None] | None = None,
+    **options: Any,
+) -> ScheduledFit:
+    """Fit one law to records at several settings: its parameters are functions of the command, a `Scheduled`.
+
+    Every setting has its own parameters, with straight lines between them. First the law is fitted at each setting
+    alone, from its own start and from the law of the neighbouring setting, of which the better fit counts, so that the
+    parameters of neighbours belong together. From there all records are fitted as one problem. `between` then leaves
+    each setting between two others out in turn and predicts it by the law interpolated from all others.
+
+    Arguments:
+        law: the start, as in `fit`, of a law without a command.
+        runs: records that state their `command`, of two or more commands.
+        common: parameters that do not depend on the setting, by path, last part of a path or pattern.
+        rig: the test machine as in `compare`, common to all settings.
+        weighting: `"samples"` or `"runs"`, as in `fit`.
+        freeze: parameters to hold at their start, as in `fit`.
+        progress: called with what is fitted next; a line in the terminal if it is left out.
+        options: passed on to `fit`.
+
+    Raises:
+        ValueError: records without a command, or of one command only; a law that takes a command itself.
+
+    >>> from jaxdamp import bench, dampers
+    >>> runs = []
+    >>> for current in (0.0, 1.0, 2.0):
+    ...     dyno = bench.VirtualDyno(dampers.Linear(1000.0 + 500.0 * current), force_noise=5.0)
+    ...     runs += [dataclasses.replace(run, command=current) for run in dyno.run(bench.SineTest(0.02, 2.0))]
+    >>> fit_scheduled(dampers.Linear, runs).between[0].fit_percent > 95.0
+    True
+    """
+    runs = settings_stated(as_runs(runs, call=CALL))
+    _checks.one_of("weighting", weighting, ("samples", "runs"))
+    frozen = [*name_patterns("freeze", freeze), *frozen_by(law)]
+    chain = Chain(law, runs, common, rig, options | {"weighting": weighting, "freeze": frozen})
+    with Progress("Fitting by setting") as line:
+        shown = progress or line
+        alone = chain.alone(chain.settings, shown)
+        shown("all settings as one law")
+        return ScheduledFit(chain.together(alone), alone, chain)
+
+
+def settings_stated(runs: Sequence[BenchRun]) -> tuple[BenchRun, ...]:
+    """The records, all of which must state a command, of two or more commands."""
+    remedy = 'Pass it when reading, `bench.read(..., command={"*_0.5A": 0.5})`.'
+    if lacking := [run.name for run in runs if run.command is None]:
+        _checks.refuse("runs", "all state their command", f"without one: {', '.join(lacking)}", remedy)
+    if len(commands := {run.command for run in runs}) < 2:
+        _checks.refuse("runs", "have two commands or more", f"records of {commands}", "Use `fit` for one setting.")
+    return tuple(runs)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Chain:
+    """The fits of one law at several settings, each of which starts from those of its neighbours."""
+
+    law: Start
+    runs: tuple[BenchRun, ...]
+    common: Sequence[str]
+    rig: Machine
+    options: dict[str, Any]
+    own: Alone = dataclasses.field(default_factory=dict)  # the fit at a setting from the start of the law there
+
+    @property
+    def settings(self) -> list[float]:
+        """The commands in increasing order."""
+        return sorted({float(run.command) for run in self.runs if run.command is not None})
+
+    def at(self, setting: float) -> list[BenchRun]:
+        """The records of one setting."""
+        return [run for run in self.runs if run.command == setting]
+
+    def alone(self, settings: Sequence[float], shown: Callable[[str], None]) -> Alone:
+        """The best fit at each of these settings: from its own start, or from the neighbour below or above."""
+        for setting in settings:
+            if setting not in self.own:
+                shown(f"{setting:g} alone")
+                self.own[setting] = self.fitted_at(setting, self.law)
+        fits = {setting: self.own[setting] for setting in settings}
+        pairs = list(itertools.pairwise(settings))
+        for begin, to in [*pairs, *((above, below) for below, above in reversed(pairs))]:
+            if fits[to].is_only_minimum:
+                continue
+            shown(f"{to:g} from the law at {begin:g}")
+            again = self.fitted_at(to, fits[begin].law, starts=1)
+            fits[to] = min(fits[to], again, key=lambda at: at.rmse)
+        return fits
+
+    def fitted_at(self, setting: float, start: Start, **changed: Any) -> AtSetting:
+        """The law at one setting, by least squares: the start of a larger fit, so without errors and warnings."""
+        options = {name: value for name, value in self.options.items() if name not in OF_THE_RESULT} | changed
+        search = {name: options.pop(name) for name in ("starts", "max_steps") if name in options}
+        problem = prepare(start, self.at(setting), rig=self.rig, **options)
+        if takes_command(problem.law):
+            remedy = "Such a law is fitted to all commands by `fit`."
+            _checks.refuse("law", "take no command itself", repr(problem.law), remedy)
+        solution = solve(problem, **search)
+        model = problem.free.started_at(solution.best.values).tree
+        errors = score(model, problem.runs)[:2]
+        return AtSetting(law_of(model), rig_of(model), problem.runs, *errors, solution.closed_form)
+
+    def together(self, alone: Alone) -> FitResult:
+        """The fit of all records of these settings as one law, from the laws of each."""
+        laws = [at.law for at in alone.values()]
+        known = [p.path for p in parameters(laws[0])]
+        shared = match_paths(known, name_patterns("common", self.common))
+        means = {path: np.mean([np.asarray(get(law, path)) for law in laws], axis=0) for path in shared}
+        rigs = [at.rig for at in alone.values() if at.rig is not None]
+        machine = jax.tree.map(lambda *leaves: sum(leaves) / len(leaves), *rigs) if rigs else None
+        place = "law.laws" if rigs else "laws"
+        tie = {f"{place}.{k}.{path}": f"{place}.0.{path}" for path in shared for k in range(1, len(laws))}
+        scheduled = Scheduled(tuple(with_values(law, means) for law in laws), list(alone), command=min(alone))
+        members = [run for setting in alone for run in self.at(setting)]
+        options: dict[str, Any] = self.options | {"starts": 1, "tie": tie}
+        return fit(scheduled, members, rig=machine, **options)
+
+    def without(self, setting: float, shown: Callable[[str], None]) -> LeftOutSetting:
+        """The score at a setting of the law interpolated from all others; its records have no part in any start."""
+        alone = self.alone([other for other in self.settings if other != setting], shown)
+        shown(f"all but {setting:g} as one law")
+        result, runs, own = self.together(alone), tuple(self.at(setting)), self.own[setting]
+        return LeftOutSetting(setting, runs, result, *result.score(runs)[:2], own.fit_percent, own.rmse)

@@ -1,0 +1,75 @@
+"""One law for records at several settings, scored at settings that it was not fitted to."""
+
+import dataclasses
+import json
+
+import pytest
+
+from jaxdamp import identify
+from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.dampers import Bilinear, ModifiedBoucWen, Scheduled, with_command
+from jaxdamp.identify.verdict import cannot_choose, not_worse
+from jaxdamp.parameters import get
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """A bilinear damper whose rates are straight lines in the current, at three currents."""
+    records = []
+    for current in (0.0, 1.0, 2.0):
+        dyno = VirtualDyno(Bilinear(1000.0 + 500.0 * current, 600.0), 200.0, force_noise=5.0, seed=int(current))
+        records += [dataclasses.replace(r, command=current) for r in dyno.run([SineTest(0.01, 4.0, cycles=3)])]
+    return records
+
+
+def test_a_setting_between_others_is_predicted_without_its_records(runs):
+    found = identify.fit_scheduled(Bilinear, runs)
+    assert isinstance(found.law, Scheduled) and list(found.law.levels) == [0.0, 1.0, 2.0]
+    (left,) = found.between
+    assert left.setting == 1.0 and all(run.command != 1.0 for run in left.result.runs)
+    law = with_command(left.result.law, 1.0)
+    assert float(law.force(0.0, 1.0, law.initial_state())) == pytest.approx(1500.0, rel=0.01)
+    assert (left.fit_percent, left.rmse) == left.result.score(left.runs)[:2]
+    assert 1.0 <= left.rmse / left.own_rmse < 1.1
+    assert "interpolated to 1, whose records" in found.verdict[1]
+    row = found.table().records()[1]
+    assert row["setting"] == 1.0 and row["interpolated"] == pytest.approx(left.fit_percent)
+    json.dumps(found.to_dict(), allow_nan=False)
+    assert found.plot().axes
+    with pytest.raises(ValueError, match="all state their command"):
+        identify.fit_scheduled(Bilinear, [dataclasses.replace(runs[0], command=None), *runs[1:]])
+    with pytest.raises(ValueError, match="two commands or more"):
+        identify.fit_scheduled(Bilinear, runs[:1])
+
+
+@pytest.mark.slow
+def test_common_parameters_have_one_value_at_all_settings(runs):
+    found = identify.fit_scheduled(Bilinear, runs, common=["compression_rate"])
+    assert len(found.result.parameters) == 5  # three rebound rates, one compression rate, the offset of the load cell
+    rates = [float(get(law, "compression_rate")) for law in found.law.laws]
+    assert rates == [rates[0]] * 3 and rates[0] == pytest.approx(600.0, rel=0.01)
+
+
+@pytest.mark.slow
+def test_a_comparison_of_laws_that_depend_on_the_setting(runs):
+    laws = {"bilinear": Bilinear, "modified": ModifiedBoucWen.prototype()}
+    comparison = identify.compare(laws, runs, scheduled=True)
+    assert "take no command itself" in comparison.failed[0].reason
+    assert list(comparison.best.laws()) == ["bilinear at 0", "bilinear at 1", "bilinear at 2"]
+    assert "bilinear interpolated to 1" in comparison.verdict[-1]
+
+
+def test_laws_that_the_records_cannot_tell_apart_are_named():
+    errors = {"linear": [20.0, 41.0, 29.0], "bilinear": [11.0, 18.0, 16.0], "table": [10.0, 20.0, 15.0]}
+    (said,) = cannot_choose(errors, "table", {"linear": 2, "bilinear": 3, "table": 9})
+    assert "cannot choose between table and bilinear:" in said and "is bilinear, with 3 numbers" in said
+    assert not cannot_choose({name: errors[name] for name in ("linear", "table")}, "table", {"linear": 2, "table": 9})
+    assert not_worse({"a": [10.0], "b": [10.05], "c": [10.2]}, "a") == ["b"]  # one record: what varies is unknown
+
+
+def test_a_comparison_says_that_its_records_cannot_choose(sines):
+    runs = sines(Bilinear(2000.0, 1000.0), noise=20.0)
+    laws = identify.default_ladder(runs, ["linear", "bilinear", "piecewise_linear"])
+    said = identify.compare(laws, runs).verdict[-1]
+    assert "cannot choose between" in said and "The simplest of them is bilinear, with 3 numbers" in said
+    assert "between linear" not in said and ", linear" not in said
