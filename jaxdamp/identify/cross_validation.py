@@ -105,8 +105,9 @@ class CrossValidation:
 
             def score(law: str, first: Fold = first) -> float:
                 means = [self.fit_percent(law, group) for group in self.groups if group != first.group]
-                own = [f for f in self.inner if (f.law, f.group, f.also_out) == (law, first.group, first.held_out)]
-                return float(np.mean([*means, np.mean([fold.fit_percent for fold in own])]))
+                key = (law, first.group, first.held_out)
+                own = [f.fit_percent for f in self.inner if (f.law, f.group, f.also_out) == key]
+                return float(np.mean([*means, float(np.mean(own))]))
 
             law = max(self.laws, key=score)
             (fold,) = (f for f in self._of(law, first.group) if f.held_out == first.held_out)

@@ -62,8 +62,8 @@ class LearntStart(AbstractTrainedStart):
             _checks.refuse("runs", must, f"{len(runs)}", "Take a law with few parameters.")
         stop = sorted(range(len(runs)), key=lambda i: runs[i].peak_velocity)[len(runs) // 2]
         rest = [run for i, run in enumerate(runs) if i != stop]
-        how = {"steps": STEPS, "patience": PATIENCE, "learning_rate": LEARNING_RATE, "weighting": "runs"}
-        how = how | {"samples_per_cycle": SAMPLES_PER_CYCLE} | self.options
+        how: dict[str, Any] = {"steps": STEPS, "patience": PATIENCE, "learning_rate": LEARNING_RATE}
+        how |= {"weighting": "runs", "samples_per_cycle": SAMPLES_PER_CYCLE} | self.options
         return [train(self.untrained(rest, key), rest, held_out=runs[stop], **how) for key in range(self.keys)]
 
     @staticmethod
@@ -72,10 +72,7 @@ class LearntStart(AbstractTrainedStart):
         velocity, force, stroke = (
             np.concatenate([getattr(run, channel) for run in runs]) for channel in ("velocity", "force", "stroke")
         )
-        scales = {
-            "velocity_scale": float(np.sqrt(np.mean(velocity**2))),
-            "force_scale": float(np.sqrt(np.mean(force**2))),
-        }
-        network = NeuralHysteresis.random(jax.random.key(key), **scales)
-        rate = float(Linear.guess(velocity, force).rate) / 3.0
+        speed, level = (float(np.sqrt(np.mean(values**2))) for values in (velocity, force))
+        network = NeuralHysteresis.random(jax.random.key(key), velocity_scale=speed, force_scale=level)
+        rate = float(np.asarray(Linear.guess(velocity, force).rate)) / 3.0
         return Linear(rate) + network + Spring.guess(velocity, force, stroke)
