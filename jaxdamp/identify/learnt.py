@@ -66,8 +66,7 @@ class LearntStart(AbstractTrainedStart):
         how |= {"weighting": "runs", "samples_per_cycle": SAMPLES_PER_CYCLE} | self.options
         return [train(self.untrained(rest, key), rest, held_out=runs[stop], **how) for key in range(self.keys)]
 
-    @staticmethod
-    def untrained(runs: Sequence[BenchRun], key: int) -> AbstractDamper:
+    def untrained(self, runs: Sequence[BenchRun], key: int = 0) -> AbstractDamper:
         """A third of the damping in one coefficient, random weights, and the spring of the records."""
         velocity, force, stroke = (
             np.concatenate([getattr(run, channel) for run in runs]) for channel in ("velocity", "force", "stroke")

@@ -9,7 +9,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify.starting import Start, started
+from jaxdamp.identify.starting import AbstractTrainedStart, Start, started
 from jaxdamp.parameters import parameters
 from jaxdamp.rig import Rig
 
@@ -94,12 +94,14 @@ def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine) -> tuple[Abst
     names, an offset or gas force is left out beside a law that contains an offset itself.
     """
     machine = started_machine(rig, runs)
-    begin = started(law, without_machine(machine, runs))
-    if machine is None or isinstance(rig, Rig) or not begin.traits().contains_offset:
+    bare, trained = without_machine(machine, runs), isinstance(law, AbstractTrainedStart)
+    begin = law.untrained(bare) if isinstance(law, AbstractTrainedStart) else started(law, bare)
+    if machine is not None and not isinstance(rig, Rig) and begin.traits().contains_offset:
+        left = dataclasses.replace(machine, force_offset=Rig().force_offset, gas_force=Rig().gas_force)
+        machine = left if free_fields(left) else None
+    elif not trained:
         return begin, machine
-    left = dataclasses.replace(machine, force_offset=Rig().force_offset, gas_force=Rig().gas_force)
-    own = left if free_fields(left) else None
-    return started(law, without_machine(own, runs)), own
+    return started(law, without_machine(machine, runs)), machine
 
 
 def free_fields(rig: Rig) -> list[str]:

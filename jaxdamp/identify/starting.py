@@ -23,6 +23,10 @@ class AbstractTrainedStart(ABC):
         """The parameters that a fit holds at the values of the training."""
 
     @abstractmethod
+    def untrained(self, runs: Sequence[BenchRun]) -> AbstractDamper:
+        """The law before its training."""
+
+    @abstractmethod
     def __call__(self, runs: Sequence[BenchRun]) -> AbstractDamper:
         """The trained law."""
 

@@ -91,7 +91,7 @@ def test_refusals(lagged):
 
 
 @pytest.mark.slow
-def test_the_learnt_rung_is_trained_without_the_record_it_stops_by(lagged):
+def test_the_learnt_rung_is_trained_without_the_record_it_stops_by(lagged, monkeypatch):
     start = identify.ladder_starts(["neural_hysteresis_spring"])["neural_hysteresis_spring"]
     assert isinstance(start, identify.LearntStart) and "neural_hysteresis_spring" not in identify.LAWS
     start = identify.LearntStart(keys=2, options={"steps": 50})
@@ -100,7 +100,11 @@ def test_the_learnt_rung_is_trained_without_the_record_it_stops_by(lagged):
     assert first.held_out_rmse != second.held_out_rmse  # another key
     best = min((first, second), key=lambda training: training.held_out_rmse)
     sigma = [1.0, 1.0, 1.0]
-    result = identify.fit(start, lagged, rig=None, weighting=sigma, max_steps=20)
+    with monkeypatch.context() as patch:  # a law with an offset of its own is trained once, on the records as they are
+        patch.setattr(identify.LearntStart, "trainings", lambda self, runs: seen.append(runs) or [first, second])
+        seen: list = []
+        result = identify.fit(start, lagged, rig="offset", weighting=sigma, max_steps=20)
+    assert result.rig is None and [list(runs) for runs in seen] == [lagged]
     for name in start.freeze:
         np.testing.assert_array_equal(get(result.law, f"terms.1.{name}"), get(best.law, f"terms.1.{name}"))
     assert {e.name for e in result.parameters} == {
