@@ -67,6 +67,7 @@ def test_laws_that_the_records_cannot_tell_apart_are_named():
     assert not_worse({"a": [10.0], "b": [10.05], "c": [10.2]}, "a") == ["b"]  # one record: what varies is unknown
 
 
+@pytest.mark.slow
 def test_a_comparison_says_that_its_records_cannot_choose(sines):
     runs = sines(Bilinear(2000.0, 1000.0), noise=20.0)
     laws = identify.default_ladder(runs, ["linear", "bilinear", "piecewise_linear"])
