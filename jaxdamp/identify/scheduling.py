@@ -183,12 +183,12 @@ def fit_scheduled(
     Raises:
         ValueError: records without a command, or of one command only; a law that takes a command itself.
 
-    >>> from jaxdamp import bench, dampers
+    >>> from jaxdamp import bench, dampers, identify
     >>> runs = []
     >>> for current in (0.0, 1.0, 2.0):
     ...     dyno = bench.VirtualDyno(dampers.Linear(1000.0 + 500.0 * current), force_noise=5.0)
     ...     runs += [dataclasses.replace(run, command=current) for run in dyno.run(bench.SineTest(0.02, 2.0))]
-    >>> fit_scheduled(dampers.Linear, runs).between[0].fit_percent > 95.0
+    >>> identify.fit_scheduled(dampers.Linear, runs).between[0].fit_percent > 95.0
     True
     """
     runs = settings_stated(as_runs(runs, call=CALL))
