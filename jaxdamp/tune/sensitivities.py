@@ -21,6 +21,7 @@ from jaxdamp.tune.objective import Function, Objective, objective_of
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
 from jaxdamp.tune.shape import damper_paths, held_force
+from jaxdamp.tune.task import is_white
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind
 
 
@@ -81,8 +82,10 @@ def sensitivity(
     _check(wanted, vehicle, road, given)
     make: Any = road
     first = make(**given) if given else make
-    white = first.white if isinstance(first, Scenarios) else isinstance(first, WhiteRoad)
-    objective = _objective(wanted, vehicle, white)
+    white = is_white(first)
+    objective = objective_of(wanted, vehicle, [], [], white=white)
+    if not objective.functions:  # the metrics that are wanted, and no others
+        objective = objective._replace(metrics=tuple(m for m in objective.metrics if m.name in objective.names))
     run = {"duration": duration, "dt": dt}
     paths = [] if dampers is None or white else _curves(vehicle, dampers)
     hatted = vehicle
@@ -97,7 +100,7 @@ def sensitivity(
     else:
         fixed = Measurement(hatted, first, objective, free, **run)
         measured = lambda x: fixed(free.build(x))  # noqa: E731
-    names = [m for m in objective.units(vehicle) if _is_wanted(m, wanted, objective)]
+    names = [name for name in objective.units(vehicle) if name in objective.names]
     values, slopes = _derivatives(measured, names, point)
     parts = [*zip(free.owners, free.names, strict=True)]
     is_curve = np.array([is_hat(p.path, hatted) for p, _ in parts] + [False] * len(given), bool)
@@ -134,19 +137,6 @@ def _check(wanted: Sequence[Any], vehicle: Any, road: Any, quantities: Mapping[s
         _checks.finite("quantities", list(quantities.values()))
     elif not isinstance(road, Scenarios):
         check_module("road", road, (AbstractRoad, WhiteRoad), call)
-
-
-def _objective(wanted: Sequence[Any], vehicle: AbstractVehicle, white: bool) -> Objective:
-    """The metrics that are wanted, and no others."""
-    objective = objective_of(wanted[0], vehicle, wanted[1:], [], white=white)
-    if objective.function is not None:
-        return objective
-    return objective._replace(metrics=tuple(m for m in objective.metrics if _is_wanted(m.name, wanted, objective)))
-
-
-def _is_wanted(name: str, wanted: Sequence[Any], objective: Objective) -> bool:
-    names = {one.name if isinstance(one, Metric) else one for one in wanted[1:]} | {objective.name}
-    return name in names
 
 
 def _curves(vehicle: AbstractVehicle, pattern: str) -> list[str]:
