@@ -139,17 +139,17 @@ def test_scenarios_limits_shapes_ties_and_starts_are_those_of_a_tuning():
 
 
 def test_a_limit_that_does_not_hold_on_fresh_roads_is_said():
-    road = roads.iso8608("C", speed=20.0, seed=1)
+    road = roads.iso8608("C", speed=20.0, seed=4712)  # smoother than the next one
     run: dict[str, Any] = {"duration": 0.5, "dt": 2e-3}
-    limits = {metrics.Metric("sprung_acceleration", "peak"): 1.0}
+    limits = {metrics.Metric("sprung_acceleration", "peak"): 0.8}
     front = tune.pareto(
         [COMFORT, TYRE], CAR, road, points=3, limits=limits, over={"rate": (2500.0, 7000.0)}, fresh_roads=2, **run
     )
     (name,) = front.limits
-    assert front.fresh[name].shape == (2, len(front)) and front.values[name].max() <= 1.0
-    other = jaxdamp.Ride(front.point(0), road.reseeded(4712), metrics=[COMFORT], **run)()
-    assert front.fresh[COMFORT][1, 0] == pytest.approx(float(other[COMFORT]), rel=1e-9)
-    beyond = front.fresh[name] > 1.0
+    assert front.fresh[name].shape == (2, len(front)) and front.values[name].max() <= 0.8
+    other = jaxdamp.Ride(front.point(0), road.reseeded(4711), metrics=[COMFORT], **run)()
+    assert front.fresh[COMFORT][0, 0] == pytest.approx(float(other[COMFORT]), rel=1e-9)
+    beyond = front.fresh[name] > 0.8
     assert beyond.any()
     note = next(text for text in front.warnings if "fresh roads" in text)
     assert f"On {beyond.any(axis=1).sum()} of 2 fresh roads {name} is beyond its limit at" in note
