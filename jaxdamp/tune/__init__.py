@@ -12,7 +12,8 @@
 """
 
 from jaxdamp._status import Status
-from jaxdamp.tune.decisions import DamperComparison, Difference, FittedLaw, compare_dampers
+from jaxdamp.tune.comparison import DamperComparison, Difference
+from jaxdamp.tune.decisions import FittedLaw, compare_dampers
 from jaxdamp.tune.front import ParetoFront, hypervolume
 from jaxdamp.tune.limits import limit_spans
 from jaxdamp.tune.minimising import minimise

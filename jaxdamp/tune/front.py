@@ -35,6 +35,9 @@ def hypervolume(values: Float[np.ndarray, "points objectives"], reference: Float
     >>> hypervolume(np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([3.0, 3.0]))
     3.0
     """
+    if values.ndim != 2 or values.shape[1:] != np.shape(reference):
+        remedy = "Give one value for each objective, as `front.reference.values()`."
+        _checks.refuse("reference", "have one value for each column of `values`", f"of {np.shape(reference)}", remedy)
     values = values[np.all(values < reference, axis=1)]
     if not len(values):
         return 0.0

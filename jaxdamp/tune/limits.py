@@ -11,6 +11,7 @@ from jaxdamp._tables import typeset_unit
 from jaxdamp.metrics import Metric, current_name
 
 
+EXAMPLE = "Write `{'working_space_peak_to_peak': 0.1}`, or `{...: (smallest, largest)}`."
 Span = tuple[float, float]  # smallest and largest allowed value, infinite without one
 
 
@@ -57,7 +58,7 @@ def limit_spans(limits: Mapping[Any, Any] | None, known: Sequence[str]) -> dict[
         ValueError: limits that are neither a largest value nor a smallest and a largest one.
     """
     if not isinstance(limits, Mapping | None):
-        _checks.refuse("limits", "be a mapping of metrics to limits", _checks.described(limits))
+        _checks.refuse("limits", "be a mapping of metrics to limits", _checks.described(limits), EXAMPLE)
     return {
         one.name if isinstance(one, Metric) else current_name(one, known): _span(one, span)
         for one, span in (limits or {}).items()
@@ -68,6 +69,8 @@ def _span(one: str | Metric, given: Any) -> Span:
     label = f"limits[{one.name if isinstance(one, Metric) else one!r}]"
     must = "be the largest allowed value, or the smallest and the largest one"
     pair = given if isinstance(given, tuple | list) else (None, given)
+    if any(isinstance(end, str) for end in pair) or all(end is None for end in pair):
+        _checks.refuse(label, must, repr(given), "Write 0.1, or (-0.08, 0.1); None for an end without a limit.")
     try:
         lower, upper = (
             default if x is None else float(x) for x, default in zip(pair, (-math.inf, math.inf), strict=True)
@@ -75,7 +78,7 @@ def _span(one: str | Metric, given: Any) -> Span:
     except (TypeError, ValueError):
         _checks.refuse(label, must, repr(given), "Write 0.1, or (-0.08, 0.1); None for an end without a limit.")
     if not lower < upper:
-        _checks.refuse(label, f"{must}, in increasing order", repr(given))
+        _checks.refuse(label, f"{must}, in increasing order", repr(given), "Write (-0.08, 0.1).")
     return lower, upper
 
 

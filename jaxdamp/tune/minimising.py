@@ -115,7 +115,7 @@ def minimise(
     'at its upper bound'
     """
     check_objective("metric", metric, "The call is `minimise(metric, vehicle, road)`.")
-    counts = {"max_steps": (max_steps, 1), "starts": (starts, 1), "fresh_roads": (fresh_roads, 0)}
+    counts = {"max_steps": (max_steps, 1), "starts": (starts, 1), "fresh_roads": (fresh_roads, 0), "seed": (seed, 0)}
     check_call("minimise(metric, vehicle, road)", vehicle, road, counts)
     task = DesignTask(
         [metric], vehicle, road, argument="metric", over=over, freeze=freeze, bounds=bounds, tie=tie, limits=limits,

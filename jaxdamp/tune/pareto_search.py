@@ -101,13 +101,8 @@ def pareto(
     >>> [round(float(rate), -1) for rate in front.designs[[0, -1], 0]]  # the two optima: 4656.4 and 5536.5
     [4660.0, 5540.0]
     """
-    _check(
-        objectives,
-        vehicle,
-        road,
-        points,
-        {"max_steps": (max_steps, 1), "starts": (starts, 1), "fresh_roads": (fresh_roads, 0), "between": (between, 0)},
-    )
+    counts = {"points": (points, 1), "between": (between, 0), "max_steps": (max_steps, 1), "starts": (starts, 1)}
+    _check(objectives, vehicle, road, points, counts | {"fresh_roads": (fresh_roads, 0), "seed": (seed, 0)})
     task = DesignTask(
         objectives, vehicle, road, argument="objectives", over=over, freeze=freeze, bounds=bounds, tie=tie,
         limits=limits, shape=shape, metrics=metrics, duration=duration, dt=dt,
@@ -180,10 +175,14 @@ def _check(objectives: Any, vehicle: Any, road: Any, points: int, counts: Mappin
 
 def _reference(reference: Mapping[str, float] | None, names: Sequence[str]) -> dict[str, float]:
     """The given part of the reference point."""
-    given = {current_name(name, names): float(value) for name, value in (reference or {}).items()}
-    for name in given:
+    remedy = f"Write `{{{names[0]!r}: 1.5}}`, in the unit of the objective."
+    if not isinstance(reference, Mapping | None):
+        _checks.refuse("reference", "be a mapping of objectives to values", _checks.described(reference), remedy)
+    given = {current_name(name, names): value for name, value in (reference or {}).items()}
+    for name, value in given.items():
         _checks.one_of("reference", name, names)
-    return given
+        _checks.finite(f"reference[{name!r}]", value, remedy)
+    return {name: float(value) for name, value in given.items()}
 
 
 def _on_fresh_roads(evaluator: BatchEvaluator, designs: np.ndarray, count: int) -> dict[str, np.ndarray]:

@@ -1,5 +1,6 @@
 """`sensitivity`: which parameters, and which velocities of the damper curve, a ride metric comes from."""
 
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
@@ -80,6 +81,10 @@ def sensitivity(
     wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
     given = dict(quantities or {})
     _check(wanted, vehicle, road, given)
+    if hats < 1:
+        _checks.refuse("hats", "be 1 or more", hats, f"{HATS} on each side of zero are usual.")
+    if reach is not None:
+        _checks.positive("reach", reach, "It is a velocity of the damper, such as 0.6 m/s.")
     make: Any = road
     first = make(**given) if given else make
     white = is_white(first)
@@ -128,13 +133,19 @@ def _check(wanted: Sequence[Any], vehicle: Any, road: Any, quantities: Mapping[s
     functions = [one for one in wanted if not isinstance(one, str | Metric)]
     if not wanted or (functions and (len(wanted) > 1 or not callable(functions[0]))):
         must = "be metrics by name, `Metric`s, or one function of metrics"
-        _checks.refuse("metric", must, _checks.described(wanted[0] if len(wanted) == 1 else wanted))
+        _checks.refuse(
+            "metric", must, _checks.described(wanted[0] if len(wanted) == 1 else wanted), f"The call is `{call}`."
+        )
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
     if quantities:
+        remedy = "Write `lambda speed: roads.iso8608('C', speed, seed=1)`, and `quantities={'speed': 20.0}`."
         if not callable(road):
-            remedy = "Write `lambda speed: roads.iso8608('C', speed, seed=1)`."
             _checks.refuse("road", f"be a function of {', '.join(quantities)}", _checks.described(road), remedy)
-        _checks.finite("quantities", list(quantities.values()))
+        try:
+            inspect.signature(road).bind(**quantities)
+        except TypeError as error:
+            _checks.refuse("quantities", "be the arguments of `road`", f"{', '.join(quantities)}: {error}", remedy)
+        _checks.finite("quantities", list(quantities.values()), remedy)
     elif not isinstance(road, Scenarios):
         check_module("road", road, (AbstractRoad, WhiteRoad), call)
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import Scalar
-from jaxdamp.metrics import Metric
+from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.limits import Limit, limit_spans, scaled
@@ -69,12 +69,20 @@ class DesignTask(Generic[V]):
         known = [m.name for m in (*vehicle.ride_metrics, *(m for m in metrics if isinstance(m, Metric)))]
         self.allowed = limit_spans(limits, known)
         limited = [metric for metric in limits or {} if isinstance(metric, Metric)]
-        of_targets = [metric for one in objectives if isinstance(one, Targets) for metric in one.metrics]
+        targets = [one for one in objectives if isinstance(one, Targets)]
+        of_targets = [metric for one in targets for metric in one.metrics]
+        for name in (name for one in targets for name in one.values):
+            with_targets = [*known, *(metric.name for metric in (*limited, *of_targets))]
+            _checks.one_of("targets", current_name(name, known), with_targets)
         more, white = [*metrics, *limited, *of_targets], is_white(road)
         self.objective = objective_of(objectives, vehicle, more, list(self.allowed), white=white, argument=argument)
         self.space = search_range(vehicle, over, freeze, bounds, tie)
         self.tolerance = tolerance_of(self.space.free)
-        self._curves = ShapeNumbers(vehicle, [shape] if isinstance(shape, Shape) else shape)
+        shapes = [shape] if isinstance(shape, Shape) else shape
+        if not isinstance(shapes, Sequence) or isinstance(shapes, str):
+            remedy = "Write `shape=[tune.monotone(), tune.slope(upper=5000.0)]`."
+            _checks.refuse("shape", "be a constraint of `tune`, or a list", _checks.described(shapes), remedy)
+        self._curves = ShapeNumbers(vehicle, shapes)
         self.measured = Measurement(
             vehicle, road, self.objective, self.space.free, each=list(self.allowed), duration=duration, dt=dt
         )
@@ -143,6 +151,6 @@ def check_call(call: str, vehicle: Any, road: Any, counts: Mapping[str, tuple[in
         check_module("road", road, (AbstractRoad, WhiteRoad), call)
     for name, (count, least) in counts.items():
         if isinstance(count, bool) or not isinstance(count, int | np.integer):
-            _checks.refuse(name, "be a whole number", repr(count))
+            _checks.refuse(name, "be a whole number", repr(count), f"Write `{name}={max(least, 1)}`, or more.")
         if count < least:
             _checks.refuse(name, f"be {least} or more", count)
