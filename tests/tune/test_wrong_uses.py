@@ -56,7 +56,7 @@ CASES = [
     (lambda: minimise(metric=tune.Targets({"rms_comfort": (1.0, 0.1)})), "targets", "'rms_comfort'", "one of 'rms_"),
     (lambda: pareto(objectives=COMFORT), "objectives", f"the text '{COMFORT}'", "pareto([metric, metric]"),
     (lambda: pareto(objectives=[COMFORT, 3]), "objectives[1]", "the number 3", "The call is"),
-    (lambda: pareto(objectives=[COMFORT, "rms_tyre"]), "objectives", "'rms_tyre'", "Did you mean"),
+    (lambda: pareto(objectives=[COMFORT, "rms_dynamic_load"]), "objectives", "'rms_dynamic_load'", "Did you mean"),
     (
         lambda: pareto(objectives=[COMFORT, "lift_off_fraction"], road=BUMP, **RUN),
         "objectives",
