@@ -128,3 +128,12 @@ def test_besinger_also_at_a_bound(bounds):
         1e-5,
     )
     assert found.held == (("rebound_rate",) if bounds else ())
+
+
+@pytest.mark.slow
+def test_a_law_with_states():
+    runs = records(dampers.SeriesSpring(dampers.Bilinear(2600.0, 1400.0), 1.5e5))
+    start = dampers.SeriesSpring(dampers.Linear(1700.0), 1e5)
+    result = identify.fit(start, runs)
+    begin = np.array([e.value for e in result.parameters])
+    check(result, ride_with(result.law), lambda runs: refitted(start, runs, begin), 2e-3, 1e-4)
