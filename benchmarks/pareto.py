@@ -37,7 +37,7 @@ LOWER, UPPER, TOP = 300.0, 12_000.0, 0.062
 ROAD = roads.iso8608("C", speed=20.0, seed=1)
 DURATION, DT, LANES, POINTS, BETWEEN, FACTOR, POPULATION = 5.0, 2e-3, 16, 33, 600, 20, 100
 RUN: dict[str, Any] = {"duration": DURATION, "dt": DT}
-OPTIONS: dict[str, Any] = RUN | {"over": {"slopes": (LOWER, UPPER)}, "limits": {LIMIT: TOP}}
+OPTIONS: dict[str, Any] = RUN | {"fresh_roads": 0, "over": {"slopes": (LOWER, UPPER)}, "limits": {LIMIT: TOP}}
 
 
 def car(slopes: np.ndarray) -> Any:

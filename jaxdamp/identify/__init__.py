@@ -19,6 +19,7 @@ from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.profile_curve import ProfileCurve
 from jaxdamp.identify.propagation import Band, Evidence, Propagated
+from jaxdamp.identify.record_sensitivity import RecordSensitivity
 from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.result import FitResult, Score, fit_percent
 from jaxdamp.identify.rungs import Failure, Rung
@@ -56,6 +57,7 @@ __all__ = [
     "Problem",
     "ProfileCurve",
     "Propagated",
+    "RecordSensitivity",
     "Rung",
     "ScheduledFit",
     "Score",

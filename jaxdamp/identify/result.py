@@ -18,6 +18,7 @@ from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
 from jaxdamp.identify.model import Model, is_memoryless, on_rig
 from jaxdamp.identify.profile_curve import ProfileCurve, profile_curve
 from jaxdamp.identify.propagation import Band, Evidence, Propagated, band, propagate
+from jaxdamp.identify.record_sensitivity import RecordSensitivity, sensitivity_to_records
 from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.traces import predict_by_record, predict_runs, used_samples
 from jaxdamp.rig import Rig
@@ -228,6 +229,21 @@ class FitResult(AbstractFitted):
             Value, standard error, and lower and upper end of the 95 % interval.
         """
         return propagate(self._evidence, function, samples, seed)
+
+    def sensitivity_to_records(self, function: Callable[[Any], Any]) -> RecordSensitivity:
+        """Exact derivatives of a function of the law by the measured forces, through the fit itself.
+
+        What would a ride metric, or the difference from another damper, be if the force of a record were 1 % larger, or
+        10 N higher, and the law were fitted again? Parameters at bounds stay there.
+
+        Arguments:
+            function: of the law, computed by JAX: a number, or a dictionary of numbers such as the metrics of a `Ride`,
+                as in `lambda law: ride.of_vehicle(quarter_car(law))()`.
+
+        Raises:
+            ValueError: a fit with a robust loss or priors; a minimum that the records do not determine.
+        """
+        return sensitivity_to_records(self._evidence, function, self.runs, self.criterion)
 
     def band(self, velocities: VectorLike) -> Band:
         """95 % intervals of the force [N] at constant velocities [m/s]; `result.band(velocities).plot()`.

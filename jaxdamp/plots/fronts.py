@@ -11,7 +11,7 @@ from jaxdamp._types import VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style
 from jaxdamp.rig import quasi_static
-from jaxdamp.tune import ParetoFront
+from jaxdamp.tune import ParetoFront, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 
 MOST_CURVES = 9
+AT_LIMIT = 1e-4  # relative distance to a limit within which a point counts as being there
 MARKS = ("s", "D", "^", "v", "P", "X")
 
 
@@ -55,7 +56,8 @@ def pareto(
         _curves(plot, front, along, name, velocities)
     for plot in plots[count:]:
         plot.set_axis_off()
-    _style.legend_above(figure, drawn[0], 4)
+    by_label = {handle.get_label(): handle for handles in drawn for handle in handles}
+    _style.legend_above(figure, list(by_label.values()), 3)
     _style.note_below(figure, [front.summary])
     return figure
 
@@ -77,10 +79,25 @@ def _points(
         colour = _style.BLACK if name == "start" else _style.COLOURS[(i + 1) % len(_style.COLOURS)]
         mark = MARKS[i % len(MARKS)]
         handles.append(axes.scatter(values[x], values[y], 45.0, colour, marker=mark, label=name, zorder=4))
-    for name, line in ((x, axes.axvline), (y, axes.axhline)):
-        if name in front.limits:
-            line(front.limits[name], color=_style.COLOURS[1], linestyle="--", linewidth=1.0)
+    handles += _limits(axes, front, x, y)
     _style.dress(axes, *(_label(front, name) for name in (x, y)))
+    return handles
+
+
+def _limits(axes: "matplotlib.axes.Axes", front: ParetoFront, x: str, y: str) -> list[Any]:
+    """Dashed lines at the limits of the two objectives, and marks at points where another metric is at its limit."""
+    colour, handles = _style.COLOURS[3], []
+    for name, (lower, upper) in limit_spans(front.limits, list(front.values)).items():
+        for end in (lower, upper):
+            if not np.isfinite(end):
+                continue
+            words = f"limit of {name.replace('_', ' ')}, {_style.short(end)} {typeset_unit(front.units[name])}".rstrip()
+            if name in (x, y):
+                line = axes.axvline if name == x else axes.axhline
+                handles.append(line(end, color=colour, linestyle="--", linewidth=1.2, label=words))
+            elif (at_limit := np.abs(front.values[name] - end) <= AT_LIMIT * abs(end)).any():
+                marks = front.values[x][at_limit], front.values[y][at_limit]
+                handles.append(axes.scatter(*marks, 60.0, colour, marker="|", linewidths=1.8, label=f"at the {words}"))
     return handles
 
 

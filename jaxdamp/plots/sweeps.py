@@ -1,13 +1,14 @@
 """A metric over the points of a sweep: curves, or a map."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
 from jaxdamp.plots import _style
+from jaxdamp.tune import limit_spans
 
 
 if TYPE_CHECKING:
@@ -18,16 +19,26 @@ if TYPE_CHECKING:
 
 LEVELS = 14  # of a map
 MOST_CURVES = 6
+HATCHES = ("////", "\\\\\\\\", "xxxx", "....")
 
 
-def sweep(data: "xarray.Dataset", metric: str, over: Sequence[str] | None = None) -> "matplotlib.figure.Figure":
+def sweep(
+    data: "xarray.Dataset",
+    metric: str,
+    over: Sequence[str] | None = None,
+    *,
+    limits: Mapping[str, Any] | None = None,
+) -> "matplotlib.figure.Figure":
     """A result of a sweep over a grid: a curve for one axis, a map for two; failed points are marked.
+
+    Where a limit is violated, a map is hatched, and points of curves are ringed.
 
     Arguments:
         data: of `jaxdamp.sweep`, over a grid.
         metric: one of its results.
         over: one axis, or two, the first along the abscissa. Left out, all there are. Fix other axes before, such as
             by `data.sel({"sprung_mass": 1200.0})`; of up to six values of one more axis, each gets a curve.
+        limits: `{result: largest value}` or `{result: (smallest, largest)}`, of this or other results.
 
     Raises:
         ValueError: an unknown result or axis; a result that is not one number for each point; too many axes.
@@ -51,9 +62,13 @@ def sweep(data: "xarray.Dataset", metric: str, over: Sequence[str] | None = None
     if not curves and (len(chosen) != 2 or rest):
         remedy = "Choose one or two by `over`, and fix the others by `data.sel`."
         _checks.refuse("over", f"leave one or two axes, the others fixed (of {axes})", chosen, remedy)
+    names = [str(name) for name in data.data_vars]
+    spans = limit_spans(limits, names)
+    for name in spans:
+        _checks.one_of("limits", name, names)
     figure = _style.new_figure(7.0, 4.6)
     plot = figure.add_subplot()
-    (_curves if curves else _map)(figure, plot, data, metric, chosen, rest)
+    (_curves if curves else _map)(figure, plot, data, metric, chosen, rest, _ends(data, spans))
     return figure
 
 
@@ -64,6 +79,7 @@ def _curves(
     metric: str,
     over: list[str],
     rest: list[str],
+    ends: Sequence["_End"],
 ) -> None:
     """A curve over one axis, for each value of another; a cross at the foot where points failed."""
     (name,) = over
@@ -77,6 +93,16 @@ def _curves(
     _style.dress(plot, _label(data, name), _label(data, metric))
     if rest:
         plot.legend(frameon=False)
+    marks = []
+    for number, end in enumerate(ends):
+        beyond = end.beyond(data[end.name].transpose(*rest, name).values.reshape(lines.shape))
+        places = np.broadcast_to(where, lines.shape)[beyond]
+        size, colour = 60.0 + 50.0 * number, _style.COLOURS[-1 - number % len(_style.COLOURS)]
+        marks.append(plot.scatter(places, lines[beyond], size, "none", edgecolors=colour, label=end.label, zorder=4))
+        if end.name == metric:
+            plot.axhline(end.value, color=colour, linestyle="--", linewidth=1.0)
+    if marks:
+        _style.legend_above(figure, marks, 2)
     if failed.any():
         crossed = where[failed.any(axis=0)]
         foot = np.zeros(len(crossed))
@@ -92,6 +118,7 @@ def _map(
     metric: str,
     over: list[str],
     rest: list[str],
+    ends: Sequence["_End"],
 ) -> None:
     """Filled contours over two axes with the smallest value marked; crosses and hatching where points failed."""
     del rest
@@ -103,9 +130,15 @@ def _map(
     if shown.count() and shown.max() > shown.min():
         filled = plot.contourf(x, y, shown, LEVELS, cmap="viridis")
         figure.colorbar(filled, ax=plot, label=_label(data, metric))
-        row, column = np.unravel_index(np.ma.argmin(shown), shown.shape)
-        least = f"smallest: {_style.short(float(values[row, column]))}{_unit(data, metric)}"
+        beyond = [end.beyond(data[end.name].transpose(over[1], over[0]).values) for end in ends]
+        allowed = np.ma.masked_where(np.any(beyond, axis=0), shown) if beyond else shown
+        row, column = np.unravel_index(np.ma.argmin(allowed if allowed.count() else shown), shown.shape)
+        within = " within the limits" * bool(beyond and allowed.count())
+        least = f"smallest{within}: {_style.short(float(values[row, column]))}{_unit(data, metric)}"
         plot.plot(x[column], y[row], "o", color="white", markeredgecolor=_style.BLACK, label=least, clip_on=False)
+    hatched = [
+        _hatch(plot, x, y, data[end.name].transpose(over[1], over[0]).values, end, i) for i, end in enumerate(ends)
+    ]
     if failed.any():
         plot.patch.set(facecolor="0.95", edgecolor="0.75", hatch="///")
         rows, columns = np.nonzero(failed)
@@ -115,7 +148,49 @@ def _map(
     plot.set_xlim(x.min(), x.max())
     plot.set_ylim(y.min(), y.max())
     handles, _ = plot.get_legend_handles_labels()
-    _style.legend_above(figure, handles)
+    _style.legend_above(figure, [*handles, *hatched], 2)
+
+
+class _End(NamedTuple):
+    """One end of a limit: values of a result above it, or below it, violate it."""
+
+    name: str
+    value: float
+    above: bool
+    label: str
+
+    def beyond(self, values: np.ndarray) -> np.ndarray:
+        """Where the limit is violated."""
+        return values > self.value if self.above else values < self.value
+
+
+def _ends(data: Any, spans: Mapping[str, tuple[float, float]]) -> list[_End]:
+    """The finite ends of limits, in words."""
+    ends = []
+    for name, span in spans.items():
+        for value, above in zip(span, (False, True), strict=True):
+            if np.isfinite(value):
+                side = "above" if above else "below"
+                label = f"{name.replace('_', ' ')} {side} {_style.short(value)}{_unit(data, name)}"
+                ends.append(_End(name, value, above, label))
+    return ends
+
+
+def _hatch(
+    plot: "matplotlib.axes.Axes", x: np.ndarray, y: np.ndarray, values: np.ndarray, end: _End, number: int
+) -> Any:
+    """Hatch a map where a limit is violated, with the boundary drawn; the handle for the legend."""
+    from matplotlib.patches import Patch
+
+    colour, hatch = _style.COLOURS[(number + 1) % len(_style.COLOURS)], HATCHES[number % len(HATCHES)]
+    sign = 1.0 if end.above else -1.0
+    beyond = np.ma.masked_invalid(sign * (values - end.value))
+    if beyond.count() and beyond.max() > 0.0:
+        region = plot.contourf(x, y, beyond, [0.0, 1.01 * float(beyond.max())], colors="none", hatches=[hatch])
+        region.set(edgecolor=colour, linewidth=0.0)
+        if beyond.min() < 0.0:
+            plot.contour(x, y, beyond, [0.0], colors=colour, linewidths=1.8)
+    return Patch(facecolor="none", edgecolor=colour, hatch=hatch, label=end.label)
 
 
 def _label(data: Any, name: str) -> str:

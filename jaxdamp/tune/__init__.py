@@ -7,12 +7,15 @@
 - `Targets`, `smooth_peak`, `smooth_settling`: objectives.
 - `slope`, `monotone`, `ratio`, `knee`: constraints on the shape of the force-velocity curve.
 - `pareto`: fronts of two or three metrics; `hypervolume`.
+- `limit_spans`: limits as they are written, as pairs of numbers.
 - `compare_dampers`: differences between dampers with error bars; `valving`: a mono-tube damper for a wanted force.
 """
 
 from jaxdamp._status import Status
-from jaxdamp.tune.decisions import DamperComparison, Difference, FittedLaw, compare_dampers
+from jaxdamp.tune.comparison import DamperComparison, Difference
+from jaxdamp.tune.decisions import FittedLaw, compare_dampers
 from jaxdamp.tune.front import ParetoFront, hypervolume
+from jaxdamp.tune.limits import limit_spans
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.pareto_search import pareto
 from jaxdamp.tune.rescoring import Rescore, rescore
@@ -63,6 +66,7 @@ __all__ = [
     "damper_paths",
     "hypervolume",
     "knee",
+    "limit_spans",
     "minimise",
     "monotone",
     "pareto",

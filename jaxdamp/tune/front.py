@@ -13,8 +13,7 @@ from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, typeset_unit, with_unit
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import FreeParameters
-from jaxdamp.simulation import Ride
-from jaxdamp.tune.objective import Objective
+from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.result import V
 
 
@@ -36,6 +35,9 @@ def hypervolume(values: Float[np.ndarray, "points objectives"], reference: Float
     >>> hypervolume(np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([3.0, 3.0]))
     3.0
     """
+    if values.ndim != 2 or values.shape[1:] != np.shape(reference):
+        remedy = "Give one value for each objective, as `front.reference.values()`."
+        _checks.refuse("reference", "have one value for each column of `values`", f"of {np.shape(reference)}", remedy)
     values = values[np.all(values < reference, axis=1)]
     if not len(values):
         return 0.0
@@ -45,6 +47,12 @@ def hypervolume(values: Float[np.ndarray, "points objectives"], reference: Float
     heights = np.diff(np.append(values[:, -1], reference[-1]))
     areas = [hypervolume(values[: i + 1, :-1], reference[:-1]) if h > 0 else 0.0 for i, h in enumerate(heights)]
     return float(heights @ areas)
+
+
+def shares_of(values: Float[np.ndarray, "points objectives"]) -> Float[np.ndarray, "points objectives"]:
+    """The objectives at each point, from 0 at the best value to 1 at the worst."""
+    best, worst = values.min(axis=0), values.max(axis=0)
+    return (values - best) / np.where(worst > best, worst - best, 1.0)
 
 
 class FrontParameter(NamedTuple):
@@ -69,7 +77,7 @@ class ParetoFront(Generic[V]):
         units: unit of each metric.
         parameters: the free numbers, with their bounds.
         designs: the value of each free number at each point.
-        limits: largest allowed values of metrics.
+        limits: largest allowed value of metrics, or the smallest and the largest one.
         reference: the point up to which the hypervolume counts, by objective.
         warnings: doubts about the front, in words.
         status: `CONVERGED` only if every search of the front ended at an optimum.
@@ -77,8 +85,8 @@ class ParetoFront(Generic[V]):
         interpolated: number of designs between them simulated without derivatives.
         dropped: number of searches whose result another point beats or a limit excludes.
         free: the free parameters of the start.
-        ride: the ride of the start.
-        objective: the objectives and all metrics.
+        measured: the metrics of any vehicle on the road of the search.
+        fresh: every metric at each point on other realisations of a random road; empty if there is none.
     """
 
     start: V
@@ -88,7 +96,7 @@ class ParetoFront(Generic[V]):
     units: dict[str, str]
     parameters: tuple[FrontParameter, ...]
     designs: Float[np.ndarray, "points free"]
-    limits: dict[str, float]
+    limits: dict[str, float | tuple[float, float]]
     reference: dict[str, float]
     warnings: tuple[str, ...]
     status: Status
@@ -96,8 +104,8 @@ class ParetoFront(Generic[V]):
     interpolated: int
     dropped: int
     free: FreeParameters
-    ride: Ride
-    objective: tuple[Objective, ...]
+    measured: Measurement
+    fresh: dict[str, Float[np.ndarray, "roads points"]]
 
     def __len__(self) -> int:
         return len(self.designs)
@@ -115,9 +123,7 @@ class ParetoFront(Generic[V]):
     @property
     def shares(self) -> Float[np.ndarray, "points objectives"]:
         """The objectives at each point, from 0 at the best value on the front to 1 at the worst."""
-        values = self.objectives
-        best, worst = values.min(axis=0), values.max(axis=0)
-        return (values - best) / np.where(worst > best, worst - best, 1.0)
+        return shares_of(self.objectives)
 
     @property
     def knee(self) -> int:
@@ -137,10 +143,8 @@ class ParetoFront(Generic[V]):
 
     def metrics_of(self, vehicle: Any) -> dict[str, float]:
         """Every metric of another vehicle on the same road, such as a baseline."""
-        found: Mapping[str, Any] = self.ride.on_axles_of(vehicle)()
-        for objective in self.objective:
-            found = objective.of(found)
-        return MetricValues.with_units({name: float(found[name]) for name in self.units}, self.units)
+        values = self.measured(vehicle)
+        return MetricValues.with_units({name: float(values[name]) for name in self.units}, self.units)
 
     def plot(self, baselines: Mapping[str, Any] | None = None, **options: Any) -> "Figure":
         """The front with its knee, the start and other vehicles, and the damper laws along the front."""
@@ -195,6 +199,7 @@ class ParetoFront(Generic[V]):
             "knee": self.knee,
             "hypervolume": plain(self.hypervolume),
             "reference": {name: with_unit(value, self.units[name]) for name, value in self.reference.items()},
+            "fresh": {name: plain(values) for name, values in self.fresh.items()},
             "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
             "evaluations": self.evaluations,
             "interpolated": self.interpolated,

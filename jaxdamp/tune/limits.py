@@ -11,6 +11,7 @@ from jaxdamp._tables import typeset_unit
 from jaxdamp.metrics import Metric, current_name
 
 
+EXAMPLE = "Write `{'working_space_peak_to_peak': 0.1}`, or `{...: (smallest, largest)}`."
 Span = tuple[float, float]  # smallest and largest allowed value, infinite without one
 
 
@@ -45,25 +46,31 @@ class Limit(NamedTuple):
         return f"{sign} {end:.4g} {typeset_unit(self.unit)}".rstrip()
 
 
-def spans(limits: Mapping[str | Metric, Any] | None, known: Sequence[str]) -> tuple[dict[str, Span], list[Metric]]:
-    """The spans of limits by the current names of the metrics, and the metrics that are no names.
+def limit_spans(limits: Mapping[Any, Any] | None, known: Sequence[str]) -> dict[str, Span]:
+    """The smallest and the largest allowed value of metrics by their current names, infinite without one.
+
+    Arguments:
+        limits: `{metric: largest value}` or `{metric: (smallest, largest)}`, by name or as a `metrics.Metric`; None for
+            an end without a limit.
+        known: names of metrics, for those that were renamed.
 
     Raises:
         ValueError: limits that are neither a largest value nor a smallest and a largest one.
     """
     if not isinstance(limits, Mapping | None):
-        _checks.refuse("limits", "be a mapping of metrics to limits", _checks.described(limits))
-    found = {
+        _checks.refuse("limits", "be a mapping of metrics to limits", _checks.described(limits), EXAMPLE)
+    return {
         one.name if isinstance(one, Metric) else current_name(one, known): _span(one, span)
         for one, span in (limits or {}).items()
     }
-    return found, [one for one in (limits or {}) if isinstance(one, Metric)]
 
 
 def _span(one: str | Metric, given: Any) -> Span:
     label = f"limits[{one.name if isinstance(one, Metric) else one!r}]"
     must = "be the largest allowed value, or the smallest and the largest one"
     pair = given if isinstance(given, tuple | list) else (None, given)
+    if any(isinstance(end, str) for end in pair) or all(end is None for end in pair):
+        _checks.refuse(label, must, repr(given), "Write 0.1, or (-0.08, 0.1); None for an end without a limit.")
     try:
         lower, upper = (
             default if x is None else float(x) for x, default in zip(pair, (-math.inf, math.inf), strict=True)
@@ -71,7 +78,7 @@ def _span(one: str | Metric, given: Any) -> Span:
     except (TypeError, ValueError):
         _checks.refuse(label, must, repr(given), "Write 0.1, or (-0.08, 0.1); None for an end without a limit.")
     if not lower < upper:
-        _checks.refuse(label, f"{must}, in increasing order", repr(given))
+        _checks.refuse(label, f"{must}, in increasing order", repr(given), "Write (-0.08, 0.1).")
     return lower, upper
 
 
@@ -88,19 +95,30 @@ def scaled(lower: float, upper: float, start: float) -> float:
     return max((abs(end) for end in (lower, upper) if math.isfinite(end)), default=0.0) or abs(start) or 1.0
 
 
-def margins(limits: Iterable[Limit], values: Mapping[str, float]) -> np.ndarray:
-    """Relative distances to every end of every limit, in the order of `margin_slopes`."""
-    rows = []
-    for limit in limits:
-        rows += [(limit.upper - values[limit.name]) / limit.scale] * math.isfinite(limit.upper)
-        rows += [(values[limit.name] - limit.lower) / limit.scale] * math.isfinite(limit.lower)
-    return np.array(rows)
+class LimitEnd(NamedTuple):
+    """One end of a limit: `sign * number` must not be above `sign * value`; the sign is −1 for a smallest value."""
+
+    name: str
+    sign: float
+    value: float
+    scale: float
 
 
-def margin_slopes(limits: Iterable[Limit], slopes: Mapping[str, np.ndarray]) -> np.ndarray:
+def limit_ends(limits: Iterable[Limit]) -> list[LimitEnd]:
+    """The finite ends of all limits."""
+    ends = [
+        LimitEnd(limit.name, sign, value, limit.scale)
+        for limit in limits
+        for sign, value in ((1.0, limit.upper), (-1.0, limit.lower))
+    ]
+    return [end for end in ends if math.isfinite(end.value)]
+
+
+def margins(ends: Iterable[LimitEnd], values: Mapping[str, Any]) -> np.ndarray:
+    """Relative distances to ends of limits, negative beyond them."""
+    return np.array([end.sign * (end.value - values[end.name]) / end.scale for end in ends])
+
+
+def margin_slopes(ends: Iterable[LimitEnd], slopes: Mapping[str, np.ndarray]) -> np.ndarray:
     """The derivatives of `margins`."""
-    rows = []
-    for limit in limits:
-        rows += [-slopes[limit.name] / limit.scale] * math.isfinite(limit.upper)
-        rows += [slopes[limit.name] / limit.scale] * math.isfinite(limit.lower)
-    return np.array(rows)
+    return np.array([-end.sign * slopes[end.name] / end.scale for end in ends])

@@ -53,6 +53,10 @@ class Measurement:
         names = list(objective.units(vehicle))
         self.names = [*names, *(entry for name in self._each for entry in self.entries(name) if entry not in names)]
 
+    def on_road(self, road: Road | Scenarios) -> Ride | ScenarioRide:
+        """The ride of the vehicle on another road, or in other scenarios."""
+        return self._ride(self.ride.vehicle, road)
+
     def _ride(self, vehicle: AbstractVehicle, road: Road | Scenarios) -> Ride | ScenarioRide:
         metrics = self.objective.metrics
         if isinstance(road, Scenarios):
@@ -80,18 +84,15 @@ class Measurement:
 
     def __call__(self, vehicle: AbstractVehicle) -> dict[str, Scalar]:
         """The metrics and the objective of a vehicle by name; those of scenarios by their risk, and some in each."""
-        if isinstance(self.ride, ScenarioRide):
-            each = self.each(vehicle)
-            values = {name: self.ride.risk(found, self.ride.weights) for name, found in each.items()}
-            return values | {entry: each[name][i] for name in self._each for i, entry in enumerate(self.entries(name))}
-        ride = self.ride.on_axles_of(vehicle) if self._follows else self.ride.of_vehicle(vehicle)
-        return self.objective.of(ride())
+        return self.by(self.ride, vehicle)
 
-    def side_by_side(self) -> "Measurement":
-        """The same, for many vehicles at a time."""
-        other = object.__new__(Measurement)
-        other.__dict__ = self.__dict__ | {"ride": self.ride.side_by_side()}
-        return other
+    def by(self, ride: Ride | ScenarioRide, vehicle: AbstractVehicle) -> dict[str, Scalar]:
+        """The same by another ride, of `on_road`."""
+        if isinstance(ride, ScenarioRide):
+            each = self.objective.of_each(ride.of_vehicle(vehicle).each())
+            values = {name: ride.risk(of_all, ride.weights) for name, of_all in each.items()}
+            return values | {entry: each[name][i] for name in self._each for i, entry in enumerate(self.entries(name))}
+        return self.objective.of((ride.on_axles_of(vehicle) if self._follows else ride.of_vehicle(vehicle))())
 
     def rides_of(self) -> list[Callable[[AbstractVehicle], Ride]]:
         """For each road a function that makes the checked ride of a vehicle on it, in no special condition."""

@@ -1,40 +1,24 @@
 """`minimise`: tune the free parameters of a vehicle for a ride metric, by exact gradients."""
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
-from jaxdamp import _checks
-from jaxdamp._field_types import check_module
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
 from jaxdamp.metrics import Metric, MetricValues
-from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.tune.limits import Limit, scaled, spans
-from jaxdamp.tune.measuring import Measurement
-from jaxdamp.tune.objective import Function, Objective, objective_of
-from jaxdamp.tune.range_notes import range_notes
-from jaxdamp.tune.ranges import SearchRange, search_range
+from jaxdamp.tune.limits import Limit
+from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.rescoring import other_roads, rescored
 from jaxdamp.tune.result import Drive, ScenarioValues, TuneResult, V
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.searching import (
-    Ended,
-    Evaluator,
-    Measured,
-    active,
-    many_at_a_time,
-    missed,
-    one_at_a_time,
-    search,
-    tolerance_of,
-)
-from jaxdamp.tune.shape import Shape, ShapeNumbers
+from jaxdamp.tune.searching import Ended, Evaluator, active, many_at_a_time, missed, one_at_a_time, search
+from jaxdamp.tune.shape import Shape
 from jaxdamp.tune.starts import Attempt, Desk, best_of, search_together, start_points
-from jaxdamp.tune.step_notes import step_notes
-from jaxdamp.tune.targets import Targets
+from jaxdamp.tune.task import DesignTask, check_call
 from jaxdamp.tune.wording import (
     active_words,
     bound_notes,
@@ -45,7 +29,6 @@ from jaxdamp.tune.wording import (
     start_notes,
     true_value_notes,
 )
-from jaxdamp.vehicles import AbstractVehicle
 
 
 def minimise(
@@ -131,67 +114,29 @@ def minimise(
     >>> bounded.parameters[0].note
     'at its upper bound'
     """
-    _check_arguments(metric, vehicle, road, max_steps, starts, fresh_roads)
-    known = [m.name for m in (*vehicle.ride_metrics, *(m for m in metrics if isinstance(m, Metric)))]
-    allowed, limited = spans(limits, known)
-    more = [*metrics, *limited, *(metric.metrics if isinstance(metric, Targets) else [])]
-    white = road.white if isinstance(road, Scenarios) else isinstance(road, WhiteRoad)
-    objective = objective_of(metric, vehicle, more, list(allowed), white=white)
-    space = search_range(vehicle, over, freeze, bounds, tie)
-    measured = Measurement(vehicle, road, objective, space.free, each=list(allowed), duration=duration, dt=dt)
-    curves = ShapeNumbers(vehicle, [shape] if isinstance(shape, Shape) else shape)
-    names = [*measured.names, *curves.names]
-    joined = _joined(measured if starts == 1 else measured.side_by_side(), curves)
-    desk = None if starts == 1 else Desk(many_at_a_time(joined, space.free, names), starts)
-    evaluate = one_at_a_time(joined, space.free, names) if desk is None else desk.alone
-    alone = Evaluator(evaluate, names, tolerance_of(space.free))
-    before, _ = alone.at(space.start)
-    _check_finite(before, objective)
-    units = objective.units(vehicle)
-    all_limits = [
-        Limit(entry, name, *span, scaled(*span, before[entry]), units[name])
-        for name, span in allowed.items()
-        for entry in measured.entries(name)
-    ]
-    all_limits += curves.limits(before)
+    check_objective("metric", metric, "The call is `minimise(metric, vehicle, road)`.")
+    counts = {"max_steps": (max_steps, 1), "starts": (starts, 1), "fresh_roads": (fresh_roads, 0), "seed": (seed, 0)}
+    check_call("minimise(metric, vehicle, road)", vehicle, road, counts)
+    task = DesignTask(
+        [metric], vehicle, road, argument="metric", over=over, freeze=freeze, bounds=bounds, tie=tie, limits=limits,
+        shape=shape, metrics=metrics, duration=duration, dt=dt,
+    )  # fmt: skip
+    space, name, names = task.space, task.objective.name, task.names
+    ride = task.measured.ride if starts == 1 else task.measured.ride.side_by_side()
+    numbers = functools.partial(task.numbers, ride)
+    desk = None if starts == 1 else Desk(many_at_a_time(numbers, space.free, names), starts)
+    evaluate = one_at_a_time(numbers, space.free, names) if desk is None else desk.alone
+    alone = Evaluator(evaluate, names, task.tolerance)
+    all_limits = task.limits(alone.at(space.start)[0])
     with Progress("Tuning") as shown:
-        progress = progress or (lambda step, value: shown(f"step {step}, {objective.name} {value:.5g}"))
+        progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
         if desk is None:
-            ended, attempts = search(alone, space, objective.name, all_limits, max_steps, progress), ()
+            ended, attempts = search(alone, space, name, all_limits, max_steps, progress), ()
         else:
             points = start_points(space, starts, seed)
-            several = search_together(desk, alone, points, space, objective.name, all_limits, max_steps, progress)
-            ended, attempts = _chosen(several, alone, points, objective.name, all_limits)
-    return _result(
-        vehicle, space, measured, alone, ended, attempts, all_limits, allowed, max_steps, (duration, dt), fresh_roads
-    )
-
-
-def _check_arguments(metric: Any, vehicle: Any, road: Any, max_steps: int, starts: int, fresh_roads: int) -> None:
-    call = "minimise(metric, vehicle, road)"
-    if not isinstance(metric, str | Metric) and not callable(metric):
-        must = "be the name of a ride metric, a Metric, or a function of the metrics"
-        _checks.refuse("metric", must, _checks.described(metric), f"The call is `{call}`.")
-    check_module("vehicle", vehicle, (AbstractVehicle,), call)
-    if not isinstance(road, Scenarios):
-        check_module("road", road, (AbstractRoad, WhiteRoad), call)
-    for name, count, least in (("max_steps", max_steps, 1), ("starts", starts, 1), ("fresh_roads", fresh_roads, 0)):
-        if count < least:
-            _checks.refuse(name, f"be {least} or more", count)
-
-
-def _joined(measured: Measurement, curves: ShapeNumbers) -> Measured:
-    """Metrics and numbers of curves of a vehicle."""
-    return lambda vehicle: {**measured(vehicle), **curves(vehicle)}
-
-
-def _check_finite(before: Mapping[str, float], objective: Objective) -> None:
-    """Refuse a start without finite metrics; a true peak or settling time beside a smooth one may be infinite."""
-    exact = {m.name for m in objective.beside}
-    if not np.all(np.isfinite([value for name, value in before.items() if name not in exact])):
-        remedy = "Call `simulate` with this road; its error messages explain the cause."
-        value = f"{objective.name} = {before[objective.name]}"
-        _checks.refuse("vehicle", "have finite metrics to start from", value, remedy)
+            several = search_together(desk, alone, points, space, name, all_limits, max_steps, progress)
+            ended, attempts = _chosen(several, alone, points, name, all_limits)
+    return _result(task, alone, ended, attempts, all_limits, max_steps, fresh_roads)
 
 
 def _chosen(
@@ -213,20 +158,16 @@ def _chosen(
 
 
 def _result(
-    vehicle: V,
-    space: SearchRange,
-    measured: Measurement,
+    task: DesignTask[V],
     evaluator: Evaluator,
     ended: Ended,
     attempts: tuple[Attempt, ...],
     limits: Sequence[Limit],
-    allowed: Mapping[str, tuple[float, float]],
     max_steps: int,
-    run: tuple[float | None, float],
     fresh_roads: int,
 ) -> TuneResult[V]:
     """The result of a tuning, judged: what holds it, what it misses, and what it is worth on fresh roads."""
-    objective, road = measured.objective, measured.road
+    vehicle, space, objective, road, units = task.vehicle, task.space, task.objective, task.road, task.units
     before, after = evaluator.at(space.start)[0], evaluator.at(ended.values)[0]
     short = missed(limits, after, evaluator.tolerance)
     changes = changes_of(space, ended.values)
@@ -237,22 +178,21 @@ def _result(
     else:
         status = Status.STEP_LIMIT if ended.out_of_steps else Status.NO_BETTER_STEP
     held = active(limits, after, evaluator.tolerance)
-    notes = missed_notes(short, after, changes) + true_value_notes(objective, after, allowed)
+    notes = missed_notes(short, after, changes) + true_value_notes(objective, after, task.allowed)
     notes += bound_notes(space, changes) + start_notes(attempts, objective.name)
     if status in (Status.STEP_LIMIT, Status.NO_BETTER_STEP):
         notes.append(early_end(ended, max_steps))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
-    notes += _notes_on_runs(vehicle, tuned, measured)
-    units = objective.units(vehicle)
+    notes += task.notes_on_runs(tuned)
     reported = [{name: values[name] for name in units} for values in (before, after)]
     fresh = None
     others = other_roads(road, fresh_roads)
     if others:
-        duration, dt = run
+        duration, dt = task.run
         cars = (vehicle, tuned)
         fresh = rescored(cars, others, objective.metrics, objective, units, objective.name, duration=duration, dt=dt)
-        notes += fresh_notes(fresh, reported, allowed)
-    each = None
+        notes += fresh_notes(fresh, reported, task.allowed)
+    each, measured = None, task.measured
     if measured.scenario_names:
         sides = [{name: np.asarray(x, float) for name, x in measured.each(car).items()} for car in (vehicle, tuned)]
         each = ScenarioValues(measured.scenario_names, *sides)
@@ -264,7 +204,7 @@ def _result(
         before=MetricValues.with_units(reported[0], units),
         after=MetricValues.with_units(reported[1], units),
         units=units,
-        limits={name: span[1] if np.isinf(span[0]) else span for name, span in allowed.items()},
+        limits=task.shown_limits(),
         active_limits=tuple(dict.fromkeys(limit.of for limit in held if not limit.is_shape)),
         warnings=tuple(dict.fromkeys(notes)),
         status=status,
@@ -274,16 +214,5 @@ def _result(
         fresh=fresh,
         starts=attempts,
         scenarios=each,
-        drive=Drive(road.scenarios[0].road if isinstance(road, Scenarios) else road, *run),
+        drive=Drive(road.scenarios[0].road if isinstance(road, Scenarios) else road, *task.run),
     )
-
-
-def _notes_on_runs(vehicle: AbstractVehicle, tuned: AbstractVehicle, measured: Measurement) -> list[str]:
-    """What is to be said of the step and of the fitted ranges, on every road."""
-    notes = []
-    for ride_of in measured.rides_of():
-        coarse = [] if measured.white else step_notes(vehicle, tuned, ride_of)
-        notes += coarse
-        if not any("does not bear" in note for note in coarse):
-            notes += range_notes(vehicle, tuned, ride_of)
-    return notes

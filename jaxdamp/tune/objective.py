@@ -1,4 +1,4 @@
-"""The objective of a tuning: a ride metric, a metric of any channel, or a function of metrics."""
+"""The objectives of a search: ride metrics, metrics of any channel, or functions of metrics."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias, final
@@ -19,23 +19,34 @@ Function: TypeAlias = Callable[[Mapping[str, Scalar]], Scalar]
 
 
 class Objective(NamedTuple):
-    """The objective of a tuning and the metrics that it needs.
+    """The objectives of a search and the metrics that they need.
 
     Attributes:
-        name: of the metric or the function.
-        function: of the metrics by name; None for a metric.
-        metrics: all metrics of the tuning, those for information included.
+        names: of the objectives, each a metric or a function; one for `minimise`, several for `pareto`.
+        functions: of the metrics by name, for those objectives that are no metrics.
+        metrics: all metrics of the search, those for information included.
         beside: the true peaks and settling times that are shown beside smooth ones.
     """
 
-    name: str
-    function: Function | None
+    names: tuple[str, ...]
+    functions: dict[str, Function]
     metrics: tuple[Metric, ...]
     beside: tuple[Metric, ...] = ()
 
+    @property
+    def name(self) -> str:
+        """The name of the first objective."""
+        return self.names[0]
+
+    @property
+    def function(self) -> Function | None:
+        """The function of the first objective; None if it is a metric."""
+        return self.functions.get(self.name)
+
     def of(self, values: Mapping[str, Scalar]) -> dict[str, Scalar]:
-        """The metrics, and the value of the function."""
-        return dict(values) if self.function is None else {**values, self.name: self.function(MetricValues(values))}
+        """The metrics, and the values of the functions."""
+        known = MetricValues(values)
+        return {**values, **{name: function(known) for name, function in self.functions.items()}}
 
     def of_each(self, values: Mapping[str, Array]) -> dict[str, Array]:
         """The same of several vehicles or scenarios, along the first axis of each value."""
@@ -43,8 +54,7 @@ class Objective(NamedTuple):
 
     def units(self, vehicle: AbstractVehicle) -> dict[str, str]:
         """Unit of each metric; that of a function is unknown."""
-        units = {m.name: m.unit(vehicle.units) for m in self.metrics}
-        return units if self.function is None else units | {self.name: ""}
+        return {m.name: m.unit(vehicle.units) for m in self.metrics} | dict.fromkeys(self.functions, "")
 
 
 @final
@@ -67,53 +77,67 @@ class _Asked(Mapping[str, Scalar]):
 
 
 def objective_of(
-    wanted: str | Metric | Function,
+    wanted: Sequence[str | Metric | Function],
     vehicle: AbstractVehicle,
     more: Sequence[str | Metric],
     limited: Sequence[str],
     *,
     white: bool,
+    argument: str = "metric",
 ) -> Objective:
-    """The objective of a tuning on a road.
+    """The objectives of a search on a road.
 
     Arguments:
-        wanted: name of a ride metric, a metric, or a function of metrics by name.
+        wanted: one or more, each the name of a ride metric, a metric, or a function of metrics by name.
         vehicle: the vehicle to tune.
-        more: further metrics, which the function or limits can use.
+        more: further metrics, which the functions or limits can use.
         limited: names of the metrics with limits.
         white: whether roads are white, so that only metrics that follow from an RMS are available.
+        argument: name of `wanted` in messages.
 
     Raises:
         ValueError: an unknown metric, one that is not available on this kind of road, or one without a derivative; a
-            function that does not return one number.
+            function that does not return one number; two objectives of one name.
     """
     extra = vehicle.chosen_metrics(list(more), "metrics") if more else []
-    extra += vehicle.chosen_metrics([wanted], "metric") if isinstance(wanted, Metric) else []
+    own = [one for one in wanted if isinstance(one, Metric)]
+    extra += vehicle.chosen_metrics(own, argument) if own else []
     beside = tuple(exact for exact in map(exact_counterpart, extra) if exact is not None)
     extra += beside
     all_metrics = (*vehicle.ride_metrics, *extra)
     known = {m.name: m for m in all_metrics if not white or is_stationary(m, vehicle.layout.by_name)}
-    asked = [m.name for m in extra]
-    function = None
-    if isinstance(wanted, str | Metric):
-        name = current_name(wanted, known) if isinstance(wanted, str) else wanted.name
-        asked.append(name)
-    else:
-        function, name = wanted, _name(wanted)
-        asked += _asked_by(wanted, list(known))
-        if name in known:
-            _checks.refuse("metric", "have a name that no metric has", repr(name), "Give the function another name.")
-    asked += limited
-    for one in asked:
-        _checks.one_of("metric", one, known)
-        if not known[one].statistic.differentiable:
+    names, functions, asked = [], {}, [m.name for m in extra]
+    for one in wanted:
+        if isinstance(one, str | Metric):
+            names.append(current_name(one, known) if isinstance(one, str) else one.name)
+            asked.append(names[-1])
+            continue
+        names.append(_name(one))
+        functions[names[-1]] = one
+        asked += _asked_by(one, list(known), argument)
+        if names[-1] in known:
+            remedy = "Give the function another name."
+            _checks.refuse(argument, "have a name that no metric has", repr(names[-1]), remedy)
+    if len(set(names)) < len(names):
+        remedy = "Functions need different names: use `def` instead of `lambda`."
+        _checks.refuse(argument, "have different names", names, remedy)
+    for place, name in [*((argument, name) for name in asked), *(("limits", name) for name in limited)]:
+        _checks.one_of(place, name, known)
+        if not known[name].statistic.differentiable:
             remedy = (
                 "Tune on the dynamic load coefficient; limit `Metric('relative_tyre_load', 'minimum')` to (-1, None)."
             )
-            _checks.refuse("metric", "have a slope", f"{one!r}, a count", remedy)
+            _checks.refuse(place, "have a slope", f"{name!r}, a count", remedy)
     # Further metrics for information: those without weightings, counts and means, which may be negative.
-    chosen = [m for m in known.values() if m.name in asked or _for_information(m)]
-    return Objective(name, function, tuple(chosen), beside)
+    chosen = [m for m in known.values() if m.name in (*asked, *limited) or _for_information(m)]
+    return Objective(tuple(names), functions, tuple(chosen), beside)
+
+
+def check_objective(argument: str, one: Any, remedy: str) -> None:
+    """Refuse what is no objective."""
+    if not isinstance(one, str | Metric) and not callable(one):
+        must = "be the name of a ride metric, a Metric, or a function of the metrics"
+        _checks.refuse(argument, must, _checks.described(one), remedy)
 
 
 def _for_information(metric: Metric) -> bool:
@@ -125,10 +149,10 @@ def _name(function: Any) -> str:
     return name if name.isidentifier() else "objective"
 
 
-def _asked_by(function: Function, names: Sequence[str]) -> list[str]:
+def _asked_by(function: Function, names: Sequence[str], argument: str) -> list[str]:
     """The metrics that a function uses, after a check that it returns one number."""
     asked = _Asked(names)
     value = function(asked)
     if np.shape(value) != () or not np.issubdtype(jnp.result_type(value), np.floating):
-        _checks.refuse("metric", "give one number", f"{_checks.described(value)} from {_name(function)!r}")
+        _checks.refuse(argument, "give one number", f"{_checks.described(value)} from {_name(function)!r}")
     return list(asked.names)

@@ -91,6 +91,9 @@ def search_range(
 
 def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> dict[str, Pair]:
     """Bounds by path, infinite without a bound. If two names match a parameter, the later one counts."""
+    if not isinstance(bounds, Mapping):
+        remedy = "Write `{'damper.rate': (1000.0, 5000.0)}`."
+        _checks.refuse(argument, "be a mapping of parameters to bounds", _checks.described(bounds), remedy)
     known, leaders, found = [p.path for p in parameters(free.tree)], dict(free.ties), {}
     paths = [p.path for p in free.chosen]
     for name, bound in bounds.items():

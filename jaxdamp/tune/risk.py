@@ -72,7 +72,7 @@ def risk_of(risk: str | Risk) -> Risk:
     if not isinstance(risk, str):
         if not callable(risk):
             must = "be 'mean', 'worst', `tune.CVaR(share)`, or a function of values and weights"
-            _checks.refuse("risk", must, _checks.described(risk))
+            _checks.refuse("risk", must, _checks.described(risk), "Write `risk='worst'`.")
         return risk
     _checks.one_of("risk", risk, RISKS)
     return RISKS[risk]

@@ -13,7 +13,7 @@ from jaxdamp.tune.objective import Function
 from jaxdamp.tune.result import TuneResult, V
 from jaxdamp.tune.risk import Risk
 from jaxdamp.tune.scenarios import Scenarios
-from jaxdamp.tune.tolerance import ToleranceEffect, tolerance_effects, tolerance_table
+from jaxdamp.tune.tolerance import ToleranceEffect, check_scatter, tolerance_effects, tolerance_table
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -114,6 +114,8 @@ def robust(
     remedy = "Write `tune.Scenarios([road, ...], conditions)`; on one road call `minimise`."
     _checks.instance("scenarios", scenarios, Scenarios, "be made by `tune.Scenarios`", remedy)
     scenarios = scenarios if risk is None else scenarios.with_risk(risk)
+    if scatter is not None:
+        check_scatter(scatter)
     tuning = minimise(metric, vehicle, scenarios, duration=duration, dt=dt, **options)
     effects: tuple[ToleranceEffect, ...] = ()
     if scatter:

@@ -98,12 +98,15 @@ class Scenarios:
             _checks.refuse("roads", "be all white or all driven over", "a mixture", remedy)
         for name, condition in conditions.items():
             must = "be a `tune.Condition(values, factors)`"
-            _checks.instance(f"conditions[{name!r}]", condition, Condition, must)
+            remedy = "Write `tune.Condition({'sprung_mass': 1500.0})`."
+            _checks.instance(f"conditions[{name!r}]", condition, Condition, must, remedy)
         of_roads = _weights(roads, weights)
         pairs = list(itertools.product(roads.items(), conditions.items()))
         shares = np.array([of_roads[road] * condition.weight for (road, _), (_, condition) in pairs])
         if not np.all(np.isfinite(shares)) or np.any(shares < 0) or not np.any(shares > 0):
-            _checks.refuse("weights", "be 0 or more, some of them positive", shares.tolist())
+            _checks.refuse(
+                "weights", "be 0 or more, some of them positive", shares.tolist(), "Leave them out for equal ones."
+            )
         object.__setattr__(self, "risk", risk_of(risk))
         object.__setattr__(self, "_counts", (len(roads), len(conditions)))
         made = (
@@ -236,5 +239,5 @@ def _weights(roads: Mapping[str, Road], weights: Any) -> dict[str, float]:
         return dict.fromkeys(roads, 1.0)
     by_name = dict(weights) if isinstance(weights, Mapping) else dict(zip(roads, weights, strict=False))
     if len(weights) != len(roads) or set(by_name) != set(roads):
-        _checks.refuse("weights", f"be one for each road ({', '.join(roads)})", weights)
+        _checks.refuse("weights", f"be one for each road ({', '.join(roads)})", weights, "Leave it out for equal ones.")
     return by_name

@@ -9,10 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxdamp._jacobian import value_and_jacobian
+from jaxdamp._jacobian import Mode, value_and_jacobian
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters
-from jaxdamp.tune.limits import Limit, margin_slopes, margins
+from jaxdamp.tune.limits import Limit, limit_ends, margin_slopes, margins
 from jaxdamp.tune.ranges import SearchRange
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -81,20 +81,34 @@ def one_at_a_time(measured: Measured, free: FreeParameters, names: Sequence[str]
     return lambda values: evaluate(free, jnp.asarray(values, free.values.dtype))
 
 
-def many_at_a_time(measured: Measured, free: FreeParameters, names: Sequence[str]) -> Evaluate:
-    """The same of several vectors side by side, with a first axis of that many, compiled."""
-    entries = [str(i) for i in range(free.values.size)]
+def many_at_a_time(
+    measured: Measured,
+    free: FreeParameters,
+    names: Sequence[str],
+    of: Sequence[str] | None = None,
+    mode: Mode = "forward",
+) -> Evaluate:
+    """The same of several vectors side by side, with a first axis of that many, compiled.
+
+    Arguments:
+        measured: the metrics of a vehicle.
+        free: its free parameters.
+        names: of the metrics to compute.
+        of: those among them to differentiate; all if left out.
+        mode: of differentiation.
+    """
+    entries, differentiated = [str(i) for i in range(free.values.size)], list(names if of is None else of)
 
     @eqx.filter_jit
     def evaluate(free: FreeParameters, values: Array) -> tuple[Array, Array]:
         def one(point: dict[str, Array]) -> dict[str, Array]:
-            found = measured(free.build(jnp.stack([point[entry] for entry in entries])))
-            return {name: found[name] for name in names}
+            results = measured(free.build(jnp.stack([point[entry] for entry in entries])))
+            return {name: results[name] for name in names}
 
         point = {entry: values[:, i] for i, entry in enumerate(entries)}
-        found, slopes = value_and_jacobian(jax.vmap(one), point)
-        rows = [jnp.stack([slopes[name][entry] for entry in entries], axis=-1) for name in names]
-        return jnp.stack([found[name] for name in names], axis=1), jnp.stack(rows, axis=1)
+        results, slopes = value_and_jacobian(jax.vmap(one), point, mode, of=differentiated)
+        rows = [jnp.stack([slopes[name][entry] for entry in entries], axis=-1) for name in differentiated]
+        return jnp.stack([results[name] for name in names], axis=1), jnp.stack(rows, axis=1)
 
     return lambda values: evaluate(free, jnp.asarray(values, free.values.dtype))
 
@@ -158,15 +172,15 @@ def missed(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tole
 
 def _constraints(evaluator: Evaluator, space: SearchRange, limits: Sequence[Limit]) -> list[dict]:
     """Constraints: numbers inside their limits, and increasing vectors."""
-    unit = space.unit
+    unit, ends = space.unit, limit_ends(limits)
     inside = {
         "type": "ineq",
-        "fun": lambda u: margins(limits, evaluator.at(u * unit)[0]),
-        "jac": lambda u: margin_slopes(limits, evaluator.at(u * unit)[1]) * unit,
+        "fun": lambda u: margins(ends, evaluator.at(u * unit)[0]),
+        "jac": lambda u: margin_slopes(ends, evaluator.at(u * unit)[1]) * unit,
     }
     rows, gaps = space.coordinates.order()
     ordered = {"type": "ineq", "fun": lambda u: rows @ u - gaps, "jac": lambda u: rows}
-    return [inside] * bool(limits) + [ordered] * bool(gaps.size)
+    return [inside] * bool(ends) + [ordered] * bool(gaps.size)
 
 
 def _slope_left(

@@ -1,5 +1,6 @@
 """`sensitivity`: which parameters, and which velocities of the damper curve, a ride metric comes from."""
 
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
@@ -21,6 +22,7 @@ from jaxdamp.tune.objective import Function, Objective, objective_of
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
 from jaxdamp.tune.shape import damper_paths, held_force
+from jaxdamp.tune.task import is_white
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind
 
 
@@ -79,10 +81,16 @@ def sensitivity(
     wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
     given = dict(quantities or {})
     _check(wanted, vehicle, road, given)
+    if hats < 1:
+        _checks.refuse("hats", "be 1 or more", hats, f"{HATS} on each side of zero are usual.")
+    if reach is not None:
+        _checks.positive("reach", reach, "It is a velocity of the damper, such as 0.6 m/s.")
     make: Any = road
     first = make(**given) if given else make
-    white = first.white if isinstance(first, Scenarios) else isinstance(first, WhiteRoad)
-    objective = _objective(wanted, vehicle, white)
+    white = is_white(first)
+    objective = objective_of(wanted, vehicle, [], [], white=white)
+    if not objective.functions:  # the metrics that are wanted, and no others
+        objective = objective._replace(metrics=tuple(m for m in objective.metrics if m.name in objective.names))
     run = {"duration": duration, "dt": dt}
     paths = [] if dampers is None or white else _curves(vehicle, dampers)
     hatted = vehicle
@@ -97,7 +105,7 @@ def sensitivity(
     else:
         fixed = Measurement(hatted, first, objective, free, **run)
         measured = lambda x: fixed(free.build(x))  # noqa: E731
-    names = [m for m in objective.units(vehicle) if _is_wanted(m, wanted, objective)]
+    names = [name for name in objective.units(vehicle) if name in objective.names]
     values, slopes = _derivatives(measured, names, point)
     parts = [*zip(free.owners, free.names, strict=True)]
     is_curve = np.array([is_hat(p.path, hatted) for p, _ in parts] + [False] * len(given), bool)
@@ -125,28 +133,21 @@ def _check(wanted: Sequence[Any], vehicle: Any, road: Any, quantities: Mapping[s
     functions = [one for one in wanted if not isinstance(one, str | Metric)]
     if not wanted or (functions and (len(wanted) > 1 or not callable(functions[0]))):
         must = "be metrics by name, `Metric`s, or one function of metrics"
-        _checks.refuse("metric", must, _checks.described(wanted[0] if len(wanted) == 1 else wanted))
+        _checks.refuse(
+            "metric", must, _checks.described(wanted[0] if len(wanted) == 1 else wanted), f"The call is `{call}`."
+        )
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
     if quantities:
+        remedy = "Write `lambda speed: roads.iso8608('C', speed, seed=1)`, and `quantities={'speed': 20.0}`."
         if not callable(road):
-            remedy = "Write `lambda speed: roads.iso8608('C', speed, seed=1)`."
             _checks.refuse("road", f"be a function of {', '.join(quantities)}", _checks.described(road), remedy)
-        _checks.finite("quantities", list(quantities.values()))
+        try:
+            inspect.signature(road).bind(**quantities)
+        except TypeError as error:
+            _checks.refuse("quantities", "be the arguments of `road`", f"{', '.join(quantities)}: {error}", remedy)
+        _checks.finite("quantities", list(quantities.values()), remedy)
     elif not isinstance(road, Scenarios):
         check_module("road", road, (AbstractRoad, WhiteRoad), call)
-
-
-def _objective(wanted: Sequence[Any], vehicle: AbstractVehicle, white: bool) -> Objective:
-    """The metrics that are wanted, and no others."""
-    objective = objective_of(wanted[0], vehicle, wanted[1:], [], white=white)
-    if objective.function is not None:
-        return objective
-    return objective._replace(metrics=tuple(m for m in objective.metrics if _is_wanted(m.name, wanted, objective)))
-
-
-def _is_wanted(name: str, wanted: Sequence[Any], objective: Objective) -> bool:
-    names = {one.name if isinstance(one, Metric) else one for one in wanted[1:]} | {objective.name}
-    return name in names
 
 
 def _curves(vehicle: AbstractVehicle, pattern: str) -> list[str]:

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any, final
 
@@ -144,7 +144,7 @@ class ShapeNumbers:
         """The names of the numbers."""
         return [name for shape, path in self._pairs for name in _names(shape, path)]
 
-    def limits(self, start: dict[str, float]) -> list[Limit]:
+    def limits(self, start: Mapping[str, float]) -> list[Limit]:
         """The limits of the numbers; their distances are scaled by the largest number of the curve at the start."""
         found = []
         for shape, path in self._pairs:

@@ -1,6 +1,7 @@
 """Several searches on the same metrics at once: their points are simulated side by side, with exact derivatives."""
 
 import dataclasses
+import functools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, final
 
@@ -10,108 +11,125 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxdamp._jacobian import Mode, value_and_jacobian
+from jaxdamp._jacobian import Mode
 from jaxdamp.parameters import FreeParameters
+from jaxdamp.simulation import Ride
+from jaxdamp.tune.limits import LimitEnd
 from jaxdamp.tune.ranges import SearchRange
-from jaxdamp.tune.searching import DOUBLE, SINGLE, Measured
+from jaxdamp.tune.scenario_ride import ScenarioRide
+from jaxdamp.tune.searching import DOUBLE, many_at_a_time
+from jaxdamp.tune.task import DesignTask
 
 
 LANES = 16  # points side by side in one call of the compiled program
 FORWARD = 5  # parameters for each result, up to which forward derivatives of so many lanes are faster
 RADIUS = 0.5  # largest change of a coordinate in the first step; coordinates are one at the start
 LEAST_RADIUS = 1e-6
-BEND = 0.1  # second derivative of a metric by a coordinate at first, relative to its size
+BEND = 0.1  # second derivative of a row by a coordinate at first, relative to its size
 SHARE = 1e-4  # of the sum of all objectives in each problem: excludes points that another one beats in one objective
 PENALTY = 10.0  # of a violated limit, in units of the objectives
 
 
 class Computed(NamedTuple):
-    """Metrics at a point, and the derivatives of the first of them with respect to the coordinates."""
+    """The numbers at a point, and the rows among them that the search follows.
 
-    values: Float[np.ndarray, " metrics"]
+    Attributes:
+        values: of all numbers.
+        rows: the objectives, then one for each end of a limit: the number, with the sign of the end.
+        slopes: derivatives of the rows with respect to the coordinates.
+    """
+
+    values: Float[np.ndarray, " numbers"]
+    rows: Float[np.ndarray, " rows"]
     slopes: Float[np.ndarray, "rows free"]
 
 
 @final
 class BatchEvaluator:
-    """Metrics and derivatives of many points, simulated `LANES` side by side; compiled once.
+    """Numbers and derivatives of many points, simulated `LANES` side by side; compiled once.
 
     Arguments:
-        ride: the metrics of a vehicle by name.
-        space: the free parameters.
-        names: of all metrics.
-        rows: number of metrics that are differentiated, the first ones.
-        modes: the modes of differentiation that pass through the ride.
+        task: with the metrics and the free parameters.
 
     Attributes:
-        points: number of points computed.
-        tolerance: as in a search of `minimise`.
+        points: number of points computed with derivatives.
         improvement: that a search may leave at its end, relative to the range of the objectives.
     """
 
-    def __init__(
-        self, ride: Measured, space: SearchRange, names: Sequence[str], rows: int, modes: Sequence[Mode]
-    ) -> None:
-        self._free, self._unit, self.points = space.free, space.unit, 0
-        columns, chosen = [str(i) for i in range(len(space.start))], list(names)[:rows]
-        mode: Mode = "forward" if len(columns) <= FORWARD * rows else "reverse"
+    def __init__(self, task: DesignTask) -> None:
+        self.task, self.points, self.ride = task, 0, task.measured.ride.side_by_side()
+        objectives = task.objective.names
+        self._differentiated = list(dict.fromkeys([*objectives, *task.limited_names]))
+        inputs, modes = len(task.space.start), task.measured.ride.derivatives
+        mode: Mode = "forward" if inputs <= FORWARD * len(self._differentiated) else "reverse"
         mode = mode if mode in modes else modes[0]
+        numbers = functools.partial(task.numbers, self.ride)
+        self._evaluate = many_at_a_time(numbers, task.space.free, task.names, self._differentiated, mode)
+        self._rows = [(name, 1.0) for name in objectives]
 
         @eqx.filter_jit
-        def evaluate(free: FreeParameters, values: Array) -> tuple[Array, Array]:
-            def one(point: dict[str, Array]) -> dict[str, Array]:
-                found = ride(free.build(jnp.stack([point[name] for name in columns])))
-                return {name: found[name] for name in names}
+        def simulate(ride: Ride | ScenarioRide, free: FreeParameters, values: Array) -> Array:
+            results = jax.vmap(lambda row: task.numbers(ride, free.build(row)))(values)
+            return jnp.stack([results[name] for name in task.names], axis=-1)
 
-            point = {name: values[:, i] for i, name in enumerate(columns)}
-            found, slopes = value_and_jacobian(jax.vmap(one), point, mode, of=chosen)
-            rows = [jnp.stack([slopes[name][column] for column in columns], axis=-1) for name in chosen]
-            return jnp.stack([found[name] for name in names], axis=-1), jnp.stack(rows, axis=1)
+        self._simulate = simulate
+        self.improvement = 1e-6 if task.tolerance == DOUBLE else 1e-3
 
-        @eqx.filter_jit
-        def simulate(free: FreeParameters, values: Array) -> Array:
-            found = jax.vmap(lambda row: ride(free.build(row)))(values)
-            return jnp.stack([found[name] for name in names], axis=-1)
-
-        self._evaluate, self._simulate = evaluate, simulate
-        double = self._free.values.dtype == np.float64
-        self.tolerance, self.improvement = (DOUBLE, 1e-6) if double else (SINGLE, 1e-3)
+    def follow(self, ends: Sequence[LimitEnd]) -> None:
+        """Add rows for ends of limits."""
+        self._rows += [(end.name, end.sign) for end in ends]
 
     def at(self, points: Float[np.ndarray, "points free"]) -> list[Computed]:
-        """Metrics and derivatives at points given by their coordinates."""
+        """Numbers and derivatives at points given by their coordinates."""
+        return [self.rows_of(values, slopes) for values, slopes in self.evaluated(points)]
+
+    def evaluated(self, points: Float[np.ndarray, "points free"]) -> list[tuple[np.ndarray, np.ndarray]]:
+        """All numbers, and the derivatives of those with a row by the coordinates, at each point."""
         self.points += len(points)
-        found = []
-        for part in self._in_lanes(points * self._unit):
-            values, slopes = self._evaluate(self._free, part)
-            found += zip(np.asarray(values, np.float64), np.asarray(slopes, np.float64) * self._unit, strict=True)
-        return [Computed(*pair) for pair in found[: len(points)]]
+        unit, results = self.task.space.unit, []
+        for part in self._in_lanes(points * unit):
+            values, slopes = (np.asarray(a, np.float64) for a in self._evaluate(part))
+            results += zip(values, slopes * unit, strict=True)
+        return results[: len(points)]
 
-    def values_at(self, designs: Float[np.ndarray, "points free"]) -> Float[np.ndarray, "points metrics"]:
-        """Metrics of designs given by their physical values."""
-        found = [np.asarray(self._simulate(self._free, part), np.float64) for part in self._in_lanes(designs)]
-        return np.concatenate(found)[: len(designs)]
+    def rows_of(self, values: np.ndarray, slopes: np.ndarray) -> Computed:
+        """The rows of what was evaluated at a point."""
+        signs = np.array([sign for _, sign in self._rows])
+        of_values = [self.task.names.index(name) for name, _ in self._rows]
+        of_slopes = [self._differentiated.index(name) for name, _ in self._rows]
+        return Computed(values, signs * values[of_values], signs[:, None] * slopes[of_slopes])
 
-    def _in_lanes(self, designs: Float[np.ndarray, "points free"]) -> list[Array]:
+    def numbers_at(
+        self, designs: Float[np.ndarray, "points free"], ride: Ride | ScenarioRide
+    ) -> dict[str, Float[np.ndarray, " points"]]:
+        """All numbers by name, of designs given by their physical values, by a ride and without derivatives."""
+        free = self.task.space.free
+        parts = [
+            np.asarray(self._simulate(ride, free, jnp.asarray(part)), np.float64) for part in self._in_lanes(designs)
+        ]
+        return dict(zip(self.task.names, np.concatenate(parts)[: len(designs)].T, strict=True))
+
+    def _in_lanes(self, designs: Float[np.ndarray, "points free"]) -> list[np.ndarray]:
         """Designs in groups of `LANES`, the last one filled up."""
         rest = np.repeat(designs[:1], -len(designs) % LANES, axis=0)
         grouped = np.concatenate([designs, rest]).reshape(-1, LANES, designs.shape[1])
-        return [jnp.asarray(group, self._free.values.dtype) for group in grouped]
+        return list(grouped.astype(self.task.space.free.values.dtype))
 
 
 class Scaling(NamedTuple):
-    """Zero and unit of each differentiated metric: objectives first, then limits, which must not be positive."""
+    """Zero and unit of each row: objectives first, then ends of limits, which must not be positive."""
 
     zero: Float[np.ndarray, " rows"]
     unit: Float[np.ndarray, " rows"]
     objectives: int
 
-    def of(self, values: Float[np.ndarray, " metrics"]) -> Float[np.ndarray, " rows"]:
-        """The differentiated metrics, scaled."""
-        return (values[: len(self.zero)] - self.zero) / self.unit
+    def of(self, rows: Float[np.ndarray, " rows"]) -> Float[np.ndarray, " rows"]:
+        """The rows, scaled."""
+        return (rows - self.zero) / self.unit
 
-    def merit(self, values: Float[np.ndarray, " metrics"], aim: Float[np.ndarray, " objectives"]) -> float:
+    def merit(self, rows: Float[np.ndarray, " rows"], aim: Float[np.ndarray, " objectives"]) -> float:
         """Largest distance of an objective beyond its aim, with the penalty of violated limits."""
-        scaled = self.of(values)
+        scaled = self.of(rows)
         own, limits = scaled[: self.objectives], scaled[self.objectives :]
         return float((own - aim).max() + SHARE * own.sum() + PENALTY * limits.max(initial=0.0))
 
@@ -119,13 +137,13 @@ class Scaling(NamedTuple):
 @final
 @dataclasses.dataclass
 class Lane:
-    """One search: towards an aim for the objectives, by quadratic models of all metrics within a trust region.
+    """One search: towards an aim for the objectives, by quadratic models of all rows within a trust region.
 
     Attributes:
         aim: value of each scaled objective that is aimed at; the largest excess is minimised.
         at: coordinates.
-        now: metrics and derivatives there.
-        curvature: estimated second derivatives of each differentiated metric.
+        now: numbers and derivatives there.
+        curvature: estimated second derivatives of each row.
         radius: largest change of a coordinate in the next step.
         steps: number of steps tried.
         open: whether the search goes on.
@@ -143,8 +161,8 @@ class Lane:
 
     @classmethod
     def begin(cls, aim: np.ndarray, at: np.ndarray, now: Computed) -> "Lane":
-        """A search without knowledge of curvature: that of a metric is taken as a share of its size."""
-        size = BEND * np.abs(now.values[: len(now.slopes)])
+        """A search without knowledge of curvature: that of a row is taken as a share of its size."""
+        size = BEND * np.abs(now.rows)
         return cls(aim, at, now, size[:, None, None] * np.eye(len(at)))
 
     def neighbour(self, aim: np.ndarray, at: np.ndarray, now: Computed) -> "Lane":
@@ -168,7 +186,7 @@ class Lane:
 
     def take(self, at: np.ndarray, found: Computed, promised: float, scaling: Scaling) -> None:
         """Move to a tried point if it is better, and adapt the trust region."""
-        before, after = (scaling.merit(c.values, self.aim) for c in (self.now, found))
+        before, after = (scaling.merit(c.rows, self.aim) for c in (self.now, found))
         gain = (before - after) / promised if np.isfinite(after) and np.isfinite(found.slopes).all() else -1.0
         length = float(np.abs(at - self.at).max())
         self.learn(at, found)
@@ -187,7 +205,7 @@ def best_step(lane: Lane, scaling: Scaling, space: SearchRange) -> tuple[np.ndar
     import scipy.optimize
 
     count, free = scaling.objectives, len(lane.at)
-    level, unit = scaling.of(lane.now.values), scaling.unit
+    level, unit = scaling.of(lane.now.rows), scaling.unit
     slopes, curvature = lane.now.slopes / unit[:, None], lane.curvature / unit[:, None, None]
     rows, gaps = space.coordinates.order()
     target = np.concatenate([lane.aim, np.zeros(len(level) - count)])
@@ -222,18 +240,18 @@ def best_step(lane: Lane, scaling: Scaling, space: SearchRange) -> tuple[np.ndar
     step = np.clip(solved.x[:free], *box)
     value = models(step)[0]
     reached = (value - target)[:count].max() + SHARE * value[:count].sum() + PENALTY * value[count:].max(initial=0.0)
-    return step, scaling.merit(lane.now.values, lane.aim) - float(reached)
+    return step, scaling.merit(lane.now.rows, lane.aim) - float(reached)
 
 
 def solve_together(
     lanes: Sequence[Lane],
     evaluator: BatchEvaluator,
     scaling: Scaling,
-    space: SearchRange,
     max_steps: int,
     progress: Callable[[], None],
 ) -> None:
     """Run all searches to their ends: one step of each open one at a time, simulated side by side."""
+    space = evaluator.task.space
     while True:
         tried = []
         for lane in lanes:

@@ -34,7 +34,8 @@ class Targets:
     def __init__(self, targets: Mapping[str | Metric, tuple[float, float]]) -> None:
         if not isinstance(targets, Mapping) or not targets:
             must = "be a mapping of one or more metrics to a value and a tolerance"
-            _checks.refuse("targets", must, _checks.described(targets))
+            remedy = "Write `{'rms_sprung_acceleration': (0.9, 0.05)}`."
+            _checks.refuse("targets", must, _checks.described(targets), remedy)
         self.metrics = [metric for metric in targets if isinstance(metric, Metric)]
         self.values = {m.name if isinstance(m, Metric) else m: _pair(m, pair) for m, pair in targets.items()}
 
@@ -58,6 +59,7 @@ class Targets:
 
 def _pair(metric: str | Metric, pair: Any) -> tuple[float, float]:
     label = f"targets[{metric.name if isinstance(metric, Metric) else metric!r}]"
-    if np.shape(pair) != (2,) or not np.all(np.isfinite(pair)) or not pair[1] > 0:
+    numbers = np.shape(pair) == (2,) and np.asarray(pair).dtype.kind in "iuf"
+    if not numbers or not np.all(np.isfinite(pair)) or not pair[1] > 0:
         _checks.refuse(label, "be a value and a positive tolerance", pair, "Write (1.2, 0.05).")
     return float(pair[0]), float(pair[1])

@@ -65,8 +65,10 @@ def tolerance_effects(
     >>> print(effect.sentence("comfort"))
     A 10 % scatter of damper.rate costs 0.35 % of comfort on average, and scatters it by 2.8 %.
     """
-    for name, deviation in scatter.items():
-        _checks.positive(f"tolerances[{name!r}]", deviation, "0.1 is a standard deviation of 10 %.")
+    check_scatter(scatter)
+    if isinstance(metric, Sequence) and not isinstance(metric, str):
+        remedy = "Call it once for each metric."
+        _checks.refuse("metric", "be a single one", _checks.described(metric), remedy)
     run: dict[str, Any] = {"duration": duration, "dt": dt}
     found = sensitivity(metric, vehicle, road, over=list(scatter), dampers=None, second_order=True, **run)
     ((name, value),) = found.values.items()
@@ -80,6 +82,15 @@ def tolerance_effects(
         second = found.hessian[name][i, i] * (found.point[i] * s) ** 2 / value
         effects.append(ToleranceEffect(parameter, s, 0.5 * second, float(np.hypot(first, second / np.sqrt(2.0)))))
     return tuple(sorted(effects, key=lambda effect: -effect.deviation))
+
+
+def check_scatter(scatter: Any) -> None:
+    """Refuse what is no mapping of parameters to positive standard deviations."""
+    remedy = "Write `{'damper.*_rate': 0.1}`: 0.1 is a standard deviation of 10 %."
+    if not isinstance(scatter, Mapping) or not scatter:
+        _checks.refuse("scatter", "be a mapping of one or more parameters", _checks.described(scatter), remedy)
+    for name, deviation in scatter.items():
+        _checks.positive(f"scatter[{name!r}]", deviation, remedy)
 
 
 def tolerance_table(effects: Sequence[ToleranceEffect], metric: str) -> Table:

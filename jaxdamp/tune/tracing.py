@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxdamp.tune.limits import Limit, limit_ends
 from jaxdamp.tune.ranges import SearchRange
 from jaxdamp.tune.side_by_side import LANES, RADIUS, BatchEvaluator, Computed, Lane, Scaling, solve_together
 
@@ -15,26 +16,18 @@ NO_CONFLICT = 1e-4  # range of an objective between the ends, relative to its si
 ROUNDS = 3  # of comparing each search with the results of the others
 
 
-class Limit(NamedTuple):
-    """Largest allowed value of a metric, and the scale of distances to it."""
-
-    top: float
-    scale: float
-
-    def margin(self, value: float) -> float:
-        """Relative distance to the limit, negative beyond it."""
-        return (self.top - value) / self.scale
-
-
 class FrontProblem(NamedTuple):
     """What all searches of a front share."""
 
     evaluator: BatchEvaluator
-    space: SearchRange
-    objectives: int
     limits: list[Limit]
     max_steps: int
     size: np.ndarray  # of each objective at the start
+
+    @property
+    def objectives(self) -> int:
+        """Number of objectives."""
+        return len(self.size)
 
     def scaling(self, zero: np.ndarray, unit: np.ndarray) -> Scaling:
         """The scaling of objectives with this zero and unit.
@@ -42,45 +35,58 @@ class FrontProblem(NamedTuple):
         Limits are aimed at from just inside. Their unit shrinks with those of the objectives, relative to the start, so
         that no objective is worth their violation.
         """
-        tolerance = self.evaluator.tolerance.limit
-        tops = [limit.top - tolerance * limit.scale for limit in self.limits]
-        scales = [limit.scale * float(min(unit / self.size)) for limit in self.limits]
-        return Scaling(np.append(zero, tops), np.append(unit, scales), self.objectives)
-
-    def excess(self, lane: Lane) -> np.ndarray:
-        """Relative distance of each limited metric beyond its limit, negative within."""
-        values = lane.now.values[self.objectives :]
-        return np.array([-limit.margin(value) for limit, value in zip(self.limits, values, strict=False)])
+        inside, ends = self.evaluator.task.tolerance.limit, limit_ends(self.limits)
+        zeros = [end.sign * end.value - inside * end.scale for end in ends]
+        scales = [end.scale * float(min(unit / self.size)) for end in ends]
+        return Scaling(np.append(zero, zeros), np.append(unit, scales), self.objectives)
 
 
-def trace_front(problem: FrontProblem, start: Computed, points: int, report: Callable[[int, int], None]) -> list[Lane]:
-    """The ends of the front, then the points between them, from coarse to fine."""
-    evaluator, space, count, _, max_steps, size = problem
+def trace_front(
+    problem: FrontProblem,
+    starts: np.ndarray,
+    computed: Sequence[Computed],
+    points: int,
+    report: Callable[[int, int], None],
+) -> list[Lane]:
+    """The ends of the front, then the points between them, from coarse to fine.
+
+    Arguments:
+        problem: of the front.
+        starts: coordinates of one or more starts, from each of which the ends are searched.
+        computed: the numbers there.
+        points: number of points of the front.
+        report: called with the number of points done and of all points.
+    """
+    evaluator, _, max_steps, size = problem
+    count = problem.objectives
     aims = np.where(np.eye(count, dtype=bool), 0.0, FAR)
-    lanes = [Lane.begin(aim, space.start / space.unit, start) for aim in aims]
+    lanes = [Lane.begin(aim, at, now) for aim in aims for at, now in zip(starts, computed, strict=True)]
     grid = lattice(count, points)
     total = len(grid)
 
     def solve(chosen: Sequence[Lane], scaling: Scaling) -> None:
         done = sum(not lane.open for lane in lanes)
-        solve_together(chosen, evaluator, scaling, space, max_steps, lambda: report(done, total))
+        solve_together(chosen, evaluator, scaling, max_steps, lambda: report(done, total))
 
-    solve(lanes, problem.scaling(np.zeros(count), size))
+    scaling = problem.scaling(np.zeros(count), size)
+    solve(lanes, scaling)
+    by_aim = (lanes[i * len(starts) : (i + 1) * len(starts)] for i in range(count))
+    lanes = [min(several, key=lambda lane: scaling.merit(lane.now.rows, lane.aim)) for several in by_aim]
     scaling = _scaled_to(lanes, problem)
     for lane in lanes:  # once more, with the accuracy relative to the range of the front
         lane.open, lane.steps, lane.radius = True, 0, max(lane.radius, 0.1 * RADIUS)
     solve(lanes, scaling)
-    if min(range_of(lanes, problem) / size) < NO_CONFLICT:
+    if min(range_of(lanes, count) / size) < NO_CONFLICT:
         return lanes
     scaling = _scaled_to(lanes, problem)
-    ends = np.stack([scaling.of(lane.now.values)[:count] for lane in lanes])
+    ends = np.stack([scaling.of(lane.now.rows)[:count] for lane in lanes])
     places, left = [*np.eye(count)], [place for place in grid if place.max() < 1.0]
     while left:
         new = _farthest(places, left, min(len(places), LANES))
-        begun = _predicted(lanes, places, new, problem)
-        found = evaluator.at(np.stack(begun))
+        begun = _predicted(lanes, places, new, evaluator.task.space)
+        at_new = evaluator.at(np.stack(begun))
         near = [lanes[int(np.argmin(np.linalg.norm(np.array(places) - place, axis=1)))] for place in new]
-        opened = [lane.neighbour(p @ ends, at, c) for lane, p, at, c in zip(near, new, begun, found, strict=True)]
+        opened = [lane.neighbour(p @ ends, at, c) for lane, p, at, c in zip(near, new, begun, at_new, strict=True)]
         solve(opened, scaling)
         lanes, places = lanes + opened, places + new
         report(len(lanes), total)
@@ -92,16 +98,16 @@ def trace_front(problem: FrontProblem, start: Computed, points: int, report: Cal
     return lanes
 
 
-def range_of(lanes: Sequence[Lane], problem: FrontProblem) -> np.ndarray:
+def range_of(lanes: Sequence[Lane], objectives: int) -> np.ndarray:
     """Difference between the worst and the best value of each objective."""
-    return np.ptp(np.stack([lane.now.values[: problem.objectives] for lane in lanes]), axis=0)
+    return np.ptp(np.stack([lane.now.rows[:objectives] for lane in lanes]), axis=0)
 
 
 def _scaled_to(lanes: Sequence[Lane], problem: FrontProblem) -> Scaling:
     """Objectives from 0 at their best to 1 at their worst value among the ends of the front."""
-    best = np.stack([lane.now.values[: problem.objectives] for lane in lanes]).min(axis=0)
+    best = np.stack([lane.now.rows[: problem.objectives] for lane in lanes]).min(axis=0)
     least = NO_CONFLICT * np.abs(best) + np.finfo(float).tiny
-    return problem.scaling(best, np.maximum(range_of(lanes, problem), least))
+    return problem.scaling(best, np.maximum(range_of(lanes, problem.objectives), least))
 
 
 def lattice(count: int, points: int) -> list[np.ndarray]:
@@ -123,21 +129,20 @@ def _farthest(places: list[np.ndarray], left: list[np.ndarray], count: int) -> l
 
 
 def _predicted(
-    lanes: Sequence[Lane], places: list[np.ndarray], new: list[np.ndarray], problem: FrontProblem
+    lanes: Sequence[Lane], places: list[np.ndarray], new: list[np.ndarray], space: SearchRange
 ) -> list[np.ndarray]:
     """Coordinates of new points, interpolated between those of the solved ones."""
     from scipy.interpolate import RBFInterpolator
 
     known, values = np.array(places)[:, :-1], np.stack([lane.at for lane in lanes])
     kernel = "cubic" if len(known) > known.shape[1] + 1 else "linear"
-    found = RBFInterpolator(known, values, kernel=kernel)(np.array(new)[:, :-1])
-    space = problem.space
-    return list(np.clip(found, space.lower / space.unit, space.upper / space.unit))
+    predicted = RBFInterpolator(known, values, kernel=kernel)(np.array(new)[:, :-1])
+    return list(np.clip(predicted, space.lower / space.unit, space.upper / space.unit))
 
 
 def _restarted(lanes: Sequence[Lane], scaling: Scaling, least: float) -> list[Lane]:
     """The searches for whose aim the result of another one is better by `least` or more, restarted from there."""
-    merits = np.array([[scaling.merit(other.now.values, lane.aim) for other in lanes] for lane in lanes])
+    merits = np.array([[scaling.merit(other.now.rows, lane.aim) for other in lanes] for lane in lanes])
     results = [(lane.at, lane.now, lane.curvature.copy()) for lane in lanes]
     improved = []
     for i, (lane, best) in enumerate(zip(lanes, merits.argmin(axis=1), strict=True)):

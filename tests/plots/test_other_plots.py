@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray
 from matplotlib.axes import Axes
+from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -261,6 +262,19 @@ def test_a_sweep_over_two_axes_is_a_map_with_its_smallest_value_and_failures() -
     assert (axes.get_xlabel(), axes.get_ylabel(), bar.get_ylabel()) == ("a", "b", "height")
     np.testing.assert_array_equal(_line(axes, "smallest: 0"), [[1.0, 2.0]])
     np.testing.assert_array_equal(_line(axes, "failed"), [[-1.0, 1.0], [-1.0, 2.0], [-1.0, 3.0]])
+
+
+def test_limits_hatch_a_map_and_ring_points_of_curves() -> None:
+    data = _grid()
+    figure = plots.sweep(data, "height", limits={"height": (0.5, 1.5)})
+    assert _legend(figure) == ["smallest within the limits: 1", "failed", "height below 0.5", "height above 1.5"]
+    hatched = [c for c in figure.axes[0].collections if isinstance(c, QuadContourSet) and any(c.hatches)]
+    assert len(hatched) == 2 and hatched[0].hatches != hatched[1].hatches
+    (axes,) = plots.sweep(data.isel(b=0), "height", limits={"height": 1.5}).axes
+    rings = next(c for c in axes.collections if c.get_label() == "height above 1.5")
+    np.testing.assert_array_equal(rings.get_offsets(), [[0.0, 2.0], [2.0, 2.0]])
+    with pytest.raises(ValueError, match=r"`limits` must be one of .*Did you mean 'height'"):
+        plots.sweep(data, "height", limits={"hight": 1.0})
 
 
 def test_a_sweep_over_one_axis_has_a_curve_for_each_value_of_another() -> None:

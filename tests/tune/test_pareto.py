@@ -1,9 +1,11 @@
 import json
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import jaxdamp
 from jaxdamp import dampers, export, metrics, parameters, roads, tune, vehicles
 from jaxdamp.tune.front import non_dominated
 
@@ -110,10 +112,56 @@ def test_three_objectives_with_a_limit_and_a_function():
     assert len(front.plot().axes) == 4
 
 
+def test_scenarios_limits_shapes_ties_and_starts_are_those_of_a_tuning():
+    """A front over two payloads: its ends are the results of `minimise` with the same arguments."""
+    car = vehicles.presets.quarter_car_000(dampers.Bilinear(2500.0, 2500.0) + dampers.Linear(2500.0))
+    loads = {"empty": tune.Condition(), "laden": tune.Condition({"sprung_mass": 1600.0})}
+    scenarios = tune.Scenarios([ROAD], loads, risk="worst")
+    highest, least = 0.0136, 0.0112  # of the travel, in each scenario
+    options: dict[str, Any] = {
+        "limits": {TRAVEL: (least, highest)},
+        "shape": [tune.ratio(1.5, 3.0, velocity=0.5)],
+        "over": {"damper.*rate": (500.0, 9000.0)},
+        "tie": {"damper.terms.1.rate": "damper.terms.0.compression_rate"},
+    }
+    front = tune.pareto([COMFORT, TYRE], car, scenarios, points=3, starts=2, **options)
+    assert front.converged and len(front.parameters) == 2
+    each = [scenarios.ride(front.point(i), metrics=[TRAVEL]).each()[TRAVEL] for i in range(len(front))]
+    assert np.max(each) == pytest.approx(highest, rel=1e-5) and np.max(each) <= highest
+    assert np.min(each) == pytest.approx(least, rel=1e-5) and np.min(each) >= least
+    alone = tune.minimise(COMFORT, front.start, scenarios, **options)
+    assert alone.after[COMFORT] == pytest.approx(front.values[COMFORT][0], rel=1e-5)
+    for i in range(len(front)):
+        forces = [float(front.point(i).damper.force(0.0, v, jnp.zeros(0))) for v in (-0.5, 0.5)]
+        assert 1.5 - 1e-6 < -forces[1] / forces[0] < 3.0 + 1e-6
+    assert front.metrics_of(front.point(0))[TYRE] == pytest.approx(front.values[TYRE][0], rel=1e-9)
+    assert front.to_dict()["limits"][TRAVEL]["value"] == [least, highest]
+
+
+def test_a_limit_that_does_not_hold_on_fresh_roads_is_said():
+    road = roads.iso8608("C", speed=20.0, seed=4712)  # smoother than the next one
+    run: dict[str, Any] = {"duration": 0.5, "dt": 2e-3}
+    limits = {metrics.Metric("sprung_acceleration", "peak"): 0.8}
+    front = tune.pareto(
+        [COMFORT, TYRE], CAR, road, points=3, limits=limits, over={"rate": (2500.0, 7000.0)}, fresh_roads=2, **run
+    )
+    (name,) = front.limits
+    assert front.fresh[name].shape == (2, len(front)) and front.values[name].max() <= 0.8
+    other = jaxdamp.Ride(front.point(0), road.reseeded(4711), metrics=[COMFORT], **run)()
+    assert front.fresh[COMFORT][0, 0] == pytest.approx(float(other[COMFORT]), rel=1e-9)
+    beyond = front.fresh[name] > 0.8
+    assert beyond.any()
+    note = next(text for text in front.warnings if "fresh roads" in text)
+    assert f"On {beyond.any(axis=1).sum()} of 2 fresh roads {name} is beyond its limit at" in note
+
+
 def test_a_limit_that_no_design_meets_is_named():
-    front = tune.pareto([COMFORT, TYRE], CAR, ROAD, points=3, limits={TRAVEL: 0.005})
+    front = tune.pareto([COMFORT, TYRE], CAR, ROAD, points=3, limits={TRAVEL: 0.005, COMFORT: 0.5})
     assert front.status is tune.Status.LIMIT_NOT_MET and len(front) == 1
-    assert f"The limit {TRAVEL} <= 0.005 is not met: 0.009" in front.warnings[0]
+    assert f"The limit {TRAVEL} <= 0.005 m is not met: 0.009" in front.warnings[0]
+    assert (
+        f"Not met together: {TRAVEL}, {COMFORT}. The search is held by the bounds of damper.rate." in front.warnings[0]
+    )
     assert front.designs[0, 0] == pytest.approx(7500.0, rel=1e-4)
 
 
@@ -157,8 +205,6 @@ def test_simulated_front_is_better_than_a_grid():
     road = roads.iso8608("C", speed=20.0, seed=1)
     over = {"rebound_rate": (1000.0, 8000.0), "compression_rate": (1000.0, 8000.0)}
     front = tune.pareto([COMFORT, TYRE], car, road, over=over, points=9, duration=4.0, dt=2e-3)
-    import jaxdamp
-
     ride = jaxdamp.Ride(car, road, metrics=[COMFORT, TYRE], duration=4.0, dt=2e-3)
     axis = np.linspace(1000.0, 8000.0, 41)
     data = jaxdamp.sweep(ride, {"damper.rebound_rate": axis, "damper.compression_rate": axis})
