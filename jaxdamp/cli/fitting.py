@@ -14,7 +14,7 @@ from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.options import decisions, law_names, split
 from jaxdamp.cli.preflighting import checked
 from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
-from jaxdamp.cli.results import Results, results_folder
+from jaxdamp.cli.results import Results, another_page, results_folder
 from jaxdamp.cli.wording import message
 from jaxdamp.identify import Comparison, Failure, Rung
 from jaxdamp.report import (
@@ -57,6 +57,7 @@ def run_fit(
     processing: ProcessOptions | None = None,
     group_by: str | None = None,
     out: Path,
+    report: Path | None = None,
     replace: bool = False,
 ) -> None:
     """Read and check records, fit laws to those without an error, say how good they are, and write all into a folder.
@@ -68,7 +69,9 @@ def run_fit(
     _checks.one_of("weighting", weighting, ("samples", "runs"))
     machine = identify.machine_names("rig", rig)
     attempts = Attempts(interrupt.check, message)
-    with results_folder(out, "fit", replace=replace) as results:
+    if report is not None and group_by is not None:
+        _checks.refuse("report", "be left out with --group-by, which writes a page for each group", str(report))
+    with another_page(report, out, replace=replace), results_folder(out, "fit", replace=replace) as results:
         with screen.stage("Reading the records"):
             raw = options.read(files)
         sound, found = checked(screen, raw, notes=False)

@@ -15,6 +15,9 @@ Replace = Annotated[
 ]
 
 
+Page = Annotated[Path | None, typer.Option("--report", help="Write the page to this file too: fit.html.")]
+
+
 Files = Annotated[
     list[Path],
     typer.Argument(help="Files with records (CSV, XLSX, MATLAB, TDMS, MDF4, Parquet), patterns, or folders."),

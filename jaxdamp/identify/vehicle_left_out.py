@@ -94,8 +94,8 @@ def _sentence(channel: str, effect: str, size: float, unit: str) -> str:
         "offset": f"has a zero error of {size:.3g} {unit}",
         "gain": f"has a gain of {1 + size:.4g}",
     }
-    how = {"delay": "lag=0.0)` or `Sensor(delay=0.0", "offset": "offset=0.0", "gain": "gain=1.0"}[effect]
+    how = {"delay": "lag or delay"}.get(effect, effect)
     return (
         f"By its residual, {channel} {words[effect]}, unless the vehicle misses something else:"
-        f" fit it with `Sensor({how})`."
+        f" fit the {how} of its sensor."
     )
