@@ -81,6 +81,9 @@ def fit(
             'mass, delay, lag, stroke_offset, heat; "gas,delay" names two, "none" nothing.'
         ),
     ] = ["offset"],  # noqa: B006
+    cross_validate: Annotated[
+        bool, typer.Option("--cross-validate", help="Predict each record by the best law fitted to the others.")
+    ] = False,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-fit"),
     report: Page = None,
     replace: Replace = False,
@@ -105,6 +108,7 @@ def fit(
             rig=rig,
             processing=processing,
             group_by=group_by,
+            cross_validate=cross_validate,
             out=out,
             report=report,
             replace=replace,

@@ -16,7 +16,7 @@ from jaxdamp.cli.preflighting import checked
 from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 from jaxdamp.cli.results import Results, another_page, results_folder
 from jaxdamp.cli.wording import message
-from jaxdamp.identify import Comparison, Failure, Rung
+from jaxdamp.identify import Comparison, CrossValidation, Failure, Rung
 from jaxdamp.report import (
     Attempts,
     failure_sentences,
@@ -56,6 +56,7 @@ def run_fit(
     rig: Sequence[str] = (identify.OFFSET,),
     processing: ProcessOptions | None = None,
     group_by: str | None = None,
+    cross_validate: bool = False,
     out: Path,
     report: Path | None = None,
     replace: bool = False,
@@ -84,7 +85,8 @@ def run_fit(
         remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
-        job = FitJob(screen, names, weighting, machine, results, attempts, found, [*remarks, *found.sentences()])
+        notes = [*remarks, *found.sentences()]
+        job = FitJob(screen, names, weighting, machine, results, attempts, found, notes, cross_validate)
         failed = []
         for number, (name, part) in enumerate(groups.items(), 1):
             try:
@@ -109,6 +111,7 @@ class FitJob(NamedTuple):
     attempts: Attempts
     found: Preflight
     remarks: Sequence[str]
+    cross_validate: bool
 
     def fit_group(self, name: str, runs: BenchSet, held_out: BenchSet, later: Sequence[str]) -> None:
         """Fit one group of records and write its folder, which has the name of the group.
@@ -125,6 +128,7 @@ class FitJob(NamedTuple):
         held, fitted = (runs.where(lambda run, yes=yes: (run in held_out.runs) == yes) for yes in (True, False))
         fits = fit_laws(self.screen, self.names, fitted, held, weighting=self.weighting, rig=self.rig)
         show(self.screen, fits)
+        validation = self.validated(fits.comparison.best.name, fitted) if self.cross_validate else None
         following = f" and the fits of {', '.join(later)}" if later else ""
         with interrupt.saving(), self.screen.stage("Laws and tables"):
             folder = self.results.draft / name
@@ -136,10 +140,26 @@ class FitJob(NamedTuple):
             folder = self.results.draft / name
             folder.mkdir(exist_ok=True)
             places = {"folder": folder, "attempts": self.attempts}
-            page = fit_report(fits.comparison, runs=runs, remarks=self.remarks, failures=fits.failures, **places)
+            page = fit_report(
+                fits.comparison,
+                runs=runs,
+                remarks=self.remarks,
+                failures=fits.failures,
+                validation=validation,
+                **places,
+            )
             page.write(folder / "report.html")
             if later:
                 self.results.publish(f"the fits of {', '.join(later)}")
+
+    def validated(self, name: str, runs: BenchSet) -> CrossValidation | None:
+        """Each record predicted by the law of this name fitted to the others; None where that fails."""
+        with self.attempts.part(f"The cross-validation of {name}"), self.screen.stage("Leaving out each record"):
+            start = identify.default_ladder(tuple(runs), [name], rig=self.rig)
+            validation = identify.cross_validate(start, tuple(runs), rig=self.rig)
+            self.screen.table(validation.record_table())
+            return validation
+        return None
 
 
 def fit_laws(

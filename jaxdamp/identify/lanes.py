@@ -12,6 +12,7 @@ from jaxtyping import Array, Float, Int
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import laws_inside, margins
+from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.model import Model
 from jaxdamp.identify.traces import Batch, record_batches
 from jaxdamp.parameters import Coordinates
@@ -44,6 +45,22 @@ class Evaluation(NamedTuple):
     keeps_conditions: np.ndarray  # of each lane
 
 
+class LanePriors(NamedTuple):
+    """Prior knowledge of parameters, common to all dampers, in units of the noise of each."""
+
+    priors: Priors
+    noise: Float[np.ndarray, " dampers"]  # standard deviation of a weighted sample
+
+
+class Missed(NamedTuple):
+    """What the law misses in a record."""
+
+    number: int  # of the record among those of all dampers
+    force: Float[np.ndarray, " samples"]  # as measured, N
+    residual: Float[np.ndarray, " samples"]  # weighted
+    weight: Float[np.ndarray, " samples"]
+
+
 class Lanes(NamedTuple):
     """Many dampers as one problem; a lane is a set of numbers for one of them.
 
@@ -51,11 +68,13 @@ class Lanes(NamedTuple):
         coordinates: of the free numbers, common to all dampers.
         groups: the records.
         damper: the damper of each lane.
+        priors: what is known of the numbers beforehand.
     """
 
     coordinates: Coordinates
     groups: tuple[Group, ...]
     damper: Int[np.ndarray, " lanes"]
+    priors: LanePriors | None = None
 
     def evaluate(self, y: Float[np.ndarray, "lanes free"], lanes: Int[np.ndarray, " some"]) -> Evaluation:
         """Sums of squares and products of some lanes, at the coordinates of all; the other lanes have zeros."""
@@ -67,20 +86,29 @@ class Lanes(NamedTuple):
                 products, margin, _ = self._chunk(group, y, lane[part], record[part])
                 np.add.at(gram, lane[part], products)
                 keeps[lane[part]] &= margin > 0
+        if self.priors is not None:
+            rows = np.asarray(_prior_rows(self.coordinates, jnp.asarray(y[lanes]), self.priors.priors), np.float64)
+            rows = rows * (self.priors.noise / self.levels())[self.damper[lanes], None, None]
+            gram[lanes] += rows.transpose(0, 2, 1) @ rows
         return Evaluation(gram, keeps)
 
-    def missed(self, y: Float[np.ndarray, "lanes free"]) -> list[tuple[list[np.ndarray], ...]]:
-        """Force, weighted residual and weight of every record of each lane, at the samples that count."""
-        found: list[tuple[list[np.ndarray], ...]] = [([], [], []) for _ in range(y.shape[0])]
+    def residuals(self, y: Float[np.ndarray, "dampers free"]) -> list[Float[np.ndarray, "records time"]]:
+        """Weighted residual of every record of each group, with one lane for each damper."""
+        found = []
         for group in self.groups:
-            lane, record = self._pairs(group, np.arange(y.shape[0]))
-            parts = group.parts(lane.size)
-            residual = np.concatenate([self._chunk(group, y, lane[part], record[part])[2] for part in parts])
+            record = np.arange(group.damper.size)
+            parts = [self._chunk(group, y, group.damper[p], record[p])[2] for p in group.parts(record.size)]
+            found.append(np.concatenate(parts) * group.level[:, None])
+        return found
+
+    def missed(self, y: Float[np.ndarray, "dampers free"]) -> list[list[Missed]]:
+        """What the law misses in every record of each damper, with one lane for each, at the samples that count."""
+        found: list[list[Missed]] = [[] for _ in range(y.shape[0])]
+        for group, residual in zip(self.groups, self.residuals(y), strict=True):
             force, weight = np.asarray(group.batch.force), np.asarray(group.batch.weight)
-            for i, k, own in zip(lane, record, residual, strict=True):
+            for k, (i, number) in enumerate(zip(group.damper, np.asarray(group.batch.number), strict=True)):
                 used = weight[k] > 0
-                for values, channel in zip(found[i], (force[k], own * group.level[k], weight[k]), strict=True):
-                    values.append(channel[used])
+                found[i].append(Missed(int(number), force[k][used], residual[k][used], weight[k][used]))
         return found
 
     def levels(self) -> Float[np.ndarray, " dampers"]:
@@ -110,6 +138,21 @@ class Lanes(NamedTuple):
         point, level = y[lane].astype(dtype), group.level[record].astype(dtype)
         found = _compared(self.coordinates, point, group.batch, record, level)
         return [np.asarray(a, np.float64)[:count] for a in found]
+
+
+@eqx.filter_jit
+def _prior_rows(coordinates: Coordinates, y: Any, priors: Priors) -> Array:
+    """For each lane the derivatives of the residuals of priors, and these in the last column."""
+
+    def one(y: Array) -> Array:
+        def residual(y: Array) -> tuple[Array, Array]:
+            missed = priors(coordinates.free.build(coordinates.to_physical(y)))
+            return missed, missed
+
+        slopes, missed = jax.jacfwd(residual, has_aux=True)(y)
+        return jnp.concatenate([slopes, missed[:, None]], axis=1)
+
+    return jax.vmap(one)(y)
 
 
 @eqx.filter_jit
