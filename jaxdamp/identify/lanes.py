@@ -1,7 +1,9 @@
 """The records of many dampers side by side, compared with one law with other numbers for each damper."""
 
 import dataclasses
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -82,8 +84,7 @@ class Lanes(NamedTuple):
         gram, keeps = np.zeros((count, size, size)), np.ones(count, bool)
         for group in self.groups:
             lane, record = self._pairs(group, lanes)
-            for part in group.parts(lane.size):
-                products, margin, _ = self._chunk(group, y, lane[part], record[part])
+            for part, (products, margin, _) in self._chunks(group, y, lane, record):
                 np.add.at(gram, lane[part], products)
                 keeps[lane[part]] &= margin > 0
         if self.priors is not None:
@@ -96,9 +97,8 @@ class Lanes(NamedTuple):
         """Weighted residual of every record of each group, with one lane for each damper."""
         found = []
         for group in self.groups:
-            record = np.arange(group.damper.size)
-            parts = [self._chunk(group, y, group.damper[p], record[p])[2] for p in group.parts(record.size)]
-            found.append(np.concatenate(parts) * group.level[:, None])
+            parts = self._chunks(group, y, group.damper, np.arange(group.damper.size))
+            found.append(np.concatenate([own for _, (_, _, own) in parts]) * group.level[:, None])
         return found
 
     def missed(self, y: Float[np.ndarray, "dampers free"]) -> list[list[Missed]]:
@@ -131,13 +131,22 @@ class Lanes(NamedTuple):
         which, record = np.nonzero(fits)
         return lanes[which], record
 
-    def _chunk(self, group: Group, y: np.ndarray, lane: np.ndarray, record: np.ndarray) -> list[np.ndarray]:
-        count = lane.size
-        lane, record = (np.pad(a, (0, group.chunk - count), "edge") for a in (lane, record))
-        dtype = self.coordinates.free.values.dtype
-        point, level = y[lane].astype(dtype), group.level[record].astype(dtype)
-        found = _compared(self.coordinates, point, group.batch, record, level)
-        return [np.asarray(a, np.float64)[:count] for a in found]
+    def _chunks(
+        self, group: Group, y: np.ndarray, lane: np.ndarray, record: np.ndarray
+    ) -> Iterator[tuple[slice, list[np.ndarray]]]:
+        """What `_compared` gives for pairs of a lane and a record, in pieces that are computed at the same time."""
+        dtype, double = self.coordinates.free.values.dtype, jnp.result_type(float) == jnp.float64
+
+        def compared(part: slice) -> list[np.ndarray]:
+            own, rows = (np.pad(a[part], (0, group.chunk - a[part].size), "edge") for a in (lane, record))
+            point, level = y[own].astype(dtype), group.level[rows].astype(dtype)
+            with jax.enable_x64(double):  # a thread begins with the precision of the process
+                found = _compared(self.coordinates, point, group.batch, rows, level)
+            return [np.asarray(a, np.float64)[: lane[part].size] for a in found]
+
+        parts = group.parts(lane.size)
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            yield from zip(parts, pool.map(compared, parts), strict=True)
 
 
 @eqx.filter_jit

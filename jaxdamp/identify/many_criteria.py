@@ -58,9 +58,7 @@ def by_rounds(
     roots, levels = [np.ones(np.shape(group.batch.weight)) for group in plain.groups], plain.levels()
     y, gram, status, steps = end.y.copy(), end.gram.copy(), list(end.status), end.steps.copy()
     still = np.isfinite(gram[:, -1, -1]) & (gram[:, -1, -1] > ROUNDING**2)
-    if loss == "squares" and plain.priors is None:
-        still[:] = False
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS if loss != "squares" or plain.priors is not None else 0):
         weighted, noise = lanes.residuals(y), np.ones(count)
         for i in np.flatnonzero(still):
             used = [_own(plain, int(i), group) for group in range(len(roots))]

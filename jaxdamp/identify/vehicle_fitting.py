@@ -15,7 +15,7 @@ from jaxdamp.identify.noise import independent
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.identify.several import Solution
-from jaxdamp.identify.vehicle_left_out import on_sensors
+from jaxdamp.identify.vehicle_left_out import on_sensors, on_signs
 from jaxdamp.identify.vehicle_noise import channel_noise
 from jaxdamp.identify.vehicle_preparing import (
     VehicleData,
@@ -154,7 +154,8 @@ def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScal
             f" {', '.join(scale.names)} may all be larger by one factor.{''.join(values)}"
             " Fix one mass that is known, or measure a force."
         )
-    notes += estimates.notes
+    scores = channel_scores(problem, end.residual, data.rides, data.channels)
+    notes += [*on_signs(scores), *estimates.notes]
     notes += on_sensors(problem, end, data.rides, data.channels, model.sensors)
     if noise.inflation > 1.0:
         notes.append(
@@ -167,7 +168,7 @@ def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScal
         bench=data.benches,
         parameters=estimates.estimates,
         covariance=estimates.covariance,
-        scores=channel_scores(problem, end.residual, data.rides, data.channels),
+        scores=scores,
         warnings=tuple(notes),
         status=end.status,
         steps=end.steps,

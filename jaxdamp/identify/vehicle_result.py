@@ -33,6 +33,7 @@ class ChannelScore(NamedTuple):
     rmse: float  # in the unit
     fit_percent: float
     largest_error: float  # in the unit
+    correlation: float  # of the predicted with the measured values
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -123,7 +124,7 @@ class VehicleFit:
         """The errors of each channel of each record."""
         columns = [Column("record"), Column("channel"), Column("unit"), Column("RMSE", spec=".3g")]
         columns += [Column("fit", "%", ".1f"), Column("largest error", spec=".3g")]
-        return Table("Channels", tuple(columns), tuple(tuple(score) for score in self.scores))
+        return Table("Channels", tuple(columns), tuple(tuple(score)[:-1] for score in self.scores))
 
     def to_dict(self) -> dict[str, Any]:
         """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
@@ -206,7 +207,9 @@ def channel_scores(
     return (*[scores[key] for key in sorted(scores)], *on_bench)
 
 
-def _figures(measured: np.ndarray, error: np.ndarray) -> tuple[float, float, float]:
-    """RMSE, fit percent and largest error."""
+def _figures(measured: np.ndarray, error: np.ndarray) -> tuple[float, float, float, float]:
+    """RMSE, fit percent, largest error, and correlation of predicted and measured values."""
     percent = fit_percent([measured], [measured + error])
-    return float(np.sqrt(np.mean(error**2))), percent, float(np.abs(error).max())
+    sizes = np.std(measured) * np.std(measured + error)
+    alike = float(np.mean((measured - measured.mean()) * (measured + error)) / sizes) if sizes > 0 else 0.0
+    return float(np.sqrt(np.mean(error**2))), percent, float(np.abs(error).max()), alike
