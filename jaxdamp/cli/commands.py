@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from jaxdamp.cli.option_types import (
+    CrossValidate,
     Debug,
     Duration,
     Files,
@@ -81,9 +82,7 @@ def fit(
             'mass, delay, lag, stroke_offset, heat; "gas,delay" names two, "none" nothing.'
         ),
     ] = ["offset"],  # noqa: B006
-    cross_validate: Annotated[
-        bool, typer.Option("--cross-validate", help="Predict each record by the best law fitted to the others.")
-    ] = False,
+    cross_validate: CrossValidate = False,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-fit"),
     report: Page = None,
     replace: Replace = False,
@@ -131,8 +130,8 @@ def fit_vehicle(
 ) -> None:
     """Fit masses, rates, friction and dampers of a vehicle to records of its motion on a rig or a road.
 
-    VEHICLE is the start. Columns are named as its channels, or assigned with --columns; heights and accelerations count
-    positive up, travels in extension. Writes the vehicle and its laws as JSON, tables, pictures and a page.
+    VEHICLE is the start. Columns are named as its channels, or by --columns; heights and accelerations are positive up,
+    travels in extension. Writes the vehicle and its laws as JSON, tables, pictures and a page.
     """
     from jaxdamp.cli import console, vehicle_fitting
 
