@@ -6,10 +6,12 @@ from typing import Annotated
 import typer
 
 from jaxdamp.cli.option_types import (
+    CrossValidate,
     Debug,
     Duration,
     Files,
     GroupBy,
+    Page,
     Replace,
     Road,
     Seed,
@@ -19,6 +21,7 @@ from jaxdamp.cli.option_types import (
     Vehicle,
 )
 from jaxdamp.cli.record_options import ProcessOptions, ReadOptions, spread
+from jaxdamp.cli.vehicle_fit_options import RideReadOptions, VehicleFitOptions
 
 
 app = typer.Typer(
@@ -79,7 +82,9 @@ def fit(
             'mass, delay, lag, stroke_offset, heat; "gas,delay" names two, "none" nothing.'
         ),
     ] = ["offset"],  # noqa: B006
+    cross_validate: CrossValidate = False,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-fit"),
+    report: Page = None,
     replace: Replace = False,
     debug: Debug = False,
 ) -> None:
@@ -102,8 +107,38 @@ def fit(
             rig=rig,
             processing=processing,
             group_by=group_by,
+            cross_validate=cross_validate,
             out=out,
+            report=report,
             replace=replace,
+        )
+
+
+@app.command(name="fit-vehicle")
+@spread
+def fit_vehicle(
+    vehicle: Vehicle,
+    files: Annotated[list[Path], typer.Argument(help="Files with records of its motion, patterns, or folders.")],
+    *,
+    start: Start = None,
+    reading: RideReadOptions,
+    options: VehicleFitOptions,
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-fit-vehicle"),
+    report: Page = None,
+    replace: Replace = False,
+    debug: Debug = False,
+) -> None:
+    """Fit masses, rates, friction and dampers of a vehicle to records of its motion on a rig or a road.
+
+    VEHICLE is the start. Columns are named as its channels, or by --columns; heights and accelerations are positive up,
+    travels in extension. Writes the vehicle and its laws as JSON, tables, pictures and a page.
+    """
+    from jaxdamp.cli import console, vehicle_fitting
+
+    with console.plain_errors(debug):
+        console.prepare()
+        vehicle_fitting.run_fit_vehicle(
+            console.Screen(), vehicle, files, reading, options, start=start, out=out, report=report, replace=replace
         )
 
 

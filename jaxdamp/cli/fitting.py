@@ -14,9 +14,9 @@ from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.options import decisions, law_names, split
 from jaxdamp.cli.preflighting import checked
 from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
-from jaxdamp.cli.results import Results, results_folder
+from jaxdamp.cli.results import Results, another_page, results_folder
 from jaxdamp.cli.wording import message
-from jaxdamp.identify import Comparison, Failure, Rung
+from jaxdamp.identify import Comparison, CrossValidation, Failure, Rung
 from jaxdamp.report import (
     Attempts,
     failure_sentences,
@@ -56,7 +56,9 @@ def run_fit(
     rig: Sequence[str] = (identify.OFFSET,),
     processing: ProcessOptions | None = None,
     group_by: str | None = None,
+    cross_validate: bool = False,
     out: Path,
+    report: Path | None = None,
     replace: bool = False,
 ) -> None:
     """Read and check records, fit laws to those without an error, say how good they are, and write all into a folder.
@@ -68,7 +70,9 @@ def run_fit(
     _checks.one_of("weighting", weighting, ("samples", "runs"))
     machine = identify.machine_names("rig", rig)
     attempts = Attempts(interrupt.check, message)
-    with results_folder(out, "fit", replace=replace) as results:
+    if report is not None and group_by is not None:
+        _checks.refuse("report", "be left out with --group-by, which writes a page for each group", str(report))
+    with another_page(report, out, replace=replace), results_folder(out, "fit", replace=replace) as results:
         with screen.stage("Reading the records"):
             raw = options.read(files)
         sound, found = checked(screen, raw, notes=False)
@@ -82,9 +86,8 @@ def run_fit(
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
         scheduled = group_by is None and len({run.command for run in runs}) > 1
-        job = FitJob(
-            screen, names, weighting, machine, scheduled, results, attempts, found, [*remarks, *found.sentences()]
-        )
+        notes = [*remarks, *found.sentences()]
+        job = FitJob(screen, names, weighting, machine, scheduled, results, attempts, found, notes, cross_validate)
         failed = []
         for number, (name, part) in enumerate(groups.items(), 1):
             try:
@@ -110,6 +113,7 @@ class FitJob(NamedTuple):
     attempts: Attempts
     found: Preflight
     remarks: Sequence[str]
+    cross_validate: bool
 
     def fit_group(self, name: str, runs: BenchSet, held_out: BenchSet, later: Sequence[str]) -> None:
         """Fit one group of records and write its folder, which has the name of the group.
@@ -127,6 +131,7 @@ class FitJob(NamedTuple):
         how = {"weighting": self.weighting, "rig": self.rig, "scheduled": self.scheduled}
         fits = fit_laws(self.screen, self.names, fitted, held, **how)
         show(self.screen, fits)
+        validation = self.validated(fits.comparison.best.name, fitted) if self.cross_validate else None
         following = f" and the fits of {', '.join(later)}" if later else ""
         with interrupt.saving(), self.screen.stage("Laws and tables"):
             folder = self.results.draft / name
@@ -138,10 +143,26 @@ class FitJob(NamedTuple):
             folder = self.results.draft / name
             folder.mkdir(exist_ok=True)
             places = {"folder": folder, "attempts": self.attempts}
-            page = fit_report(fits.comparison, runs=runs, remarks=self.remarks, failures=fits.failures, **places)
+            page = fit_report(
+                fits.comparison,
+                runs=runs,
+                remarks=self.remarks,
+                failures=fits.failures,
+                validation=validation,
+                **places,
+            )
             page.write(folder / "report.html")
             if later:
                 self.results.publish(f"the fits of {', '.join(later)}")
+
+    def validated(self, name: str, runs: BenchSet) -> CrossValidation | None:
+        """Each record predicted by the law of this name fitted to the others; None where that fails."""
+        with self.attempts.part(f"The cross-validation of {name}"), self.screen.stage("Leaving out each record"):
+            start = identify.default_ladder(tuple(runs), [name], rig=self.rig)
+            validation = identify.cross_validate(start, tuple(runs), rig=self.rig)
+            self.screen.table(validation.record_table())
+            return validation
+        return None
 
 
 def fit_laws(

@@ -15,6 +15,12 @@ Replace = Annotated[
 ]
 
 
+CrossValidate = Annotated[
+    bool, typer.Option("--cross-validate", help="Predict each record by the best law fitted to the others.")
+]
+Page = Annotated[Path | None, typer.Option("--report", help="Write the page to this file too: fit.html.")]
+
+
 Files = Annotated[
     list[Path],
     typer.Argument(help="Files with records (CSV, XLSX, MATLAB, TDMS, MDF4, Parquet), patterns, or folders."),

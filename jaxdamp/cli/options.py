@@ -12,6 +12,7 @@ from jaxdamp.cli.wording import in_options
 
 _COMPRESSION = Setting("sign", "compression-positive")  # what the reader proposes in its notes
 ROLES = ("time", "stroke", "velocity", "force", "temperature")
+NAME = r"[\w.]+"  # of any channel
 
 
 def law_names(asked: Sequence[str]) -> list[str]:
@@ -28,19 +29,20 @@ def law_names(asked: Sequence[str]) -> list[str]:
     return list(identify.LAWS) if "all" in asked else list(dict.fromkeys(asked))
 
 
-def assignments(option: str, texts: Sequence[str]) -> dict[str, str]:
-    """What "stroke=x_mm,force=Load, N" assigns to the quantities of a record.
+def assignments(option: str, texts: Sequence[str], roles: Sequence[str] | None = ROLES) -> dict[str, str]:
+    """What "stroke=x_mm,force=Load, N" assigns to the quantities of a record; any names if `roles` is None.
 
     >>> assignments("columns", ["time=t,stroke=Displacement, in", "force=2"])
     {'time': 't', 'stroke': 'Displacement, in', 'force': '2'}
     """
     assigned = {}
     for text in texts:
-        for part in re.split(rf",(?=\s*(?:{'|'.join(ROLES)})\s*=)", text):
+        for part in re.split(rf",(?=\s*(?:{'|'.join(roles or [NAME])})\s*=)", text):
             role, equals, value = (piece.strip() for piece in part.partition("="))
             if not equals or not value:
                 raise ValueError(f"Option --{option} must read like stroke=..., but is {part!r}.")
-            _checks.one_of(option, role, ROLES)
+            if roles is not None:
+                _checks.one_of(option, role, roles)
             assigned[role] = value
     return assigned
 

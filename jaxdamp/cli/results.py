@@ -123,6 +123,27 @@ def results_folder(target: Path, command: str, *, replace: bool = False) -> Iter
         shutil.rmtree(results.draft, ignore_errors=True)
 
 
+@contextmanager
+def another_page(page: Path | None, target: Path, *, replace: bool = False) -> Iterator[None]:
+    """A copy of the report of a results folder in another place, written when all is done.
+
+    Arguments:
+        page: the file to write; None for no copy.
+        target: the results folder.
+        replace: replace a file that is there.
+
+    Raises:
+        ValueError: the file is there already, or is a folder.
+    """
+    if page is not None and (page.is_dir() or (page.exists() and not replace)):
+        what = "is a folder: name a file" if page.is_dir() else "is there already: name another file"
+        raise ValueError(f"{str(page)!r} {what} with --report{', or pass --replace' * page.is_file()}.")
+    yield
+    if page is not None:
+        page.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(target.expanduser() / "report.html", page)
+
+
 def _opened(target: Path, command: str, replace: bool) -> Results:
     """The results of a folder that may be written."""
     earlier = _earlier_files(target, replace)

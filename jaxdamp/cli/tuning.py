@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
-
 from jaxdamp import Ride, _checks, export, roads, sweep, tune
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
@@ -15,9 +13,8 @@ from jaxdamp.cli.metric_words import axis_words, limit_words, metric_names, obje
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.riding import USUAL, parse_road
 from jaxdamp.cli.unusual import unusual
-from jaxdamp.cli.vehicle_words import damper_places, parse_vehicle
+from jaxdamp.cli.vehicle_words import parse_vehicle, write_laws
 from jaxdamp.cli.wording import message
-from jaxdamp.parameters import get
 from jaxdamp.report import Attempts, sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.tune import Status, TuneResult
@@ -127,12 +124,7 @@ def _write(folder: Path, result: TuneResult[Any]) -> None:
     """The tuned laws, the vehicle, tables, and all of it as JSON."""
     import json
 
-    laws = {path: get(result.vehicle, path) for path in damper_places(result.vehicle)}
-    first = next(iter(laws.values()))
-    if all(bool(eqx.tree_equal(first, law)) for law in laws.values()):
-        laws = {"law": first}
-    for path, law in laws.items():
-        export.to_json(law, folder / f"{path.replace('.', '_')}.json")
+    write_laws(folder, result.vehicle)
     export.to_json(result.vehicle, folder / "vehicle.json")
     tables = {"parameters": result.parameter_table(), "metrics": result.table()}
     if result.scenarios is not None:

@@ -93,6 +93,16 @@ def with_law(vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
     return vehicle
 
 
+def write_laws(folder: Path, vehicle: AbstractVehicle) -> None:
+    """The dampers of a vehicle as JSON: law.json if all are alike, otherwise a file named after each path."""
+    laws = {path: get(vehicle, path) for path in damper_paths(vehicle) if fnmatchcase(path, "*damper")}
+    first = next(iter(laws.values()), None)
+    if first is not None and all(bool(eqx.tree_equal(first, law)) for law in laws.values()):
+        laws = {"law": first}
+    for path, law in laws.items():
+        export.to_json(law, folder / f"{path.replace('.', '_')}.json")
+
+
 def damper_places(vehicle: AbstractVehicle) -> list[str]:
     """The paths of the dampers of a vehicle."""
     known = damper_paths(vehicle)

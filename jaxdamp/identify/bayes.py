@@ -130,8 +130,9 @@ def _potential(evidence: Evidence) -> tuple[Callable[[Array], Array], Callable[[
     backward = np.linalg.inv(slopes)
     half = jnp.asarray(np.linalg.cholesky(backward @ evidence.covariance @ backward.T))
     weight = jnp.asarray(1.0 / np.where(noise.sigma > 0, noise.sigma, 1.0))
-    # Σ (r/σ)² counts every sample; noise with a memory has fewer independent ones.
+    # Σ (r/σ)² counts every sample; noise with a memory has fewer independent ones. Priors count as they are.
     counted = float(noise.variance / np.mean(noise.sigma[problem.used] ** 2))
+    weight = weight / jnp.where(jnp.asarray(problem.used), np.sqrt(counted), 1.0)
     least = float(np.sum((evidence.minimum.residual * np.asarray(weight)) ** 2))
     power = 0.5 * (noise.dof + centre.size)
 
@@ -142,7 +143,7 @@ def _potential(evidence: Evidence) -> tuple[Callable[[Array], Array], Callable[[
         values, stretch = physical(z), jax.jacfwd(physical)(z)
         model = problem.free.build(values)
         residual = weight * jnp.concatenate([part(model) for part in problem.residuals])
-        rise = (jnp.sum(residual**2) - least) / counted
+        rise = jnp.sum(residual**2) - least
         energy = power * jnp.log1p(jnp.maximum(rise, -0.5 * noise.dof) / noise.dof) - jnp.linalg.slogdet(stretch)[1]
         return jnp.where(jnp.isfinite(energy), energy, REFUSED)
 

@@ -124,7 +124,7 @@ def solve_by(
             break
         relative = residual / spread
         root = np.where(plain.used, np.sqrt(LOSSES[loss].weight(relative)), 1.0)
-        factor = _noise_factor(LOSSES[loss], relative[plain.used])
+        factor = noise_factor(LOSSES[loss], relative[plain.used])
         problem = _weighted(plain, root, float(np.mean(noise[plain.used])))._replace(
             noise_factor=factor, share_left_out=float(np.mean(root[plain.used] ** 2 < HALF))
         )
@@ -136,7 +136,7 @@ def solve_by(
     return problem, solution
 
 
-def _noise_factor(loss: Loss, relative: np.ndarray) -> float:
+def noise_factor(loss: Loss, relative: np.ndarray) -> float:
     """Factor from the noise that weighted residuals show to that which the errors of an M-estimate follow."""
     weight = loss.weight(relative)
     shown = np.mean(weight * relative**2) / np.mean(weight)

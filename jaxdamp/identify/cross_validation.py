@@ -144,6 +144,12 @@ class CrossValidation:
         )
         return Table("Fit of the held-out records", (Column("law"), *columns, Column("RMSE", "N", ".1f")), rows)
 
+    def record_table(self) -> Table:
+        """One row for each law and record held out: its error."""
+        columns = (Column("law"), Column("held-out record"), Column("fit", "%", ".1f"), Column("RMSE", "N", ".1f"))
+        rows = tuple((fold.law, fold.held_out, fold.fit_percent, fold.rmse) for fold in self.folds)
+        return Table("Errors of the held-out records", columns, rows)
+
     def to_dict(self) -> dict[str, Any]:
         """The errors of each law on each held-out record with units, ready for JSON."""
         folds = [

@@ -133,7 +133,8 @@ def _groups(
 
 def _together(problem: Problem, estimates: Sequence[Estimate], members: set[int], how: str) -> str:
     """A sentence on parameters that only tests of another kind tell apart, and what kind."""
-    runs = [run for run in problem.fitted_to if isinstance(run, BenchRun)]
+    on_bench = all(isinstance(run, BenchRun) for run in problem.runs)
+    runs = problem.fitted_to if on_bench else []
     lacking = [
         f"another {what}"
         for what, values in (("frequency", [r.frequency for r in runs]), ("stroke", [r.amplitude for r in runs]))

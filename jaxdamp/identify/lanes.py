@@ -1,7 +1,9 @@
 """The records of many dampers side by side, compared with one law with other numbers for each damper."""
 
 import dataclasses
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -12,6 +14,7 @@ from jaxtyping import Array, Float, Int
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import laws_inside, margins
+from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.model import Model
 from jaxdamp.identify.traces import Batch, record_batches
 from jaxdamp.parameters import Coordinates
@@ -44,6 +47,22 @@ class Evaluation(NamedTuple):
     keeps_conditions: np.ndarray  # of each lane
 
 
+class LanePriors(NamedTuple):
+    """Prior knowledge of parameters, common to all dampers, in units of the noise of each."""
+
+    priors: Priors
+    noise: Float[np.ndarray, " dampers"]  # standard deviation of a weighted sample
+
+
+class Missed(NamedTuple):
+    """What the law misses in a record."""
+
+    number: int  # of the record among those of all dampers
+    force: Float[np.ndarray, " samples"]  # as measured, N
+    residual: Float[np.ndarray, " samples"]  # weighted
+    weight: Float[np.ndarray, " samples"]
+
+
 class Lanes(NamedTuple):
     """Many dampers as one problem; a lane is a set of numbers for one of them.
 
@@ -51,11 +70,13 @@ class Lanes(NamedTuple):
         coordinates: of the free numbers, common to all dampers.
         groups: the records.
         damper: the damper of each lane.
+        priors: what is known of the numbers beforehand.
     """
 
     coordinates: Coordinates
     groups: tuple[Group, ...]
     damper: Int[np.ndarray, " lanes"]
+    priors: LanePriors | None = None
 
     def evaluate(self, y: Float[np.ndarray, "lanes free"], lanes: Int[np.ndarray, " some"]) -> Evaluation:
         """Sums of squares and products of some lanes, at the coordinates of all; the other lanes have zeros."""
@@ -63,24 +84,31 @@ class Lanes(NamedTuple):
         gram, keeps = np.zeros((count, size, size)), np.ones(count, bool)
         for group in self.groups:
             lane, record = self._pairs(group, lanes)
-            for part in group.parts(lane.size):
-                products, margin, _ = self._chunk(group, y, lane[part], record[part])
+            for part, (products, margin, _) in self._chunks(group, y, lane, record):
                 np.add.at(gram, lane[part], products)
                 keeps[lane[part]] &= margin > 0
+        if self.priors is not None:
+            rows = np.asarray(_prior_rows(self.coordinates, jnp.asarray(y[lanes]), self.priors.priors), np.float64)
+            rows = rows * (self.priors.noise / self.levels())[self.damper[lanes], None, None]
+            gram[lanes] += rows.transpose(0, 2, 1) @ rows
         return Evaluation(gram, keeps)
 
-    def missed(self, y: Float[np.ndarray, "lanes free"]) -> list[tuple[list[np.ndarray], ...]]:
-        """Force, weighted residual and weight of every record of each lane, at the samples that count."""
-        found: list[tuple[list[np.ndarray], ...]] = [([], [], []) for _ in range(y.shape[0])]
+    def residuals(self, y: Float[np.ndarray, "dampers free"]) -> list[Float[np.ndarray, "records time"]]:
+        """Weighted residual of every record of each group, with one lane for each damper."""
+        found = []
         for group in self.groups:
-            lane, record = self._pairs(group, np.arange(y.shape[0]))
-            parts = group.parts(lane.size)
-            residual = np.concatenate([self._chunk(group, y, lane[part], record[part])[2] for part in parts])
+            parts = self._chunks(group, y, group.damper, np.arange(group.damper.size))
+            found.append(np.concatenate([own for _, (_, _, own) in parts]) * group.level[:, None])
+        return found
+
+    def missed(self, y: Float[np.ndarray, "dampers free"]) -> list[list[Missed]]:
+        """What the law misses in every record of each damper, with one lane for each, at the samples that count."""
+        found: list[list[Missed]] = [[] for _ in range(y.shape[0])]
+        for group, residual in zip(self.groups, self.residuals(y), strict=True):
             force, weight = np.asarray(group.batch.force), np.asarray(group.batch.weight)
-            for i, k, own in zip(lane, record, residual, strict=True):
+            for k, (i, number) in enumerate(zip(group.damper, np.asarray(group.batch.number), strict=True)):
                 used = weight[k] > 0
-                for values, channel in zip(found[i], (force[k], own * group.level[k], weight[k]), strict=True):
-                    values.append(channel[used])
+                found[i].append(Missed(int(number), force[k][used], residual[k][used], weight[k][used]))
         return found
 
     def levels(self) -> Float[np.ndarray, " dampers"]:
@@ -103,13 +131,37 @@ class Lanes(NamedTuple):
         which, record = np.nonzero(fits)
         return lanes[which], record
 
-    def _chunk(self, group: Group, y: np.ndarray, lane: np.ndarray, record: np.ndarray) -> list[np.ndarray]:
-        count = lane.size
-        lane, record = (np.pad(a, (0, group.chunk - count), "edge") for a in (lane, record))
-        dtype = self.coordinates.free.values.dtype
-        point, level = y[lane].astype(dtype), group.level[record].astype(dtype)
-        found = _compared(self.coordinates, point, group.batch, record, level)
-        return [np.asarray(a, np.float64)[:count] for a in found]
+    def _chunks(
+        self, group: Group, y: np.ndarray, lane: np.ndarray, record: np.ndarray
+    ) -> Iterator[tuple[slice, list[np.ndarray]]]:
+        """What `_compared` gives for pairs of a lane and a record, in pieces that are computed at the same time."""
+        dtype, double = self.coordinates.free.values.dtype, jnp.result_type(float) == jnp.float64
+
+        def compared(part: slice) -> list[np.ndarray]:
+            own, rows = (np.pad(a[part], (0, group.chunk - a[part].size), "edge") for a in (lane, record))
+            point, level = y[own].astype(dtype), group.level[rows].astype(dtype)
+            with jax.enable_x64(double):  # a thread begins with the precision of the process
+                found = _compared(self.coordinates, point, group.batch, rows, level)
+            return [np.asarray(a, np.float64)[: lane[part].size] for a in found]
+
+        parts = group.parts(lane.size)
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            yield from zip(parts, pool.map(compared, parts), strict=True)
+
+
+@eqx.filter_jit
+def _prior_rows(coordinates: Coordinates, y: Any, priors: Priors) -> Array:
+    """For each lane the derivatives of the residuals of priors, and these in the last column."""
+
+    def one(y: Array) -> Array:
+        def residual(y: Array) -> tuple[Array, Array]:
+            missed = priors(coordinates.free.build(coordinates.to_physical(y)))
+            return missed, missed
+
+        slopes, missed = jax.jacfwd(residual, has_aux=True)(y)
+        return jnp.concatenate([slopes, missed[:, None]], axis=1)
+
+    return jax.vmap(one)(y)
 
 
 @eqx.filter_jit

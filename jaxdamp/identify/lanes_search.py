@@ -39,6 +39,10 @@ class LanesEnd(NamedTuple):
     status: list[Status]
     steps: Int[np.ndarray, " problems"]
 
+    def of(self, problems: Int[np.ndarray, " some"]) -> "LanesEnd":
+        """Those of some problems."""
+        return LanesEnd(self.y[problems], self.gram[problems], [self.status[i] for i in problems], self.steps[problems])
+
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # points without finite forces are refused as steps
 def search_lanes(

@@ -12,13 +12,14 @@ from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import Reach
 from jaxdamp.identify._blas import one_thread
+from jaxdamp.identify.criteria import FIRST_NOISE, LOSSES, priors_on
 from jaxdamp.identify.dependence import Dependence, dependence
-from jaxdamp.identify.lanes import Evaluation, Lanes, grouped_records
+from jaxdamp.identify.lanes import Evaluation, LanePriors, Lanes, grouped_records
 from jaxdamp.identify.lanes_search import LanesEnd, search_lanes
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
+from jaxdamp.identify.many_criteria import Fitted, by_rounds, noise_level
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import on_rig
-from jaxdamp.identify.noise import CORRELATED, correlation_time
 from jaxdamp.identify.preparing import weights
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
@@ -42,6 +43,8 @@ def fit_many(
     shared: Mapping[str, int] | Sequence[str] = (),
     settings: Sequence[float | int] | None = None,
     weighting: str = "samples",
+    loss: str = "squares",
+    priors: Mapping[str, tuple[float, float]] | None = None,
     samples_per_cycle: int | None = 400,
     starts: int = 1,
     max_steps: int = 200,
@@ -67,6 +70,8 @@ def fit_many(
             setting, `{"blow_off_rate": 0, "rebound_rate": 2}`.
         settings: one number for each damper.
         weighting: of the records of a damper: `"samples"` or `"runs"`, as in `fit`.
+        loss: as in `fit`; each damper has its own weights.
+        priors: as in `fit`, the same for every damper; they count against the noise that the standard errors assume.
         samples_per_cycle: slow records are averaged in blocks down to this number.
         starts: largest number of starts of each damper, side by side: `law`, then those that it proposes.
         max_steps: largest number of steps of each search.
@@ -89,6 +94,7 @@ def fit_many(
     """
     names, records = _named(dampers)
     _checks.one_of("weighting", weighting, ["samples", "runs"])
+    _checks.one_of("loss", loss, LOSSES)
     for name, count in (("max_steps", max_steps), ("starts", starts)):
         if count < 1:
             _checks.refuse(name, "be 1 or more", count)
@@ -107,11 +113,20 @@ def fit_many(
     depends = dependence(free, shared, settings, len(names))
     if depends is not None and starts > 1:
         _checks.refuse("starts", "be 1 with shared parameters", starts, "Fit the dampers apart first.")
+    if depends is not None and (loss != "squares" or priors):
+        name, value = ("loss", loss) if loss != "squares" else ("priors", ", ".join(priors or {}))
+        _checks.refuse(
+            name, "be left out with shared parameters", value, "Fit the dampers apart, or leave out `shared`."
+        )
+    if priors:
+        noise = FIRST_NOISE * lanes.levels() / np.sqrt(lanes.samples())
+        lanes = lanes._replace(priors=LanePriors(priors_on(free, priors, 1.0)[0], noise))
     lanes, begin = _with_other_starts(lanes, records, starts)
     end, best, vector = _solved(lanes, begin, depends, max_steps)
     lanes = lanes._replace(damper=np.arange(len(names)))
-    fitted = _physical(coordinates, end.y[best])
-    errors, percent, rmse = _judged(lanes, end.y[best], end.gram[best], depends, records)
+    found = by_rounds(lanes, end.of(best), loss, lambda some, y: _solved(some, y, None, max_steps)[0])
+    end, fitted = found.end, _physical(coordinates, found.end.y)
+    errors, percent, rmse, record_rmse = _judged(found, depends, [len(runs) for runs in records])
     return ManyFits(
         names=tuple(names),
         records=tuple(records),
@@ -120,11 +135,13 @@ def fit_many(
         standard_errors=errors,
         fit_percent=percent,
         rmse=rmse,
-        status=tuple(end.status[i] for i in best),
-        steps=end.steps[best],
+        status=tuple(end.status),
+        steps=end.steps,
         free=coordinates.free,
         dependence=depends,
         vector=vector,
+        record_rmse=record_rmse,
+        share_left_out=found.share_left_out,
     )
 
 
@@ -181,9 +198,10 @@ def _solved(
     bounds, precision = lanes.coordinates.bounds(), float(jnp.finfo(lanes.coordinates.free.values.dtype).eps)
     samples = lanes.samples()
     if depends is None:
+        dampers = np.unique(lanes.damper)
         end = search_lanes(lanes.evaluate, begin, bounds, samples[lanes.damper], max_steps, precision)
         squares = [s if np.isfinite(s) else np.inf for s in end.gram[:, -1, -1]]
-        best = [min(np.flatnonzero(lanes.damper == i), key=lambda lane: squares[lane]) for i in range(samples.size)]
+        best = [min(np.flatnonzero(lanes.damper == i), key=lambda lane: squares[lane]) for i in dampers]
         return end, np.array(best), None
     everyone = np.arange(samples.size)
 
@@ -201,30 +219,27 @@ def _solved(
 
 
 def _judged(
-    lanes: Lanes,
-    y: Float[np.ndarray, "dampers free"],
-    gram: np.ndarray,
-    depends: Dependence | None,
-    records: Sequence[Sequence[BenchRun]],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Standard errors [dampers, free], fit percent and RMSE [N] of each damper."""
+    found: Fitted, depends: Dependence | None, counts: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
+    """Standard errors [dampers, free], fit percent and RMSE [N] of each damper, and the RMSE of each of its records."""
+    lanes, y, gram = found.lanes, found.end.y, found.end.gram
     count, free = y.shape
     errors, percent, rmse = np.full((count, free), np.inf), np.zeros(count), np.zeros(count)
+    first, by_record = np.cumsum([0, *counts]), tuple(np.zeros(n) for n in counts)
     slopes = np.asarray(_both(lanes.coordinates, jnp.asarray(y))[1], np.float64)
     inverse = [_inverse(own[:-1, :-1]) for own in (gram if depends is None else gram[:1])]
-    missed = lanes.missed(y)
     free_numbers = free if depends is None else depends.size / count
     noise, levels = np.zeros(count), lanes.levels()
-    for i, (force, residual, weight) in enumerate(missed):
-        error = [r / w for r, w in zip(residual, weight, strict=True)]
-        together, measured = np.concatenate(error), np.concatenate(force)
+    for i, records in enumerate(lanes.missed(y)):
+        errors_of = [own.residual / own.weight for own in records]
+        together, measured = np.concatenate(errors_of), np.concatenate([own.force for own in records])
         rmse[i] = np.sqrt(np.mean(together**2))
         spread = np.linalg.norm(measured - measured.mean())
         percent[i] = 100.0 * (1.0 - np.linalg.norm(together) / spread) if spread > 0 else -np.inf
-        alike = correlation_time(residual)
-        dof = max(together.size - free_numbers, 1)
-        squares = sum(float(r @ r) for r in residual) / levels[i] ** 2
-        noise[i] = squares / dof * (alike if alike > CORRELATED else 1.0)
+        for own, error in zip(records, errors_of, strict=True):
+            by_record[i][own.number - first[i]] = np.sqrt(np.mean(error**2))
+        level = found.factor[i] * noise_level([own.residual for own in records], free_numbers)
+        noise[i] = (level / levels[i]) ** 2
     for i in range(count):
         columns, rows = (np.arange(free), np.eye(free)) if depends is None else depends.rows(i)
         whole, lost = inverse[i if depends is None else 0]
@@ -233,7 +248,7 @@ def _judged(
         covariance = variance * to_values @ whole[np.ix_(columns, columns)] @ to_values.T
         undetermined = np.any(lost[columns] & (to_values != 0), axis=1)
         errors[i] = np.where(undetermined, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-    return errors, percent, rmse
+    return errors, percent, rmse, by_record
 
 
 def _inverse(products: Float[np.ndarray, "free free"]) -> tuple[np.ndarray, np.ndarray]:

@@ -23,6 +23,8 @@ from jaxdamp.rig import Rig
 
 OUTLYING = 6.0  # robust standard deviations from the other dampers from which one is named
 LEAST_SPREAD = 0.02  # of the median: numbers that differ by less do not make a damper stand out
+LEFT_OUT = 0.02  # share of samples with little weight, above that of the others, from which it is named
+ONE_RECORD = 1.5  # times the RMSE of the other records, from which one is named as the cause
 CERTAIN = 4.0  # standard errors by which it must differ as well
 
 
@@ -43,6 +45,8 @@ class ManyFits:
         free: the free parameters, with names, units and meanings.
         dependence: how shared parameters depend on the setting.
         vector: the numbers that the dependence is made of.
+        record_rmse: of each record of each damper [N].
+        share_left_out: of the samples of each damper, to which a robust loss gives less than half weight.
     """
 
     names: tuple[str, ...]
@@ -57,6 +61,8 @@ class ManyFits:
     free: FreeParameters
     dependence: Dependence | None = None
     vector: Float[np.ndarray, " size"] | None = None
+    record_rmse: tuple[Float[np.ndarray, " _"], ...] = ()
+    share_left_out: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
 
     @property
     def converged(self) -> bool:
@@ -126,7 +132,11 @@ class ManyFits:
         misfit = 100.0 - self.fit_percent
         for i, score in enumerate(_robust_scores(misfit, None)):
             if score > OUTLYING:
-                texts[i].append(f"its error is {misfit[i] / np.median(misfit):.2g} times that of the others")
+                times = misfit[i] / np.median(misfit)
+                texts[i].append(f"its error is {times:.2g} times that of the others{self._mostly_of(i)}")
+        for i, share in enumerate(self.share_left_out):
+            if share > LEFT_OUT + float(np.median(self.share_left_out)):
+                texts[i].append(f"{100.0 * share:.2g} % of its samples have less than half weight")
         for j, name in enumerate(self.parameters):
             expected, scores = self._expected(j)
             apart = np.abs(self.values[:, j] - expected)
@@ -181,6 +191,13 @@ class ManyFits:
         named = [f"{name}: {remark}" for name, remark in zip(self.names, self.remarks, strict=True) if remark]
         head = f"{type(law_of(self.free.tree)).__name__} fitted to {len(self)} dampers: mean fit"
         return "\n".join([f"{head} {np.mean(self.fit_percent):.1f} %, RMSE up to {np.max(self.rmse):.4g} N", *named])
+
+    def _mostly_of(self, i: int) -> str:
+        """The record that a large error of a damper is due to, if it is one."""
+        errors = self.record_rmse[i]
+        worst = int(np.argmax(errors))
+        alone = len(errors) > 1 and errors[worst] > ONE_RECORD * np.median(np.delete(errors, worst))
+        return f", mostly of {self.records[i][worst].name!r} with an RMSE of {errors[worst]:.3g} N" if alone else ""
 
     def _expected(self, j: int) -> tuple[np.ndarray, np.ndarray]:
         """What the other dampers suggest for a number of each, and by how many deviations it differs."""

@@ -266,8 +266,8 @@ class FitResult(AbstractFitted):
         """The full posterior of the parameters, by the no-U-turn sampler of numpyro (`pip install 'jaxdamp[bayes]'`).
 
         Unlike standard errors it is valid where parameters depend on one another along curves, or end at bounds. The
-        prior is flat within the domains and `bounds`; the level of the noise is unknown. Noise with a memory counts by
-        its `inflation`.
+        prior is flat within the domains and `bounds`, times the `priors` of the fit; the level of the noise is unknown.
+        Noise with a memory counts by its `inflation`, a robust loss with the weights of its minimum.
 
         Arguments:
             samples: of each chain.

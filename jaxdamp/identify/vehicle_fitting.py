@@ -10,11 +10,12 @@ from jaxdamp._field_types import check_module
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.estimating import estimate
+from jaxdamp.identify.machine import Machine, started_machine
 from jaxdamp.identify.noise import independent
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.identify.several import Solution
-from jaxdamp.identify.vehicle_left_out import on_sensors
+from jaxdamp.identify.vehicle_left_out import on_sensors, on_signs
 from jaxdamp.identify.vehicle_noise import channel_noise
 from jaxdamp.identify.vehicle_preparing import (
     VehicleData,
@@ -30,7 +31,7 @@ from jaxdamp.identify.vehicle_preparing import (
 from jaxdamp.identify.vehicle_result import VehicleFit, channel_scores
 from jaxdamp.identify.vehicle_scale import FreeScale, free_scale, without
 from jaxdamp.parameters import free_parameters, get, with_values
-from jaxdamp.rig import Rig, Sensor
+from jaxdamp.rig import Sensor
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -45,7 +46,7 @@ def fit_vehicle(
     *,
     sensors: Mapping[str, Sensor] | None = None,
     bench: Mapping[str, Iterable[BenchRun]] | None = None,
-    rig: Rig | None = None,
+    rig: Machine = None,
     over: Sequence[str] | None = None,
     freeze: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -76,7 +77,7 @@ def fit_vehicle(
         bench: bench records of laws of the vehicle, by the path of the law: `{"damper": runs}`, or "damper.law" inside
             a `MotionRatio`. They are fitted together with the records of the vehicle; dampers that share a law are
             tied by `tie`.
-        rig: test machine of the bench records, as in `fit`.
+        rig: test machine of the bench records, as in `fit`: a `Rig`, or names such as "gas,friction".
         over: parameters of the vehicle to fit, by path, last part or pattern; all if left out.
         freeze: parameters to hold at their start, also of sensors.
         bounds: extra limits `{name: (lower, upper)}`.
@@ -109,7 +110,8 @@ def fit_vehicle(
     if settling > 0.5 * min(len(ride) * ride.dt for ride in rides):
         _checks.refuse("settling", "leave at least half of every record", settling)
     benches = checked_benches(vehicle, bench or {}, rig)
-    model = vehicle_test(vehicle, rides, sensors or {}, start, rig)
+    machine = started_machine(rig, [run for runs in benches.values() for run in runs])
+    model = vehicle_test(vehicle, rides, sensors or {}, start, machine)
     own, frozen = per_record_paths(model, per_record, len(rides)), frozen_paths(model, over, freeze)
     spread = with_values(model, {path: jnp.full(len(rides), get(model, path)) for path in own})
     data = VehicleData(model, rides, drives_of(vehicle, rides, dt), benches, float(settling), own, samples_per_cycle)
@@ -149,10 +151,11 @@ def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScal
         ]
         notes.append(
             "These records hold no force, so only ratios of masses, rates and forces can be determined:"
-            f" {len(scale.names)} parameters (`scale_free`) may all be larger by one factor.{''.join(values)}"
+            f" {', '.join(scale.names)} may all be larger by one factor.{''.join(values)}"
             " Fix one mass that is known, or measure a force."
         )
-    notes += estimates.notes
+    scores = channel_scores(problem, end.residual, data.rides, data.channels)
+    notes += [*on_signs(scores), *estimates.notes]
     notes += on_sensors(problem, end, data.rides, data.channels, model.sensors)
     if noise.inflation > 1.0:
         notes.append(
@@ -162,9 +165,10 @@ def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScal
     return VehicleFit(
         vehicle=model.vehicle,
         records=data.rides,
+        bench=data.benches,
         parameters=estimates.estimates,
         covariance=estimates.covariance,
-        scores=channel_scores(problem, end.residual, data.rides, data.channels),
+        scores=scores,
         warnings=tuple(notes),
         status=end.status,
         steps=end.steps,

@@ -10,12 +10,25 @@ from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.vehicle_noise import channel_noise
 from jaxdamp.identify.vehicle_residuals import RideBatch
+from jaxdamp.identify.vehicle_result import ChannelScore
 from jaxdamp.rig import Sensor
 
 
 SURE = 6.0  # standard errors from which an effect is named
 NOTICEABLE = 0.01  # sampling intervals of a delay, and tenths of a channel, below which an effect does not matter
+REVERSED = -0.3  # correlation of a channel with its prediction below which its sign is doubted
 OF_ITS_OWN = 1e-3  # share of an effect that no fitted number has, below which it cannot be shown
+
+
+def on_signs(scores: Sequence[ChannelScore]) -> list[str]:
+    """A sentence on each channel that the vehicle predicts with the other sign."""
+    return [
+        f"{score.channel} of {score.record} runs against the fitted vehicle (correlation {score.correlation:.2f}): its"
+        " sign, or that of the other channels, is reversed. Accelerations and heights count positive up, travels in"
+        " extension; `read_rides(..., reversed_channels=[...])` and --reversed turn a channel round."
+        for score in scores
+        if score.correlation < REVERSED
+    ]
 
 
 def on_sensors(
@@ -94,8 +107,8 @@ def _sentence(channel: str, effect: str, size: float, unit: str) -> str:
         "offset": f"has a zero error of {size:.3g} {unit}",
         "gain": f"has a gain of {1 + size:.4g}",
     }
-    how = {"delay": "lag=0.0)` or `Sensor(delay=0.0", "offset": "offset=0.0", "gain": "gain=1.0"}[effect]
+    how = {"delay": "lag or delay"}.get(effect, effect)
     return (
         f"By its residual, {channel} {words[effect]}, unless the vehicle misses something else:"
-        f" fit it with `Sensor({how})`."
+        f" fit the {how} of its sensor."
     )

@@ -12,6 +12,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp.bench import BenchRun, RideRecord, as_runs
 from jaxdamp.dampers import AbstractDamper, Reach, without_fitted_ranges
+from jaxdamp.identify.machine import Machine, absent_paths
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.vehicle_model import InitialMotion, VehicleTest
@@ -111,7 +112,7 @@ def checked_records(vehicle: AbstractVehicle, records: Any) -> tuple[RideRecord,
 
 
 def checked_benches(
-    vehicle: AbstractVehicle, bench: Mapping[str, Any], rig: Rig | None
+    vehicle: AbstractVehicle, bench: Mapping[str, Any], rig: Machine
 ) -> dict[str, tuple[BenchRun, ...]]:
     """The bench records by the path of the law."""
     if rig is not None and not bench:
@@ -151,9 +152,7 @@ def frozen_paths(model: VehicleTest, over: Sequence[str] | None, freeze: Sequenc
     held = [path for path in of_vehicle if path not in kept]
     for name, sensor in model.sensors.items():
         held += [f"sensors.{name}.{p.path}" for p in parameters(sensor) if p.path not in sensor.given]
-    if model.rig is not None:
-        pairs = zip(parameters(model.rig), parameters(Rig()), strict=True)
-        held += [f"rig.{p.path}" for p, default in pairs if p.value == default.value]
+    held += absent_paths(model.rig)
     return [*held, *match_paths(known, name_patterns("freeze", freeze))]
 
 

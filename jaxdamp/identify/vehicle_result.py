@@ -10,12 +10,12 @@ from jaxtyping import Array, Float
 
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
-from jaxdamp.bench import RideRecord
+from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.result import fit_percent
 from jaxdamp.identify.vehicle_model import VehicleTest
-from jaxdamp.identify.vehicle_residuals import RideBatch
+from jaxdamp.identify.vehicle_residuals import DamperOnBench, RideBatch
 from jaxdamp.rig import Rig, Sensor
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class ChannelScore(NamedTuple):
-    """How well the vehicle predicts a channel of a record."""
+    """How well the vehicle predicts a channel of a record, or the force of a law on the bench."""
 
     record: str
     channel: str
@@ -33,6 +33,7 @@ class ChannelScore(NamedTuple):
     rmse: float  # in the unit
     fit_percent: float
     largest_error: float  # in the unit
+    correlation: float  # of the predicted with the measured values
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -42,9 +43,10 @@ class VehicleFit:
     Attributes:
         vehicle: the fitted vehicle; parameters with a value for each record have their mean.
         records: the records given.
+        bench: the bench records given, by the path of their law.
         parameters: an estimate for each free number, with unit, standard error and 95 % interval.
         covariance: of the free numbers, in their units, in the order of `parameters`.
-        scores: errors of each channel of each record.
+        scores: errors of each channel of each record, and of the force of each law over its bench records.
         warnings: doubts about the result, in words.
         status: how the search ended.
         steps: steps of the last search.
@@ -58,6 +60,7 @@ class VehicleFit:
 
     vehicle: AbstractVehicle
     records: tuple[RideRecord, ...]
+    bench: dict[str, tuple[BenchRun, ...]]
     parameters: tuple[Estimate, ...]
     covariance: Float[np.ndarray, "free free"]
     scores: tuple[ChannelScore, ...]
@@ -75,6 +78,12 @@ class VehicleFit:
     def converged(self) -> bool:
         """Whether the search ended by its tolerance."""
         return self.status is Status.CONVERGED
+
+    @property
+    def worst(self) -> str:
+        """The channel that is predicted worst, in words."""
+        least = min(self.scores, key=lambda score: score.fit_percent)
+        return f"the least fit is {least.fit_percent:.1f} %, of {least.channel} in {least.record}"
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name, or of the only one whose name ends with it: "sprung_mass", "stroke.offset"."""
@@ -115,7 +124,7 @@ class VehicleFit:
         """The errors of each channel of each record."""
         columns = [Column("record"), Column("channel"), Column("unit"), Column("RMSE", spec=".3g")]
         columns += [Column("fit", "%", ".1f"), Column("largest error", spec=".3g")]
-        return Table("Channels", tuple(columns), tuple(tuple(score) for score in self.scores))
+        return Table("Channels", tuple(columns), tuple(tuple(score)[:-1] for score in self.scores))
 
     def to_dict(self) -> dict[str, Any]:
         """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
@@ -151,12 +160,7 @@ class VehicleFit:
     def __repr__(self) -> str:
         width = max(len(e.name) for e in self.parameters)
         texts = [rounded(e.value, e.standard_error) for e in self.parameters]
-        percent = {s.channel: s.fit_percent for s in self.scores}
-        worst = min(percent, key=lambda name: percent[name])
-        lines = [
-            f"{type(self.vehicle).__name__} on {len(self.records)} record(s): worst channel {worst},"
-            f" {percent[worst]:.1f} %"
-        ]
+        lines = [f"{type(self.vehicle).__name__} on {len(self.records)} record(s): {self.worst}"]
         for e, (value, error) in zip(self.parameters, texts, strict=True):
             note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
             lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
@@ -180,18 +184,32 @@ def channel_scores(
         channels: all channels in the order of `problem.sigma`.
     """
     scores, end, units = {}, 0, problem.law.units
+    forces: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for part in problem.residuals:
-        if not isinstance(part, RideBatch):
-            continue
-        weight = np.asarray(part.weight)
+        assert isinstance(part, RideBatch | DamperOnBench)
+        weight = np.asarray(part.weight if isinstance(part, RideBatch) else part.batch.weight)
         begin, end = end, end + weight.size
         used, errors = weight > 0, residual[begin:end].reshape(weight.shape)
+        if isinstance(part, DamperOnBench):
+            pair = np.asarray(part.batch.force)[used], errors[used] / weight[used]
+            forces.setdefault(part.path, []).append(pair)
+            continue
         for i, number in enumerate(np.asarray(part.number)):
             for k, channel in enumerate(part.channels):
                 chosen = used[i, k]
                 error = errors[i, k][chosen] * problem.sigma[channels.index(channel)]
-                measured = records[number][channel][chosen]
-                rmse, most = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
-                percent = fit_percent([measured], [measured + error])
-                scores[number, k] = ChannelScore(records[number].name, channel, units[channel], rmse, percent, most)
-    return tuple(scores[key] for key in sorted(scores))
+                figures = _figures(records[number][channel][chosen], error)
+                scores[number, k] = ChannelScore(records[number].name, channel, units[channel], *figures)
+    on_bench = [
+        ChannelScore("bench", f"{path} force", "N", *_figures(*map(np.concatenate, zip(*pairs, strict=True))))
+        for path, pairs in forces.items()
+    ]
+    return (*[scores[key] for key in sorted(scores)], *on_bench)
+
+
+def _figures(measured: np.ndarray, error: np.ndarray) -> tuple[float, float, float, float]:
+    """RMSE, fit percent, largest error, and correlation of predicted and measured values."""
+    percent = fit_percent([measured], [measured + error])
+    sizes = np.std(measured) * np.std(measured + error)
+    alike = float(np.mean((measured - measured.mean()) * (measured + error)) / sizes) if sizes > 0 else 0.0
+    return float(np.sqrt(np.mean(error**2))), percent, float(np.abs(error).max()), alike

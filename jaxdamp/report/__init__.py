@@ -1,9 +1,10 @@
 """Pages of results of fits, rides and tunings: one self-contained HTML file with tables and pictures.
 
-- Pages: `bench_report(evaluation, preflight)`, `fit_report(comparison)`, `ride_report(responses)`,
-  `tuning_report(result)`; each gives a `Report`, to which more can be added before `write(path)`.
+- Pages: `bench_report(evaluation, preflight)`, `fit_report(comparison)`, `vehicle_fit_report(result)`,
+  `ride_report(responses)`, `tuning_report(result)`; each gives a `Report`, to which more can be added before
+  `write(path)`.
 - Your own page: `Report`, with the sections `add_fits` and `add_tuning`.
-- Tables of these pages: `records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
+- Tables of these pages: `records_table`, `ride_records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
 """
 
 from jaxdamp._tables import Column, Table
@@ -22,6 +23,7 @@ from jaxdamp.report.ranges import fitted_range_table, range_use_table
 from jaxdamp.report.rides import axles_sentence, notes_of, ride_report, ride_tables
 from jaxdamp.report.sweeps import sweep_report
 from jaxdamp.report.tunings import add_tuning, tuning_report
+from jaxdamp.report.vehicle_fits import ride_records_table, vehicle_fit_report
 
 
 __all__ = [
@@ -41,8 +43,10 @@ __all__ = [
     "parameters_of",
     "range_use_table",
     "records_table",
+    "ride_records_table",
     "ride_report",
     "ride_tables",
     "sweep_report",
     "tuning_report",
+    "vehicle_fit_report",
 ]

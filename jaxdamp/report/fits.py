@@ -9,8 +9,9 @@ from jaxdamp import plots, rig
 from jaxdamp._tables import Cell, Column, Table
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify import Band, Comparison, Rung, without_machine
+from jaxdamp.identify import Band, Comparison, CrossValidation, Rung, without_machine
 from jaxdamp.report.attempts import Attempts
+from jaxdamp.report.fit_findings import add_findings, add_validation
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import fitted_range_table
 
@@ -28,6 +29,7 @@ def fit_report(
     failures: Sequence[str] | None = None,
     folder: Path | None = None,
     attempts: Attempts | None = None,
+    validation: CrossValidation | None = None,
 ) -> Report:
     """A page on the fits of several laws, or of one.
 
@@ -39,6 +41,7 @@ def fit_report(
         failures: sentences on laws without a fit, instead of those of the comparison.
         folder: folder for the pictures as separate files; without it they are only in the page.
         attempts: collects parts that fail; a new one if left out.
+        validation: of `identify.cross_validate`.
 
     >>> from jaxdamp import bench, identify, report
     >>> from jaxdamp.dampers import Bilinear, Linear
@@ -54,6 +57,8 @@ def fit_report(
     report.table(records_table(records, comparison.held_out))
     report.points(remarks)
     add_fits(report, comparison, failures)
+    if validation is not None:
+        add_validation(report, validation)
     return report
 
 
@@ -70,7 +75,7 @@ def add_fits(report: Report, comparison: Comparison, failures: Sequence[str] | N
         report.picture(lambda: plots.ladder(comparison), "Errors of the laws", "ladder.png")
     report.heading(f"The best law: {best.name}" if several else best.name)
     report.table(parameters_of(best))
-    report.points(best.result.warnings)
+    add_findings(report, best.result)
     report.picture(lambda: plots.fit_loops(best.result), f"{best.name} over the fitted records", "best_law_loops.png")
     if comparison.held_out:
         caption = f"{best.name} over the held-out records"

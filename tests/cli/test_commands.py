@@ -48,6 +48,7 @@ def test_vehicles_are_listed_with_a_line_of_meaning() -> None:
             "--law --held-out --sign --force-sign --columns --units --sampling-rate --weighting --rig --out --replace",
         ),
         ("demo", "--out --seed --replace --debug"),
+        ("fit-vehicle", "--start --columns --road --reversed --over --sensor --guide --bench --rig --report --replace"),
     ],
 )
 def test_help_of_a_command_names_its_options(command: str, options: str) -> None:
@@ -98,11 +99,19 @@ def test_what_the_machine_adds_is_fitted_and_shown(records: Path, tmp_path: Path
     out = tmp_path / "fit"
     text = jaxdamp("fit", records, "--law", "bilinear", "--rig", "gas,friction", "--out", out).output
     assert "rig.gas_force" in text and "rig.friction" in text
-    assert "rig.gas_force" in (out / "report.html").read_text(encoding="utf-8")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "rig.gas_force" in page and "effects of the test machine: gas force" in page
+    assert "Taken as absent: " in page and "gas stiffness" in page
     machine = from_json(out / "machines" / "bilinear.json")
     assert abs(float(machine.gas_force)) < 5.0 and float(machine.force_offset) == 0.0
-    bare = tmp_path / "bare"
-    assert "rig." not in jaxdamp("fit", records, "--law", "bilinear", "--rig", "none", "--out", bare).output
+    bare, copy = tmp_path / "bare", tmp_path / "copy" / "fit.html"
+    words = ["--rig", "none", "--out", bare, "--cross-validate", "--report", copy]
+    assert "rig." not in jaxdamp("fit", records, "--law", "bilinear", *words).output
+    page = copy.read_text(encoding="utf-8")
+    assert "No test machine was fitted" in page and "Each record was left out once and predicted by bilinear" in page
+    assert "--group-by" in refused(
+        tmp_path, "fit", records, "--group-by", "x", "--report", copy, "--out", tmp_path / "n"
+    )
     assert not (bare / "machines").exists()
     message = refused(tmp_path, "fit", records, "--law", "bilinear", "--rig", "gas,dellay", "--out", tmp_path / "new")
     assert "Option --rig must be one of" in message and "Did you mean 'delay'" in message

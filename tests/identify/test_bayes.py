@@ -1,11 +1,13 @@
 """The posterior by sampling, beside the covariance of a linear law and an integral for a banana."""
 
+import dataclasses
 import sys
 
 import numpy as np
 import pytest
+import scipy.signal
 
-from jaxdamp.dampers import Bilinear, Saturating
+from jaxdamp.dampers import Bilinear, Linear, Saturating
 from jaxdamp.identify import fit
 
 
@@ -50,3 +52,34 @@ def test_without_the_package_the_error_says_what_to_install(sines, monkeypatch):
     monkeypatch.setitem(sys.modules, "numpyro.infer", None)
     with pytest.raises(ImportError, match=r"pip install 'jaxdamp\[bayes\]'"):
         result.posterior()
+
+
+@pytest.mark.slow
+def test_priors_losses_and_the_machine_count_as_in_a_linear_fit(sines):
+    pytest.importorskip("numpyro")
+    runs = sines(Bilinear(2600.0, 1200.0), noise=20.0)
+    spiked = [dataclasses.replace(r, force=r.force + 3e3 * (np.arange(len(r)) % 97 == 5) - 60.0) for r in runs]
+    known = {"gas_force": (-61.0, 0.3), "rebound_rate": (2610.0, 4.0)}
+    result = fit(Bilinear, spiked, rig="gas", loss="student_t", priors=known)
+    drawn = result.posterior(samples=1000, warm_up=300, seed=3)
+    for estimate in result.parameters:
+        row = drawn[estimate.name]
+        assert row.mean == pytest.approx(estimate.value, abs=0.15 * estimate.standard_error)
+        assert row.standard_deviation == pytest.approx(estimate.standard_error, rel=0.1)
+
+
+@pytest.mark.slow
+def test_noise_with_a_memory_widens_the_posterior_but_not_the_priors(sines):
+    pytest.importorskip("numpyro")
+    runs, rng = sines(Linear(2000.0), noise=0.0), np.random.default_rng(4)
+    memory = [scipy.signal.lfilter([1.0], [1.0, -0.9], 10.0 * rng.standard_normal(len(r))) for r in runs]
+    noisy = [dataclasses.replace(r, force=r.force + n) for r, n in zip(runs, memory, strict=True)]
+    flat = fit(Linear, noisy)
+    own = flat["rate"]
+    assert flat.inflation > 2.0
+    mean, deviation = own.value + own.standard_error, 0.5 * own.standard_error
+    drawn = fit(Linear, noisy, priors={"rate": (mean, deviation)}).posterior(samples=1500, warm_up=300, seed=5)["rate"]
+    precision = own.standard_error**-2.0 + deviation**-2.0
+    expected = (own.value * own.standard_error**-2.0 + mean * deviation**-2.0) / precision
+    assert drawn.standard_deviation == pytest.approx(precision**-0.5, rel=0.15)
+    assert drawn.mean == pytest.approx(expected, abs=0.3 * precision**-0.5)

@@ -1,5 +1,6 @@
 """Many dampers in one call: the optimum of single fits, shared parameters, dampers that stand out."""
 
+import dataclasses
 import json
 from typing import Any
 
@@ -115,3 +116,46 @@ def test_what_is_refused(clicks):
     with pytest.raises(ValueError, match="`dampers` must hold at least one damper"):
         fit_many(Bilinear, {})
     assert identify.ManyFits is type(fit_many(Bilinear, [clicks["0"]]))
+
+
+def spiked(runs: list[BenchRun], seed: int) -> list[BenchRun]:
+    """The same with spikes of either sign at 1 to 6 % of the samples."""
+    rng = np.random.default_rng(seed)
+    spikes = [rng.choice([-2e3, 2e3], len(r)) * (rng.random(len(r)) < 0.01 * (1 + seed)) for r in runs]
+    return [dataclasses.replace(r, force=r.force + spike) for r, spike in zip(runs, spikes, strict=True)]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"loss": "student_t"},
+        {"priors": {"rebound_rate": (3000.0, 4.0), "gas_force": (-90.0, 1.0)}},
+        {"loss": "huber", "priors": {"compression_rate": (1210.0, 4.0)}},
+    ],
+    ids=["loss", "priors", "both"],
+)
+def test_losses_and_priors_are_those_of_single_fits(clicks, options):
+    wild = {name: spiked(runs, i) for i, (name, runs) in enumerate(clicks.items())} if "loss" in options else clicks
+    many = fit_many(Bilinear, wild, rig="gas", **options)
+    for i in (0, 4):
+        single = fit(Bilinear, wild[many.names[i]], rig="gas", starts=1, **options)
+        values, errors = (
+            np.array([getattr(e, name) for e in single.parameters]) for name in ("value", "standard_error")
+        )
+        np.testing.assert_allclose(many.values[i], values, atol=0.02 * errors.min(), rtol=0.0)
+        np.testing.assert_allclose(many.standard_errors[i], errors, rtol=0.01)
+    if options.get("loss") == "student_t":
+        assert many.share_left_out[5] > many.share_left_out[0] + 0.02 > 0.02
+        assert many.unusual == ("10",) and "of its samples have less than half weight" in many.remarks[5]
+
+
+def test_a_bad_record_of_a_damper_is_named(clicks):
+    bad = [dataclasses.replace(run, force=run.force * (1.3 if i else 1.0)) for i, run in enumerate(clicks["6"])]
+    many = fit_many(Bilinear, clicks | {"6": bad}, rig="gas")
+    assert many.unusual == ("6",) and f"mostly of {bad[1].name!r}" in many.remarks[3]
+
+
+@pytest.mark.parametrize("options", [{"loss": "huber"}, {"priors": {"rebound_rate": (2000.0, 10.0)}}])
+def test_losses_and_priors_are_refused_with_shared_parameters(clicks, options):
+    with pytest.raises(ValueError, match=f"`{next(iter(options))}` must be left out with shared parameters"):
+        fit_many(Bilinear, clicks, shared=["rebound_rate"], **options)

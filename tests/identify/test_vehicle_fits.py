@@ -1,5 +1,6 @@
 """Vehicles from records of their motion."""
 
+import dataclasses
 import re
 
 import numpy as np
@@ -215,3 +216,12 @@ def test_payload_and_offset_of_each_record_and_its_initial_motion():
         begin = result[f"starts.{i}.position[0]"]
         assert abs(begin.value - 0.02) < 3.5 * begin.standard_error
     assert result["offset[1]"].value == pytest.approx(-0.2, abs=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("reversed_channel", ["stroke", "sprung_acceleration"])
+def test_a_reversed_channel_is_named(record, reversed_channel):
+    channels = dict(record.channels) | {reversed_channel: -record[reversed_channel]}
+    wrong_sign = dataclasses.replace(record, channels=channels)
+    result = identify.fit(START, wrong_sign, over=FREE, freeze=["sprung_mass"], sensors=ZERO, dt=2e-3)
+    assert re.search(r"of sweep runs against the fitted vehicle \(correlation -0", " ".join(result.warnings))
