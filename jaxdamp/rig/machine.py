@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from jaxdamp import _checks
-from jaxdamp._types import Number, Scalar, Signal, SignalLike
+from jaxdamp._types import Number, Scalar, Signal, SignalLike, State
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import Module, as_float, check_parameters, nonnegative, parameter, positive, readable, setting
 from jaxdamp.rig.channel import delayed, lagged
@@ -155,9 +155,10 @@ class Rig(Module):
         velocity: Signal,
         temperature: Signal | None = None,
         substeps: int = 1,
+        state: State | None = None,
     ) -> Readings:
         """`readings` without its checks, for use inside compiled functions, with the `effects` known outside."""
-        force = march(law, dt, stroke - self.stroke_offset, velocity, substeps, temperature)
+        force = march(law, dt, stroke - self.stroke_offset, velocity, substeps, temperature, state)
         return _readings(self, effects, force, dt, stroke, velocity, temperature)
 
     def effects(self) -> tuple[str, ...]:
