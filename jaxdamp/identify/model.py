@@ -86,10 +86,17 @@ def marched(
     return model.rig.march(model.law, effects, dt, stroke, velocity, temperature, substeps, state).force
 
 
-def initial_state(model: Model, cycle: Cycle) -> tuple[State, Scalar]:
+def initial_state(
+    model: Model, effects: tuple[str, ...], cycle: Cycle, temperature: Float[Array, " time"] | None
+) -> tuple[State, Scalar]:
     """The states at the start of a record: periodic, or at rest; and how much they still change over the cycle."""
     if isinstance(model, OnRig):
-        cycle = cycle._replace(stroke=cycle.stroke - model.rig.stroke_offset)
+        before = [jnp.concatenate([channel[:-1], channel]) for channel in (cycle.stroke, cycle.velocity)]
+        stroke, velocity = model.rig.delayed_motion(effects, cycle.dt, *before)
+        again = -cycle.stroke.size
+        cycle = cycle._replace(stroke=stroke[again:] - model.rig.stroke_offset, velocity=velocity[again:])
     law = law_of(model)
+    if temperature is not None and law.traits().temperature_dependent:
+        law = law.at_temperature(temperature[0])
     state, change = periodic_state(law, cycle)
     return jnp.where(cycle.periodic, state, law.initial_state()), jnp.where(cycle.periodic, change, 0.0)

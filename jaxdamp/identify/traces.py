@@ -51,7 +51,9 @@ class Batch(AbstractResiduals):
             dt: Array, x: Array, v: Array, temperature: Array | None, cycle: Cycle | None, values: dict[str, Array]
         ) -> tuple[Array, Array]:
             own = with_values(model, values)
-            state, change = (None, jnp.zeros(())) if cycle is None else initial_state(own, cycle)
+            state, change = (
+                (None, jnp.zeros(())) if cycle is None else initial_state(own, self.effects, cycle, temperature)
+            )
             return marched(own, self.effects, dt, x, v, temperature, self.substeps, state), change
 
         own = {path: get(model, path)[self.number] for path in self.per_record}
