@@ -29,7 +29,6 @@ from jaxdamp.rig import Rig  # noqa: E402
 
 TESTS = [SineTest(0.02, 1.0, cycles=4), SineTest(0.01, 4.0, cycles=8), SineTest(0.005, 10.0, cycles=16)]
 SAMPLING_RATE = 500.0  # Hz
-WITH_MACHINE = 2000.0  # Hz: friction turns within 5 ms, which 500 Hz show too coarsely
 NOISE = 15.0  # N
 MEMORY = 0.9
 BESIDE = (1.2, 0.8)  # start relative to the truth
@@ -72,7 +71,7 @@ def repeated(
     law: AbstractDamper, rig: Rig | None, freeze: Sequence[str], memory: float, repeats: int
 ) -> list[FitResult]:
     """Fits to records that differ in their noise only."""
-    clean = VirtualDyno(law, rig=rig, sampling_rate=SAMPLING_RATE if rig is None else WITH_MACHINE).run(TESTS)
+    clean = VirtualDyno(law, rig=rig, sampling_rate=SAMPLING_RATE).run(TESTS)
     frozen = {p.path for p in parameters(law) if p.path.rpartition(".")[2] in freeze}
     start = replace(law, {path: value for path, value in beside(law).items() if path not in frozen})
     machine = None if rig is None else replace(rig, beside(rig, Rig()))

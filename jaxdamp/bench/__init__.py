@@ -11,6 +11,7 @@ from jaxdamp.bench.analysis import (
     continuous_velocity_loop,
     fold_cycles,
     last_steady_cycle,
+    moving_part,
     peak_velocity_points,
     steady_cycles,
 )
@@ -78,6 +79,7 @@ __all__ = [
     "fold_cycles",
     "last_steady_cycle",
     "low_pass_gain",
+    "moving_part",
     "peak_velocity_points",
     "preflight",
     "programmes",

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp.bench.motion import cycle_instants
+from jaxdamp.bench.motion import cycle_instants, moving_span
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import as_runs
 
@@ -61,6 +61,12 @@ def steady_cycles(run: BenchRun) -> list[slice]:
 def last_steady_cycle(run: BenchRun) -> slice:
     """The samples of the last steady cycle (`steady_cycles`), or all of them in a record without a full cycle."""
     return next(reversed(steady_cycles(run)), slice(None))
+
+
+def moving_part(run: BenchRun) -> slice:
+    """The samples of the motion, without the rest before and after it, which `process(moving=True)` cuts off."""
+    first, last = moving_span(run.time, run.stroke)
+    return slice(first, last + 1)
 
 
 def peak_velocity_points(runs: BenchRun | Iterable[BenchRun]) -> PeakVelocityPoints:

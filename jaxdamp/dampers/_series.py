@@ -1,6 +1,7 @@
 """A law in series with massless springs: all have the same force, the spring deflections are states."""
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -17,6 +18,7 @@ from jaxdamp.dampers.wrapper import AbstractWrapper
 
 
 FASTEST = 1e3  # m/s, far above any damper
+MOST_STEPS = 60  # of a search; a dozen are enough unless the law levels off far from the root
 
 Deflections = tuple[Scalar, ...]
 
@@ -51,6 +53,21 @@ class AbstractSeries(AbstractWrapper):
     @abstractmethod
     def largest_deflection(self, force: Scalar, begun: Deflections) -> Scalar:
         """A total deflection [m] at which the springs have at least this force [N] at the end of any stage."""
+
+    def spring_in_stage(
+        self, law_force: Callable[[Scalar], Scalar], free: Scalar, duration: ScalarLike
+    ) -> Callable[[Deflections], Scalar]:
+        """The force [N] by the deflections at the end of a stage, for the search of its velocity.
+
+        By default `spring_force`. A spring with kinks gives the piece on which the stage ends, continued without kinks.
+
+        Arguments:
+            law_force: of the law at its constant velocity over the stage.
+            free: deflection [m] at the end for a locked law.
+            duration: duration of the stage [s].
+        """
+        del law_force, free, duration
+        return self.spring_force
 
     def shared(self, total: Scalar, begun: Deflections, duration: ScalarLike) -> Deflections:
         """The deflection of each spring at the end of an implicit stage, from their total; by default one spring.
@@ -138,12 +155,14 @@ class AbstractSeries(AbstractWrapper):
 
         at_rest = jnp.abs(law_force(jnp.zeros_like(free)))
         reach = self.largest_deflection(at_rest, now.deflections)
+        spring_force = self.spring_in_stage(law_force, free, duration)
         limit = (jnp.abs(free) + reach) / duration + jnp.finfo(free.dtype).tiny
         velocity = increasing_root(
-            lambda w: law_force(w) - self.spring_force(deflections(w)),
+            lambda w: law_force(w) - spring_force(deflections(w)),
             within(now.guess, -limit, limit),
             -limit,
             limit,
+            steps=MOST_STEPS,
             likely=likely,
             close=1e-4,
         )

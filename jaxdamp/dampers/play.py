@@ -1,7 +1,10 @@
 """Any law in series with a clearance: a worn ball joint, a loose rod end, a void in the oil."""
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import final
+
+import jax.numpy as jnp
 
 from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike
@@ -31,6 +34,19 @@ class AbstractClearance(AbstractSeries):
         """Force [N] of the spring behind its clearance."""
         stiffness, clearance = self.contact()
         return stiffness * dead_zone(deflections[0], clearance)
+
+    def spring_in_stage(
+        self, law_force: Callable[[Scalar], Scalar], free: Scalar, duration: ScalarLike
+    ) -> Callable[[Deflections], Scalar]:
+        """Force [N] on the side of the clearance, or inside it, on which the stage ends.
+
+        At the kinks a stiff contact looks like a root to Newton's method; the law's force there tells the side.
+        """
+        stiffness, clearance = self.contact()
+        extended = law_force((free - clearance) / duration) > 0
+        compressed = law_force((free + clearance) / duration) < 0
+        gap = jnp.where(extended, clearance, -clearance)
+        return lambda deflections: jnp.where(extended | compressed, stiffness * (deflections[0] - gap), 0.0)
 
     def largest_deflection(self, force: Scalar, begun: Deflections) -> Scalar:
         """Clearance and deflection [m] of the spring."""

@@ -19,7 +19,7 @@ from jaxdamp.identify.input_noise import input_noise_bias, on_bias
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import rig_of
-from jaxdamp.identify.preparing import prepare
+from jaxdamp.identify.preparing import prepare, records_in_words
 from jaxdamp.identify.problem import Problem, linearised
 from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.search import SearchEnd
@@ -47,6 +47,7 @@ def fit(
     priors: Mapping[str, tuple[float, float]] | None = None,
     force_noise: float | None = None,
     input_noise: tuple[float, float] | None = None,
+    initial_state: str = "warm_up",
     samples_per_cycle: int | None = 400,
     starts: int | None = None,
     max_steps: int = 200,
@@ -63,8 +64,10 @@ def fit(
     Standard errors take all other free parameters as unknown. If the residual is correlated from sample to sample,
     because the law does not describe everything, only the number of independent samples counts (`inflation`).
 
-    States of a law are initialised by running the first cycle of each record once before the record; the first half
-    cycle of the record is not compared. Slow records are averaged in blocks down to `samples_per_cycle`.
+    The states of a law start at rest in records that begin at rest. Records that begin in motion are preceded by a copy
+    of their first cycle, and their first half cycle is not compared, unless `initial_state` says otherwise. Rest before
+    and after the motion is left out for laws without states: it shows no more than a friction that holds any force, or
+    the zero error of the load cell. Slow records are averaged in blocks down to `samples_per_cycle`.
 
     Arguments:
         law: the start: a law; a law class, which estimates its starting values; or a function that returns a law,
@@ -94,6 +97,10 @@ def fit(
             estimated from the residual, including its correlation.
         input_noise: standard deviations of stroke [m] and velocity [m/s] as they stand in the records. Least squares of
             the force takes both as exact; the bias that this causes is estimated and stands beside each parameter.
+        initial_state: of a law with states at the first sample of a record: `"warm_up"`, as above; `"rest"`, the law's
+            own, for records that begin with the first motion; or `"periodic"`, for records cut out of a motion that had
+            lasted long: in those whose stroke repeats from cycle to cycle the law has settled, however slow it is, and
+            all samples are compared. Other records start as with `"warm_up"`. How each starts stands in `criterion`.
         samples_per_cycle: see above; `None` uses every sample.
         starts: largest number of starts: `law` first, then those that its laws propose (`other_starts`); all of them if
             left out. With 1, the search starts from `law` only.
@@ -127,6 +134,7 @@ def fit(
         per_record=per_record,
         weighting=weighting,
         priors=priors,
+        initial_state=initial_state,
         samples_per_cycle=samples_per_cycle,
     )
 
@@ -135,7 +143,8 @@ def fit(
 
     problem, solution = solve_by(problem, by_squares, loss=loss, force_noise=force_noise, starts=starts)
     result = judge(problem, solution, force_noise=force_noise)
-    criterion = criterion_in_words(problem, loss, priors or {})
+    words = (criterion_in_words(problem, loss, priors or {}), records_in_words(problem))
+    criterion = "; ".join(filter(None, words))
     if input_noise is None:
         return dataclasses.replace(result, criterion=criterion)
     biases = map(float, input_noise_bias(problem, solution.best, input_noise))

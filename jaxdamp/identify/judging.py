@@ -14,11 +14,11 @@ from jaxdamp.identify.estimating import estimate, on_misfit
 from jaxdamp.identify.left_out import left_out
 from jaxdamp.identify.model import Model, OnRig, is_memoryless, law_of, rig_of, with_range
 from jaxdamp.identify.noise import noise_of
+from jaxdamp.identify.predicting import predict_runs
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.result import FitResult, score
 from jaxdamp.identify.several import Solution
-from jaxdamp.identify.traces import predict_runs
 from jaxdamp.parameters import get, with_values
 
 
@@ -47,7 +47,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     estimates = estimate(problem, solution, noise)
     models, model = _fitted(problem, best.values)
     law, rig = law_of(model), rig_of(model)
-    percent, rmse, scores = score(models or model, problem.runs, np.isfinite(problem.sigma))
+    percent, rmse, scores = score(models or model, problem.runs, np.isfinite(problem.sigma), problem.initial_state)
     notes = [f"The search did not converge: {best.status.sentence} {_REMEDY}"] * (not best.converged)
     notes += [*notes_on(law, problem.fitted_to), *estimates.notes, *on_misfit(noise), *left_out(problem, best)]
     return FitResult(
@@ -66,6 +66,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         inflation=noise.inflation,
         record_laws=tuple(map(law_of, models)),
         rig=rig,
+        initial_state=problem.initial_state,
         record_rigs=tuple(m.rig for m in models if isinstance(m, OnRig)),
         evidence=Evidence(problem, best, noise, estimates.covariance),
     )

@@ -2,10 +2,13 @@
 
 from typing import final
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp._types import Scalar, State
 from jaxdamp.dampers import AbstractDamper, FittedRange, with_fitted_range
+from jaxdamp.identify.initial_states import Cycle, periodic_state
 from jaxdamp.parameters import Module
 from jaxdamp.rig import Rig, march
 
@@ -46,6 +49,14 @@ def is_memoryless(model: Model) -> bool:
     return law_of(model).initial_state().size == 0 and not effects_of(model)
 
 
+def can_rest(model: Model) -> bool:
+    """Whether the law has states, which rest can tell of: friction that holds, a force that relaxes.
+
+    Without them its force at rest is one number, while dry friction holds any force up to its own.
+    """
+    return law_of(model).initial_state().size > 0
+
+
 def with_range(model: Model, fitted_to: FittedRange) -> Model:
     """The same with the range that the law was fitted to."""
     return on_rig(with_fitted_range(law_of(model), fitted_to), rig_of(model))
@@ -67,8 +78,25 @@ def marched(
     velocity: Float[Array, " time"],
     temperature: Float[Array, " time"] | None,
     substeps: int,
+    state: State | None,
 ) -> Float[Array, " time"]:
-    """Force [N] in a record with this motion, for use inside compiled functions."""
+    """Force [N] in a record with this motion, for use inside compiled functions, from this state if one is given."""
     if isinstance(model, AbstractDamper):
-        return march(model, dt, stroke, velocity, substeps, temperature)
-    return model.rig.march(model.law, effects, dt, stroke, velocity, temperature, substeps).force
+        return march(model, dt, stroke, velocity, substeps, temperature, state)
+    return model.rig.march(model.law, effects, dt, stroke, velocity, temperature, substeps, state).force
+
+
+def initial_state(
+    model: Model, effects: tuple[str, ...], cycle: Cycle, temperature: Float[Array, " time"] | None
+) -> tuple[State, Scalar]:
+    """The states at the start of a record: periodic, or at rest; and how much they still change over the cycle."""
+    if isinstance(model, OnRig):
+        before = [jnp.concatenate([channel[:-1], channel]) for channel in (cycle.stroke, cycle.velocity)]
+        stroke, velocity = model.rig.delayed_motion(effects, cycle.dt, *before)
+        again = -cycle.stroke.size
+        cycle = cycle._replace(stroke=stroke[again:] - model.rig.stroke_offset, velocity=velocity[again:])
+    law = law_of(model)
+    if temperature is not None and law.traits().temperature_dependent:
+        law = law.at_temperature(temperature[0])
+    state, change = periodic_state(law, cycle)
+    return jnp.where(cycle.periodic, state, law.initial_state()), jnp.where(cycle.periodic, change, 0.0)

@@ -8,10 +8,8 @@ import scipy.signal
 from jaxtyping import Bool, Float, Int
 
 from jaxdamp.identify._tall import orthonormal
-from jaxdamp.identify.model import is_memoryless
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
-from jaxdamp.identify.traces import settling_time
 
 
 CORRELATED = 3.0  # samples per independent sample above which residuals are called alike
@@ -213,12 +211,9 @@ def repeats(problem: Problem, residuals: Sequence[Float[np.ndarray, " _"]]) -> b
         problem: the problem that was minimised.
         residuals: the used samples of each record.
     """
-    memoryless = is_memoryless(problem.free.tree)
     alike, size = 0.0, 0.0
-    for run, residual in zip(problem.runs, residuals, strict=True):
-        used = run.duration - (0.0 if memoryless else settling_time(run))
-        block = max(round(used * run.sampling_rate / max(residual.size, 1)), 1)
-        cycle = round(run.sampling_rate / (block * run.frequency)) if run.frequency > 0 else residual.size
+    for run, step, residual in zip(problem.runs, problem.sample_steps, residuals, strict=True):
+        cycle = round(1.0 / (step * run.frequency)) if run.frequency > 0 else residual.size
         if residual.size >= (1.0 + LEAST_OVERLAP) * cycle:
             early, late = residual[:-cycle], residual[cycle:]
             alike, size = alike + float(early @ late), size + 0.5 * float(early @ early + late @ late)

@@ -9,8 +9,9 @@ from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import Reach
 from jaxdamp.identify.criteria import FIRST_NOISE, priors_on
+from jaxdamp.identify.initial_states import INITIAL_STATES, moving_samples, starts_in_words
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
-from jaxdamp.identify.model import Model, on_rig
+from jaxdamp.identify.model import Model, can_rest, is_memoryless, on_rig
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.traces import batches, owners
@@ -28,6 +29,7 @@ def prepare(
     per_record: Sequence[str] = (),
     weighting: str | Sequence[float] = "samples",
     priors: Mapping[str, tuple[float, float]] | None = None,
+    initial_state: str = "warm_up",
     samples_per_cycle: int | None = 400,
 ) -> Problem:
     """The first of the three steps of `fit`, whose arguments these are: `prepare`, `solve`, `judge`.
@@ -45,6 +47,7 @@ def prepare(
     >>> round(float(judge(problem, solve(problem)).law.rate), 3)
     1500.0
     """
+    _checks.one_of("initial_state", initial_state, INITIAL_STATES)
     runs = as_runs(runs, call="fit(law, runs)")
     if not runs:
         _checks.refuse("runs", "hold at least one record", "empty", "Read some with `bench.read`.")
@@ -58,7 +61,7 @@ def prepare(
     frozen = [*name_patterns("freeze", freeze), *frozen_by(law), *absent]
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
-    residuals, ranges = batches(model, runs, sigma, samples_per_cycle, own)
+    residuals, ranges = batches(model, runs, sigma, samples_per_cycle, own, initial_state)
     owner = owners(residuals, ranges)
     weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
     level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
@@ -67,7 +70,22 @@ def prepare(
     owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in known)])
     residuals = (*residuals, *known)
     steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
-    return Problem(free, residuals, level, runs, tuple(sigma), owner, reach, begin, own, weighting == "runs", steps)
+    each, sigma = weighting == "runs", tuple(sigma)
+    return Problem(free, residuals, level, runs, sigma, owner, reach, begin, own, each, steps, initial_state)
+
+
+def records_in_words(problem: Problem) -> str:
+    """What of the records is left out, and how they start, where that differs from the usual; else empty."""
+    model, runs = problem.free.tree, problem.fitted_to
+    parts = [] if is_memoryless(model) else [starts_in_words(runs, problem.initial_state)]
+    if not can_rest(model):
+        resting = [(run, moving_samples(run)) for run in runs]
+        resting = [(run, moving) for run, moving in resting if moving.stop - moving.start < len(run)]
+        before = sum(moving.start / run.sampling_rate for run, moving in resting)
+        after = sum((len(run) - moving.stop) / run.sampling_rate for run, moving in resting)
+        names = ", ".join(run.name for run, _ in resting)
+        parts += [f"rest left out: {before:.3g} s before and {after:.3g} s after the motion of {names}"] * bool(names)
+    return "; ".join(filter(None, parts))
 
 
 def _per_record(model: Model, names: Sequence[str], sigma: Sequence[float], absent: Sequence[str]) -> tuple[str, ...]:

@@ -54,6 +54,7 @@ class Problem(NamedTuple):
         per_record: paths of the parameters with a value for each record.
         each: whether every record has its own noise level.
         sample_steps: time [s] from one sample of the residuals to the next, for each record.
+        initial_state: how the records start, of `INITIAL_STATES`.
         noise_factor: factor on the noise that weighted residuals show, because of a robust loss.
         share_left_out: share of the samples that a robust loss gives less than half weight.
     """
@@ -69,6 +70,7 @@ class Problem(NamedTuple):
     per_record: tuple[str, ...]
     each: bool
     sample_steps: tuple[float, ...] = ()
+    initial_state: str = "warm_up"
     noise_factor: float = 1.0
     share_left_out: float = 0.0
 

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.model import Model, is_memoryless
-from jaxdamp.identify.traces import predict_by_record, used_samples
+from jaxdamp.identify.predicting import predict_by_record, used_samples
 
 
 class ErrorShares(NamedTuple):
@@ -19,7 +19,9 @@ class ErrorShares(NamedTuple):
     rest: float  # noise, and changes from cycle to cycle
 
 
-def error_shares(law: Model | Sequence[Model], runs: BenchRun | Iterable[BenchRun]) -> ErrorShares:
+def error_shares(
+    law: Model | Sequence[Model], runs: BenchRun | Iterable[BenchRun], initial_state: str = "warm_up"
+) -> ErrorShares:
     """Split the squared force error of a law over records, record by record, by an analysis of variance.
 
     The samples of a record are sorted by velocity into bins, and each bin is divided by the half of the stroke: a cycle
@@ -32,6 +34,7 @@ def error_shares(law: Model | Sequence[Model], runs: BenchRun | Iterable[BenchRu
     Arguments:
         law: a law, fitted or not, or the `model` of a fit; or one for each record.
         runs: one record or several.
+        initial_state: how they start, as in `fit`.
 
     >>> from jaxdamp import bench
     >>> from jaxdamp.dampers import Bilinear, Linear
@@ -41,9 +44,9 @@ def error_shares(law: Model | Sequence[Model], runs: BenchRun | Iterable[BenchRu
     """
     runs = as_runs(runs, call="error_shares(law, runs)")
     sums = np.zeros(3)
-    laws, forces = predict_by_record(law, runs)
+    laws, forces = predict_by_record(law, runs, initial_state)
     for own, run, force in zip(laws, runs, forces, strict=True):
-        part = used_samples(own, run, is_memoryless(own))
+        part = used_samples(own, run, is_memoryless(own), initial_state)
         sums += _sums(run.velocity[part], run.stroke[part], force[part] - run.force[part])
     shape, hysteresis, rest = sums / max(sums.sum(), np.finfo(float).tiny)
     return ErrorShares(float(shape), float(hysteresis), float(rest))

@@ -16,11 +16,11 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.bayes import Posterior, posterior
 from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
 from jaxdamp.identify.model import Model, is_memoryless, on_rig
+from jaxdamp.identify.predicting import predict_by_record, predict_runs, used_samples
 from jaxdamp.identify.profile_curve import ProfileCurve, profile_curve
 from jaxdamp.identify.propagation import Band, Evidence, Propagated, band, propagate
 from jaxdamp.identify.record_sensitivity import RecordSensitivity, sensitivity_to_records
 from jaxdamp.identify.residual import ErrorShares, error_shares
-from jaxdamp.identify.traces import predict_by_record, predict_runs, used_samples
 from jaxdamp.rig import Rig
 
 
@@ -70,13 +70,15 @@ def score(
     model: Model | Sequence[Model],
     runs: Sequence[BenchRun],
     counted: Sequence[bool] | np.ndarray | None = None,
+    initial_state: str = "warm_up",
 ) -> tuple[float, float, tuple[Score, ...]]:
     """Fit percent and RMSE [N] of a model, or of one for each record, over the records that count, and for each."""
-    models, forces = predict_by_record(model, runs)
+    models, forces = predict_by_record(model, runs, initial_state)
     memoryless = {
         id(own): is_memoryless(own) for own in {id(own): own for own in models}.values()
     }  # most often one model for all records
-    used = [used_samples(own, run, memoryless[id(own)]) for own, run in zip(models, runs, strict=True)]
+    pairs = zip(models, runs, strict=True)
+    used = [used_samples(own, run, memoryless[id(own)], initial_state) for own, run in pairs]
     measured = [run.force[k] for run, k in zip(runs, used, strict=True)]
     predicted = [force[k] for force, k in zip(forces, used, strict=True)]
     rows = []
@@ -113,6 +115,7 @@ class AbstractFitted:
         warnings: doubts about the result, in words.
         status: how the search ended.
         rig: the fitted test machine, if one was fitted.
+        initial_state: how records start, as in `fit`.
     """
 
     law: AbstractDamper
@@ -123,6 +126,7 @@ class AbstractFitted:
     warnings: tuple[str, ...]
     status: Status
     rig: Rig | None = dataclasses.field(default=None, kw_only=True)
+    initial_state: str = dataclasses.field(default="warm_up", kw_only=True)
 
     @property
     def converged(self) -> bool:
@@ -136,11 +140,11 @@ class AbstractFitted:
 
     def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
         """Force [N] that the fit expects at every sample of records, old or new, of the same machine."""
-        return predict_runs(self.model, as_runs(runs))
+        return predict_runs(self.model, as_runs(runs), self.initial_state)
 
     def score(self, runs: Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
         """Fit percent, RMSE [N] and the scores by record, on other records."""
-        return score(self.model, as_runs(runs))
+        return score(self.model, as_runs(runs), initial_state=self.initial_state)
 
     def to_dict(self) -> dict[str, Any]:
         """The result as numbers with units and words, ready for JSON; numbers that are not finite are None.
@@ -173,7 +177,7 @@ class FitResult(AbstractFitted):
             not, or if the noise was given.
         record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
         record_rigs: the test machine of each record, as `record_laws`.
-        criterion: loss and priors in words; empty for plain least squares.
+        criterion: loss, priors and what is special about the records in words; empty for plain least squares.
         evidence: the minimum and the noise, for `band`, `propagate`, `profile` and `posterior`.
     """
 
@@ -200,7 +204,7 @@ class FitResult(AbstractFitted):
     def error_shares(self) -> ErrorShares:
         """Shares of the squared error over the records: shape, hysteresis, rest (`identify.error_shares`)."""
         rigs = self.record_rigs or (None,) * len(self.record_laws)
-        return error_shares([*map(on_rig, self.record_laws, rigs)] or self.model, self.runs)
+        return error_shares([*map(on_rig, self.record_laws, rigs)] or self.model, self.runs, self.initial_state)
 
     def table(self, truth: AbstractDamper | None = None, *, true_rig: Rig | None = None, title: str = "") -> Table:
         """The parameters with units, standard errors and meanings, compared with a true law if one is given.

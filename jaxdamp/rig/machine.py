@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from jaxdamp import _checks
-from jaxdamp._types import Number, Scalar, Signal, SignalLike
+from jaxdamp._types import Number, Scalar, Signal, SignalLike, State
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import Module, as_float, check_parameters, nonnegative, parameter, positive, readable, setting
 from jaxdamp.rig.channel import delayed, lagged
@@ -50,9 +50,9 @@ class Rig(Module):
         F_measured(t) = F₀ + (F behind a first-order lag)(t − delay)
 
     Everything is zero by default, so that `Rig()` shows the force of the law. The gas does no lasting work and gives no
-    heat. It differentiates by all parameters of law and rig, and works under `jit` and `vmap`. A delay of any part of a
-    sample is interpolated by cubics, whose error falls with the fourth power of the sampling step (1e-4 of the force at
-    14 samples a period, 1e-6 at 45).
+    heat. It differentiates by all parameters of law and rig, and works under `jit` and `vmap`. For a delay of
+    any part of a sample stroke and velocity are interpolated by cubics, whose error falls with the fourth power of the
+    sampling step (1e-4 at 14 samples a period, 1e-6 at 45), however suddenly the force turns.
 
     In a fit a record is led in by a copy of its first cycle, and ϑ begins with that.
 
@@ -134,8 +134,6 @@ class Rig(Module):
             ValueError: what `jaxdamp.respond` refuses; a temperature that is not finite or of another length.
         """
         time, stroke = as_float(time, "time"), as_float(stroke, "stroke")
-        own = temperature if law.traits().temperature_dependent else None
-        law_force = respond(law, time, stroke - self.stroke_offset, velocity, temperature=own, substeps=substeps)
         dt = (time[-1] - time[0]) / (time.size - 1)
         rate = jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else as_float(velocity, "velocity")
         if temperature is not None:
@@ -144,7 +142,10 @@ class Rig(Module):
                 value = f"of shape {temperature.shape} for time {time.shape}"
                 _checks.refuse("temperature", "be as long as `time`", value)
             _checks.finite("temperature", temperature)
-        return _readings(self, self.effects(), law_force, dt, stroke, rate, temperature)
+        motion = self.delayed_motion(self.effects(), dt, stroke, rate)
+        own = temperature if law.traits().temperature_dependent else None
+        law_force = respond(law, time, motion[0] - self.stroke_offset, motion[1], temperature=own, substeps=substeps)
+        return _readings(self, self.effects(), law_force, dt, *motion, temperature)
 
     def march(
         self,
@@ -155,10 +156,20 @@ class Rig(Module):
         velocity: Signal,
         temperature: Signal | None = None,
         substeps: int = 1,
+        state: State | None = None,
     ) -> Readings:
         """`readings` without its checks, for use inside compiled functions, with the `effects` known outside."""
-        force = march(law, dt, stroke - self.stroke_offset, velocity, substeps, temperature)
+        stroke, velocity = self.delayed_motion(effects, dt, stroke, velocity)
+        force = march(law, dt, stroke - self.stroke_offset, velocity, substeps, temperature, state)
         return _readings(self, effects, force, dt, stroke, velocity, temperature)
+
+    def delayed_motion(
+        self, effects: tuple[str, ...], dt: Scalar, stroke: Signal, velocity: Signal
+    ) -> tuple[Signal, Signal]:
+        """The motion [m, m/s] whose force the force channel shows: between samples it is smoother than the force."""
+        if "delay" not in effects:
+            return stroke, velocity
+        return delayed(stroke, self.force_delay / dt), delayed(velocity, self.force_delay / dt)
 
     def effects(self) -> tuple[str, ...]:
         """Which effects there are that depend on more than the instant; one that is traced counts as there."""
@@ -184,8 +195,10 @@ def _readings(
 ) -> Readings:
     """`Rig.readings` from the force of the law, without checks."""
     friction = rig.friction * jnp.tanh(velocity / rig.friction_velocity)
+    samples = rig.force_delay / dt
     if temperature is not None:
         rise = temperature - rig.reference_temperature
+        rise = delayed(rise, samples) if "delay" in effects else rise
     elif "heat" in effects:
         rise = _temperature_rise(rig, dt, law_force * velocity, friction * velocity)
     else:
@@ -197,9 +210,9 @@ def _readings(
         force = force + rig.moving_mass * slopes(velocity, dt)
     if "lag" in effects:
         force = lagged(force, rig.force_lag / dt)
-    if "delay" in effects:
-        force = delayed(force, rig.force_delay / dt)
-    return Readings(force + rig.force_offset, rig.reference_temperature + rise)
+    if temperature is None:
+        temperature = rig.reference_temperature + (delayed(rise, -samples) if "delay" in effects else rise)
+    return Readings(force + rig.force_offset, temperature)
 
 
 def _temperature_rise(rig: Rig, dt: Scalar, law_power: Signal, friction_power: Signal) -> Signal:

@@ -13,7 +13,7 @@ from jaxtyping import Array, ArrayLike, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import Mode
-from jaxdamp._types import Signal, SignalLike
+from jaxdamp._types import Signal, SignalLike, State
 from jaxdamp.dampers import (
     AbstractDamper,
     Motion,
@@ -216,8 +216,9 @@ def march(
     velocity: Signal,
     substeps: int,
     temperature: Signal | None = None,
+    state: State | None = None,
 ) -> Signal:
-    """`respond` without its checks, for use inside compiled functions.
+    """`respond` without its checks, for use inside compiled functions, from this state if one is given.
 
     A temperature [K] counts for laws that depend on one; within a step it is the mean of both ends.
     """
@@ -229,7 +230,7 @@ def march(
     def force(x: Array, v: Array, state: Array, temperature: Array | None) -> Array:
         return at(temperature).force(x, v, state)
 
-    state = at(None if warm is None else warm[0]).initial_state()
+    state = at(None if warm is None else warm[0]).initial_state() if state is None else state
     if state.size == 0:
         return jax.vmap(force, (0, 0, None, 0))(stroke, velocity, state, warm)
     fine_x = _refine(stroke, dt * velocity, substeps)

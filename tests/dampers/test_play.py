@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxdamp.dampers import Bilinear, CoulombFriction, KaradayiMasada, Lag, Linear, Play
+from jaxdamp.dampers import Bilinear, CoulombFriction, KaradayiMasada, Lag, Linear, Play, Saturating
 from jaxdamp.parameters import with_values
 from jaxdamp.rig import march
 
@@ -41,3 +41,19 @@ def test_a_law_whose_force_is_a_state_needs_damping_beside_it():
     with pytest.raises(ValueError, match=r"depends directly on the velocity, but is a Lag.*`Lag\(Play\(law\)\)`"):
         Play(Lag(Linear(2000.0), 0.004), 1e6, 3e-4)
     Play(Lag(Linear(2000.0), 0.004) + Linear(50.0), 1e6, 3e-4)
+
+
+@pytest.mark.parametrize("stiffness", [1.5e7, 1e9])
+def test_forces_and_derivatives_are_finite_around_a_law_that_levels_off(stiffness):
+    """The law's force levels off within a fraction of a millimetre per second; the contact is far stiffer."""
+    t = np.linspace(0.0, 0.5, 251)
+    x, v = jnp.asarray(0.02 * np.sin(4 * np.pi * t)), jnp.asarray(0.08 * np.pi * np.cos(4 * np.pi * t))
+    values = jnp.array([18_000.0, 79_000.0, 4.8, 1.6e5, stiffness, 2.9e-3])
+
+    def force(values):
+        return march(Play(Saturating(*values[:4]), *values[4:]), jnp.asarray(2e-3), x, v, 1)
+
+    assert np.all(np.isfinite(jax.jit(jax.jacfwd(force))(values)))
+    if stiffness == 1e9:  # the contact has let go at once
+        inside = np.asarray(jax.jit(force)(values))[(t > 0.13) & (t < 0.145)]
+        assert np.all(inside == 0.0)

@@ -6,7 +6,8 @@ import pytest
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import Lag, Linear
 from jaxdamp.identify import default_ladder, fit
-from jaxdamp.identify.traces import batches, predict_runs, used_samples
+from jaxdamp.identify.predicting import predict_runs, used_samples
+from jaxdamp.identify.traces import batches
 from jaxdamp.parameters import free_parameters
 
 

@@ -145,3 +145,17 @@ def test_numbers_that_no_machine_has(name, value):
         Rig(**{name: value})
     with pytest.raises(ValueError, match=f"`Rig.{name}` must be"):
         dataclasses.replace(Rig(), **{name: value})
+
+
+@pytest.mark.parametrize("temperature", [None, 320.0])
+def test_a_delay_of_half_a_sample_is_exact_where_friction_turns_within_one(temperature):
+    """The motion is interpolated, not the force, which turns from one sample to the next."""
+    rig = Rig(gas_force=-120.0, friction=30.0, friction_velocity=0.005, force_delay=1e-3, temperature_slope=2e-3)
+
+    def shown(rate):
+        time = np.arange(0.0, 1.0, 1.0 / rate)
+        stroke, velocity = 0.01 * np.sin(8 * np.pi * time), 0.08 * np.pi * np.cos(8 * np.pi * time)
+        warm = None if temperature is None else np.full(time.size, temperature)
+        return rig.force(Linear(1500.0), time, stroke, velocity, temperature=warm)[:: round(rate / 500.0)]
+
+    assert np.abs(shown(500.0) - shown(20_000.0))[2:-2].max() < 0.05

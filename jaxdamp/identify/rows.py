@@ -1,0 +1,128 @@
+"""A record made ready for a model: averaged in blocks, weighted, led in."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool
+
+from jaxdamp.bench import BenchRun
+from jaxdamp.identify.initial_states import Cycle, moving_samples, repeated_motion, start_of
+from jaxdamp.identify.model import Model, blind_end, can_rest, is_memoryless
+
+
+STEP_ANGLE = 0.06  # rad of the dominant frequency per step: keeps the error of a law's step near 1e-4
+
+
+class Row(NamedTuple):
+    """A record made ready for a model with memory."""
+
+    dt: float
+    signals: list[np.ndarray]  # stroke, velocity, force, and the temperature if it is used
+    weight: np.ndarray
+    number: int
+    warm_up: int
+    block: int
+    substeps: int
+    repeated: Callable[[np.ndarray], np.ndarray] | None = None  # stroke and velocity of a periodic record
+
+
+def averaged(values: np.ndarray, block: int) -> np.ndarray:
+    """Means of successive blocks, the remainder dropped."""
+    kept = len(values) // block * block
+    return values[:kept].reshape(-1, block).mean(axis=1)
+
+
+_rates: WeakKeyDictionary[BenchRun, float] = WeakKeyDictionary()  # records do not change
+
+
+def dominant_rate(run: BenchRun) -> float:
+    """Dominant angular frequency of a record [rad/s]: RMS velocity over RMS stroke, or its frequency if higher."""
+    if run not in _rates:
+        moved = float(np.std(run.stroke))
+        _rates[run] = max(2 * np.pi * run.frequency, float(np.std(run.velocity)) / moved)
+    return _rates[run]
+
+
+def settling_time(run: BenchRun) -> float:
+    """Settling time [s] at the start of a record, half a cycle, after which the initial states no longer matter."""
+    return min(np.pi / dominant_rate(run), 0.25 * run.duration)
+
+
+def _with_warm_up(run: BenchRun, count: int, channels: Sequence[str]) -> list[np.ndarray]:
+    """Channels, preceded by a copy of the first cycle with a continuous stroke."""
+    period = min(2 * np.pi / dominant_rate(run), run.duration)
+    since = run.time - run.time[0]
+    instants = period + np.arange(-count, 0) / run.sampling_rate
+    stroke, velocity = (np.interp(instants, since, values) for values in (run.stroke, run.velocity))
+    stroke = stroke + run.stroke[0] - np.interp(period, since, run.stroke)
+    before = {"stroke": stroke, "velocity": velocity, "force": np.zeros(count)}
+    if "temperature" in channels and run.temperature is not None:
+        before["temperature"] = np.full(count, run.temperature[0])
+    return [np.concatenate([before[channel], getattr(run, channel)]) for channel in channels]
+
+
+def samples_in_block(run: BenchRun, samples_per_cycle: int | None) -> int:
+    """How many samples of a record are averaged."""
+    cycle = 2 * np.pi * run.sampling_rate / dominant_rate(run)
+    return 1 if samples_per_cycle is None else max(int(cycle / samples_per_cycle), 1)
+
+
+def resting_blocks(run: BenchRun, block: int) -> Bool[np.ndarray, " blocks"]:
+    """Which blocks of a record are not wholly in motion."""
+    moving = moving_samples(run)
+    begins = np.arange(len(run) // block) * block
+    return (begins < moving.start) | (begins + block > moving.stop)
+
+
+def row_of(
+    run: BenchRun,
+    sigma: float,
+    samples_per_cycle: int | None,
+    model: Model,
+    channels: Sequence[str],
+    initial_state: str,
+    number: int,
+) -> Row:
+    """A record as `traces.batches` says."""
+    omega = dominant_rate(run)
+    block = samples_in_block(run, samples_per_cycle)
+    dt = block / run.sampling_rate
+    substeps = int(np.clip(np.ceil(omega * dt / STEP_ANGLE), 1, 8))
+    start = "rest" if is_memoryless(model) else start_of(run, initial_state)
+    warm_up = 0 if start == "rest" else int(min(2 * np.pi / omega, run.duration) / dt)
+    signals = [averaged(values, block) for values in _with_warm_up(run, warm_up * block, channels)]
+    repeated = None
+    if start == "periodic":
+        repeated = repeated_motion(run, [values[warm_up:] for values in signals[:2]], dt)
+        signals[0][:warm_up], signals[1][:warm_up] = repeated(np.arange(-warm_up, 0) * dt)
+    weight = np.full(len(signals[0]), np.sqrt(block) / sigma)
+    weight[len(weight) - blind_end(model, dt) :] = 0.0
+    weight[: warm_up + (int(np.ceil(settling_time(run) / dt)) if start == "warm_up" else 0)] = 0.0
+    if not can_rest(model):
+        weight[warm_up:][resting_blocks(run, block)] = 0.0
+    return Row(dt, signals, weight, number, warm_up, block, substeps, repeated)
+
+
+def cycles_of(rows: Sequence[Row], runs: Sequence[BenchRun]) -> Cycle | None:
+    """The cycle before each record, all with as many points, where some start in the periodic solution."""
+    if not any(row.repeated for row in rows):
+        return None
+    periods = [1.0 / run.frequency for run in runs]
+    points = 1 + max(int(np.ceil(t / row.dt)) * row.substeps for t, row in zip(periods, rows, strict=True))
+    motions = [
+        np.zeros((2, points))
+        if row.repeated is None
+        else row.repeated(np.linspace(0.0, t, points) - row.warm_up * row.dt)
+        for t, row in zip(periods, rows, strict=True)
+    ]
+    stroke, velocity = (on_device(np.stack(channel)) for channel in zip(*motions, strict=True))
+    periodic = jnp.asarray([row.repeated is not None for row in rows])
+    return Cycle(on_device(np.array(periods) / (points - 1)), stroke, velocity, periodic)
+
+
+def on_device(array: np.ndarray) -> Array:
+    """With a type stated, an array is copied; without one JAX compiles a program for that."""
+    return jnp.asarray(array, float if array.dtype.kind == "f" else int)
