@@ -6,6 +6,8 @@ from typing import Annotated
 import typer
 
 from jaxdamp.cli.option_types import (
+    Baseline,
+    Commands,
     Debug,
     Duration,
     Files,
@@ -22,6 +24,7 @@ from jaxdamp.cli.record_options import ProcessOptions, ReadOptions, spread
 
 
 app = typer.Typer(
+    cls=Commands,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -79,6 +82,7 @@ def fit(
             'mass, delay, lag, stroke_offset, heat; "gas,delay" names two, "none" nothing.'
         ),
     ] = ["offset"],  # noqa: B006
+    baseline: Baseline = None,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-fit"),
     replace: Replace = False,
     debug: Debug = False,
@@ -102,6 +106,7 @@ def fit(
             rig=rig,
             processing=processing,
             group_by=group_by,
+            baseline=baseline,
             out=out,
             replace=replace,
         )
@@ -120,6 +125,9 @@ def bench(
     ] = None,
     limits: Annotated[
         Path | None, typer.Option(help="CSV of limits: quantity, minimum, maximum, velocity, setting, record.")
+    ] = None,
+    baseline: Annotated[
+        Path | None, typer.Option(help="To compare with: a law as JSON, or other records, read the same way.")
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-bench"),
     replace: Replace = False,
@@ -142,6 +150,7 @@ def bench(
             velocities=velocities,
             group_by=group_by,
             limits=limits,
+            baseline=baseline,
             out=out,
             replace=replace,
         )
@@ -179,7 +188,7 @@ def ride(
         str, typer.Option(help="iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.")
     ] = "iso:C",
     speed: Annotated[float, typer.Option(help="Of the vehicle [m/s].")] = 20.0,
-    baseline: Annotated[Path | None, typer.Option(help="Another law to compare with, as JSON.")] = None,
+    baseline: Baseline = None,
     duration: Annotated[float | None, typer.Option(help="Of the ride [s]; the road's own, or 10.")] = None,
     dt: Annotated[
         float, typer.Option(help="Step [s]; 1 ms is right for cars, a coarse one is warned of or refused.")
@@ -223,6 +232,9 @@ def tune_command(
     ] = 1,
     starts: Annotated[int, typer.Option(help="Searches side by side, from inside the bounds.")] = 1,
     max_steps: Annotated[int, typer.Option(help="Of the search.")] = 100,
+    baseline: Annotated[
+        Path | None, typer.Option(help="To compare with: another law, or another tuning's vehicle.json, as JSON.")
+    ] = None,
     speed: Speed = 20.0,
     duration: Duration = None,
     dt: Step = 1e-3,
@@ -245,6 +257,7 @@ def tune_command(
             tuning.TuneOptions(
                 minimise, tuple(limit), tuple(over), tuple(freeze), tuple(bound), tuple(tie), roads, starts, max_steps
             ),
+            baseline=baseline,
             out=out,
             replace=replace,
         )

@@ -11,11 +11,13 @@ from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.grouping import grouped
 from jaxdamp.cli.interrupt import Interrupted
+from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.options import decisions, law_names, split
 from jaxdamp.cli.preflighting import checked
 from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 from jaxdamp.cli.results import Results, results_folder
 from jaxdamp.cli.wording import message
+from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, Failure, Rung
 from jaxdamp.report import (
     Attempts,
@@ -56,6 +58,7 @@ def run_fit(
     rig: Sequence[str] = (identify.OFFSET,),
     processing: ProcessOptions | None = None,
     group_by: str | None = None,
+    baseline: Path | None = None,
     out: Path,
     replace: bool = False,
 ) -> None:
@@ -67,6 +70,7 @@ def run_fit(
     names = law_names(laws)
     _checks.one_of("weighting", weighting, ("samples", "runs"))
     machine = identify.machine_names("rig", rig)
+    beside = None if baseline is None else law_of(baseline)
     attempts = Attempts(interrupt.check, message)
     with results_folder(out, "fit", replace=replace) as results:
         with screen.stage("Reading the records"):
@@ -81,7 +85,7 @@ def run_fit(
         remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
-        job = FitJob(screen, names, weighting, machine, results, attempts, found, [*remarks, *found.sentences()])
+        job = FitJob(screen, names, weighting, machine, results, attempts, found, remarks, beside)
         failed = []
         for number, (name, part) in enumerate(groups.items(), 1):
             try:
@@ -106,6 +110,7 @@ class FitJob(NamedTuple):
     attempts: Attempts
     found: Preflight
     remarks: Sequence[str]
+    baseline: AbstractDamper | None
 
     def fit_group(self, name: str, runs: BenchSet, held_out: BenchSet, later: Sequence[str]) -> None:
         """Fit one group of records and write its folder, which has the name of the group.
@@ -133,10 +138,18 @@ class FitJob(NamedTuple):
             folder = self.results.draft / name
             folder.mkdir(exist_ok=True)
             places = {"folder": folder, "attempts": self.attempts}
-            page = fit_report(fits.comparison, runs=runs, remarks=self.remarks, failures=fits.failures, **places)
-            page.write(folder / "report.html")
+            notes = {"remarks": self.remarks, "preflight": self.found, "failures": fits.failures}
+            page = fit_report(fits.comparison, runs=runs, baseline=self.baseline, **notes, **places)
+            page.write(folder / "report.html", command_line())
             if later:
                 self.results.publish(f"the fits of {', '.join(later)}")
+
+
+def law_of(path: Path) -> AbstractDamper:
+    """The damper law of the option --baseline."""
+    law = export.from_json(path)
+    _checks.instance("baseline", law, AbstractDamper, "be a file with a damper law")
+    return law
 
 
 def fit_laws(

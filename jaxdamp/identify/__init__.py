@@ -22,6 +22,7 @@ from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.result import FitResult, Score, fit_percent
 from jaxdamp.identify.rungs import Failure, Rung
 from jaxdamp.identify.targets import TargetFit, fit_targets
+from jaxdamp.identify.traces import predict_runs
 from jaxdamp.identify.training import Training, train
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
 from jaxdamp.identify.vehicle_model import InitialMotion, VehicleTest
@@ -76,6 +77,7 @@ __all__ = [
     "ladder_starts",
     "laws_table",
     "machine_names",
+    "predict_runs",
     "prepare",
     "rounded",
     "solve",

@@ -333,7 +333,12 @@ def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
 
 
 def predict_runs(model: Model, runs: Sequence[BenchRun]) -> list[np.ndarray]:
-    """Force [N] of the model at every sample of every record."""
+    """Force [N] of the model at every sample of every record, states settled by a copy of its first cycle.
+
+    Arguments:
+        model: a law, or a law on a test machine.
+        runs: the records, whose motion is prescribed.
+    """
     model = without_fitted_ranges(model)
     memoryless = is_memoryless(model)
     made, ranges = batches(model, runs, [1.0] * len(runs), None if memoryless else PREDICTED_PER_CYCLE)
