@@ -49,7 +49,7 @@ def chain_report(
 
     >>> from jaxdamp import bench, identify, report, roads, simulate, tune, vehicles
     >>> from jaxdamp.dampers import Bilinear
-    >>> runs = bench.VirtualDyno(Bilinear(2600.0, 1200.0), force_noise=5.0).run(bench.SineTest(0.01, 2.0))
+    >>> runs = bench.VirtualDyno(Bilinear(2600.0, 1200.0), force_noise=5.0).run(bench.SineTest(0.05, 4.0))
     >>> comparison = identify.compare({"bilinear": Bilinear}, runs)
     >>> car = vehicles.presets.quarter_car_000(comparison.best.result.law)
     >>> ride = simulate(car, roads.cosine_bump(0.05, start=0.2, duration=0.25), duration=1.0)

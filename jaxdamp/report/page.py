@@ -166,12 +166,17 @@ def _points(items: Sequence[str]) -> str:
 
 def _footer(command: str) -> str:
     """Date, versions, and the command that makes the page again."""
-    from importlib.metadata import version
-
-    import jaxdamp
-
-    libraries = ", ".join(f"{name} {version(name)}" for name in ("jax", "equinox", "numpy", "scipy"))
+    own, *libraries = (f"{name} {_version(name)}" for name in ("jaxdamp", "jax", "equinox", "numpy", "scipy"))
     system = f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"
-    made = f"Written on {datetime.date.today()} by jaxdamp {jaxdamp.__version__} ({libraries}, {system})."
+    made = f"Written on {datetime.date.today()} by {own} ({', '.join(libraries)}, {system})."
     again = f" To repeat it:<pre>{html.escape(command)}</pre>" if command else ""
     return f"<footer>{html.escape(made)}{again}</footer>"
+
+
+def _version(package: str) -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(package)
+    except PackageNotFoundError:  # a source tree on the path, not installed
+        return "of unknown version"
