@@ -22,7 +22,17 @@ REFUSED = 1e12  # potential where the forces are not finite
 
 
 class Spread(NamedTuple):
-    """The posterior of one number."""
+    """The posterior of one number.
+
+    Attributes:
+        name: path of the number.
+        unit: in SI.
+        mean: over the samples, in the unit.
+        standard_deviation: over the samples, in the unit.
+        interval: ends of the 95 % interval of the samples, in the unit.
+        r_hat: near 1 if the chains agree.
+        effective: number of independent samples.
+    """
 
     name: str
     unit: str

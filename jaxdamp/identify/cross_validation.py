@@ -34,7 +34,11 @@ class Fold(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class CrossValidation:
-    """How well laws predict records that they were not fitted to. Results of the same records are joined with `+`."""
+    """How well laws predict records that they were not fitted to. Results of the same records are joined with `+`.
+
+    Attributes:
+        folds: for each law and each record held out the fit and its errors.
+    """
 
     folds: tuple[Fold, ...]
 

@@ -9,7 +9,17 @@ from jaxdamp.identify.result import FitResult
 
 
 class Rung(NamedTuple):
-    """One law of a comparison."""
+    """One law of a comparison.
+
+    Attributes:
+        name: of the law.
+        parameters: number of free parameters.
+        fit_percent: on the fitted records [%].
+        rmse: on the fitted records [N].
+        held_out_fit_percent: on the records held out [%]; None if there are none.
+        held_out_rmse: on the records held out [N]; None if there are none.
+        result: the fit.
+    """
 
     name: str
     parameters: int
@@ -26,7 +36,12 @@ class Rung(NamedTuple):
 
 
 class Failure(NamedTuple):
-    """A law of a comparison that has no fit."""
+    """A law of a comparison that has no fit.
+
+    Attributes:
+        name: of the law.
+        reason: in words.
+    """
 
     name: str
     reason: str  # in words

@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 def ladder(comparison: Comparison) -> "matplotlib.figure.Figure":
-    """Bars of the RMSE of each law, on the fitted records and on those that were held out."""
+    """Bars of the RMSE of each law, on the fitted records and on those that were held out.
+
+    Arguments:
+        comparison: of `identify.compare`.
+    """
     rungs = comparison.rungs
     held = bool(comparison.held_out)
     rows = np.arange(len(rungs), dtype=float)

@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 def experiment(design: ExperimentDesign) -> "matplotlib.figure.Figure":
-    """The runs over stroke and velocity, and the relative standard errors beside those of the programme."""
+    """The runs over stroke and velocity, and the relative standard errors beside those of the programme.
+
+    Arguments:
+        design: of `identify.design_experiment`.
+    """
     figure = _style.new_figure(11.0, 4.5)
     left, right = figure.subplots(1, 2)
     sets = [("design", design.tests, design.covariance)]

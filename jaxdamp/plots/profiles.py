@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 def profile(curve: ProfileCurve) -> "matplotlib.figure.Figure":
-    """Cost over value, with the 95 % interval and the parabola that the standard error stands for."""
+    """Cost over value, with the 95 % interval and the parabola that the standard error stands for.
+
+    Arguments:
+        curve: of `FitResult.profile`.
+    """
     figure = _style.new_figure(7.5, 4.5)
     axes = figure.subplots()
     best = float(curve.values[np.argmin(curve.cost)])

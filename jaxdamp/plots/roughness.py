@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 def roughness_by_segment(roughness: RoughnessBySegment) -> "matplotlib.figure.Figure":
-    """The international roughness index of each segment over the distance, and that of the whole profile."""
+    """The international roughness index of each segment over the distance, and that of the whole profile.
+
+    Arguments:
+        roughness: of `metrics.roughness_by_segment`.
+    """
     figure = _style.new_figure(8.0, 3.5)
     axes = figure.subplots()
     values, whole = 1e3 * np.asarray(roughness.segments), 1e3 * float(roughness.whole)

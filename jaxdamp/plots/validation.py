@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 def cross_validation(result: CrossValidation) -> "matplotlib.figure.Figure":
-    """Fit percent of every held-out record, a row for each law, a colour for each group; black bars are the means."""
+    """Fit percent of every held-out record, a row for each law, a colour for each group; black bars are the means.
+
+    Arguments:
+        result: of `identify.cross_validate`.
+    """
     laws = sorted(result.laws, key=result.fit_percent)
     figure = _style.new_figure(8.5, 1.6 + 0.4 * len(laws))
     axes = figure.subplots()

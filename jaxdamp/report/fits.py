@@ -119,7 +119,12 @@ def add_fits(
 
 
 def add_other_fits(report: Report, comparison: Comparison) -> None:
-    """The sections of a page on the laws that are not the best: parameters and warnings."""
+    """The sections of a page on the laws that are not the best: parameters and warnings.
+
+    Arguments:
+        report: the page.
+        comparison: of `identify.compare`.
+    """
     for rung in comparison.rungs:
         if rung is not comparison.best:
             report.heading(rung.name)
@@ -128,17 +133,29 @@ def add_other_fits(report: Report, comparison: Comparison) -> None:
 
 
 def parameters_of(rung: Rung) -> Table:
-    """The parameters of one law of a comparison, under its name there."""
+    """The parameters of one law of a comparison, under its name there.
+
+    Arguments:
+        rung: a law of the comparison.
+    """
     return rung.result.table(title=f"Parameters of {rung.name}")
 
 
 def failure_sentences(comparison: Comparison) -> list[str]:
-    """The laws without a fit, and why."""
+    """The laws without a fit, and why.
+
+    Arguments:
+        comparison: of `identify.compare`.
+    """
     return [f"{failure.name} could not be fitted. {failure.reason}" for failure in comparison.failed]
 
 
 def fitted_velocities(comparison: Comparison) -> np.ndarray:
-    """Velocities [m/s] for a force-velocity table: the range that was fitted, and zero."""
+    """Velocities [m/s] for a force-velocity table: the range that was fitted, and zero.
+
+    Arguments:
+        comparison: of `identify.compare`.
+    """
     runs = comparison.best.result.runs
     lower = min(min(float(run.velocity.min()) for run in runs), 0.0)
     upper = max(max(float(run.velocity.max()) for run in runs), 0.0)

@@ -33,7 +33,12 @@ def add_records(
 
 
 def records_table(runs: Sequence[BenchRun], held_out: Sequence[BenchRun] = ()) -> Table:
-    """Records with their figures, and which of them are held out."""
+    """Records with their figures, and which of them are held out.
+
+    Arguments:
+        runs: the records.
+        held_out: those of them that are not fitted.
+    """
     columns = [Column("record"), Column("rate", "Hz"), Column("motion", "Hz", ".3g"), Column("0-peak", "mm", ".3g")]
     columns += [Column("peak velocity", "m/s", ".3g"), Column("least force", "N", ".0f")]
     columns += [Column("largest force", "N", ".0f"), Column("work per cycle", "J", ".3g"), Column("cycles")]

@@ -135,18 +135,30 @@ def _means(response: Response, goals: Mapping[str, Sequence[str]]) -> dict[str, 
 
 
 def ride_tables(responses: Mapping[str, Response]) -> dict[str, Table]:
-    """The tables on rides by the name of their file: metrics, comfort, use of the dampers where laws have a range."""
+    """The tables on rides by the name of their file: metrics, comfort, use of the dampers where laws have a range.
+
+    Arguments:
+        responses: by name, of one kind of vehicle.
+    """
     use = range_use_table(responses)
     tables = {"metrics": metrics_table(responses), "comfort": comfort_table(responses)}
     return tables if use is None else tables | {"range_use": use}
 
 
 def axles_sentence(responses: Mapping[str, Response]) -> str:
-    """When each axle met the road; nothing of a vehicle with one axle."""
+    """When each axle met the road; nothing of a vehicle with one axle.
+
+    Arguments:
+        responses: by name.
+    """
     timing = next(iter(responses.values())).axle_timing
     return "" if timing.kind == "one axle" else f"Axles: {timing}."
 
 
 def notes_of(responses: Mapping[str, Response]) -> list[str]:
-    """The notes of each response, after its name."""
+    """The notes of each response, after its name.
+
+    Arguments:
+        responses: by name.
+    """
     return [f"{name}: {note}" for name, response in responses.items() for note in response.notes]

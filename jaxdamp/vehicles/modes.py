@@ -95,6 +95,9 @@ def modes(vehicle: AbstractVehicle | LinearVehicle) -> Modes:
     Undamped modes solve K φ = ω² M φ with the stiffness of the laws at rest in K; damped ones are the eigenvalues of
     the state matrix. The results are NumPy arrays and not differentiable.
 
+    Arguments:
+        vehicle: a vehicle, or a result of `linearise`.
+
     >>> from jaxdamp.vehicles.presets import half_car_002
     >>> print(modes(half_car_002()))
     Modes
