@@ -33,7 +33,7 @@ def public(package: str) -> Iterator[tuple[str, Any]]:
 
 def arguments(value: Any) -> list[str]:
     """The arguments of a function or class, without fields that are declared with unit and meaning."""
-    if isinstance(value, type) and (issubclass(value, enum.Enum) or inspect.isabstract(value)):
+    if isinstance(value, type) and (issubclass(value, enum.Enum | Exception | dict) or inspect.isabstract(value)):
         return []
     fields = getattr(value, "__dataclass_fields__", {})
     declared = {name for name, field in fields.items() if {"parameter", "setting"} & set(field.metadata)}
