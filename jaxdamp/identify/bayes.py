@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -14,6 +14,10 @@ from jaxdamp import _checks
 from jaxdamp._tables import Column, Table
 from jaxdamp.identify.propagation import Evidence, Propagated
 from jaxdamp.parameters import Coordinates
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
 
 
 INSIDE = 0.5  # standard errors from an edge at which a chain starts, if the fit ended there
@@ -74,6 +78,12 @@ class Posterior:
         drawn = np.asarray(eqx.filter_jit(jax.vmap(of))(jnp.asarray(self.samples)), float)
         lower, upper = np.quantile(drawn, [0.025, 0.975], axis=0)
         return Propagated(drawn.mean(axis=0), drawn.std(axis=0, ddof=1), lower, upper, drawn)
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """Histograms of the samples (`plots.posterior`)."""
+        from jaxdamp import plots
+
+        return plots.posterior(self)
 
     def table(self) -> Table:
         """The posterior of every number."""

@@ -33,7 +33,7 @@ def cross_validation(result: CrossValidation) -> "matplotlib.figure.Figure":
         )
     means = [result.fit_percent(law) for law in laws]
     handles += axes.plot(means, np.arange(len(laws)), "|", markersize=16, color=_style.BLACK, label="mean", mew=2)
-    _style.dress(axes, "fit of the record held out [%]", "")
+    _style.dress(axes, "fit of the record held out [%]", "", "Each record held out in turn")
     axes.set_yticks(np.arange(len(laws)), laws)
     low = max(min(fold.fit_percent for fold in result.folds), -20.0)
     axes.set_xlim(left=min(low - 3.0, 50.0), right=100.0)

@@ -1,7 +1,7 @@
 """Natural modes of a vehicle: frequencies, damping, shapes."""
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -9,6 +9,10 @@ from jaxtyping import Complex, Float
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,6 +52,12 @@ class Modes:
     def damping_ratio(self) -> Float[np.ndarray, " oscillations"]:
         """−Re λ/|λ|."""
         return -np.real(self.poles) / np.abs(self.poles)
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """The shape of each oscillation (`plots.modes`)."""
+        from jaxdamp import plots
+
+        return plots.modes(self)
 
     def table(self) -> Table:
         """A row for each damped oscillation, with the coordinates of largest amplitude."""
