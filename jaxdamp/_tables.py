@@ -34,7 +34,13 @@ class Shown(float):
 
 
 class Column(NamedTuple):
-    """A column: its name, its unit, and how a number in it is written for reading."""
+    """A column: its name, its unit, and how a number in it is written for reading.
+
+    Attributes:
+        name: of the column.
+        unit: as it is printed; empty for none.
+        spec: format of a number in it, such as ".3g".
+    """
 
     name: str
     unit: str = ""
@@ -55,6 +61,11 @@ class Column(NamedTuple):
 @dataclass(frozen=True, repr=False)
 class Table:
     """A table with a title, columns with units, and rows of words and numbers. Notebooks show it as HTML.
+
+    Attributes:
+        title: of the table.
+        columns: names, units and formats.
+        rows: a cell for each column.
 
     >>> table = Table("Laws", (Column("law"), Column("RMSE", "N", ".1f")), (("linear", 88.93), ("besinger", 45.02)))
     >>> print(table)

@@ -1,27 +1,81 @@
-"""Every public name has a docstring, so that the API reference has no gaps."""
+"""Every public name has a docstring that mentions every argument, so that the API reference has no gaps."""
 
+import enum
 import inspect
+import re
+from collections.abc import Iterator
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import Any
 
 import pytest
 
 import jaxdamp
+from jaxdamp.dampers import AbstractDamper
 
 
 PACKAGES = [m.name for m in iter_modules(jaxdamp.__path__) if m.ispkg and not m.name.startswith("_")]
+UNITS = {  # of arguments that mean the same wherever they stand
+    "dt": "s", "duration": "s", "time": "s", "speed": "m/s", "velocity": "m/s", "velocities": "m/s", "stroke": "m",
+    "force": "N", "frequency": "Hz", "sampling_rate": "Hz", "rmse": "N",
+}  # fmt: skip
+
+
+def public(package: str) -> Iterator[tuple[str, Any]]:
+    """The functions and classes that a package offers."""
+    module = import_module(f"jaxdamp.{package}")
+    assert module.__doc__
+    for name in module.__all__:
+        value = getattr(module, name)
+        if callable(value) and value.__module__.startswith("jaxdamp"):
+            yield name, value
+
+
+def arguments(value: Any) -> list[str]:
+    """The arguments of a function or class, without fields that are declared with unit and meaning."""
+    if isinstance(value, type) and (issubclass(value, enum.Enum | Exception | dict) or inspect.isabstract(value)):
+        return []
+    fields = getattr(value, "__dataclass_fields__", {})
+    declared = {name for name, field in fields.items() if {"parameter", "setting"} & set(field.metadata)}
+    given = {"fitted_to"} if isinstance(value, type) and issubclass(value, AbstractDamper) else set()
+    given |= {"args", "kwargs"} if getattr(value, "_is_protocol", False) else set()
+    return [name for name in inspect.signature(value).parameters if name not in declared | given]
+
+
+def documentation(value: Any) -> str:
+    """The docstring, of a class with those of the classes that it derives from."""
+    if not isinstance(value, type):
+        return inspect.getdoc(value) or ""
+    return "\n".join(inspect.getdoc(kind) or "" for kind in value.__mro__ if kind.__module__.startswith("jaxdamp"))
+
+
+def described(name: str, text: str) -> str:
+    """What a section says of an argument, `name: words` with its further lines; or that it stands in a sentence."""
+    found = re.search(rf"^ *(?:\w+, )*\**{name}(?:, \w+)*: (.*(?:\n {{8,}}.*)*)", text, re.M)
+    return found[1] if found else "in a sentence" * bool(re.search(rf"\b{name}\b", text))
 
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_public_name_has_a_docstring(package: str) -> None:
-    module = import_module(f"jaxdamp.{package}")
-    assert module.__doc__
     undocumented = []
-    for name in module.__all__:
-        value = getattr(module, name)
-        if callable(value) and value.__module__.startswith("jaxdamp"):
-            members = vars(value) if isinstance(value, type) else {}
-            methods = {f"{name}.{k}": v for k, v in members.items() if inspect.isfunction(v) and k == v.__name__}
-            public = {name: value} | {k: v for k, v in methods.items() if "._" not in k}
-            undocumented += [k for k, v in public.items() if not inspect.getdoc(v)]
+    for name, value in public(package):
+        members = vars(value) if isinstance(value, type) else {}
+        methods = {f"{name}.{k}": v for k, v in members.items() if inspect.isfunction(v) and k == v.__name__}
+        names = {name: value} | {k: v for k, v in methods.items() if "._" not in k}
+        undocumented += [k for k, v in names.items() if not inspect.getdoc(v)]
     assert not undocumented, f"without a docstring: {', '.join(undocumented)}"
+
+
+@pytest.mark.parametrize("package", [package for package in PACKAGES if package != "cli"])
+def test_every_argument_is_mentioned_with_its_unit(package: str) -> None:
+    missing = []
+    for name, value in public(package):
+        text = documentation(value)
+        for argument in arguments(value):
+            said = described(argument, text)
+            if not said:
+                missing.append(f"{name}({argument})")
+            unit = UNITS.get(argument, "") if said != "in a sentence" else ""
+            if unit and f"[{unit}" not in said and "as in" not in said and "in the unit" not in said:
+                missing.append(f"{name}({argument} [{unit}])")
+    assert not missing, f"not documented: {', '.join(missing)}"

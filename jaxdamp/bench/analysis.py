@@ -21,6 +21,10 @@ class PeakVelocityPoints(NamedTuple):
     """Points of the force-velocity curve, of shape (records, 2): compression in column 0, rebound in column 1.
 
     A row for each record, in their order. `np.ravel` of both gives the points of a curve.
+
+    Attributes:
+        velocity: peak velocities [m/s], positive in rebound.
+        force: forces there [N], positive when they resist extension.
     """
 
     velocity: Float[np.ndarray, "records 2"]  # m/s, positive in rebound
@@ -31,6 +35,13 @@ class VelocityLoops(NamedTuple):
     """Mean cycles of records, of shape (records, points), at equal steps of time over the period.
 
     A row for each record, in their order. A loop is closed: its first point follows its last one.
+
+    Attributes:
+        time: from the first point of the cycle [s].
+        stroke: [m], positive in rebound.
+        velocity: [m/s], positive in rebound.
+        force: [N], positive when it resists extension.
+        cycles: number of cycles in the mean of each record.
     """
 
     time: Float[np.ndarray, "records points"]  # s, from the first point of the cycle
@@ -41,7 +52,15 @@ class VelocityLoops(NamedTuple):
 
 
 class FoldedCycles(NamedTuple):
-    """The steady cycles of one record at equal fractions of their periods."""
+    """The steady cycles of one record at equal fractions of their periods.
+
+    Attributes:
+        starts: beginning of each cycle [s], shape (cycles,).
+        periods: duration of each cycle [s], shape (cycles,).
+        stroke: [m], positive in rebound, shape (cycles, points).
+        velocity: [m/s], positive in rebound, shape (cycles, points).
+        force: [N], positive when it resists extension, shape (cycles, points).
+    """
 
     starts: Float[np.ndarray, " cycles"]  # s
     periods: Float[np.ndarray, " cycles"]  # s
@@ -54,12 +73,19 @@ def steady_cycles(run: BenchRun) -> list[slice]:
     """The samples of each full cycle whose stroke range is within 10 % of the median one.
 
     So the cycles in which a machine runs up or down are left out. Empty for a record without a full cycle.
+
+    Arguments:
+        run: the record.
     """
     return [_samples(run, *ends) for ends in _steady_instants(run)]
 
 
 def last_steady_cycle(run: BenchRun) -> slice:
-    """The samples of the last steady cycle (`steady_cycles`), or all of them in a record without a full cycle."""
+    """The samples of the last steady cycle (`steady_cycles`), or all of them in a record without a full cycle.
+
+    Arguments:
+        run: the record.
+    """
     return next(reversed(steady_cycles(run)), slice(None))
 
 

@@ -20,7 +20,15 @@ _NAMED = 3  # pairs in a sentence
 
 
 class Contradiction(NamedTuple):
-    """Two records of the same motion whose forces differ by more than one of them scatters."""
+    """Two records of the same motion whose forces differ by more than one of them scatters.
+
+    Attributes:
+        first: name of one record.
+        second: name of the other.
+        difference: RMS over a cycle of the difference of their forces [N].
+        share: the difference over the RMS of their forces [-].
+        scatter: RMS by which the mean cycle of one of them is uncertain [N]; 0 for a single cycle.
+    """
 
     first: str
     second: str
@@ -46,6 +54,9 @@ def contradictions(runs: Sequence[BenchRun]) -> list[Contradiction]:
     or gas pressure does. Records that state different commands contradict all the same: whether a law follows the
     command is for the law to say. Motions that do not repeat from cycle to cycle are not compared.
 
+    Arguments:
+        runs: the records.
+
     >>> from jaxdamp.bench import SineTest, VirtualDyno
     >>> from jaxdamp.dampers import Linear
     >>> test = SineTest(0.01, 2.0)
@@ -68,7 +79,11 @@ def contradictions(runs: Sequence[BenchRun]) -> list[Contradiction]:
 
 
 def contradictions_in_words(found: Sequence[Contradiction]) -> list[str]:
-    """A sentence on records that contradict each other, none if there are none."""
+    """A sentence on records that contradict each other, none if there are none.
+
+    Arguments:
+        found: of `contradictions`.
+    """
     if not found:
         return []
     pairs = "; ".join(

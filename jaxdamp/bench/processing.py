@@ -108,6 +108,11 @@ def processed(raw: "BenchRun", steps: Steps) -> "BenchRun":
 def low_pass_gain(frequency: float, cutoff: float, sampling_rate: float) -> float:
     """What the zero-phase filter leaves of a sine: 1 / (1 + (tan(π f / f_s) / tan(π f_c / f_s))^8), all in Hz.
 
+    Arguments:
+        frequency: of the sine [Hz].
+        cutoff: of the filter [Hz].
+        sampling_rate: of the record [Hz].
+
     >>> [round(low_pass_gain(f, 50.0, 2000.0), 4) for f in (15.0, 50.0, 60.0)]
     [0.9999, 0.5, 0.1876]
     """

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
@@ -16,6 +16,10 @@ from jaxdamp.bench import sampling
 from jaxdamp.bench.motion import cycle_instants, cycle_works, dominant_frequency, motion_amplitude
 from jaxdamp.bench.processing import Steps, choose_cycles, cut_between, processed
 from jaxdamp.bench.velocity import estimate_velocity
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
 
 
 FILE_MARK = "# jaxdamp bench record: stroke and velocity positive in extension, force positive resisting it"
@@ -271,6 +275,12 @@ class BenchRun:
             f"{1e3 * self.amplitude:.4g} mm, up to {self.peak_velocity:.3g} m/s, "
             f"{self.force.min():.4g} … {self.force.max():.4g} N)"
         )
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """Loops over velocity and stroke, and the channels over time (`plots.records`)."""
+        from jaxdamp import plots
+
+        return plots.records(self)
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the record with units in its header; `read` gives back the same numbers to the last bit."""

@@ -6,10 +6,14 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, final, overload
+from typing import TYPE_CHECKING, Any, final, overload
 
 from jaxdamp import _checks
 from jaxdamp.bench.runs import BenchRun
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
 
 
 Selection = str | Iterable[str] | Callable[[BenchRun], bool]
@@ -115,6 +119,12 @@ class BenchSet:
     def process(self, **steps: Any) -> "BenchSet":
         """Every record with further steps of processing, see `BenchRun.process`."""
         return BenchSet((run.process(**steps) for run in self.runs), self.left_out)
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """Loops of the records over velocity and stroke, and their channels over time (`plots.records`)."""
+        from jaxdamp import plots
+
+        return plots.records(self)
 
     def table(self) -> list[dict[str, Any]]:
         """One row of figures in SI per record: a list that `pandas.DataFrame` takes as it is."""

@@ -7,14 +7,15 @@ from jaxdamp import bench
 from jaxdamp.bench import Evaluation
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.fitting import write_table
+from jaxdamp.cli.fitting import law_of, write_table
 from jaxdamp.cli.grouping import value_of
+from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.options import decisions
 from jaxdamp.cli.preflighting import checked
 from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.wording import message
-from jaxdamp.report import Attempts, bench_report, records_table
+from jaxdamp.report import Attempts, baseline_table, bench_report, law_evaluation, records_table
 
 
 def run_bench(
@@ -26,6 +27,7 @@ def run_bench(
     velocities: str | None = None,
     group_by: str | None = None,
     limits: Path | None = None,
+    baseline: Path | None = None,
     out: Path,
     replace: bool = False,
 ) -> bool:
@@ -52,12 +54,15 @@ def run_bench(
         by = None if group_by is None else value_of(tuple(raw), group_by)
         with screen.stage("Evaluating the records"):
             evaluation = bench.evaluate(runs, velocities=wanted, by=by)
+            beneath = None if baseline is None else _baseline(baseline, evaluation, options, processing)
         check = None if chosen is None else evaluation.check(chosen)
         for name in ("velocities", "settings", "peak_forces", "loops"):
             screen.table(evaluation.tables()[name])
         screen.points(evaluation.notes, style="yellow")
         if check is not None:
             screen.table(check.table())
+        if beneath is not None:
+            screen.table(baseline_table(evaluation, beneath))
         (results.draft / "tables").mkdir()
         write_table(results.draft, "preflight", found.table())
         _write_evaluation(results.draft, evaluation)
@@ -66,11 +71,18 @@ def run_bench(
         results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
             places = {"folder": results.draft, "attempts": attempts}
-            page = bench_report(evaluation, found, check, remarks=remarks, **places)
-            page.write(results.draft / "report.html")
+            page = bench_report(evaluation, found, check, baseline=beneath, remarks=remarks, **places)
+            page.write(results.draft / "report.html", command_line())
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
     return check is None or check.passed
+
+
+def _baseline(path: Path, evaluation: Evaluation, options: ReadOptions, processing: ProcessOptions) -> Evaluation:
+    """The evaluation of a law on the bench of these records, or of other records at the same velocities."""
+    if path.suffix == ".json":
+        return law_evaluation(law_of(path), evaluation)
+    return bench.evaluate(processing.apply(options.read([path])), velocities=evaluation.velocities)
 
 
 def _velocities(text: str | None) -> list[float] | None:

@@ -6,6 +6,8 @@ from typing import Annotated
 import typer
 
 from jaxdamp.cli.option_types import (
+    Baseline,
+    Commands,
     CrossValidate,
     Debug,
     Duration,
@@ -25,6 +27,7 @@ from jaxdamp.cli.vehicle_fit_options import RideReadOptions, VehicleFitOptions
 
 
 app = typer.Typer(
+    cls=Commands,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -83,6 +86,7 @@ def fit(
         ),
     ] = ["offset"],  # noqa: B006
     cross_validate: CrossValidate = False,
+    baseline: Baseline = None,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-fit"),
     report: Page = None,
     replace: Replace = False,
@@ -108,6 +112,7 @@ def fit(
             processing=processing,
             group_by=group_by,
             cross_validate=cross_validate,
+            baseline=baseline,
             out=out,
             report=report,
             replace=replace,
@@ -156,6 +161,9 @@ def bench(
     limits: Annotated[
         Path | None, typer.Option(help="CSV of limits: quantity, minimum, maximum, velocity, setting, record.")
     ] = None,
+    baseline: Annotated[
+        Path | None, typer.Option(help="To compare with: a law as JSON, or other records, read the same way.")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-bench"),
     replace: Replace = False,
     debug: Debug = False,
@@ -177,6 +185,7 @@ def bench(
             velocities=velocities,
             group_by=group_by,
             limits=limits,
+            baseline=baseline,
             out=out,
             replace=replace,
         )
@@ -214,7 +223,7 @@ def ride(
         str, typer.Option(help="iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.")
     ] = "iso:C",
     speed: Annotated[float, typer.Option(help="Of the vehicle [m/s].")] = 20.0,
-    baseline: Annotated[Path | None, typer.Option(help="Another law to compare with, as JSON.")] = None,
+    baseline: Baseline = None,
     duration: Annotated[float | None, typer.Option(help="Of the ride [s]; the road's own, or 10.")] = None,
     dt: Annotated[
         float, typer.Option(help="Step [s]; 1 ms is right for cars, a coarse one is warned of or refused.")
@@ -258,6 +267,9 @@ def tune_command(
     ] = 1,
     starts: Annotated[int, typer.Option(help="Searches side by side, from inside the bounds.")] = 1,
     max_steps: Annotated[int, typer.Option(help="Of the search.")] = 100,
+    baseline: Annotated[
+        Path | None, typer.Option(help="To compare with: another law, or another tuning's vehicle.json, as JSON.")
+    ] = None,
     speed: Speed = 20.0,
     duration: Duration = None,
     dt: Step = 1e-3,
@@ -280,6 +292,7 @@ def tune_command(
             tuning.TuneOptions(
                 minimise, tuple(limit), tuple(over), tuple(freeze), tuple(bound), tuple(tie), roads, starts, max_steps
             ),
+            baseline=baseline,
             out=out,
             replace=replace,
         )

@@ -10,15 +10,25 @@ from jaxdamp._tables import Table
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.demo_rides import TRUE, add_rides, ride_table, show_rides
+from jaxdamp.cli.demo_rides import TRUE, add_rides, ride_table, ride_verdict, show_rides
 from jaxdamp.cli.demo_tuning import COMFORT, fresh_verdict, limits, outcome, purpose
 from jaxdamp.cli.fitting import Fitted, fit_laws, write_fits, write_table
+from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.results import Results, results_folder
 from jaxdamp.cli.run_warnings import without_range_warnings
 from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper, Besinger, SeriesSpring
 from jaxdamp.identify import FitResult
-from jaxdamp.report import Attempts, Report, add_fits, add_tuning, fitted_velocities
+from jaxdamp.report import (
+    Attempts,
+    Report,
+    add_fits,
+    add_other_fits,
+    add_records,
+    add_tuning,
+    fit_verdict,
+    fitted_velocities,
+)
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
 from jaxdamp.tune import Rescore, TuneResult
@@ -101,13 +111,23 @@ def run_demo(screen: Screen, scenario: Scenario, *, out: Path, replace: bool = F
         _save_rides(results, rides, tuned, fits, attempts)
         with screen.stage("Pictures and report"):
             report = Report("jaxdamp demo: from bench records to a better damper", results.draft, attempts)
+            preflight = bench.preflight(runs)
+            report.verdict(
+                f"{preflight.summary()}.",
+                *fit_verdict(report, fits.comparison),
+                "" if truth is None else truth_verdict(scenario, truth),
+                *(f"{name}: {ride_verdict(responses)}" for name, responses in rides.items()),
+                *([] if tuned is None else [outcome(tuned[0]), fresh_verdict(tuned[1])]),
+            )
             _introduce(report, scenario)
-            add_fits(report, fits.comparison, fits.failures)
+            add_records(report, tuple(runs), tuple(held), preflight=preflight)
+            add_fits(report, fits.comparison, fits.failures, others=False)
             _report_truth(truth, scenario, report)
             add_rides(report, rides)
             if tuned is not None:
                 _report_tuning(*tuned, rides[ISO][scenario.true_name], scenario, report)
-            report.write(results.draft / "report.html")
+            add_other_fits(report, fits.comparison)
+            report.write(results.draft / "report.html", command_line())
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
     screen.table(screen.times_table())
@@ -275,7 +295,6 @@ def _report_truth(truth: FitResult | None, scenario: Scenario, report: Report) -
     if truth is None:
         report.text(f"{scenario.true_name} could not be fitted.")
         return
-    report.text(truth_verdict(scenario, truth))
     report.table(truth_table(scenario, truth))
 
 
@@ -287,5 +306,5 @@ def _report_tuning(tuned: TuneResult, fresh: Rescore, before: Response, scenario
 
     report.heading("A better damper")
     report.text(purpose(scenario.tyre_load))
-    add_tuning(report, tuned, fresh, outcome=outcome(tuned), elsewhere=fresh_verdict(fresh))
+    add_tuning(report, tuned, fresh, elsewhere=fresh_verdict(fresh))
     report.picture(rides, f"Quarter car on {ISO}, before and after", "tuning_ride.png")

@@ -11,11 +11,13 @@ from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.grouping import grouped
 from jaxdamp.cli.interrupt import Interrupted
+from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.options import decisions, law_names, split
 from jaxdamp.cli.preflighting import checked
 from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 from jaxdamp.cli.results import Results, another_page, results_folder
 from jaxdamp.cli.wording import message
+from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, CrossValidation, Failure, Rung
 from jaxdamp.report import (
     Attempts,
@@ -57,6 +59,7 @@ def run_fit(
     processing: ProcessOptions | None = None,
     group_by: str | None = None,
     cross_validate: bool = False,
+    baseline: Path | None = None,
     out: Path,
     report: Path | None = None,
     replace: bool = False,
@@ -69,6 +72,7 @@ def run_fit(
     names = law_names(laws)
     _checks.one_of("weighting", weighting, ("samples", "runs"))
     machine = identify.machine_names("rig", rig)
+    beside = None if baseline is None else law_of(baseline)
     attempts = Attempts(interrupt.check, message)
     if report is not None and group_by is not None:
         _checks.refuse("report", "be left out with --group-by, which writes a page for each group", str(report))
@@ -86,8 +90,9 @@ def run_fit(
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
         scheduled = group_by is None and len({run.command for run in runs}) > 1
-        notes = [*remarks, *found.sentences()]
-        job = FitJob(screen, names, weighting, machine, scheduled, results, attempts, found, notes, cross_validate)
+        job = FitJob(
+            screen, names, weighting, machine, scheduled, results, attempts, found, remarks, cross_validate, beside
+        )
         failed = []
         for number, (name, part) in enumerate(groups.items(), 1):
             try:
@@ -114,6 +119,7 @@ class FitJob(NamedTuple):
     found: Preflight
     remarks: Sequence[str]
     cross_validate: bool
+    baseline: AbstractDamper | None
 
     def fit_group(self, name: str, runs: BenchSet, held_out: BenchSet, later: Sequence[str]) -> None:
         """Fit one group of records and write its folder, which has the name of the group.
@@ -146,12 +152,14 @@ class FitJob(NamedTuple):
             page = fit_report(
                 fits.comparison,
                 runs=runs,
+                baseline=self.baseline,
                 remarks=self.remarks,
+                preflight=self.found,
                 failures=fits.failures,
                 validation=validation,
                 **places,
             )
-            page.write(folder / "report.html")
+            page.write(folder / "report.html", command_line())
             if later:
                 self.results.publish(f"the fits of {', '.join(later)}")
 
@@ -163,6 +171,13 @@ class FitJob(NamedTuple):
             self.screen.table(validation.record_table())
             return validation
         return None
+
+
+def law_of(path: Path) -> AbstractDamper:
+    """The damper law of the option --baseline."""
+    law = export.from_json(path)
+    _checks.instance("baseline", law, AbstractDamper, "be a file with a damper law")
+    return law
 
 
 def fit_laws(

@@ -6,14 +6,8 @@ from typing import Any
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp.vehicles import AbstractVehicle, ChannelKind
-
-
-GOALS = {  # word: kind of the channel, statistic, whether it is weighted
-    "comfort": (ChannelKind.ACCELERATION, "rms", True),
-    "travel": (ChannelKind.STROKE, "peak_to_peak", False),
-    "grip": (ChannelKind.TYRE_LOAD, "rms", False),
-}
+from jaxdamp.report import GOALS, goal_metrics
+from jaxdamp.vehicles import AbstractVehicle
 
 
 def metric_names(option: str, word: str, vehicle: AbstractVehicle, *, white: bool) -> list[str]:
@@ -29,16 +23,7 @@ def metric_names(option: str, word: str, vehicle: AbstractVehicle, *, white: boo
     if word not in GOALS:
         _checks.one_of(option, word, [*GOALS, *(m.name for m in layout.metrics)])
         return [word]
-    kind, statistic, weighted = GOALS[word]
-    statistic = "standard_deviation" if white and kind is ChannelKind.STROKE else statistic
-    names = [
-        m.name
-        for m in layout.metrics
-        if layout.by_name[m.channel].kind is kind
-        and m.statistic.name == statistic
-        and (m.weighting is not None) == weighted
-    ]
-    return names[:1] if word == "comfort" else names
+    return goal_metrics(layout, word, white=white)
 
 
 def objective_word(word: str, vehicle: AbstractVehicle, *, white: bool) -> str | Callable[[Mapping[str, Any]], Any]:

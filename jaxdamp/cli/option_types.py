@@ -1,9 +1,29 @@
 """Arguments and options that several commands share."""
 
+import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
+
+
+_typed: list[str] = []  # the command that is running, as it was typed
+
+
+class Commands(TyperGroup):
+    """All commands; keeps the words that they were called with, for the last lines of a page."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words after the name of the program."""
+        _typed[:] = [shlex.join(["jaxdamp", *args])]
+        ctx.call_on_close(_typed.clear)
+        return super().parse_args(ctx, args)
+
+
+def command_line() -> str:
+    """The command that is running, as it was typed; empty if a function was called from Python."""
+    return "".join(_typed)
 
 
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
@@ -38,6 +58,7 @@ Road = Annotated[
     str,
     typer.Argument(help="iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height."),
 ]
+Baseline = Annotated[Path | None, typer.Option(help="Another law to compare with, as JSON.")]
 Start = Annotated[Path | None, typer.Option(help="A law as JSON for all dampers, instead of the vehicle's own.")]
 Speed = Annotated[float, typer.Option(help="Of the vehicle [m/s].")]
 Duration = Annotated[float | None, typer.Option(help="Of each ride [s]; the road's own, or 10.")]

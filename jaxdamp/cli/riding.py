@@ -6,6 +6,7 @@ from pathlib import Path
 from jaxdamp import _checks, export, roads, simulate
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.run_warnings import with_step_warnings, without_range_warnings
 from jaxdamp.cli.unusual import unusual
@@ -94,7 +95,7 @@ def run_ride(
             title = f"{vehicle} on {road} at {speed:g} m/s"
             options = {"title": title, "laws": laws, "remarks": remarks}
             report = ride_report(responses, **options, folder=results.draft, attempts=attempts)
-            report.write(results.draft / "report.html")
+            report.write(results.draft / "report.html", command_line())
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
     return responses

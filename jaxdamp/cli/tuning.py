@@ -10,11 +10,13 @@ from jaxdamp import Ride, _checks, export, roads, sweep, tune
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.metric_words import axis_words, limit_words, metric_names, objective_word, pairs, span
+from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.riding import USUAL, parse_road
 from jaxdamp.cli.unusual import unusual
-from jaxdamp.cli.vehicle_words import parse_vehicle, write_laws
+from jaxdamp.cli.vehicle_words import parse_vehicle, with_law, write_laws
 from jaxdamp.cli.wording import message
+from jaxdamp.dampers import AbstractDamper
 from jaxdamp.report import Attempts, sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.tune import Status, TuneResult
@@ -68,12 +70,19 @@ class TuneOptions:
 
 
 def run_tune(
-    screen: Screen, on: RoadOptions, options: TuneOptions, *, out: Path, replace: bool = False
+    screen: Screen,
+    on: RoadOptions,
+    options: TuneOptions,
+    *,
+    baseline: Path | None = None,
+    out: Path,
+    replace: bool = False,
 ) -> TuneResult[Any]:
     """Tune a vehicle, and write the law, the vehicle, tables, then pictures and a page."""
     if options.roads < 1:
         _checks.refuse("roads", "be 1 or more", options.roads)
     car = on.car()
+    beside = None if baseline is None else _baseline(baseline, car)
     made, run = on.roads(options.roads)
     white = isinstance(made[0], WhiteRoad)
     if options.roads > 1 and (white or not on.road.startswith("iso:")):
@@ -108,11 +117,20 @@ def run_tune(
             _write(results.draft, result)
             results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
-            page = tuning_report(result, folder=results.draft, attempts=attempts)
-            page.write(results.draft / "report.html")
+            page = tuning_report(result, baseline=beside, folder=results.draft, attempts=attempts)
+            page.write(results.draft / "report.html", command_line())
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
     return result
+
+
+def _baseline(path: Path, car: AbstractVehicle) -> AbstractVehicle:
+    """The vehicle of the option --baseline: with another law, or that of another tuning."""
+    thing = export.from_json(path)
+    if isinstance(thing, AbstractDamper):
+        return with_law(car, thing)
+    _checks.instance("baseline", thing, type(car), f"be a damper law or a {type(car).__name__}")
+    return thing
 
 
 def meets_limits(result: TuneResult[Any]) -> bool:
@@ -170,7 +188,7 @@ def run_sweep(
             results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
             page = sweep_report(data, remarks=remarks, folder=results.draft, attempts=attempts)
-            page.write(results.draft / "report.html")
+            page.write(results.draft / "report.html", command_line())
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
     return data

@@ -7,6 +7,7 @@ from jaxdamp._checks import ArgumentError, Setting
 
 
 OPTIONS = (
+    "baseline",
     "bench",
     "between",
     "bound",

@@ -37,7 +37,13 @@ class Symbols:
 
 
 def symbols(name: str, shape: tuple[int, ...] = (), dtype: str = "float64") -> Symbols:
-    """An input by its name: `x`, or `x[0]`, `x[1]`, ... in the order of memory."""
+    """An input by its name: `x`, or `x[0]`, `x[1]`, ... in the order of memory.
+
+    Arguments:
+        name: of the input in the C text.
+        shape: of the input.
+        dtype: of its numbers.
+    """
     names = np.empty(shape, object)
     for place, index in enumerate(np.ndindex(*shape)):
         names[index] = f"{name}[{place}]" if shape else name

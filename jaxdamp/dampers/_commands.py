@@ -9,7 +9,12 @@ from jaxdamp.parameters import get
 
 
 def command_paths(tree: Any, prefix: str = "") -> list[str]:
-    """Paths of the commands in a law and in the laws inside."""
+    """Paths of the commands in a law and in the laws inside.
+
+    Arguments:
+        tree: a law, a vehicle or another module.
+        prefix: put before each path.
+    """
     if isinstance(tree, tuple | list):
         return [path for i, item in enumerate(tree) for path in command_paths(item, f"{prefix}{i}.")]
     if not isinstance(tree, eqx.Module):

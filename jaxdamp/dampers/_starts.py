@@ -9,7 +9,12 @@ import numpy as np
 
 
 class Reach(NamedTuple):
-    """The extent of records."""
+    """The extent of records.
+
+    Attributes:
+        stroke: half the range of the stroke [m].
+        velocity: largest magnitude of the velocity [m/s].
+    """
 
     stroke: float  # half the range [m]
     velocity: float  # largest magnitude [m/s]
@@ -20,6 +25,10 @@ def from_samples(make: Callable[..., Any], runs: Sequence[Any]) -> Any:
 
     The function gets velocity and force as its first two arguments, and `stroke` and `time` if it has arguments of
     these names.
+
+    Arguments:
+        make: function of velocity [m/s] and force [N], such as the `guess` of a law.
+        runs: the records.
     """
     names = inspect.signature(make).parameters
     channels = ["velocity", "force", *(name for name in ("stroke", "time") if name in names)]

@@ -265,7 +265,13 @@ class AbstractStateful(AbstractDamper):
 
 
 def own_states(law: AbstractDamper, state: State, count: int) -> list[Scalar]:
-    """The states as a list of scalars, after a check of their number."""
+    """The states as a list of scalars, after a check of their number.
+
+    Arguments:
+        law: the damper law.
+        state: its states, shape (count,).
+        count: number of states that the law has.
+    """
     if state.size != count:
         must = f"hold {count} number{'s' * (count != 1)} for {type(law).__name__}"
         _checks.refuse("state", must, f"of shape {state.shape}", START)
@@ -273,7 +279,12 @@ def own_states(law: AbstractDamper, state: State, count: int) -> list[Scalar]:
 
 
 def laws_inside(tree: Any, prefix: str = "") -> list[tuple[str, AbstractDamper]]:
-    """All laws in a law, a vehicle or another module, each with the prefix of the paths of its parameters."""
+    """All laws in a law, a vehicle or another module, each with the prefix of the paths of its parameters.
+
+    Arguments:
+        tree: the module.
+        prefix: put before the path of each law.
+    """
     if isinstance(tree, tuple | list):
         return [entry for i, item in enumerate(tree) for entry in laws_inside(item, f"{prefix}{i}.")]
     if isinstance(tree, dict):

@@ -11,12 +11,20 @@ from jaxdamp.parameters import as_float, checked, with_values
 
 
 def takes_command(law: AbstractDamper) -> bool:
-    """Whether the law or a law inside has a command."""
+    """Whether the law or a law inside has a command.
+
+    Arguments:
+        law: the damper law.
+    """
     return bool(command_paths(law))
 
 
 def with_command(law: AbstractDamper, command: ScalarLike) -> AbstractDamper:
     """The same law at another command, in the law itself and in all laws inside.
+
+    Arguments:
+        law: the damper law.
+        command: coil current, voltage or clicks, in the unit of the law's command.
 
     >>> from jaxdamp.dampers import Lag, ModifiedBoucWen
     >>> law = with_command(Lag(ModifiedBoucWen.prototype(), 0.002), 1.5)

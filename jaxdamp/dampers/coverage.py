@@ -9,12 +9,22 @@ from jaxdamp.dampers.base import AbstractDamper
 
 
 def coverage(law: AbstractDamper) -> str:
-    """The valid range of a law and of the laws inside, in words; empty without limits."""
+    """The valid range of a law and of the laws inside, in words; empty without limits.
+
+    Arguments:
+        law: the damper law.
+    """
     return " ".join(filter(None, [law.validity(), *map(coverage, law.inner_laws())]))
 
 
 def require_finite_force(law: AbstractDamper, force: Any, where: str) -> None:
-    """Refuse forces [N] of a law that are not finite (traced ones cannot be checked)."""
+    """Refuse forces [N] of a law that are not finite (traced ones cannot be checked).
+
+    Arguments:
+        law: the damper law.
+        force: its forces [N].
+        where: for the message, such as "over the whole motion".
+    """
     known = _checks.concrete(force)
     if known is not None and not np.all(np.isfinite(known)):
         missing = f"{type(law).__name__} with none at {np.count_nonzero(~np.isfinite(known))} of {known.size} samples"

@@ -154,12 +154,19 @@ def without_fitted_ranges(tree: Tree) -> Tree:
     """A law, a vehicle or any tree without the ranges of its laws.
 
     Compiled code uses laws without them, so that laws fitted to different records share one program.
+
+    Arguments:
+        tree: the tree.
     """
     return jax.tree.map(lambda leaf: None if isinstance(leaf, FittedRange) else leaf, tree, is_leaf=_is_range)
 
 
 def has_fitted_range(tree: Any) -> bool:
-    """Whether any law in a tree has a fitted range."""
+    """Whether any law in a tree has a fitted range.
+
+    Arguments:
+        tree: a law, a vehicle or another module.
+    """
     return any(map(_is_range, jax.tree.leaves(tree, is_leaf=_is_range)))
 
 

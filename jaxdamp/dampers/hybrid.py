@@ -26,6 +26,9 @@ class Hybrid(AbstractDamper):
     records contain an offset or a stiffness. States: those of the network. Valid in the range of velocities, forces and
     frequencies of its records; outside, it is still passive but not accurate.
 
+    Attributes:
+        hysteresis: the network.
+
     >>> v = np.linspace(-0.5, 0.5, 200)
     >>> law = Hybrid.guess(v, 1500.0 * np.tanh(4.0 * v), key=jax.random.key(1))
     >>> law.initial_state().size, bool(law.backbone.force_velocity(0.5) > 0)

@@ -20,7 +20,16 @@ _ROUNDING = 1e-9  # of the larger limit
 
 
 class RangeUse(NamedTuple):
-    """One quantity of a law in use, beside the range of its records."""
+    """One quantity of a law in use, beside the range of its records.
+
+    Attributes:
+        law: class of the law that has the range.
+        quantity: velocity, stroke, force, temperature or command.
+        unit: in SI.
+        used: lowest and highest value in use.
+        fitted: lowest and highest value of the records.
+        share: share of the time outside [-]; None where nothing changes with time.
+    """
 
     law: str  # class of the law that has the range
     quantity: str  # velocity, stroke, force, temperature or command
@@ -118,6 +127,10 @@ def sentence(name: str, uses: Sequence[RangeUse]) -> str:
     """By how much a damper of this name leaves the range of its laws; empty if it does not.
 
     A force beyond the range is said where it does not simply follow from a velocity beyond it.
+
+    Arguments:
+        name: of the damper.
+        uses: its quantities in use.
     """
     left = [use for use in uses if use.outside]
     fast = {use.law for use in left if use.quantity == "velocity"}
@@ -128,13 +141,23 @@ def sentence(name: str, uses: Sequence[RangeUse]) -> str:
 
 
 def warn_outside(sentences: Sequence[str], stacklevel: int = 3) -> None:
-    """Warn of each damper that leaves its range, at the line of who called the caller."""
+    """Warn of each damper that leaves its range, at the line of who called the caller.
+
+    Arguments:
+        sentences: what to warn of, one for each damper; empty ones are left out.
+        stacklevel: as in `warnings.warn`.
+    """
     for text in filter(None, sentences):
         warnings.warn(f"Extrapolated: {text}", OutsideFittedRangeWarning, stacklevel=stacklevel)
 
 
 def extrapolated(law: AbstractDamper, velocities: Float[np.ndarray, " points"]) -> Bool[np.ndarray, " points"]:
-    """At which velocities [m/s] the law, or a law inside, is outside the velocities that it was fitted to."""
+    """At which velocities [m/s] the law, or a law inside, is outside the velocities that it was fitted to.
+
+    Arguments:
+        law: the damper law.
+        velocities: [m/s], positive in rebound, shape (points,).
+    """
     velocities = np.asarray(velocities, dtype=float)
     outside = np.zeros(velocities.shape, bool)
     if not has_fitted_range(law):

@@ -54,6 +54,9 @@ class Saturating(AbstractMemoryless):
     Valid for dampers whose blow-off is gradual; `DigressiveProgressive` has a knee. Data that do not reach F_s/c₀ leave
     F_s undetermined.
 
+    Attributes:
+        shape: the function g, "tanh", "algebraic" or "arctan".
+
     >>> law = Saturating(900.0, 9000.0, 400.0, 6000.0, rebound_high_rate=700.0, compression_high_rate=300.0)
     >>> [round(float(law.force_velocity(v)), 2) for v in (1e-4, 1.0, -1.0)]
     [0.97, 1600.0, -700.0]

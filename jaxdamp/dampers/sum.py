@@ -14,7 +14,11 @@ from jaxdamp.dampers.with_range import with_fitted_range
 
 @final
 class Sum(AbstractDamper):
-    """Laws in parallel, F = Σ Fᵢ; created by `law + law`. States are concatenated in order."""
+    """Laws in parallel, F = Σ Fᵢ; created by `law + law`. States are concatenated in order.
+
+    Attributes:
+        terms: the laws.
+    """
 
     terms: tuple[AbstractDamper, ...]
 

@@ -15,6 +15,7 @@ from jaxdamp.identify.learnt import LearntStart
 from jaxdamp.identify.machine import OFFSET, machine_names, without_machine
 from jaxdamp.identify.many import fit_many
 from jaxdamp.identify.many_result import ManyFits
+from jaxdamp.identify.predicting import predict_runs
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.profile_curve import ProfileCurve
@@ -84,6 +85,7 @@ __all__ = [
     "ladder_starts",
     "laws_table",
     "machine_names",
+    "predict_runs",
     "prepare",
     "rounded",
     "solve",

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -16,13 +16,27 @@ from jaxdamp.identify.propagation import Evidence, Propagated
 from jaxdamp.parameters import Coordinates
 
 
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+
 INSIDE = 0.5  # standard errors from an edge at which a chain starts, if the fit ended there
 APART = 1.0  # spread of the starts of the chains, in standard errors
 REFUSED = 1e12  # potential where the forces are not finite
 
 
 class Spread(NamedTuple):
-    """The posterior of one number."""
+    """The posterior of one number.
+
+    Attributes:
+        name: path of the number.
+        unit: in SI.
+        mean: over the samples, in the unit.
+        standard_deviation: over the samples, in the unit.
+        interval: ends of the 95 % interval of the samples, in the unit.
+        r_hat: near 1 if the chains agree.
+        effective: number of independent samples.
+    """
 
     name: str
     unit: str
@@ -64,6 +78,12 @@ class Posterior:
         drawn = np.asarray(eqx.filter_jit(jax.vmap(of))(jnp.asarray(self.samples)), float)
         lower, upper = np.quantile(drawn, [0.025, 0.975], axis=0)
         return Propagated(drawn.mean(axis=0), drawn.std(axis=0, ddof=1), lower, upper, drawn)
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """Histograms of the samples (`plots.posterior`)."""
+        from jaxdamp import plots
+
+        return plots.posterior(self)
 
     def table(self) -> Table:
         """The posterior of every number."""

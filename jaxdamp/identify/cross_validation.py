@@ -48,7 +48,11 @@ class Choice(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class CrossValidation:
-    """How well laws predict records that they were not fitted to. Results of the same records are joined with `+`."""
+    """How well laws predict records that they were not fitted to. Results of the same records are joined with `+`.
+
+    Attributes:
+        folds: for each law and each record held out the fit and its errors.
+    """
 
     folds: tuple[Fold, ...]
     inner: tuple[Fold, ...] = ()  # of a nested choice

@@ -108,7 +108,11 @@ class ExperimentDesign:
 
 
 def extent(test: Excitation) -> tuple[float, float]:
-    """Largest stroke [mm] and velocity [m/s] of a record."""
+    """Largest stroke [mm] and velocity [m/s] of a record.
+
+    Arguments:
+        test: the excitation.
+    """
     time = np.arange(0.0, test.duration, 0.01 / test.highest_frequency)
     return 1e3 * float(np.max(np.abs(test.stroke(time)))), float(np.max(np.abs(test.velocity(time))))
 

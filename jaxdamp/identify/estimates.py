@@ -17,6 +17,18 @@ class Estimate(NamedTuple):
 
     The standard error takes all other free numbers as unknown, also those that ended at an edge of their range, and is
     computed without any edges.
+
+    Attributes:
+        name: path of the number.
+        value: fitted value, in the unit.
+        unit: in SI.
+        standard_error: in the unit.
+        interval: ends of the 95 % interval, cut at the edges of the range, in the unit.
+        meaning: of the number, in words.
+        note: empty, "not identifiable" or "at a bound".
+        reason: why it is not identifiable.
+        tied: the numbers that have the same value.
+        bias: by the noise of stroke and velocity, in the unit; None if it was not estimated.
     """
 
     name: str
@@ -40,6 +52,10 @@ def rounded(value: float, error: float) -> tuple[str, str]:
     """A value and its standard error as text, with the significant digits.
 
     The error has two digits, the value the digits down to the second digit of the error, but at least one.
+
+    Arguments:
+        value: the number.
+        error: its standard error, in the same unit.
 
     >>> rounded(14361.27, 61.8), rounded(0.9035, 0.2912), rounded(3.2, float("inf"))
     (('14361', '62'), ('0.90', '0.29'), ('3.2', 'inf'))

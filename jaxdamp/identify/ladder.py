@@ -68,6 +68,9 @@ def ladder_starts(names: Sequence[str] = LAWS) -> dict[str, Start]:
 
     For `cross_validate`, where the held-out record must not influence the start.
 
+    Arguments:
+        names: of the laws.
+
     Raises:
         ValueError: an unknown name.
 

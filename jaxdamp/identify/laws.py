@@ -6,7 +6,12 @@ from jaxdamp._tables import Column, Table
 
 
 class NamedLaw(NamedTuple):
-    """A law that can be fitted by name."""
+    """A law that can be fitted by name.
+
+    Attributes:
+        hysteresis: whether the law has states.
+        meaning: of the law, in words.
+    """
 
     hysteresis: bool
     meaning: str

@@ -54,6 +54,10 @@ EFFECTS: dict[str, _Start] = {
 def machine_names(argument: str, names: str | Sequence[str]) -> list[str]:
     """Names of effects, each once: "gas,delay" names two, "none" none.
 
+    Arguments:
+        argument: its name in messages.
+        names: of the effects.
+
     Raises:
         ValueError: an unknown name.
 
@@ -119,7 +123,12 @@ def absent_paths(rig: Rig | None) -> list[str]:
 
 
 def without_machine(rig: Rig | None, runs: Sequence[BenchRun]) -> list[BenchRun]:
-    """Records without gas force, gas stiffness and offset of a machine, from which a law can be started or drawn."""
+    """Records without gas force, gas stiffness and offset of a machine, from which a law can be started or drawn.
+
+    Arguments:
+        rig: the machine; None changes nothing.
+        runs: the records.
+    """
     if rig is None:
         return list(runs)
     gas, stiffness, offset = (float(a) for a in (rig.gas_force, rig.gas_stiffness, rig.force_offset))

@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +19,10 @@ from jaxdamp.identify.estimates import rounded
 from jaxdamp.identify.model import Model, law_of, rig_of, with_range
 from jaxdamp.parameters import Coordinates, FreeParameters
 from jaxdamp.rig import Rig
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
 
 
 OUTLYING = 6.0  # robust standard deviations from the other dampers from which one is named
@@ -167,6 +171,12 @@ class ManyFits:
         return Table(
             f"{type(law_of(self.free.tree)).__name__} fitted to {len(self)} dampers", tuple(columns), tuple(rows)
         )
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """The parameters and errors of all dampers side by side (`plots.many_fits`)."""
+        from jaxdamp import plots
+
+        return plots.many_fits(self)
 
     def to_dict(self) -> dict[str, Any]:
         """The fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""

@@ -36,6 +36,11 @@ def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
 def predict_runs(model: Model, runs: Sequence[BenchRun], initial_state: str = "warm_up") -> list[np.ndarray]:
     """Force [N] of the model at every sample of every record.
 
+    Arguments:
+        model: a law, or a law on a test machine.
+        runs: the records, whose motion is prescribed.
+        initial_state: of the law at the first sample, as in `fit`.
+
     Raises:
         ValueError: forces that are not finite; states that drift in a motion that is said to be periodic.
     """

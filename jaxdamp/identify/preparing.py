@@ -34,6 +34,18 @@ def prepare(
 ) -> Problem:
     """The first of the three steps of `fit`, whose arguments these are: `prepare`, `solve`, `judge`.
 
+    Arguments:
+        law: as in `fit`.
+        runs: as in `fit`.
+        rig: as in `fit`.
+        freeze: as in `fit`.
+        bounds: as in `fit`.
+        tie: as in `fit`.
+        per_record: as in `fit`.
+        weighting: as in `fit`.
+        priors: as in `fit`.
+        samples_per_cycle: as in `fit`.
+
     Returns:
         The residuals of the records, and the free parameters with their start.
 

@@ -12,7 +12,13 @@ from jaxdamp.identify.predicting import predict_by_record, used_samples
 
 
 class ErrorShares(NamedTuple):
-    """Shares of the mean squared error; their sum is 1."""
+    """Shares of the mean squared error; their sum is 1.
+
+    Attributes:
+        shape: share that another curve of force over velocity would remove [-].
+        hysteresis: share by which the force differs between the two passes through the same velocity [-].
+        rest: noise, and changes from cycle to cycle [-].
+    """
 
     shape: float  # another curve of force over velocity would remove it
     hysteresis: float  # the force differs between the two passes through the same velocity

@@ -37,7 +37,14 @@ class Minimum(NamedTuple):
 
 
 class Score(NamedTuple):
-    """Errors of the force of a law on one record, after settling."""
+    """Errors of the force of a law on one record, after settling.
+
+    Attributes:
+        name: of the record.
+        rmse: root of the mean squared error [N].
+        fit_percent: 100 is perfect, 0 no better than a constant [%].
+        largest_error: largest magnitude of the error [N].
+    """
 
     name: str
     rmse: float  # N
@@ -58,6 +65,10 @@ def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray])
     """100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all samples: 100 is perfect, 0 no better than a constant.
 
     −∞ for a constant measured force that is not matched exactly.
+
+    Arguments:
+        measured: measured force of each record [N].
+        predicted: force of the law at the same samples [N].
     """
     y, p = np.concatenate(list(measured)), np.concatenate(list(predicted))
     missed, spread = (float(np.sqrt(np.sum(a * a))) for a in (y - p, y - y.mean()))

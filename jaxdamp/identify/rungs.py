@@ -11,7 +11,17 @@ from jaxdamp.identify.scheduling import ScheduledFit
 
 
 class Rung(NamedTuple):
-    """One law of a comparison."""
+    """One law of a comparison.
+
+    Attributes:
+        name: of the law.
+        parameters: number of free parameters.
+        fit_percent: on the fitted records [%].
+        rmse: on the fitted records [N].
+        held_out_fit_percent: on the records held out [%]; None if there are none.
+        held_out_rmse: on the records held out [N]; None if there are none.
+        result: the fit.
+    """
 
     name: str
     parameters: int
@@ -36,7 +46,12 @@ class Rung(NamedTuple):
 
 
 class Failure(NamedTuple):
-    """A law of a comparison that has no fit."""
+    """A law of a comparison that has no fit.
+
+    Attributes:
+        name: of the law.
+        reason: in words.
+    """
 
     name: str
     reason: str  # in words

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias, final
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -22,6 +22,10 @@ from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.identify.uncertainty import uncertainty
 from jaxdamp.parameters import FreeParameters, Parameter, free_parameters, interval, match_paths, name_patterns, real
 from jaxdamp.simulation import Ride
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
 
 
 NORMAL = 1.959964  # 97.5 % quantile of the normal distribution
@@ -86,6 +90,12 @@ class TargetFit:
             for t in self.targets
         ]
         return Table("Targets", tuple(columns), tuple(rows))
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """The distance of each value from its target (`plots.targets`)."""
+        from jaxdamp import plots
+
+        return plots.targets(self)
 
     def parameters_table(self) -> Table:
         """The fitted numbers with units and standard errors."""

@@ -25,7 +25,17 @@ if TYPE_CHECKING:
 
 
 class ChannelScore(NamedTuple):
-    """How well the vehicle predicts a channel of a record, or the force of a law on the bench."""
+    """How well the vehicle predicts a channel of a record, or the force of a law on the bench.
+
+    Attributes:
+        record: name of the record.
+        channel: name of the channel.
+        unit: of the channel.
+        rmse: root of the mean squared error, in the unit.
+        fit_percent: 100 is perfect, 0 no better than a constant [%].
+        largest_error: largest magnitude of the error, in the unit.
+        correlation: of the measured and the computed channel.
+    """
 
     record: str
     channel: str

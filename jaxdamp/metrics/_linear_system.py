@@ -14,7 +14,14 @@ from jaxdamp._types import Scalar, ScalarLike, Signal
 
 
 class StateSpace(NamedTuple):
-    """A linear system with one input and one output: x' = A x + B u, y = C x + D u; time in seconds."""
+    """A linear system with one input and one output: x' = A x + B u, y = C x + D u; time in seconds.
+
+    Attributes:
+        state_matrix: A [1/s], shape (n, n).
+        input_vector: B, shape (n,).
+        output_vector: C, shape (n,).
+        feed_through: D.
+    """
 
     state_matrix: Float[Array, "n n"] | Float[np.ndarray, "n n"]
     input_vector: Float[Array, " n"] | Float[np.ndarray, " n"]

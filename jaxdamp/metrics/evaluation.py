@@ -19,7 +19,13 @@ CREST_FACTOR_LIMIT, TRANSIENT_LIMIT, DOSE_LIMIT = 9.0, 1.5, 1.75
 
 
 class ShockRatios(NamedTuple):
-    """Three ratios that measure shocks in a record [-]."""
+    """Three ratios that measure shocks in a record [-].
+
+    Attributes:
+        crest_factor: largest weighted acceleration over its RMS [-].
+        transient_ratio: largest running RMS over the weighted RMS [-].
+        dose_ratio: vibration dose value over weighted RMS times T^(1/4) [-].
+    """
 
     crest_factor: Scalar
     transient_ratio: Scalar
@@ -27,7 +33,14 @@ class ShockRatios(NamedTuple):
 
 
 class Evaluation(NamedTuple):
-    """The evaluation method required by ISO 2631-1, in words, and the three ratios it follows from [-]."""
+    """The evaluation method required by ISO 2631-1, in words, and the three ratios it follows from [-].
+
+    Attributes:
+        method: in words.
+        crest_factor: largest weighted acceleration over its RMS [-].
+        transient_ratio: largest running RMS over the weighted RMS [-].
+        dose_ratio: vibration dose value over weighted RMS times T^(1/4) [-].
+    """
 
     method: str
     crest_factor: float

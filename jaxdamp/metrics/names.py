@@ -20,7 +20,12 @@ _INSIDE = ("jaxdamp", "jaxtyping", "equinox", "jax")  # packages that are skippe
 
 
 def current_name(name: str, known: Collection[str]) -> str:
-    """The current name of a metric: for a renamed one the new name, with a `FutureWarning`."""
+    """The current name of a metric: for a renamed one the new name, with a `FutureWarning`.
+
+    Arguments:
+        name: of a metric, perhaps an earlier one.
+        known: all current names.
+    """
     new = _new_name(name, known)
     if new is None:
         return name
@@ -47,6 +52,11 @@ def _new_name(name: Any, known: Collection[str]) -> str | None:
 
 def current_names(argument: str, names: Sequence[str], known: Collection[str]) -> list[str]:
     """The current names of these metrics.
+
+    Arguments:
+        argument: its name in messages.
+        names: of metrics, perhaps earlier ones.
+        known: all current names.
 
     Raises:
         ValueError: an unknown name, with the nearest known one; a single text instead of a list.

@@ -66,6 +66,10 @@ class Term(NamedTuple):
 
     The first sample is available if the first term of the statistic is `Term(Reduction.FIRST)`; otherwise it is None,
     because a run does not save it.
+
+    Attributes:
+        reduction: how the values are combined over time.
+        value: function of the sample and of the first sample.
     """
 
     reduction: Reduction

@@ -188,6 +188,10 @@ def discrete_weighting(weighting: str, dt: float) -> tuple[np.ndarray, np.ndarra
 
     In the real basis of its modes, each a pair of states that turns and decays by itself: Φ holds blocks of 2 × 2, so
     that a step takes half the products. The constants are NumPy arrays in double precision.
+
+    Arguments:
+        weighting: of ISO 2631-1, such as "Wk".
+        dt: step [s].
     """
     system = cascade(weighting)
     values, vectors = map(np.asarray, np.linalg.eig(np.asarray(system.state_matrix)))

@@ -17,6 +17,9 @@ def check_parameters(module: eqx.Module) -> None:
     """Refuse fields of a wrong type and values outside their domain (traced values are not checked).
 
     Modules call it in `__check_init__`.
+
+    Arguments:
+        module: the law, vehicle or other module.
     """
     check_field_types(module)
     for field in dataclasses.fields(module):
@@ -38,6 +41,9 @@ def checked(tree: Tree) -> Tree:
     For trees whose values were set without a constructor: fields of a wrong type, values outside their domains, and
     violated conditions between fields or on a law inside are refused (traced values are not checked). Modules inside
     are checked before those around them, and base classes before derived ones, so that the error names the cause.
+
+    Arguments:
+        tree: the tree.
 
     Raises:
         ValueError: as the constructors of the modules.

@@ -22,7 +22,12 @@ Vector = TypeVar("Vector", Float[Array, " free"], Float[np.ndarray, " free"])
 
 
 class Bounds(NamedTuple):
-    """Limits of coordinates, infinite where there is none."""
+    """Limits of coordinates, infinite where there is none.
+
+    Attributes:
+        lower: lower limits, shape (free,).
+        upper: upper limits, shape (free,).
+    """
 
     lower: Float[Array, " free"] | Float[np.ndarray, " free"]
     upper: Float[Array, " free"] | Float[np.ndarray, " free"]

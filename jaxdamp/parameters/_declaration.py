@@ -17,6 +17,10 @@ from jaxdamp.parameters._domains import Domain, real
 def as_float(value: Any, name: str = "value") -> Array:
     """A JAX array of the default float type; arrays that are floating already keep their type.
 
+    Arguments:
+        value: a number or an array.
+        name: of the argument in messages.
+
     Raises:
         ValueError: something that is not a number; the message names the argument.
     """
@@ -53,6 +57,13 @@ def setting(unit: str, meaning: str, domain: Domain = real, *, command: bool = F
     """Declare a field as a number with a unit that fits and tunings never change, such as a knee width.
 
     A `command` is set from outside, run by run, such as a coil current (`dampers.with_command`).
+
+    Arguments:
+        unit: in SI.
+        meaning: in words.
+        domain: the values that it may take.
+        command: whether it is set from outside.
+        field: further arguments of `equinox.field`, such as a default.
     """
     return _number("setting", {"unit": unit, "meaning": meaning, "domain": domain, "command": command}, field)
 
@@ -81,7 +92,16 @@ else:
 
 
 class Parameter(eqx.Module):
-    """One parameter of a tree, as `parameters` lists it."""
+    """One parameter of a tree, as `parameters` lists it.
+
+    Attributes:
+        path: such as "damper.rate".
+        value: a number or an array, in the unit.
+        unit: in SI.
+        meaning: in words.
+        domain: the values that it may take.
+        linear: whether the force is linear in it.
+    """
 
     path: str = eqx.field(static=True)
     value: Any
@@ -92,7 +112,12 @@ class Parameter(eqx.Module):
 
 
 def modules_inside(tree: Any, prefix: str = "") -> Iterator[tuple[str, eqx.Module]]:
-    """All modules in a tree, each with the prefix of the paths of its fields, before those inside it."""
+    """All modules in a tree, each with the prefix of the paths of its fields, before those inside it.
+
+    Arguments:
+        tree: the tree.
+        prefix: put before each path.
+    """
     if isinstance(tree, tuple | list):
         for index, item in enumerate(tree):
             yield from modules_inside(item, f"{prefix}{index}.")
@@ -106,13 +131,22 @@ def modules_inside(tree: Any, prefix: str = "") -> Iterator[tuple[str, eqx.Modul
 
 
 def domain_of(declared: dict[str, Any], module: eqx.Module) -> Domain:
-    """The domain of a declared field; one that depends on a setting is a function of the module."""
+    """The domain of a declared field; one that depends on a setting is a function of the module.
+
+    Arguments:
+        declared: the metadata of the field.
+        module: the module that has the field.
+    """
     domain = declared["domain"]
     return domain if isinstance(domain, Domain) else domain(module)
 
 
 def parameters(tree: Any, prefix: str = "") -> list[Parameter]:
     """All parameters of a law, vehicle or any other module, depth first in the order of their fields.
+
+    Arguments:
+        tree: the module.
+        prefix: put before each path.
 
     >>> from jaxdamp.dampers import Lag, Linear
     >>> [(p.path, p.unit, float(p.value)) for p in parameters(Lag(Linear(1500.0), lag_time=0.004))]
@@ -138,7 +172,11 @@ def parameters(tree: Any, prefix: str = "") -> list[Parameter]:
 
 
 def readable(module: eqx.Module) -> str:
-    """The module as a line with its numbers: `Lag(law=Linear(rate=1500.0), lag_time=0.004)`."""
+    """The module as a line with its numbers: `Lag(law=Linear(rate=1500.0), lag_time=0.004)`.
+
+    Arguments:
+        module: the module.
+    """
 
     def text(value: Any) -> str:
         if isinstance(value, tuple | list):

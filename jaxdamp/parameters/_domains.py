@@ -17,6 +17,12 @@ class Domain:
     `from_raw(raw, scale)` and `to_raw(value, scale)` are inverse to each other; `scale` is a typical magnitude, so
     that a raw step of one is a step of about the size of the parameter. `steps` is for ordered vectors: the steps from
     one number to the next, which are scaled in place of the numbers.
+
+    Attributes:
+        name: in words, such as "positive".
+        contains: whether an array of values lies inside.
+        lower: limit below; −∞ if there is none.
+        upper: limit above; ∞ if there is none.
     """
 
     name: str
@@ -149,12 +155,22 @@ def _raw_of_ordered_shares(shares: Array) -> Array:
 
 @functools.lru_cache
 def interval(lower: float, upper: float) -> Domain:
-    """Numbers between two finite ones (scaled logistic map)."""
+    """Numbers between two finite ones (scaled logistic map).
+
+    Arguments:
+        lower: lower end, in the unit of the parameter.
+        upper: upper end.
+    """
     return _bounded("", lower, upper, jax.nn.sigmoid, _logit)
 
 
 @functools.lru_cache
 def ordered_interval(lower: float, upper: float) -> Domain:
-    """Increasing numbers between two finite ones: their gaps are the shares of a softmax."""
+    """Increasing numbers between two finite ones: their gaps are the shares of a softmax.
+
+    Arguments:
+        lower: lower end, in the unit of the parameter.
+        upper: upper end.
+    """
     shares = _ordered_shares, _raw_of_ordered_shares
     return _bounded("strictly increasing ", lower, upper, *shares, steps=increasing.steps)

@@ -16,7 +16,12 @@ Tree = TypeVar("Tree")
 
 
 def get(tree: Any, path: str) -> Any:
-    """The value at a path such as `"damper.terms.0.rate"`."""
+    """The value at a path such as `"damper.terms.0.rate"`.
+
+    Arguments:
+        tree: a law, a vehicle, or containers of them.
+        path: names and indices joined by dots.
+    """
     for part in path.split(".") if path else []:
         if isinstance(tree, tuple | list):
             tree = tree[int(part)]
@@ -27,6 +32,10 @@ def get(tree: Any, path: str) -> Any:
 
 def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
     """The same tree with other values at exact paths, unchecked: for searches, which respect bounds themselves.
+
+    Arguments:
+        tree: the tree.
+        values: new values by exact path.
 
     >>> from jaxdamp.dampers import Linear
     >>> with_values(Linear(1500.0), {"rate": 2000.0}).rate
@@ -42,6 +51,10 @@ def replace(tree: Tree, values: Mapping[str, Any]) -> Tree:
     Values outside their domain are refused, and so are all values that a constructor refuses: violated conditions
     between several parameters, or of a wrapper on the law inside (see `checked`).
 
+    Arguments:
+        tree: the tree.
+        values: new values by path, in the units of the parameters.
+
     >>> from jaxdamp.dampers import Linear
     >>> float(replace(Linear(1500.0), {"rate": 2000.0}).rate)
     2000.0
@@ -53,7 +66,12 @@ def replace(tree: Tree, values: Mapping[str, Any]) -> Tree:
 
 
 def match_paths(known: Sequence[str], patterns: Sequence[str]) -> list[str]:
-    """The known paths that patterns name: exactly, by their last part, or with `*`."""
+    """The known paths that patterns name: exactly, by their last part, or with `*`.
+
+    Arguments:
+        known: all paths.
+        patterns: names, last parts of names, or patterns with `*`.
+    """
     chosen = []
     for pattern in [patterns] if isinstance(patterns, str) else patterns:
         hits = [p for p in known if fnmatchcase(p, pattern)] or [p for p in known if fnmatchcase(p, f"*.{pattern}")]
@@ -67,6 +85,10 @@ def match_paths(known: Sequence[str], patterns: Sequence[str]) -> list[str]:
 
 def name_patterns(argument: str, names: Any) -> list[str]:
     """Names or patterns of parameters as a list.
+
+    Arguments:
+        argument: its name in messages.
+        names: one name or several.
 
     Raises:
         ValueError: anything else, such as a mapping to values, which would be ignored.

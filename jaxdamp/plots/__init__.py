@@ -15,10 +15,13 @@ from jaxdamp.plots.experiments import experiment
 from jaxdamp.plots.fronts import pareto
 from jaxdamp.plots.history import training_history
 from jaxdamp.plots.loops import fit_loops
+from jaxdamp.plots.many_values import many_fits, posterior, rescore, targets
+from jaxdamp.plots.modes import modes
 from jaxdamp.plots.preflight import preflight
 from jaxdamp.plots.profiles import profile
+from jaxdamp.plots.records import records
 from jaxdamp.plots.rides import ride
-from jaxdamp.plots.roughness import roughness_by_segment
+from jaxdamp.plots.roughness import roughness_by_segment, roughness_spectrum
 from jaxdamp.plots.sensitivities import sensitivity
 from jaxdamp.plots.sweeps import sweep
 from jaxdamp.plots.validation import cross_validation
@@ -37,13 +40,20 @@ __all__ = [
     "gas_and_friction",
     "ladder",
     "law_card",
+    "many_fits",
+    "modes",
     "pareto",
+    "posterior",
     "preflight",
     "profile",
+    "records",
+    "rescore",
     "ride",
     "roughness_by_segment",
+    "roughness_spectrum",
     "sensitivity",
     "sweep",
+    "targets",
     "training_history",
     "tuning",
     "valving",

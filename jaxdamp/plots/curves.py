@@ -67,7 +67,7 @@ def force_velocity(
     curves, gaps = draw_laws(axes, laws, points, baseline, bands)
     handles += curves
     handles += fitted_range.shade(axes, laws.values(), points)
-    _style.dress(axes, _style.VELOCITY, _style.FORCE)
+    _style.dress(axes, _style.VELOCITY, _style.FORCE, "Force over velocity")
     _style.cross(axes)
     axes.set_xlim(float(points.min()), float(points.max()))
     _style.legend_beside(figure, handles)

@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 def ladder(comparison: Comparison) -> "matplotlib.figure.Figure":
-    """Bars of the RMSE of each law, on the fitted records and on those that were held out."""
+    """Bars of the RMSE of each law, on the fitted records and on those that were held out.
+
+    Arguments:
+        comparison: of `identify.compare`.
+    """
     rungs = comparison.rungs
     held = bool(comparison.held_out)
     rows = np.arange(len(rungs), dtype=float)
@@ -29,12 +33,12 @@ def ladder(comparison: Comparison) -> "matplotlib.figure.Figure":
         bars = axes.barh(rows + shift, values, thickness, color=colour, label=label)
         axes.bar_label(bars, fmt=_style.short, padding=3, fontsize="small")
         handles.append(bars)
-    _style.dress(axes, "root of the mean squared force error [N]", "")
+    words = "Errors of the laws (free parameters in brackets, the best in bold)"
+    _style.dress(axes, "root of the mean squared force error [N]", "", words)
     axes.grid(False, axis="y")
     axes.set_yticks(rows, [f"{r.name} ({r.parameters})" for r in rungs])
     axes.get_yticklabels()[[r.name for r in rungs].index(comparison.best.name)].set_fontweight("bold")
     axes.invert_yaxis()
     axes.margins(x=0.1)
-    axes.set_ylabel("law (free parameters), best in bold")
     _style.legend_beside(figure, handles)
     return figure

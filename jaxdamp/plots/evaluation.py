@@ -68,7 +68,11 @@ def evaluation(
 
 
 def gas_and_friction(found: GasAndFriction) -> "matplotlib.figure.Figure":
-    """Force over stroke in both directions, its even part with the gas force, and its odd part with the friction."""
+    """Force over stroke in both directions, its even part with the gas force, and its odd part with the friction.
+
+    Arguments:
+        found: of `bench.separate_gas_and_friction`.
+    """
     _checks.instance("found", found, GasAndFriction, "be separated", "Take `bench.separate_gas_and_friction(run)`.")
     figure = _style.new_figure(9.0, 5.0)
     axes = figure.subplots()

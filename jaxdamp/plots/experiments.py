@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 def experiment(design: ExperimentDesign) -> "matplotlib.figure.Figure":
-    """The runs over stroke and velocity, and the relative standard errors beside those of the programme."""
+    """The runs over stroke and velocity, and the relative standard errors beside those of the programme.
+
+    Arguments:
+        design: of `identify.design_experiment`.
+    """
     figure = _style.new_figure(11.0, 4.5)
     left, right = figure.subplots(1, 2)
     sets = [("design", design.tests, design.covariance)]
@@ -28,10 +32,10 @@ def experiment(design: ExperimentDesign) -> "matplotlib.figure.Figure":
         handles += left.plot(reach[:, 0], reach[:, 1], "os"[number], markersize=7 - 2 * number, label=label, **style)
         errors = 100.0 * np.sqrt(np.diag(covariance)) / np.where(values > 0, values, np.nan)
         right.barh(rows + 0.4 * number, errors, height=0.36, **style)
-    _style.dress(left, "stroke, zero to peak [mm]", "peak velocity [m/s]")
+    _style.dress(left, "stroke, zero to peak [mm]", "peak velocity [m/s]", "Tests")
     left.set_xscale("log")
     left.set_yscale("log")
-    _style.dress(right, "expected standard error [% of the value]", "")
+    _style.dress(right, "expected standard error [% of the value]", "", "Parameters")
     right.set_xscale("log")
     right.set_yticks(rows + 0.2 * (len(sets) - 1), design.free.names)
     _style.legend_above(figure, handles)

@@ -11,7 +11,11 @@ if TYPE_CHECKING:
 
 
 def training_history(training: Training) -> "matplotlib.figure.Figure":
-    """Errors over the steps of a training, on its records and on those held out, and the step of the result."""
+    """Errors over the steps of a training, on its records and on those held out, and the step of the result.
+
+    Arguments:
+        training: of `identify.train`.
+    """
     figure = _style.new_figure(8.0, 4.0)
     axes = figure.subplots()
     handles = []

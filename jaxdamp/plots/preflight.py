@@ -20,6 +20,9 @@ def preflight(found: Preflight) -> "matplotlib.figure.Figure":
     """A row for each record, a column for each kind of finding, coloured by severity, with its size.
 
     Where a record has several findings of a kind, the largest is shown and their number stands in brackets.
+
+    Arguments:
+        found: of `bench.preflight`.
     """
     from matplotlib.patches import Patch, Rectangle
 

@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 def profile(curve: ProfileCurve) -> "matplotlib.figure.Figure":
-    """Cost over value, with the 95 % interval and the parabola that the standard error stands for."""
+    """Cost over value, with the 95 % interval and the parabola that the standard error stands for.
+
+    Arguments:
+        curve: of `FitResult.profile`.
+    """
     figure = _style.new_figure(7.5, 4.5)
     axes = figure.subplots()
     best = float(curve.values[np.argmin(curve.cost)])
@@ -30,7 +34,7 @@ def profile(curve: ProfileCurve) -> "matplotlib.figure.Figure":
             axes.axvline(end, color=_style.COLOURS[0], linewidth=0.8)
     axes.axhline(curve.level, color="0.6", linewidth=0.8)
     unit = f" [{curve.unit}]" if curve.unit else ""
-    _style.dress(axes, f"{curve.name}{unit}", "cost [squared standard errors]")
+    _style.dress(axes, f"{curve.name}{unit}", "cost [squared standard errors]", "Profile")
     axes.set_ylim(0.0, 3.0 * curve.level)
     _style.legend_beside(figure, line)
     return figure

@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 def cross_validation(result: CrossValidation) -> "matplotlib.figure.Figure":
-    """Fit percent of every held-out record, a row for each law, a colour for each group; black bars are the means."""
+    """Fit percent of every held-out record, a row for each law, a colour for each group; black bars are the means.
+
+    Arguments:
+        result: of `identify.cross_validate`.
+    """
     laws = sorted(result.laws, key=result.fit_percent)
     figure = _style.new_figure(8.5, 1.6 + 0.4 * len(laws))
     axes = figure.subplots()
@@ -29,7 +33,7 @@ def cross_validation(result: CrossValidation) -> "matplotlib.figure.Figure":
         )
     means = [result.fit_percent(law) for law in laws]
     handles += axes.plot(means, np.arange(len(laws)), "|", markersize=16, color=_style.BLACK, label="mean", mew=2)
-    _style.dress(axes, "fit of the record held out [%]", "")
+    _style.dress(axes, "fit of the record held out [%]", "", "Each record held out in turn")
     axes.set_yticks(np.arange(len(laws)), laws)
     low = max(min(fold.fit_percent for fold in result.folds), -20.0)
     axes.set_xlim(left=min(low - 3.0, 50.0), right=100.0)

@@ -1,12 +1,16 @@
 """A page on bench records without a law: what is odd about them, and their evaluation."""
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
-from jaxdamp.bench import Evaluation, LimitCheck, Preflight
+from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, percent_change
+from jaxdamp.bench import Evaluation, LimitCheck, Preflight, evaluate
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify import predict_runs
 from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.fits import records_table
 from jaxdamp.report.page import Report
+from jaxdamp.report.records import add_records
 
 
 def bench_report(
@@ -14,7 +18,7 @@ def bench_report(
     preflight: Preflight | None = None,
     limits: LimitCheck | None = None,
     *,
-    baseline: Evaluation | None = None,
+    baseline: Evaluation | AbstractDamper | None = None,
     title: str = "Damper records",
     remarks: Sequence[str] = (),
     folder: Path | None = None,
@@ -26,7 +30,7 @@ def bench_report(
         evaluation: of `bench.evaluate`.
         preflight: of `bench.preflight`.
         limits: of `evaluation.check`.
-        baseline: another evaluation to draw beneath.
+        baseline: another evaluation to draw beneath, or a law, which is put on the bench with the same motions.
         title: of the page.
         remarks: on the records.
         folder: for the pictures as files of their own; in the page alone if it is left out.
@@ -40,24 +44,101 @@ def bench_report(
     True
     """
     report = Report(title, folder, attempts)
-    report.heading("Records")
-    report.table(records_table(evaluation.runs))
-    report.points(remarks)
-    if preflight is not None:
-        report.heading("Preflight")
-        report.text(f"{preflight.summary()}.")
-        if preflight.findings:
-            report.picture(preflight.plot, "What was found in which record", "preflight.png")
-            report.table(preflight.table())
+    if isinstance(baseline, AbstractDamper):
+        baseline = law_evaluation(baseline, evaluation)
+    report.verdict(*bench_verdict(evaluation, preflight, limits))
+    add_records(report, evaluation.runs, (), remarks, preflight)
+    if preflight is not None and preflight.findings:
+        report.table(preflight.table())
     if limits is not None:
         report.heading("Limits")
         report.table(limits.table())
+    add_evaluation(report, evaluation, baseline, limits)
+    return report
+
+
+def add_evaluation(
+    report: Report, evaluation: Evaluation, baseline: Evaluation | None = None, limits: LimitCheck | None = None
+) -> None:
+    """The section of a page on an evaluation: notes, pictures, tables, gas force and friction.
+
+    Arguments:
+        report: the page.
+        evaluation: of `bench.evaluate`.
+        baseline: another evaluation to draw beneath.
+        limits: of `evaluation.check`, to be drawn.
+    """
     report.heading("Evaluation")
     report.points(evaluation.notes)
     report.picture(lambda: evaluation.plot(baseline, limits), "Mean cycles and forces over velocity", "evaluation.png")
     for name, table in evaluation.tables().items():
         if name != "measurements":
             report.table(table)
+        if name == "velocities" and baseline is not None:
+            report.table(baseline_table(evaluation, baseline))
     for number, found in enumerate(evaluation.gas_and_friction.values()):
         report.picture(found.plot, f"Gas force and friction of {found.record}", f"gas_and_friction_{number + 1}.png")
-    return report
+
+
+def bench_verdict(
+    evaluation: Evaluation, preflight: Preflight | None = None, limits: LimitCheck | None = None
+) -> list[str]:
+    """Sentences on limits, forces at the largest stated velocity, and oddities.
+
+    Arguments:
+        evaluation: of `bench.evaluate`.
+        preflight: of `bench.preflight`.
+        limits: of `evaluation.check`.
+    """
+    sentences = []
+    if limits is not None:
+        kept = [measured is not None and limit.kept_by(measured.value) for limit, measured in limits.results]
+        sentences.append(f"Limits: {sum(kept)} of {len(kept)} are kept{'' if all(kept) else ': NOT PASSED'}.")
+    if evaluation.velocities:
+        velocity = max(evaluation.velocities)
+        for setting in evaluation.settings:
+            rebound, compression, ratio = (
+                evaluation.get(name, setting=setting, velocity=velocity).cell
+                for name in ("rebound force", "compression force", "rebound/compression ratio")
+            )
+            where = f"Setting {setting}, at" if setting else "At"
+            force, share = Column("", spec=".4g").text, f" (ratio {ratio})" if ratio is not None else ""
+            parts = ((rebound, "in rebound"), (compression, "in compression"))
+            words = " and ".join(f"{force(cell)} N {side}" for cell, side in parts if cell is not None)
+            sentences += [f"{where} {velocity:.4g} m/s: {words}{share}."] if words else []
+    return sentences + ([f"{preflight.summary()}."] if preflight else [])
+
+
+def law_evaluation(law: AbstractDamper, evaluation: Evaluation) -> Evaluation:
+    """The evaluation of a law on the bench with the motions of measured records.
+
+    Arguments:
+        law: the damper law.
+        evaluation: of the records.
+    """
+    forces = predict_runs(law, evaluation.runs)
+    runs = [dataclasses.replace(run, force=force) for run, force in zip(evaluation.runs, forces, strict=True)]
+    setting = {run.name: name for name, group in evaluation.settings.items() for run in group}
+    return evaluate(runs, velocities=evaluation.velocities, method=evaluation.method, by=lambda run: setting[run.name])
+
+
+def baseline_table(evaluation: Evaluation, baseline: Evaluation) -> Table:
+    """Forces at stated velocities beside those of a baseline, for each setting that both have.
+
+    Arguments:
+        evaluation: of the records.
+        baseline: another evaluation; one with a single setting is compared with every setting.
+    """
+    rows = []
+    names = {(m.quantity, m.velocity, m.setting): m for m in baseline.measurements}
+    only = next(iter(baseline.settings)) if len(baseline.settings) == 1 else None
+    for m in evaluation.measurements:
+        other = names.get((m.quantity, m.velocity, m.setting if only is None else only))
+        if m.velocity is not None and other is not None:
+            values: tuple[Cell, ...] = (other.cell, m.cell)
+            change = percent_change(other.value, m.value) if None not in values else None
+            more = (m.setting,) if len(evaluation.settings) > 1 else ()
+            rows.append(Compared(f"{m.quantity} at {m.velocity:.4g} m/s", m.unit, values, change, more))
+    title, sides = "Forces beside the baseline", ("baseline", "measured")
+    setting = (Column("setting"),) if len(evaluation.settings) > 1 else ()
+    return comparison_table(title, "quantity", sides, rows, setting)

@@ -1,22 +1,25 @@
 """A page on laws fitted to records: errors, parameters, loops and curves."""
 
+import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from jaxdamp import plots, rig
-from jaxdamp._tables import Cell, Column, Table
-from jaxdamp.bench import BenchRun
+from jaxdamp._tables import Table
+from jaxdamp.bench import BenchRun, Preflight
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Band, Comparison, CrossValidation, Rung, without_machine
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.fit_findings import add_findings, add_validation
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import fitted_range_table
+from jaxdamp.report.records import add_records
 
 
 MOST_CURVES = 5  # laws in one picture of force over velocity
+BASELINE = "baseline"  # name of a law to compare with
 BAND_STEP = 10  # points of a curve from one of its band to the next
 
 
@@ -26,7 +29,9 @@ def fit_report(
     title: str = "Damper laws fitted to bench records",
     runs: Iterable[BenchRun] | None = None,
     remarks: Sequence[str] = (),
+    preflight: Preflight | None = None,
     failures: Sequence[str] | None = None,
+    baseline: AbstractDamper | None = None,
     folder: Path | None = None,
     attempts: Attempts | None = None,
     validation: CrossValidation | None = None,
@@ -38,7 +43,9 @@ def fit_report(
         title: of the page.
         runs: the records in the order of the page; the fitted ones and those held out, if left out.
         remarks: on the records.
+        preflight: of `bench.preflight`.
         failures: sentences on laws without a fit, instead of those of the comparison.
+        baseline: another law, drawn over the curves and scored on the same records.
         folder: folder for the pictures as separate files; without it they are only in the page.
         attempts: collects parts that fail; a new one if left out.
         validation: of `identify.cross_validate`.
@@ -52,21 +59,52 @@ def fit_report(
     True
     """
     report = Report(title, folder, attempts)
-    report.heading("Records")
+    report.verdict(*fit_verdict(report, comparison, baseline), f"{preflight.summary()}." if preflight else "")
     records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
-    report.table(records_table(records, comparison.held_out))
-    report.points(remarks)
-    add_fits(report, comparison, failures)
+    add_records(report, records, comparison.held_out, remarks, preflight)
+    add_fits(report, comparison, failures, baseline)
     if validation is not None:
         add_validation(report, validation)
     return report
 
 
-def add_fits(report: Report, comparison: Comparison, failures: Sequence[str] | None = None) -> None:
-    """The sections of a page on fits: errors of the laws, the best one, the others."""
+def fit_verdict(report: Report, comparison: Comparison, baseline: AbstractDamper | None = None) -> tuple[str, ...]:
+    """Sentences on the errors of the laws, and of a baseline on the same records and the same test machine.
+
+    Arguments:
+        report: the page, which lists a baseline that cannot be computed on the records.
+        comparison: the fits.
+        baseline: another law.
+    """
+    best, beside = comparison.best, ()
+    if baseline is not None:
+        with report.part("The errors of the baseline"):
+            records = comparison.held_out or best.result.runs
+            percent, rmse, _ = dataclasses.replace(best.result, law=baseline, record_laws=()).score(records)
+            factor = f", {rmse / best.error:.1f} times that of {best.name}" if best.error else ""
+            beside = (f"Baseline on the same records: RMSE {rmse:.1f} N (fit {percent:.1f} %){factor}.",)
+    return *comparison.verdict, *beside
+
+
+def add_fits(
+    report: Report,
+    comparison: Comparison,
+    failures: Sequence[str] | None = None,
+    baseline: AbstractDamper | None = None,
+    *,
+    others: bool = True,
+) -> None:
+    """The sections of a page on fits: errors of the laws, the best one, the others.
+
+    Arguments:
+        report: the page.
+        comparison: the fits, of `identify.compare`.
+        failures: sentences on laws without a fit, instead of those of the comparison.
+        baseline: another law to draw.
+        others: the parameters of the other laws too; `add_other_fits` adds them later.
+    """
     best, several = comparison.best, len(comparison.rungs) > 1
     report.heading("How good the laws are")
-    report.text(*comparison.verdict)
     if best.result.law.fitted_to is not None:
         report.table(fitted_range_table(best.result.law.fitted_to))
     report.table(comparison.table())
@@ -85,41 +123,49 @@ def add_fits(report: Report, comparison: Comparison, failures: Sequence[str] | N
         for left in best.by_setting.between:
             caption = f"{best.name} interpolated to {left.setting:g}, over records that it was not fitted to"
             report.picture(left.plot, caption, f"best_law_interpolated_to_{left.setting:g}.png")
-    _add_curves(report, comparison)
+    _add_curves(report, comparison, baseline)
+    if others:
+        add_other_fits(report, comparison)
+
+
+def add_other_fits(report: Report, comparison: Comparison) -> None:
+    """The sections of a page on the laws that are not the best: parameters and warnings.
+
+    Arguments:
+        report: the page.
+        comparison: of `identify.compare`.
+    """
     for rung in comparison.rungs:
-        if rung is not best:
+        if rung is not comparison.best:
             report.heading(rung.name)
             report.table(parameters_of(rung))
             report.points(rung.result.warnings)
 
 
 def parameters_of(rung: Rung) -> Table:
-    """The parameters of one law of a comparison, under its name there."""
+    """The parameters of one law of a comparison, under its name there.
+
+    Arguments:
+        rung: a law of the comparison.
+    """
     return rung.result.table(title=f"Parameters of {rung.name}")
 
 
 def failure_sentences(comparison: Comparison) -> list[str]:
-    """The laws without a fit, and why."""
+    """The laws without a fit, and why.
+
+    Arguments:
+        comparison: of `identify.compare`.
+    """
     return [f"{failure.name} could not be fitted. {failure.reason}" for failure in comparison.failed]
 
 
-def records_table(runs: Sequence[BenchRun], held_out: Sequence[BenchRun] = ()) -> Table:
-    """Records with their figures, and which of them are held out."""
-    columns = [Column("record"), Column("rate", "Hz"), Column("motion", "Hz", ".3g"), Column("0-peak", "mm", ".3g")]
-    columns += [Column("peak velocity", "m/s", ".3g"), Column("least force", "N", ".0f")]
-    columns += [Column("largest force", "N", ".0f"), Column("work per cycle", "J", ".3g"), Column("cycles")]
-    columns += [Column("use")] if held_out else []
-    names = {run.name for run in held_out}
-    rows: list[tuple[Cell, ...]] = []
-    for run in runs:
-        row: tuple[Cell, ...] = (run.name, run.sampling_rate, run.frequency, 1e3 * run.amplitude, run.peak_velocity)
-        row += (float(run.force.min()), float(run.force.max()), run.work_per_cycle, run.cycles)
-        rows.append(row + ("held out" if run.name in names else "fitted",) * bool(held_out))
-    return Table("Records (stroke and velocity positive in rebound)", tuple(columns), tuple(rows))
-
-
 def fitted_velocities(comparison: Comparison) -> np.ndarray:
-    """Velocities [m/s] for a force-velocity table: the range that was fitted, and zero."""
+    """Velocities [m/s] for a force-velocity table: the range that was fitted, and zero.
+
+    Arguments:
+        comparison: of `identify.compare`.
+    """
     runs = comparison.best.result.runs
     lower = min(min(float(run.velocity.min()) for run in runs), 0.0)
     upper = max(max(float(run.velocity.max()) for run in runs), 0.0)
@@ -128,8 +174,11 @@ def fitted_velocities(comparison: Comparison) -> np.ndarray:
     return points
 
 
-def _add_curves(report: Report, comparison: Comparison) -> None:
-    """Force over velocity of the best laws; a law without a curve is left out of the picture and named."""
+def _add_curves(report: Report, comparison: Comparison, baseline: AbstractDamper | None) -> None:
+    """Force over velocity of the best laws; a law without a curve is left out of the picture and named.
+
+    The baseline is dashed and black; without one, the best of several laws is.
+    """
     best = comparison.best
     order = sorted(comparison.rungs, key=lambda rung: rung.error)
     points = fitted_velocities(comparison)
@@ -142,10 +191,13 @@ def _add_curves(report: Report, comparison: Comparison) -> None:
     if len(laws) > len(drawn):
         rest = ", ".join(list(laws)[MOST_CURVES:])
         note = f"Drawn are the {MOST_CURVES} laws with the smallest errors. The other {len(laws) - len(drawn)}: {rest}."
-    baseline = best.name if len(drawn) > 1 and best.name in drawn else None
+    dashed = best.name if len(drawn) > 1 and best.name in drawn else None
+    if baseline is not None:
+        drawn |= _with_curves(report, {BASELINE: baseline}, points)
+        dashed = BASELINE if BASELINE in drawn else dashed
     report.picture(
         lambda: plots.force_velocity(
-            drawn, runs=without_machine(best.result.rig, best.result.runs), baseline=baseline, note=note, bands=bands
+            drawn, runs=without_machine(best.result.rig, best.result.runs), baseline=dashed, note=note, bands=bands
         ),
         "Force over velocity",
         "force_velocity.png",

@@ -8,14 +8,22 @@ from jaxdamp.simulation import Response
 
 
 def fitted_range_table(covered: FittedRange) -> Table:
-    """The range of the records that laws were fitted to."""
+    """The range of the records that laws were fitted to.
+
+    Arguments:
+        covered: `law.fitted_to`.
+    """
     columns = (Column("quantity"), Column("unit"), Column("lowest", spec=".4g"), Column("highest", spec=".4g"))
     rows = tuple((q.name, q.unit or "–", *q.limits) for q in covered.known())
     return Table("Range of the fitted records; beyond it the laws are extrapolated", columns, rows)
 
 
 def range_use_table(responses: Mapping[str, Response]) -> Table | None:
-    """The motion of each damper compared with the fitted range of its law; no table if no law has a range."""
+    """The motion of each damper compared with the fitted range of its law; no table if no law has a range.
+
+    Arguments:
+        responses: by name.
+    """
     columns = [Column("law"), Column("damper"), Column("quantity"), Column("unit")]
     columns += [Column(name, spec=".3g") for name in ("lowest", "highest", "fitted from", "fitted to", "times")]
     columns += [Column("time outside", "%", ".0f")]

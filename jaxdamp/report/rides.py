@@ -4,12 +4,26 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from jaxdamp import plots
-from jaxdamp._tables import Table
+from jaxdamp._tables import Table, percent_change, typeset_unit
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.metrics import comfort_reaction
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import range_use_table
 from jaxdamp.simulation import Response, comfort_table, metrics_table
+from jaxdamp.vehicles import ChannelKind, Layout
+
+
+GOALS = {  # word: kind of the channel, statistic, whether it is weighted
+    "comfort": (ChannelKind.ACCELERATION, "rms", True),
+    "travel": (ChannelKind.STROKE, "peak_to_peak", False),
+    "grip": (ChannelKind.TYRE_LOAD, "rms", False),
+}
+WORDS = {
+    "comfort": "weighted RMS of the body acceleration",
+    "travel": "suspension travel, peak to peak,",
+    "grip": "RMS of the dynamic tyre load",
+}
 
 
 def ride_report(
@@ -39,33 +53,112 @@ def ride_report(
     """
     rides = {"ride": responses} if isinstance(responses, Response) else dict(responses)
     report = Report(title, folder, attempts)
+    report.verdict(*ride_verdict(rides))
     report.text(axles_sentence(rides))
     report.points(notes_of(rides) if remarks is None else remarks)
     for name, law in (laws or {}).items():
         covered = f" Fitted to: {law.fitted_to.words()}." if law.fitted_to is not None else ""
         report.text(f"{name}: {law!r}{'.' * bool(covered)}{covered}")
-    for table in ride_tables(rides).values():
-        report.table(table)
-    report.picture(lambda: plots.ride(rides, weighting="Wk"), title, "ride.png")
-    for damper in next(iter(rides.values())).dampers:
-        caption = f"Use of the {damper.replace('_', ' ')} during the ride"
-        report.picture(lambda name=damper: plots.damper_use(rides, damper=name), caption, f"{damper}.png")
+    add_rides(report, rides, title)
     return report
 
 
+def add_rides(report: Report, responses: Mapping[str, Response], title: str, prefix: str = "") -> None:
+    """The tables and pictures of rides on one road.
+
+    Arguments:
+        report: the page.
+        responses: by name, of one kind of vehicle, the first being the baseline.
+        title: what was driven over, as the caption of the picture.
+        prefix: of the names of the picture files, if the page shows several roads.
+    """
+    for table in ride_tables(responses).values():
+        report.table(table)
+    report.picture(lambda: plots.ride(responses, weighting="Wk"), title, f"{prefix}ride.png")
+    for damper in next(iter(responses.values())).dampers:
+        caption = f"Use of the {damper.replace('_', ' ')} during the ride"
+        report.picture(lambda name=damper: plots.damper_use(responses, damper=name), caption, f"{prefix}{damper}.png")
+
+
+def goal_metrics(layout: Layout, goal: str, *, white: bool = False) -> list[str]:
+    """The ride metrics of a vehicle that a goal means: comfort, travel or grip.
+
+    Comfort is the weighted RMS acceleration of the body [m/s^2]; travel the working space of every suspension, peak to
+    peak, on a white road its RMS [m]; grip the RMS variation of the load of every tyre [N].
+
+    Arguments:
+        layout: of the vehicle, `vehicle.layout`.
+        goal: one of `GOALS`.
+        white: for stationary rides on a white road.
+    """
+    kind, statistic, weighted = GOALS[goal]
+    statistic = "standard_deviation" if white and kind is ChannelKind.STROKE else statistic
+    names = [
+        m.name
+        for m in layout.metrics
+        if layout.by_name[m.channel].kind is kind
+        and m.statistic.name == statistic
+        and (m.weighting is not None) == weighted
+    ]
+    return names[:1] if goal == "comfort" else names
+
+
+def ride_verdict(responses: Mapping[str, Response]) -> list[str]:
+    """Comfort, travel and grip in a sentence for each ride, compared with the first one if there are several.
+
+    Arguments:
+        responses: by name, of one kind of vehicle.
+    """
+    (first, baseline), *others = responses.items()
+    layout = baseline.system.layout
+    goals = {goal: names for goal in GOALS if (names := goal_metrics(layout, goal))}
+    values = {name: _means(response, goals) for name, response in responses.items()}
+    if others:
+        return [
+            f"{name} against {first}: "
+            + ", ".join(f"{WORDS[g]} {percent_change(values[first][g], values[name][g]) or 0.0:+.1f} %" for g in goals)
+            + "."
+            for name, _ in others
+        ]
+    units = baseline.metric_units()
+    said = [f"{WORDS[g]} {values[first][g]:.3g} {typeset_unit(units[names[0]])}" for g, names in goals.items()]
+    feel = ""
+    if "comfort" in goals and typeset_unit(units[goals["comfort"][0]]) == "m/s²":
+        feel = f" ISO 2631-1 calls such an acceleration {' or '.join(comfort_reaction(values[first]['comfort']))}."
+    return [f"{', '.join(said)}.{feel}" if said else ""]
+
+
+def _means(response: Response, goals: Mapping[str, Sequence[str]]) -> dict[str, float]:
+    """The mean of the metrics of each goal."""
+    numbers = response.metrics([name for names in goals.values() for name in names])
+    return {goal: sum(float(numbers[n]) for n in names) / len(names) for goal, names in goals.items()}
+
+
 def ride_tables(responses: Mapping[str, Response]) -> dict[str, Table]:
-    """The tables on rides by the name of their file: metrics, comfort, use of the dampers where laws have a range."""
+    """The tables on rides by the name of their file: metrics, comfort, use of the dampers where laws have a range.
+
+    Arguments:
+        responses: by name, of one kind of vehicle.
+    """
     use = range_use_table(responses)
     tables = {"metrics": metrics_table(responses), "comfort": comfort_table(responses)}
     return tables if use is None else tables | {"range_use": use}
 
 
 def axles_sentence(responses: Mapping[str, Response]) -> str:
-    """When each axle met the road; nothing of a vehicle with one axle."""
+    """When each axle met the road; nothing of a vehicle with one axle.
+
+    Arguments:
+        responses: by name.
+    """
     timing = next(iter(responses.values())).axle_timing
     return "" if timing.kind == "one axle" else f"Axles: {timing}."
 
 
 def notes_of(responses: Mapping[str, Response]) -> list[str]:
-    """The notes of each response, after its name."""
+    """The notes of each response, after its name.
+
+    Arguments:
+        responses: by name.
+    """
     return [f"{name}: {note}" for name, response in responses.items() for note in response.notes]

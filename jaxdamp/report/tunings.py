@@ -4,11 +4,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from jaxdamp import plots
+import equinox as eqx
+import numpy as np
+
+from jaxdamp import _checks, plots
+from jaxdamp._tables import Compared, Table, comparison_table, percent_change
+from jaxdamp.parameters import get
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
-from jaxdamp.simulation import Response
-from jaxdamp.tune import Rescore, TuneResult
+from jaxdamp.simulation import Response, Ride
+from jaxdamp.tune import Rescore, TuneResult, damper_paths
+from jaxdamp.vehicles import AbstractVehicle
 
 
 def tuning_report(
@@ -17,6 +23,7 @@ def tuning_report(
     title: str = "Tuning",
     rescored: Rescore | None = None,
     rides: Mapping[str, Response] | None = None,
+    baseline: AbstractVehicle | None = None,
     folder: Path | None = None,
     attempts: Attempts | None = None,
 ) -> Report:
@@ -27,6 +34,7 @@ def tuning_report(
         title: of the page.
         rescored: the same cars on other roads, of `tune.rescore`.
         rides: responses before and after by name, to be drawn over each other.
+        baseline: another vehicle of this kind, such as that of another tuning, to be compared on the same road.
         folder: folder for the pictures as separate files; without it they are only in the page.
         attempts: collects parts that fail; a new one if left out.
 
@@ -37,14 +45,18 @@ def tuning_report(
     True
     """
     report = Report(title, folder, attempts)
-    add_tuning(report, result, rescored, outcome=result.summary)
+    report.verdict(result.summary, *([result.fresh.summary] if rescored is None and result.fresh else []))
+    report.heading("Before and after")
+    add_tuning(report, result, rescored)
+    if baseline is not None:
+        add_baseline(report, result, baseline)
     if rides is not None:
         report.picture(lambda: plots.ride(rides), "Before and after", "tuning_ride.png")
     return report
 
 
 def add_tuning(
-    report: Report, result: TuneResult[Any], rescored: Rescore | None = None, *, outcome: str, elsewhere: str = ""
+    report: Report, result: TuneResult[Any], rescored: Rescore | None = None, *, outcome: str = "", elsewhere: str = ""
 ) -> None:
     """The section of a page on a tuning.
 
@@ -52,7 +64,7 @@ def add_tuning(
         report: the page.
         result: of `tune.minimise`.
         rescored: the same cars on other roads; the fresh roads of the tuning, if there are any, if left out.
-        outcome: result of the tuning, in words.
+        outcome: result of the tuning in words, if they do not stand at the top of the page.
         elsewhere: result on the other roads, in words; by default those of `rescored`.
     """
     report.table(result.parameter_table())
@@ -66,3 +78,47 @@ def add_tuning(
         report.table(rescored.table())
         report.text(elsewhere or rescored.summary)
     report.picture(lambda: plots.tuning(result), "Before and after the tuning", "tuning.png")
+
+
+def add_baseline(report: Report, result: TuneResult[Any], baseline: AbstractVehicle) -> None:
+    """The section of a page on a tuning beside another vehicle: ride metrics on the same road, and damper curves.
+
+    Arguments:
+        report: the page.
+        result: of `tune.minimise`.
+        baseline: the other vehicle, of the same class.
+    """
+    _checks.instance("baseline", baseline, type(result.start), f"be a {type(result.start).__name__} as the tuned one")
+    report.heading("Beside the baseline")
+    if result.drive is not None:
+        with report.part("The metrics of the baseline"):
+            report.table(_beside(result, baseline))
+    peaks = [values.get("peak_damper_velocity", 0.0) for values in (result.before, result.after)]
+    reach = 1.1 * max(peaks) or 1.0
+    for path in damper_paths(result.vehicle):
+        cars = {"baseline": baseline, "before": result.start, "after": result.vehicle}
+        laws = {name: get(car, path) for name, car in cars.items()}
+        if not all(eqx.tree_equal(laws["after"], law) for law in laws.values()):
+            points = np.linspace(-reach, reach, 401)
+            report.picture(
+                lambda laws=laws, points=points: plots.force_velocity(laws, points, baseline="baseline"),
+                f"{path.replace('_', ' ')}: baseline, before and after the tuning",
+                f"baseline_{path.replace('.', '_')}.png",
+            )
+
+
+def _beside(result: TuneResult[Any], baseline: AbstractVehicle) -> Table:
+    """Ride metrics of the baseline, before and after, on the road of the tuning."""
+    assert result.drive is not None
+    road, duration, dt = result.drive
+    known = (*result.start.layout.metrics, *(result.objective.metrics if result.objective else ()))
+    metrics = list({m.name: m for m in known if m.name in result.units}.values())
+    cars = (baseline, result.start, result.vehicle)
+    rides = [Ride(car, road, metrics=metrics, duration=duration, dt=dt)() for car in cars]
+    rows = []
+    for name in (name for name in result.units if name in rides[0]):
+        values = [float(ride[name]) for ride in rides]
+        rows.append(Compared(name, result.units[name], values, percent_change(values[0], values[-1])))
+    where = "the first road" if result.scenarios is not None else "the road"
+    title = f"Ride metrics on {where} of the tuning; the change is from the baseline to the tuned vehicle"
+    return comparison_table(title, "metric", ("baseline", "before", "after"), rows)

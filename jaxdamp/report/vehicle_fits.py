@@ -11,8 +11,8 @@ from jaxdamp.bench import RideRecord
 from jaxdamp.identify import VehicleFit, without_machine
 from jaxdamp.parameters import get
 from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.fits import records_table
 from jaxdamp.report.page import Report
+from jaxdamp.report.records import records_table
 
 
 def vehicle_fit_report(
@@ -41,7 +41,7 @@ def vehicle_fit_report(
     False
     """
     report = Report(title, folder, attempts)
-    report.text(_summary(result))
+    report.verdict(_summary(result))
     report.heading("Warnings")
     report.points(result.warnings)
     if not result.warnings:

@@ -193,7 +193,18 @@ def solve_law(
     atol: float,
     mode: Mode = "forward",
 ) -> Signal:
-    """`march` by a solver of diffrax."""
+    """`march` by a solver of diffrax.
+
+    Arguments:
+        law: the damper law.
+        time: uniform instants [s], shape (time,).
+        stroke: [m], positive in extension, shape (time,).
+        velocity: [m/s], shape (time,).
+        solver: of diffrax.
+        rtol: relative tolerance.
+        atol: absolute tolerance, in the units of the states.
+        mode: "forward" or "reverse", the derivatives that pass through it.
+    """
     from jaxdamp._driven import check_solver, driven_states, verdict
 
     start = law.initial_state()
@@ -220,7 +231,13 @@ def march(
 ) -> Signal:
     """`respond` without its checks, for use inside compiled functions, from this state if one is given.
 
-    A temperature [K] counts for laws that depend on one; within a step it is the mean of both ends.
+    Arguments:
+        law: the damper law.
+        dt: step [s].
+        stroke: [m], positive in extension, shape (time,).
+        velocity: [m/s], shape (time,).
+        substeps: steps from one instant to the next.
+        temperature: [K], shape (time,), for laws that depend on one; within a step it is the mean of both ends.
     """
     warm = None if temperature is None or not law.traits().temperature_dependent else temperature
 

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
@@ -16,6 +16,10 @@ from jaxdamp.roads.iso_classes import (
     class_limits,
     road_class,
 )
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
 
 
 # A Hann window correlates neighbouring lines: so many lines count as one independent line (1.94).
@@ -91,6 +95,12 @@ class RoughnessAssessment:
             wave = 1.0 / self.spatial_frequency[worst]
             words.append(f"The bands are of class {least} to {most}; the roughest has a wavelength of {wave:.2g} m.")
         return " ".join(words)
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """The spectrum with its straight line and the classes (`plots.roughness_spectrum`)."""
+        from jaxdamp import plots
+
+        return plots.roughness_spectrum(self)
 
     def table(self) -> Table:
         """A row for each band."""

@@ -16,7 +16,12 @@ FOR_REVERSE = "needed by reverse derivatives"  # the rest of a step is cheap to 
 
 
 class RoadInput(NamedTuple):
-    """The road under the wheels at an instant: heights [m], and their rates [m/s] where they are needed."""
+    """The road under the wheels at an instant: heights [m], and their rates [m/s] where they are needed.
+
+    Attributes:
+        height: [m, up], shape (wheels,).
+        rate: [m/s], shape (wheels,); None where it is not needed.
+    """
 
     height: Vector
     rate: Vector | None
@@ -26,6 +31,11 @@ class StepState(NamedTuple):
     """A vehicle at an instant: motion (q, q̇) in SI units, states and forces [N] of its elements.
 
     `memory` is what an engine of several steps remembers of the steps before.
+
+    Attributes:
+        motion: q and q̇ in SI units, shape (n,).
+        states: of the elements.
+        force: of each element [N], positive when it resists extension.
     """
 
     motion: Vector
@@ -81,7 +91,12 @@ class Equations(eqx.Module):
 
 
 def settled(system: System, road: Float[Array, " wheels"]) -> Float[Array, " n"]:
-    """The motion (q, q̇) of a vehicle at rest on these heights [m]."""
+    """The motion (q, q̇) of a vehicle at rest on these heights [m].
+
+    Arguments:
+        system: the vehicle.
+        road: heights under the wheels [m, up], shape (wheels,).
+    """
     position = rest_position(system, road)
     return jnp.concatenate([position, jnp.zeros_like(position)])
 

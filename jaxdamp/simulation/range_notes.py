@@ -49,11 +49,19 @@ def range_uses(
 
 
 def named_laws(vehicle: AbstractVehicle) -> dict[str, AbstractDamper]:
-    """The law at each port by the name of its element, such as "front_damper"."""
+    """The law at each port by the name of its element, such as "front_damper".
+
+    Arguments:
+        vehicle: the vehicle.
+    """
     return dict(zip(vehicle.layout.ports, vehicle.elements(), strict=True))
 
 
 def range_sentences(uses: dict[str, Sequence[RangeUse]] | dict[str, list[RangeUse]]) -> tuple[str, ...]:
-    """A sentence for each damper that leaves its range."""
+    """A sentence for each damper that leaves its range.
+
+    Arguments:
+        uses: by the name of the damper.
+    """
     texts = (sentence(name.replace("_", " "), found) for name, found in uses.items())
     return tuple(text for text in texts if text)

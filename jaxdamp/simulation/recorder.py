@@ -58,6 +58,14 @@ def recorded(
 
     From `start`, or settled and at rest on the road's first height. Elements that stand on the road take its rate as
     the mean of the slopes before and after an instant. Vectors are arrays, which are saved as they are.
+
+    Arguments:
+        engine: the engine with its step.
+        system: the vehicle.
+        heights: of the road under each wheel [m, up], shape (time, wheels).
+        dt: step of the heights [s].
+        start: q and q̇ at the beginning, shape (n,); at rest if left out.
+        every: number of instants from one that is saved to the next.
     """
     equations = Equations(system)
     start = settled(system, heights[0]) if start is None else start

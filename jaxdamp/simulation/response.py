@@ -68,6 +68,19 @@ class Response(eqx.Module):
 
     `response["sprung_acceleration"]` is a channel; `response.units` lists them, `response.descriptions` says what each
     one is, and `response.notes` what to know beside the numbers. `response.between(1.0, 3.0)` is a part of the run.
+
+    Attributes:
+        vehicle: the vehicle.
+        system: the assembled vehicle.
+        time: uniform instants [s], shape (time,).
+        motion: q and q̇ in SI units, shape (time, n).
+        port_force: force of each element [N], positive when it resists extension, shape (time, ports).
+        road: heights under the wheels [m, up], shape (time, wheels).
+        road_rate: their rates [m/s], shape (time, wheels).
+        final_state: states of each element at the end.
+        axle_timing: when each axle met the road.
+        whole: the response that this one is a part of, and the number of its first instant there.
+        begin: start of the statistics of this part.
     """
 
     vehicle: AbstractVehicle

@@ -14,6 +14,9 @@ def metrics_table(responses: "Mapping[str, Response]") -> Table:
     """The ride metrics of responses by name, of one kind of vehicle, and the change from the first to the last.
 
     A metric that may be negative, such as a mean, has no change in percent.
+
+    Arguments:
+        responses: by name, of one kind of vehicle.
     """
     first = next(iter(responses.values()))
     values = [response.metrics() for response in responses.values()]
@@ -27,7 +30,11 @@ def metrics_table(responses: "Mapping[str, Response]") -> Table:
 
 
 def comfort_table(responses: "Mapping[str, Response]") -> Table:
-    """Comfort by ISO 2631-1 of every acceleration, of responses by name, and the change from the first to the last."""
+    """Comfort by ISO 2631-1 of every acceleration, of responses by name, and the change from the first to the last.
+
+    Arguments:
+        responses: by name, of one kind of vehicle.
+    """
     first = next(iter(responses.values()))
     comforts = [response.comfort() for response in responses.values()]
     rows = []

@@ -103,7 +103,12 @@ def heights_under_wheels(vehicle: AbstractVehicle, road: AbstractRoad, time: Sig
 
 
 def moves_axles(build: Callable[[Any], AbstractVehicle], values: Any) -> bool:
-    """Whether the axle positions of the vehicle built from values depend on them; conservative within inner calls."""
+    """Whether the axle positions of the vehicle built from values depend on them; conservative within inner calls.
+
+    Arguments:
+        build: function of the values that gives the vehicle.
+        values: what the vehicle is built from.
+    """
     traced = jax.make_jaxpr(lambda values: build(values).axle_positions)(values).jaxpr
     moving = set(traced.invars)
     for equation in traced.eqns:

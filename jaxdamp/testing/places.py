@@ -83,7 +83,11 @@ def _resists_more_the_faster(law: AbstractDamper) -> bool:
 
 
 def check_inside_wrappers(law: AbstractDamper) -> None:
-    """Every wrapper takes the law, or refuses it as its traits say, and gives finite forces with it."""
+    """Every wrapper takes the law, or refuses it as its traits say, and gives finite forces with it.
+
+    Arguments:
+        law: the damper law.
+    """
     stateless, feed_through = law.initial_state().size == 0, law.traits().has_feed_through
     wrapped = {name: wrap(law) for name, wrap in WRAPPERS.items()}
     for name, wrap in (IN_SERIES | WITHOUT_STATES).items():

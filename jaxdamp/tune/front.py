@@ -32,6 +32,10 @@ def non_dominated(values: Float[np.ndarray, "points objectives"]) -> Bool[np.nda
 def hypervolume(values: Float[np.ndarray, "points objectives"], reference: Float[np.ndarray, " objectives"]) -> float:
     """Volume of objectives that at least one point beats, up to a reference point, by slices along the last objective.
 
+    Arguments:
+        values: objectives of each point, shape (points, objectives).
+        reference: values that count as worst, shape (objectives,).
+
     >>> hypervolume(np.array([[1.0, 2.0], [2.0, 1.0]]), np.array([3.0, 3.0]))
     3.0
     """

@@ -19,6 +19,8 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 if TYPE_CHECKING:
+    import matplotlib.figure
+
     from jaxdamp.tune.result import TuneResult
 
 FIRST_SEED = 4711  # of fresh roads, which are thereby others than those of usual small seeds
@@ -74,6 +76,12 @@ class Rescore:
         title = f"Ride metrics on {self.roads} other roads (means, and the change on each road)"
         more = (Column("smallest", "%", "+.1f"), Column("largest", "%", "+.1f"))
         return comparison_table(title, "metric", ("before", "after"), rows, more)
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """The change of each ride metric on each road (`plots.rescore`)."""
+        from jaxdamp import plots
+
+        return plots.rescore(self)
 
     def to_dict(self) -> dict[str, Any]:
         """All metrics on each road with units, ready for JSON; numbers that are not finite are None."""

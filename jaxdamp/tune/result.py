@@ -29,7 +29,18 @@ V = TypeVar("V", bound=AbstractVehicle)
 
 
 class Change(NamedTuple):
-    """One parameter before and after."""
+    """One parameter before and after.
+
+    Attributes:
+        name: path of the parameter.
+        before: value of the start, in the unit.
+        after: tuned value, in the unit.
+        unit: in SI.
+        note: empty, "at its lower bound" or "at its upper bound".
+        lower: lower bound of the search.
+        upper: upper bound of the search.
+        tied: the numbers that have the same value.
+    """
 
     name: str
     before: float

@@ -37,7 +37,14 @@ class Condition(NamedTuple):
 
 
 class Scenario(NamedTuple):
-    """One road under one condition of the vehicle."""
+    """One road under one condition of the vehicle.
+
+    Attributes:
+        name: of the scenario.
+        road: what is driven over.
+        condition: values of the vehicle that differ.
+        weight: in a mean over scenarios [-].
+    """
 
     name: str
     road: Road

@@ -70,7 +70,11 @@ def slope(lower: float | None = None, upper: float | None = None, *, reach: floa
 
 
 def monotone(*, reach: float = 1.0) -> Shape:
-    """A force that never falls as the velocity grows: a slope of zero or more."""
+    """A force that never falls as the velocity grows: a slope of zero or more.
+
+    Arguments:
+        reach: largest magnitude of the velocities at which the slope is held [m/s].
+    """
     return slope(0.0, reach=reach)
 
 
@@ -156,7 +160,11 @@ class ShapeNumbers:
 
 
 def damper_paths(vehicle: AbstractVehicle) -> list[str]:
-    """The paths of the outermost laws of a vehicle."""
+    """The paths of the outermost laws of a vehicle.
+
+    Arguments:
+        vehicle: the vehicle.
+    """
     found: list[str] = []
     for prefix, _ in laws_inside(vehicle):
         if not any(prefix.startswith(f"{path}.") for path in found):

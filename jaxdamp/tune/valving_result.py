@@ -16,7 +16,18 @@ if TYPE_CHECKING:
 
 
 class ValveParameter(NamedTuple):
-    """A chosen number with its bounds."""
+    """A chosen number with its bounds.
+
+    Attributes:
+        name: path of the parameter.
+        unit: in SI.
+        start: value of the start, in the unit.
+        value: chosen value, in the unit.
+        lower: lower bound of the search.
+        upper: upper bound of the search.
+        note: empty, "at its lower bound" or "at its upper bound".
+        meaning: in words.
+    """
 
     name: str
     unit: str

@@ -28,6 +28,10 @@ def rest_position(system: System, road: Float[Array, " wheels"]) -> Float[Array,
     The laws are in their initial states. If no law depends on its stroke at rest, this is one linear system; otherwise
     it is solved by Newton's method with step control. Derivatives are exact (implicit function theorem). NaN if no
     equilibrium is found.
+
+    Arguments:
+        system: the vehicle.
+        road: heights under the wheels [m, up], shape (wheels,).
     """
     form, ports = system.form, Ports(system.laws)
     if not any(law.traits().stroke_dependent_at_rest for law in system.laws):
@@ -105,7 +109,11 @@ def static_equilibrium(vehicle: AbstractVehicle, road: Any = None) -> dict[str, 
 
 
 def refuse_restless(vehicle: AbstractVehicle) -> NoReturn:
-    """Refuse a vehicle for which no static equilibrium was found."""
+    """Refuse a vehicle for which no static equilibrium was found.
+
+    Arguments:
+        vehicle: the vehicle.
+    """
     remedy = "Check for springs that are much too soft, or for a law whose force decreases with extension."
     remedy = " ".join([*filter(None, map(coverage, vehicle.elements())), remedy])
     actual = f"a {type(vehicle).__name__} for which none was found"

@@ -1,7 +1,7 @@
 """Natural modes of a vehicle: frequencies, damping, shapes."""
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -9,6 +9,10 @@ from jaxtyping import Complex, Float
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,6 +52,12 @@ class Modes:
     def damping_ratio(self) -> Float[np.ndarray, " oscillations"]:
         """−Re λ/|λ|."""
         return -np.real(self.poles) / np.abs(self.poles)
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """The shape of each oscillation (`plots.modes`)."""
+        from jaxdamp import plots
+
+        return plots.modes(self)
 
     def table(self) -> Table:
         """A row for each damped oscillation, with the coordinates of largest amplitude."""
@@ -94,6 +104,9 @@ def modes(vehicle: AbstractVehicle | LinearVehicle) -> Modes:
 
     Undamped modes solve K φ = ω² M φ with the stiffness of the laws at rest in K; damped ones are the eigenvalues of
     the state matrix. The results are NumPy arrays and not differentiable.
+
+    Arguments:
+        vehicle: a vehicle, or a result of `linearise`.
 
     >>> from jaxdamp.vehicles.presets import half_car_002
     >>> print(modes(half_car_002()))

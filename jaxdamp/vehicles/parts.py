@@ -16,7 +16,12 @@ Parts: TypeAlias = "tuple[tuple[Body, ...], tuple[Link, ...], tuple[Wheel, ...]]
 
 
 def prefixed(name: str, word: str) -> str:
-    """The name of a channel of a part: "front" and "stroke" give "front_stroke"; an empty name adds no prefix."""
+    """The name of a channel of a part: "front" and "stroke" give "front_stroke"; an empty name adds no prefix.
+
+    Arguments:
+        name: of the part.
+        word: the channel.
+    """
     return f"{name}_{word}" if name else word
 
 

@@ -22,6 +22,9 @@ class Point(eqx.Module):
     Points can be added, subtracted and scaled: the extension of a link is `body.at(1.2) - wheel.at()`. `Body.at` gives
     points, `Body.pitch` and `Body.roll` give angles.
 
+    Attributes:
+        terms: the coefficient of each coordinate, by its name.
+
     >>> twist = Point({"roll": 1.0}) - (Point({"z_left": 1.0}) - Point({"z_right": 1.0})) * 0.5
     >>> twist.terms
     {'roll': 1.0, 'z_left': -0.5, 'z_right': 0.5}

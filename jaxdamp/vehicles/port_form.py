@@ -24,6 +24,18 @@ class PortForm(eqx.Module):
     """The matrices of a vehicle, in SI units; q coordinates, `wheels` road inputs, `ports` nonlinear elements.
 
     The ground matrices are for the energy balance: the springs store ½ qᵀK q − qᵀK_r z_r + ½ z_rᵀK_g z_r.
+
+    Attributes:
+        mass: M, shape (q, q).
+        stiffness: K, shape (q, q).
+        damping: C, shape (q, q).
+        road_stiffness: K_r, shape (q, wheels).
+        road_damping: C_r, shape (q, wheels).
+        ground_stiffness: K_g, shape (wheels, wheels).
+        ground_damping: C_g, shape (wheels, wheels).
+        ports: P, extension of each element from the coordinates, shape (ports, q).
+        port_road: S, extension of each element from the heights of the road, shape (ports, wheels); None if no element
+            is at the road.
     """
 
     mass: Float[Array, "q q"]
@@ -56,7 +68,14 @@ class PortForm(eqx.Module):
 
 @final
 class LinearMap(eqx.Module):
-    """y = X x + F f + R z + S ż of the motion x = (q, q̇), the forces f and the heights z, matrices or scalars."""
+    """y = X x + F f + R z + S ż of the motion x = (q, q̇), the forces f and the heights z, matrices or scalars.
+
+    Attributes:
+        motion: X, from the motion.
+        force: F, from the forces [N] of the elements.
+        road: R, from the heights of the road.
+        road_rate: S, from their rates.
+    """
 
     motion: Matrix
     force: Matrix

@@ -75,6 +75,10 @@ def is_stationary(metric: Metric, channels: Mapping[str, Channel]) -> bool:
     """Whether a metric follows from the RMS of its channel on a white road.
 
     Absolute heights have no finite RMS there, since they follow the road.
+
+    Arguments:
+        metric: the metric.
+        channels: of the vehicle, by name.
     """
     unbounded = metric.from_rest and channels[metric.channel].kind is ChannelKind.HEIGHT
     return metric.statistic.of_rms is not None and not (unbounded or metric.by or metric.window)

@@ -18,7 +18,13 @@ from jaxdamp.vehicles.suspension import Suspension
 
 
 class PitchDecay(NamedTuple):
-    """Amplitude ratios of a free pitch decay, each amplitude divided by the next: over a half cycle and a whole one."""
+    """Amplitude ratios of a free pitch decay, each amplitude divided by the next: over a half cycle and a whole one.
+
+    Attributes:
+        nose_down: over the half cycle with the nose down [-].
+        nose_up: over the half cycle with the nose up [-].
+        whole: over a whole cycle [-].
+    """
 
     nose_down: Scalar
     nose_up: Scalar

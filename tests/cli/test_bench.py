@@ -1,6 +1,7 @@
 """`jaxdamp bench` and the processing options of `jaxdamp fit`, called as a user does."""
 
 import csv
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.cli import fitting
 from jaxdamp.dampers import Bilinear, Scheduled
-from jaxdamp.export import from_json
+from jaxdamp.export import from_json, to_json
 
 from .invoking import jaxdamp, refused
 
@@ -37,9 +38,18 @@ def test_bench_prints_and_writes_preflight_evaluation_and_limits(folder: Path, t
     limits.write_text(
         "quantity,velocity,minimum,maximum\nrebound force,0.131,330,350\ncompression force,0.131,-150,-100\n"
     )
-    text = jaxdamp("bench", folder, "--limits", limits, "--cycles", "last:4", "--out", out, code=1).output
+    to_json(Bilinear(1300.0, 1200.0), tmp_path / "softer.json")
+    words = ["--limits", limits, "--baseline", tmp_path / "softer.json", "--cycles", "last:4"]
+    text = jaxdamp("bench", folder, *words, "--out", out, code=1).output
     flat = " ".join(text.split())
-    for said in ("2 errors", "error, force clipped: clipped", "rest before", "rest cut off", "Limits: not all passed"):
+    for said in (
+        "2 errors",
+        "error, force clipped: clipped",
+        "rest before",
+        "rest cut off",
+        "Limits: not all passed",
+        "Forces beside the baseline",
+    ):
         assert said in flat, said
     written = {row["quantity"]: row for row in rows(out / "tables" / "velocities.csv")}
     assert float(written["rebound force at 0.131 m/s"]["value"]) == pytest.approx(2600 * 0.131, rel=0.01)
@@ -52,6 +62,9 @@ def test_bench_prints_and_writes_preflight_evaluation_and_limits(folder: Path, t
         assert (out / name).read_bytes().startswith(b"\x89PNG")
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 3 and "Forces at stated velocities" in page and "FAILED" in page
+    beside = page.partition("Forces beside the baseline")[2].partition("</tr>")[2].partition("</tr>")[0]
+    change = float(re.findall(r"\+[\d.]+", beside)[-1])  # of the rebound force, with twice the rate of the baseline
+    assert change == pytest.approx(100.0, abs=2.0)
 
 
 def test_fit_leaves_out_records_with_an_error(folder: Path, tmp_path: Path) -> None:

@@ -11,8 +11,8 @@ from jaxdamp.bench import BenchSet
 from jaxdamp.cli import app
 from jaxdamp.cli.options import law_names, split
 from jaxdamp.cli.vehicle_words import presets
-from jaxdamp.dampers import Bilinear
-from jaxdamp.export import from_json
+from jaxdamp.dampers import Bilinear, Linear
+from jaxdamp.export import from_json, to_json
 
 from .invoking import jaxdamp, refused
 
@@ -77,8 +77,10 @@ def test_fit_writes_laws_that_load_again(records: Path, tmp_path: Path) -> None:
 
 
 def test_fit_writes_tables_pictures_and_a_report(records: Path, tmp_path: Path) -> None:
-    out = tmp_path / "fit"
-    jaxdamp("fit", records, "--law", "linear", "--law", "bilinear", "--held-out", "10mm_4Hz", "--out", out)
+    out, old = tmp_path / "fit", tmp_path / "old.json"
+    to_json(Linear(2000.0), old)
+    words = ["--law", "linear", "--law", "bilinear", "--held-out", "10mm_4Hz", "--baseline", old]
+    jaxdamp("fit", records, *words, "--out", out)
     files = sorted(file.relative_to(out).as_posix() for file in out.rglob("*") if file.is_file())
     assert json.loads((out / "manifest.json").read_text())["files"] == [f for f in files if f != "manifest.json"] + [
         "manifest.json"
@@ -93,6 +95,7 @@ def test_fit_writes_tables_pictures_and_a_report(records: Path, tmp_path: Path) 
     assert float(_rows(out / "tables" / "parameters_bilinear.csv")[0]["value"]) == pytest.approx(2600.0, rel=2e-3)
     report = (out / "report.html").read_text(encoding="utf-8")
     assert report.count("data:image/png;base64,") == 4 and "held-out RMSE [N]" in report
+    assert "Baseline on the same records: RMSE " in report and f"<pre>jaxdamp fit {records} --law linear" in report
 
 
 def test_what_the_machine_adds_is_fitted_and_shown(records: Path, tmp_path: Path) -> None:

@@ -46,8 +46,11 @@ def test_the_demo_goes_through_the_whole_chain(tmp_path: Path, capsys: pytest.Ca
     fresh = list(csv.DictReader((out / "tables" / "tuned_on_fresh_roads.csv").read_text(encoding="utf-8").splitlines()))
     (held,) = [row for row in fresh if row["metric"] == comfort["metric"]]
     assert float(held["largest [%]"]) < -5.0
-    assert len(list(out.glob("*.png"))) == 8
-    assert (out / "report.html").read_text(encoding="utf-8").count("data:image/png") == 8
+    assert len(list(out.glob("*.png"))) == 9
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png") == 9
+    verdict = page.partition('<div class="verdict">')[2].partition("</div>")[0]
+    assert "standard errors off" in verdict and "fresh roads the body shakes less" in verdict
     for said in (
         "standard errors off",
         "of 2 fresh roads",

@@ -46,7 +46,9 @@ def test_odd_dampers_give_laws_tables_and_pictures(tmp_path: Path, name: str) ->
     assert sorted(path.stem for path in (out / "laws").iterdir()) == laws
     rows = (out / "best_law_force_velocity.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) > 100 and not any("nan" in row for row in rows if not row.startswith("#"))
-    assert (out / "report.html").read_text(encoding="utf-8").count("data:image/png") == 3
+    assert (
+        (out / "report.html").read_text(encoding="utf-8").count("data:image/png") == len(list(out.glob("*.png"))) >= 3
+    )
     assert not (out / "UNFINISHED.txt").exists()
 
 

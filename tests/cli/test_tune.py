@@ -32,17 +32,27 @@ def _toml(folder: Path, text: str) -> Path:
 
 def test_tune_writes_a_better_law(law: Path, tmp_path: Path) -> None:
     out = tmp_path / "tuned"
-    words = ["--start", law, "--minimise", "rms_sprung_acceleration", "--limit", "grip=1400,travel=0.02"]
+    words = [
+        "--start",
+        law,
+        "--minimise",
+        "rms_sprung_acceleration",
+        "--limit",
+        "grip=1400,travel=0.02",
+        "--baseline",
+        law,
+    ]
     text = jaxdamp("tune", "quarter_car_000", "white:C", *words, "--out", out).output
     assert "an optimum" in text
     assert float(from_json(out / "law.json").rate) == pytest.approx(BEST, rel=1e-4)
     assert float(from_json(out / "vehicle.json").damper.rate) == pytest.approx(BEST, rel=1e-4)
     rows = {row["metric"]: row for row in csv.DictReader((out / "metrics.csv").read_text().splitlines())}
     assert rows["rms_dynamic_tyre_load"]["note"] == "limit 1400" and float(rows["working_space_rms"]["after"]) < 0.02
+    assert "the change is from the baseline to the tuned vehicle" in (out / "report.html").read_text()
     assert json.loads((out / "tuning.json").read_text())["converged"] is True
     assert {file.name for file in out.iterdir()} == {
         "law.json", "vehicle.json", "parameters.csv", "metrics.csv", "tuning.json", "tuning.png", "report.html",
-        "manifest.json",
+        "baseline_damper.png", "manifest.json",
     }  # fmt: skip
 
 

@@ -1,15 +1,27 @@
 """Pages of fits, rides and tunings: what stands on them, without the command line."""
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from jaxdamp import bench, identify, roads, simulate, tune, vehicles
 from jaxdamp.bench import SineTest
 from jaxdamp.dampers import Bilinear, FittedRange, Linear, with_fitted_range
 from jaxdamp.identify import Comparison
-from jaxdamp.report import fit_report, ride_report, tuning_report
-from jaxdamp.simulation import Response
+from jaxdamp.report import (
+    baseline_table,
+    bench_report,
+    chain_report,
+    fit_report,
+    law_evaluation,
+    ride_report,
+    ride_verdict,
+    tuning_report,
+)
+from jaxdamp.simulation import Response, Ride
+from jaxdamp.tune import TuneResult
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +41,12 @@ def rides() -> dict[str, Response]:
         return {name: simulate(car, bump, duration=1.0, dt=0.002) for name, car in cars.items()}
 
 
+@pytest.fixture(scope="module")
+def tuned() -> TuneResult:
+    road = roads.white("C", 20.0)
+    return tune.minimise("rms_dynamic_tyre_load", vehicles.presets.quarter_car_000(), road)
+
+
 def test_a_page_on_fits(comparison: Comparison, tmp_path: Path) -> None:
     page = fit_report(comparison, remarks=["positive stroke is rebound"], folder=tmp_path).to_html()
     assert sorted(path.name for path in tmp_path.iterdir()) == [
@@ -40,16 +58,61 @@ def test_a_page_on_fits(comparison: Comparison, tmp_path: Path) -> None:
     assert page.count("data:image/png") == 4 and "could not be made" not in page
     for table in (comparison.table(), comparison["linear"].table(title="Parameters of linear")):
         assert table.to_html() in page
+    body = page.partition("</nav>")[2]
     order = [
-        "Records",
+        *comparison.verdict,
+        ">Records</h2>",
         "<li>positive stroke is rebound",
-        "How good the laws are",
-        "The best law: bilinear",
-        "<h2>linear",
+        ">How good the laws are",
+        ">The best law: bilinear",
+        ">linear</h2>",
     ]
-    places = [page.index(text) for text in order]
+    places = [body.index(text) for text in order]
     assert places == sorted(places)
-    assert all(sentence in page for sentence in comparison.verdict)
+
+
+def test_a_page_on_fits_beside_a_baseline(comparison: Comparison) -> None:
+    stiffer = Bilinear(2.0 * 2600.0, 2.0 * 1200.0)
+    found = bench.preflight(comparison.best.result.runs)
+    page = fit_report(comparison, baseline=stiffer, preflight=found)
+    html = page.to_html()
+    assert not page.attempts.troubles and f"<p>{found.summary()}.</p>" in html
+    (run,) = comparison.held_out
+    share = np.sqrt(np.mean(run.force**2))  # the error of twice the force is the force
+    rmse = float(re.findall(r"Baseline on the same records: RMSE ([\d.]+) N", html)[0])
+    assert rmse == pytest.approx(share, rel=0.01)
+
+
+def test_a_page_on_records_beside_a_law(comparison: Comparison) -> None:
+    runs = comparison.best.result.runs
+    evaluation = bench.evaluate(runs, velocities=[0.1])
+    limits = evaluation.check([bench.Limit("rebound force", 250.0, 270.0, velocity=0.1), bench.Limit("friction", 90.0)])
+    law = Bilinear(2600.0, 2400.0)
+    report = bench_report(evaluation, bench.preflight(runs), limits, baseline=law)
+    html = report.to_html()
+    assert not report.attempts.troubles
+    assert "<p>Limits: 1 of 2 are kept: NOT PASSED.</p>" in html
+    assert re.search(r"<p>At 0.1 m/s: 260(\.\d)? ± [\d.]+ N in rebound and -1(19|20)", html)
+    rows = {row["quantity"]: row for row in baseline_table(evaluation, law_evaluation(law, evaluation)).records()}
+    changes = [rows[f"{side} force at 0.1 m/s"]["change"] for side in ("rebound", "compression")]
+    assert changes == pytest.approx([0.0, -50.0], abs=0.5)
+
+
+def test_a_page_on_the_whole_chain(comparison: Comparison, rides: dict[str, Response], tuned: TuneResult) -> None:
+    runs = comparison.best.result.runs
+    evaluation, found = bench.evaluate(runs), bench.preflight(runs)
+    page = chain_report(comparison, {"a bump": rides}, tuned, evaluation=evaluation, preflight=found)
+    html = page.to_html()
+    assert not page.attempts.troubles
+    verdict = html.partition('<div class="verdict">')[2].partition("</div>")[0]
+    for sentence in (found.summary(), *comparison.verdict, *ride_verdict(rides), tuned.summary.replace(">", "&gt;")):
+        assert sentence in verdict
+    sections = re.findall(r'<h2 id="\d+">(.*?)</h2>', html)
+    assert sections == [
+        *(("Records", "Preflight") if found.findings else ("Records",)),
+        *("Evaluation", "How good the laws are", "The best law: bilinear"),
+        *("Ride: a bump", "A better damper", "linear"),
+    ]
 
 
 def test_a_page_on_one_ride_or_several(rides: dict[str, Response], tmp_path: Path) -> None:
@@ -62,13 +125,33 @@ def test_a_page_on_one_ride_or_several(rides: dict[str, Response], tmp_path: Pat
     assert alone.count("data:image/png") == 2 and "Use of the dampers" not in alone and "change [%]" not in alone
 
 
-def test_a_page_on_a_tuning(rides: dict[str, Response]) -> None:
+def test_rides_in_words(rides: dict[str, Response]) -> None:
+    (sentence,) = ride_verdict(rides)
+    soft, firm = (float(run.metrics()["rms_dynamic_tyre_load"]) for run in rides.values())
+    assert sentence.startswith("firm against soft: weighted RMS of the body acceleration ")
+    assert sentence.endswith(f"RMS of the dynamic tyre load {100 * (firm / soft - 1):+.1f} %.")
+    (alone,) = ride_verdict({"soft": rides["soft"]})
+    assert f"tyre load {soft:.3g} N. ISO 2631-1 calls such an acceleration" in alone
+
+
+def test_a_page_on_a_tuning_beside_another_vehicle(tuned: TuneResult) -> None:
+    other = vehicles.presets.quarter_car_000(Linear(900.0))
+    html = tuning_report(tuned, baseline=other).to_html()
+    assert "could not be made" not in html and html.count("data:image/png") == 2
+    rows = html.partition("the change is from the baseline to the tuned vehicle")[2].partition("</table>")[0]
+    values = dict(re.findall(r"<td>(rms_dynamic_tyre_load)</td><td>N</td><td class=\"number\">([\d.]+)</td>", rows))
     road = roads.white("C", 20.0)
-    result = tune.minimise("rms_dynamic_tyre_load", vehicles.presets.quarter_car_000(), road)
+    expected = float(Ride(other, road, metrics=["rms_dynamic_tyre_load"])()["rms_dynamic_tyre_load"])
+    assert float(values["rms_dynamic_tyre_load"]) == pytest.approx(expected, rel=1e-3)
+    with pytest.raises(ValueError, match="QuarterCar"):
+        tuning_report(tuned, baseline=vehicles.presets.half_car_002())
+
+
+def test_a_page_on_a_tuning(rides: dict[str, Response], tuned: TuneResult) -> None:
     bump = roads.cosine_bump(0.05, start=0.1, duration=0.2)
-    fresh = tune.rescore(result, [bump], duration=1.0, dt=0.002)
-    page = tuning_report(result, rescored=fresh, rides=rides).to_html()
+    fresh = tune.rescore(tuned, [bump], duration=1.0, dt=0.002)
+    page = tuning_report(tuned, rescored=fresh, rides=rides).to_html()
     assert page.count("data:image/png") == 2 and "could not be made" not in page
-    tables = (result.table(), result.parameter_table(), fresh.table())
+    tables = (tuned.table(), tuned.parameter_table(), fresh.table())
     assert all(table.to_html() in page for table in tables)
     assert fresh.summary in page and "not an optimum" not in page

@@ -59,7 +59,11 @@ class Limit:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class LimitCheck:
-    """Measurements beside their limits."""
+    """Measurements beside their limits.
+
+    Attributes:
+        results: each limit with a measurement that it holds for; None where nothing was measured.
+    """
 
     results: tuple[tuple[Limit, Measurement | None], ...]
 
@@ -109,6 +113,9 @@ def read_limits(path: str | os.PathLike[str]) -> tuple[Limit, ...]:
     """Limits from a CSV file with the columns quantity, minimum, maximum and, as needed, velocity, setting, record.
 
     Values are in SI with the library's signs: compression and gas forces are negative. An empty cell is no limit.
+
+    Arguments:
+        path: of the file.
 
     Raises:
         ValueError: naming file, line and column.

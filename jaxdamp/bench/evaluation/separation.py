@@ -43,6 +43,7 @@ class GasAndFriction:
         record: the name of the record.
         velocities: the range of velocities that was used [m/s].
         note: what the friction still contains; empty if nothing.
+        middle: the stroke that the gas force belongs to [m].
     """
 
     measurements: tuple[Measurement, ...]

@@ -1,0 +1,40 @@
+"""A statement of a paper with its verdict, a row of the table "paper against jaxdamp"."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+
+REPRODUCED, CORRECTED, OPEN = "reproduced", "corrected", "not reproducible"
+
+
+class Statement(NamedTuple):
+    """A statement of a paper.
+
+    Arguments:
+        place: equation, table, figure or section.
+        statement: what the paper says.
+        verdict: `REPRODUCED`, `CORRECTED` or `OPEN`.
+        comment: how it is reproduced, why it is corrected, or what is missing.
+        printed: the number in the paper, if it is one.
+        computed: the number of jaxdamp.
+        tolerance: largest relative difference of a reproduced number.
+        unit: of both numbers.
+    """
+
+    place: str
+    statement: str
+    verdict: str
+    comment: str
+    printed: float | None = None
+    computed: Callable[[], float] | None = None
+    tolerance: float = 0.01
+    unit: str = ""
+
+    def row(self) -> str:
+        """The row of the table, with the numbers beside each other."""
+        numbers = ""
+        if self.computed is not None:
+            numbers = f"{self.computed():.4g} {self.unit}".strip()
+            if self.printed is not None:
+                numbers += f" (printed {self.printed:.4g})"
+        return f"| {self.place} | {self.statement} | {numbers} | {self.verdict} | {self.comment} |"

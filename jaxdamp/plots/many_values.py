@@ -1,0 +1,112 @@
+"""Numbers with their spread: one law fitted to many dampers, posteriors, targets, a tuning on other roads."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from jaxdamp.identify import ManyFits, Posterior, TargetFit
+from jaxdamp.plots import _style
+from jaxdamp.tune import Rescore
+
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+
+
+_COLUMNS = 3  # of panels
+_BINS = 30
+
+
+def many_fits(result: ManyFits) -> "matplotlib.figure.Figure":
+    """The parameters of each damper with their 95 % intervals, and the error of each damper.
+
+    Over the setting of the dampers, if it is stated, otherwise in their order. Intervals without an end are left out.
+
+    Arguments:
+        result: of `identify.fit_many`.
+    """
+    places = np.arange(len(result.names), dtype=float) if result.settings is None else np.asarray(result.settings)
+    label = "damper" if result.settings is None else "setting"
+    figure, panels = _panels(len(result.parameters) + 1)
+    units = [owner.unit for owner in result.free.owners]
+    for number, (axes, name) in enumerate(zip(panels, result.parameters, strict=False)):
+        error = 1.96 * result.standard_errors[:, number]
+        error = np.where(np.isfinite(error), error, np.nan)
+        axes.errorbar(
+            places, result.values[:, number], error, fmt="o", color=_style.COLOURS[0], markersize=4, capsize=2
+        )
+        _style.dress(axes, label, f"[{units[number] or '–'}]", name)
+    panels[-1].plot(places, result.rmse, "o", color=_style.COLOURS[1], markersize=4)
+    _style.dress(panels[-1], label, "[N]", "root of the mean squared force error")
+    if result.settings is None:
+        for axes in panels:
+            axes.set_xticks(places, result.names, rotation=30, ha="right")
+    figure.suptitle(f"{len(result.names)} dampers, with 95 % intervals")
+    return figure
+
+
+def posterior(result: Posterior) -> "matplotlib.figure.Figure":
+    """Histograms of the samples of every number, with the mean and the 95 % interval.
+
+    Arguments:
+        result: of `FitResult.posterior`.
+    """
+    figure, panels = _panels(len(result.parameters))
+    for axes, own, samples in zip(panels, result.parameters, result.samples.T, strict=True):
+        axes.hist(samples, _BINS, color=_style.COLOURS[0], alpha=0.6)
+        axes.axvline(own.mean, color=_style.BLACK, linewidth=1.2)
+        for end in own.interval:
+            axes.axvline(end, color=_style.BLACK, linewidth=0.9, linestyle="--")
+        _style.dress(axes, f"{own.name} [{own.unit or '–'}]", "samples", f"r hat {own.r_hat:.3f}")
+    figure.suptitle(f"Posterior from {len(result.samples)} samples: mean and 95 % interval")
+    return figure
+
+
+def targets(result: TargetFit) -> "matplotlib.figure.Figure":
+    """The distance of each value from its target, in tolerances; the shaded values meet it.
+
+    Arguments:
+        result: of `identify.fit_targets`.
+    """
+    rows = np.arange(len(result.targets), dtype=float)
+    figure = _style.new_figure(8.0, 1.6 + 0.35 * len(rows))
+    axes = figure.subplots()
+    axes.axvspan(-1.0, 1.0, color=_style.SHADE, zorder=0)
+    axes.plot([met.deviation for met in result.targets], rows, "o", color=_style.COLOURS[0])
+    axes.set_yticks(rows, [f"{t.name}: {_style.short(t.value)} for {_style.short(t.target)}" for t in result.targets])
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    _style.dress(axes, "distance from the target [tolerances]", "", "Reached and wanted")
+    _style.cross(axes, horizontal=False)
+    return figure
+
+
+def rescore(result: Rescore) -> "matplotlib.figure.Figure":
+    """The change of each ride metric by the tuning on each of the other roads, and its mean.
+
+    Metrics that are zero or negative on a road are left out, since they have no change in percent.
+
+    Arguments:
+        result: of `tune.rescore`.
+    """
+    names = [name for name, before in result.before.items() if np.all(before > 0)]
+    rows = np.arange(len(names), dtype=float)
+    figure = _style.new_figure(8.5, 1.6 + 0.35 * len(names))
+    axes = figure.subplots()
+    changes = [100.0 * result.change(name) for name in names]
+    dots = axes.plot(np.concatenate(changes), np.repeat(rows, result.roads), "o", alpha=0.5, label="a road")
+    means = axes.plot([c.mean() for c in changes], rows, "|", color=_style.BLACK, markersize=14, label="mean")
+    axes.set_yticks(rows, [n.replace("_", " ") + " (minimised)" * (n == result.metric) for n in names])
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    _style.dress(axes, "change by the tuning [%]", "", f"Ride metrics on {result.roads} other roads")
+    _style.cross(axes, horizontal=False)
+    _style.legend_beside(figure, [*dots, *means])
+    return figure
+
+
+def _panels(count: int) -> tuple["matplotlib.figure.Figure", list["matplotlib.axes.Axes"]]:
+    """So many panels, three in a row."""
+    rows = -(-count // _COLUMNS)
+    figure = _style.new_figure(12.0, 0.6 + 2.8 * rows)
+    grid = figure.add_gridspec(rows, _COLUMNS)
+    return figure, [figure.add_subplot(grid[i // _COLUMNS, i % _COLUMNS]) for i in range(count)]

@@ -1,0 +1,81 @@
+"""A page on the whole chain: records, laws, rides on the best law, a tuning."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from jaxdamp.bench import BenchRun, Evaluation, Preflight
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify import Comparison
+from jaxdamp.report.attempts import Attempts
+from jaxdamp.report.benches import add_evaluation, bench_verdict
+from jaxdamp.report.fits import add_fits, add_other_fits, fit_verdict
+from jaxdamp.report.page import Report
+from jaxdamp.report.records import add_records
+from jaxdamp.report.rides import add_rides, notes_of, ride_verdict
+from jaxdamp.report.tunings import add_tuning
+from jaxdamp.simulation import Response
+from jaxdamp.tune import TuneResult
+
+
+def chain_report(
+    comparison: Comparison,
+    rides: Mapping[str, Mapping[str, Response]],
+    tuned: TuneResult[Any] | None = None,
+    *,
+    title: str = "From bench records to a better damper",
+    evaluation: Evaluation | None = None,
+    preflight: Preflight | None = None,
+    runs: Sequence[BenchRun] | None = None,
+    remarks: Sequence[str] = (),
+    baseline: AbstractDamper | None = None,
+    folder: Path | None = None,
+    attempts: Attempts | None = None,
+) -> Report:
+    """A page on records, the laws fitted to them, rides on these laws, and a tuning.
+
+    Arguments:
+        comparison: the fits, of `identify.compare`.
+        rides: for each road, by its title, the responses by name; the first is compared with the others.
+        tuned: of `tune.minimise`.
+        title: of the page.
+        evaluation: of `bench.evaluate`.
+        preflight: of `bench.preflight`.
+        runs: the records in the order of the page; the fitted ones and those held out, if left out.
+        remarks: on the records.
+        baseline: another law, drawn over the curves and scored on the same records.
+        folder: folder for the pictures as separate files; without it they are only in the page.
+        attempts: collects parts that fail; a new one if left out.
+
+    >>> from jaxdamp import bench, identify, report, roads, simulate, tune, vehicles
+    >>> from jaxdamp.dampers import Bilinear
+    >>> runs = bench.VirtualDyno(Bilinear(2600.0, 1200.0), force_noise=5.0).run(bench.SineTest(0.05, 4.0))
+    >>> comparison = identify.compare({"bilinear": Bilinear}, runs)
+    >>> car = vehicles.presets.quarter_car_000(comparison.best.result.law)
+    >>> ride = simulate(car, roads.cosine_bump(0.05, start=0.2, duration=0.25), duration=1.0)
+    >>> tuned = tune.minimise("rms_dynamic_tyre_load", car, roads.white("C", 20.0), over=["damper.*"])
+    >>> page = report.chain_report(comparison, {"a bump": {"bilinear": ride}}, tuned)  # page.write("chain.html")
+    >>> tuned.summary.replace(">", "&gt;") in page.to_html()
+    True
+    """
+    report = Report(title, folder, attempts)
+    report.verdict(
+        *(bench_verdict(evaluation, preflight) if evaluation else []),
+        *fit_verdict(report, comparison, baseline),
+        *(f"{road}: {sentence}" for road, ride in rides.items() for sentence in ride_verdict(ride)),
+        *([tuned.summary] if tuned else []),
+    )
+    records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
+    add_records(report, records, comparison.held_out, remarks, preflight)
+    if evaluation is not None:
+        add_evaluation(report, evaluation)
+    add_fits(report, comparison, baseline=baseline, others=False)
+    for number, (road, ride) in enumerate(rides.items(), 1):
+        report.heading(f"Ride: {road}")
+        report.points(notes_of(ride))
+        add_rides(report, ride, road, f"ride_{number}_")
+    if tuned is not None:
+        report.heading("A better damper")
+        add_tuning(report, tuned)
+    add_other_fits(report, comparison)
+    return report

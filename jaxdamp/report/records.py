@@ -1,0 +1,52 @@
+"""The section of a page on the records: what they are, what was done to them, what is odd about them."""
+
+from collections.abc import Sequence
+
+from jaxdamp._tables import Cell, Column, Table
+from jaxdamp.bench import BenchRun, Preflight
+from jaxdamp.report.page import Report
+
+
+def add_records(
+    report: Report,
+    runs: Sequence[BenchRun],
+    held_out: Sequence[BenchRun] = (),
+    remarks: Sequence[str] = (),
+    preflight: Preflight | None = None,
+) -> None:
+    """The section of a page on bench records.
+
+    Arguments:
+        report: the page.
+        runs: the records.
+        held_out: those of them that are not fitted.
+        remarks: what was done to the records when they were read, in words.
+        preflight: of `bench.preflight`.
+    """
+    report.heading("Records")
+    report.table(records_table(runs, held_out))
+    report.points(remarks)
+    if preflight is not None and preflight.findings:
+        report.heading("Preflight")
+        report.picture(preflight.plot, "What was found in which record", "preflight.png")
+        report.points(preflight.sentences())
+
+
+def records_table(runs: Sequence[BenchRun], held_out: Sequence[BenchRun] = ()) -> Table:
+    """Records with their figures, and which of them are held out.
+
+    Arguments:
+        runs: the records.
+        held_out: those of them that are not fitted.
+    """
+    columns = [Column("record"), Column("rate", "Hz"), Column("motion", "Hz", ".3g"), Column("0-peak", "mm", ".3g")]
+    columns += [Column("peak velocity", "m/s", ".3g"), Column("least force", "N", ".0f")]
+    columns += [Column("largest force", "N", ".0f"), Column("work per cycle", "J", ".3g"), Column("cycles")]
+    columns += [Column("use")] if held_out else []
+    names = {run.name for run in held_out}
+    rows: list[tuple[Cell, ...]] = []
+    for run in runs:
+        row: tuple[Cell, ...] = (run.name, run.sampling_rate, run.frequency, 1e3 * run.amplitude, run.peak_velocity)
+        row += (float(run.force.min()), float(run.force.max()), run.work_per_cycle, run.cycles)
+        rows.append(row + ("held out" if run.name in names else "fitted",) * bool(held_out))
+    return Table("Records (stroke and velocity positive in rebound)", tuple(columns), tuple(rows))
