@@ -90,6 +90,9 @@ def run_fit(
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
         scheduled = group_by is None and len({run.command for run in runs}) > 1
+        if scheduled and cross_validate:
+            remedy = "Records at each inner command are predicted without them anyway; --group-by command fits apart."
+            _checks.refuse("cross-validate", "be left out where the records state several commands", "given", remedy)
         job = FitJob(
             screen, names, weighting, machine, scheduled, results, attempts, found, remarks, cross_validate, beside
         )

@@ -11,8 +11,15 @@ from typer.core import TyperGroup
 _typed: list[str] = []  # the command that is running, as it was typed
 
 
+ORDER = ("demo", "bench", "fit", "fit-vehicle", "ride", "tune", "sweep", "explore", "export", "laws", "vehicles")
+
+
 class Commands(TyperGroup):
-    """All commands; keeps the words that they were called with, for the last lines of a page."""
+    """All commands, along the chain from records to a damper; keeps the words typed, for the last lines of a page."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """The names in the order of the help."""
+        return [name for name in ORDER if name in self.commands]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the words after the name of the program."""

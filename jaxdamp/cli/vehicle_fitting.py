@@ -68,7 +68,7 @@ def run_fit_vehicle(
             results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
             page = vehicle_fit_report(result, remarks=remarks, folder=results.draft, attempts=attempts)
-            page.write(results.draft / "report.html")
+            page.write(results.draft / "report.html", command_line())
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
     return result

@@ -44,6 +44,7 @@ def prepare(
         per_record: as in `fit`.
         weighting: as in `fit`.
         priors: as in `fit`.
+        initial_state: as in `fit`.
         samples_per_cycle: as in `fit`.
 
     Returns:

@@ -238,6 +238,7 @@ def march(
         velocity: [m/s], shape (time,).
         substeps: steps from one instant to the next.
         temperature: [K], shape (time,), for laws that depend on one; within a step it is the mean of both ends.
+        state: of the law at the first instant; its own initial state if left out.
     """
     warm = None if temperature is None or not law.traits().temperature_dependent else temperature
 

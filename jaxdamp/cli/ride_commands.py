@@ -1,0 +1,133 @@
+"""Commands that drive vehicles: ride, tune, sweep."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from jaxdamp.cli.application import app
+from jaxdamp.cli.option_types import (
+    Baseline,
+    Debug,
+    Duration,
+    Replace,
+    Road,
+    Seed,
+    Speed,
+    Start,
+    Step,
+    Vehicle,
+)
+
+
+@app.command()
+def ride(
+    law: Annotated[Path, typer.Argument(help="A law as JSON, such as best_law.json of jaxdamp fit.")],
+    vehicle: Annotated[
+        str, typer.Option(help='A published vehicle, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.')
+    ] = "quarter_car_000",
+    road: Annotated[
+        str, typer.Option(help="iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.")
+    ] = "iso:C",
+    speed: Annotated[float, typer.Option(help="Of the vehicle [m/s].")] = 20.0,
+    baseline: Baseline = None,
+    duration: Annotated[float | None, typer.Option(help="Of the ride [s]; the road's own, or 10.")] = None,
+    dt: Annotated[
+        float, typer.Option(help="Step [s]; 1 ms is right for cars, a coarse one is warned of or refused.")
+    ] = 1e-3,
+    seed: Annotated[int, typer.Option(help="Of a random road.")] = 0,
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-ride"),
+    replace: Replace = False,
+    debug: Debug = False,
+) -> None:
+    """Ride on a law: metrics, comfort by ISO 2631-1 and pictures, beside a baseline.
+
+    The law is at every damper of the vehicle.
+    """
+    from jaxdamp.cli import console, riding
+
+    with console.plain_errors(debug):
+        console.prepare()
+        options = {"vehicle": vehicle, "road": road, "speed": speed, "duration": duration, "dt": dt, "seed": seed}
+        riding.run_ride(console.Screen(), law, baseline=baseline, out=out, replace=replace, **options)
+
+
+@app.command(name="tune")
+def tune_command(
+    vehicle: Vehicle,
+    road: Road,
+    start: Start = None,
+    minimise: Annotated[str, typer.Option(help="comfort, travel, grip, or the name of a ride metric.")] = "comfort",
+    limit: Annotated[list[str], typer.Option(help="Hard limits [SI]: travel=0.1,grip=900, or NAME=LOWER:UPPER.")] = [],  # noqa: B006
+    over: Annotated[
+        list[str], typer.Option(help='Parameters to tune, by path or pattern, such as "damper.*_rate".')
+    ] = ["*damper*"],  # noqa: B006
+    freeze: Annotated[list[str], typer.Option(help="Parameters among these to hold.")] = [],  # noqa: B006
+    bound: Annotated[
+        list[str], typer.Option(help="Bounds: rate=1000:4000; a third to three times the start if left out.")
+    ] = [],  # noqa: B006
+    tie: Annotated[
+        list[str], typer.Option(help="Parameters with the value of others: front.damper.*=rear.damper.*")
+    ] = [],  # noqa: B006
+    roads: Annotated[
+        int, typer.Option(help="Realisations of an iso road, driven side by side; their mean counts.")
+    ] = 1,
+    starts: Annotated[int, typer.Option(help="Searches side by side, from inside the bounds.")] = 1,
+    max_steps: Annotated[int, typer.Option(help="Of the search.")] = 100,
+    baseline: Annotated[
+        Path | None, typer.Option(help="To compare with: another law, or another tuning's vehicle.json, as JSON.")
+    ] = None,
+    speed: Speed = 20.0,
+    duration: Duration = None,
+    dt: Step = 1e-3,
+    seed: Seed = 0,
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-tune"),
+    replace: Replace = False,
+    debug: Debug = False,
+) -> None:
+    """Tune the dampers of a vehicle for a ride metric within limits.
+
+    Writes the law, the vehicle, tables, pictures and a page. Ends with exit code 1 if a limit is not met.
+    """
+    from jaxdamp.cli import console, tuning
+
+    with console.plain_errors(debug):
+        console.prepare()
+        result = tuning.run_tune(
+            console.Screen(),
+            tuning.RoadOptions(vehicle, road, start, speed, duration, dt, seed),
+            tuning.TuneOptions(
+                minimise, tuple(limit), tuple(over), tuple(freeze), tuple(bound), tuple(tie), roads, starts, max_steps
+            ),
+            baseline=baseline,
+            out=out,
+            replace=replace,
+        )
+    if not tuning.meets_limits(result):
+        raise typer.Exit(1)
+
+
+@app.command(name="sweep")
+def sweep_command(
+    vehicle: Vehicle,
+    road: Road,
+    over: Annotated[list[str], typer.Option(help="Axes: damper.rate=1000:8000:15 or sprung_mass=1000;1200.")],
+    start: Start = None,
+    metric: Annotated[
+        str, typer.Option(help="comfort, travel, grip, or names of ride metrics.")
+    ] = "comfort,travel,grip",
+    speed: Speed = 20.0,
+    duration: Duration = None,
+    dt: Step = 1e-3,
+    seed: Seed = 0,
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-sweep"),
+    replace: Replace = False,
+    debug: Debug = False,
+) -> None:
+    """Compute ride metrics over a grid of parameters: curves, maps and a table."""
+    from jaxdamp.cli import console, tuning
+
+    with console.plain_errors(debug):
+        console.prepare()
+        on = tuning.RoadOptions(vehicle, road, start, speed, duration, dt, seed)
+        tuning.run_sweep(console.Screen(), on, over=over, metrics=metric, out=out, replace=replace)
