@@ -22,6 +22,10 @@ MAPS = Path("/proc/self/maps")
 MOST_MAPS = 30_000  # Linux allows a process 65 530, and every compiled program takes a few
 
 
+# Traced programs are millions of objects, and looking through all of them for cycles takes seconds each time.
+gc.set_threshold(100_000, 20, 100)
+
+
 @pytest.fixture(scope="module", autouse=True)
 def few_programs() -> Iterator[None]:
     """Forget compiled programs before there are so many that the next one crashes the process."""

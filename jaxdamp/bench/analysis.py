@@ -90,7 +90,11 @@ def last_steady_cycle(run: BenchRun) -> slice:
 
 
 def moving_part(run: BenchRun) -> slice:
-    """The samples of the motion, without the rest before and after it, which `process(moving=True)` cuts off."""
+    """The samples of the motion, without the rest before and after it, which `process(moving=True)` cuts off.
+
+    Arguments:
+        run: a record.
+    """
     first, last = moving_span(run.time, run.stroke)
     return slice(first, last + 1)
 

@@ -20,8 +20,8 @@ from jaxdamp.bench.sampling import FEWEST
 from jaxdamp.bench.sensors import Sensors, described
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.velocity import estimate_velocity
-from jaxdamp.dampers import AbstractDamper, require_finite_force
-from jaxdamp.parameters import parameters
+from jaxdamp.dampers import AbstractDamper, Heated, require_finite_force
+from jaxdamp.parameters import modules_inside, parameters
 from jaxdamp.rig import Rig
 
 
@@ -83,6 +83,11 @@ class VirtualDyno:
     ) -> None:
         check_module("law", law, (AbstractDamper,), "VirtualDyno(law, force_noise=20.0)")
         rig, sensors = rig or Rig(), sensors or Sensors()
+        if temperature_channel and any(isinstance(inside, Heated) for _, inside in modules_inside(law)):
+            remedy = (
+                "Leave the channel out, or let the machine heat a law without heat: VirtualDyno(law, rig=Rig(...))."
+            )
+            _checks.refuse("temperature_channel", "be False for a law with its own heat", repr(law), remedy)
         check_module("rig", rig, (Rig,), "VirtualDyno(law, rig=Rig(gas_force=-100.0))")
         _checks.instance("sensors", sensors, Sensors, "be sensors", "Write `bench.Sensors(force_noise=5.0)`.")
         _checks.positive("sampling_rate", sampling_rate)

@@ -52,6 +52,7 @@ class CrossValidation:
 
     Attributes:
         folds: for each law and each record held out the fit and its errors.
+        inner: of a nested choice, the same for the records that remain when one is held out.
     """
 
     folds: tuple[Fold, ...]

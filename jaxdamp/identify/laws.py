@@ -11,11 +11,12 @@ class NamedLaw(NamedTuple):
     Attributes:
         hysteresis: whether the law has states.
         meaning: of the law, in words.
+        optional: fitted only where it is asked for by name.
     """
 
     hysteresis: bool
     meaning: str
-    optional: bool = False  # fitted only where it is asked for by name
+    optional: bool = False
 
 
 NAMED_LAWS = {

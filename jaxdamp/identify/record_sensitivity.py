@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -17,6 +17,10 @@ from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
 
 
 GAIN, OFFSET = 0.01, 10.0  # changes of the force that tables state: 1 %, 10 N
@@ -68,6 +72,12 @@ class RecordSensitivity:
     def to_dict(self) -> dict[str, Any]:
         """All derivatives as plain data, ready for JSON; numbers that are not finite are None."""
         return plain({field.name: getattr(self, field.name) for field in dataclasses.fields(self)})
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """See `jaxdamp.plots.record_sensitivity`."""
+        from jaxdamp import plots
+
+        return plots.record_sensitivity(self)
 
     def __repr__(self) -> str:
         return "\n".join([self.table().to_text(), *(f"warning: {warning}" for warning in self.warnings)])

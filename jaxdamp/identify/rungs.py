@@ -21,6 +21,8 @@ class Rung(NamedTuple):
         held_out_fit_percent: on the records held out [%]; None if there are none.
         held_out_rmse: on the records held out [N]; None if there are none.
         result: the fit.
+        scores: on the held-out records one by one, or on the fitted ones if there are none.
+        by_setting: the fit whose parameters are functions of the command, where there is one.
     """
 
     name: str
@@ -30,8 +32,8 @@ class Rung(NamedTuple):
     held_out_fit_percent: float | None
     held_out_rmse: float | None  # N
     result: FitResult
-    scores: tuple[Score, ...]  # on the held-out records one by one, or on the fitted ones if there are none
-    by_setting: ScheduledFit | None = None  # where the parameters are functions of the command
+    scores: tuple[Score, ...]
+    by_setting: ScheduledFit | None = None
 
     @property
     def error(self) -> float:

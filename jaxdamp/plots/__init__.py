@@ -22,7 +22,7 @@ from jaxdamp.plots.profiles import profile
 from jaxdamp.plots.records import records
 from jaxdamp.plots.rides import ride
 from jaxdamp.plots.roughness import roughness_by_segment, roughness_spectrum
-from jaxdamp.plots.sensitivities import sensitivity
+from jaxdamp.plots.sensitivities import record_sensitivity, sensitivity
 from jaxdamp.plots.sweeps import sweep
 from jaxdamp.plots.validation import cross_validation
 from jaxdamp.plots.valve_choice import valving
@@ -46,6 +46,7 @@ __all__ = [
     "posterior",
     "preflight",
     "profile",
+    "record_sensitivity",
     "records",
     "rescore",
     "ride",

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp.identify import RecordSensitivity
 from jaxdamp.plots import _style
 from jaxdamp.tune import Sensitivity
 
@@ -45,6 +46,27 @@ def sensitivity(result: Sensitivity, *, most: int = MOST) -> "matplotlib.figure.
         _style.dress(axes, "change for +1 % [%]", "", metric.replace("_", " "))
         axes.grid(False, axis="y")
         _style.cross(axes, horizontal=False)
+    return figure
+
+
+def record_sensitivity(result: RecordSensitivity) -> "matplotlib.figure.Figure":
+    """What follows from a fit, by the measured force: how it changes for 10 N more at each sample, over the velocity.
+
+    Arguments:
+        result: of `FitResult.sensitivity_to_records`.
+    """
+    remedy = "The call is `plots.record_sensitivity(result.sensitivity_to_records(function))`."
+    _checks.instance("result", result, RecordSensitivity, "be the result of `sensitivity_to_records`", remedy)
+    figure = _style.new_figure(5.2 * len(result.values), 3.8)
+    for column, name in enumerate(result.values):
+        axes = figure.add_subplot(1, len(result.values), column + 1)
+        for number, (record, slopes) in enumerate(zip(result.records, result.by_sample[name], strict=True)):
+            colour = _style.COLOURS[number % len(_style.COLOURS)]
+            axes.plot(result.velocity[number], 10.0 * slopes, ".", ms=2.5, color=colour, label=record)
+        _style.dress(axes, "velocity, rebound positive [m/s]", "change for 10 N more in one sample", name)
+        _style.cross(axes)
+        if column == 0 and len(result.records) <= MOST:
+            axes.legend()
     return figure
 
 

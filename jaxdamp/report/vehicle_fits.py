@@ -78,7 +78,11 @@ def vehicle_fit_report(
 
 
 def ride_records_table(records: Sequence[RideRecord]) -> Table:
-    """Records of a vehicle with their length, rate, input and channels."""
+    """Records of a vehicle with their length, rate, input and channels.
+
+    Arguments:
+        records: of `bench.read_rides`, or virtual ones.
+    """
     columns = [Column("record"), Column("length", "s", ".4g"), Column("rate", "Hz", ".6g"), Column("wheels")]
     columns += [Column("moved by"), Column("measured")]
     rows = []

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from jaxdamp.bench import RandomTest, Sensors, SineTest, VirtualDyno, programmes, read
-from jaxdamp.dampers import Bilinear, Lag, Linear, SeriesSpring
+from jaxdamp.dampers import Bilinear, Heated, Lag, Linear, SeriesSpring
 from jaxdamp.rig import Rig
 
 
@@ -241,6 +241,12 @@ def test_bad_settings(argument, value):
 def test_an_unknown_setting_is_named():
     with pytest.raises(TypeError, match=r"no argument 'force_limits'.* Did you mean 'force_limit'\?"):
         VirtualDyno(Linear(2000.0), force_limits=100.0)
+
+
+def test_the_temperature_of_a_law_that_heats_itself_is_not_that_of_the_machine():
+    law = Heated(Linear(1500.0))
+    with pytest.raises(ValueError, match="temperature_channel"):
+        VirtualDyno(law, temperature_channel=True)
 
 
 def test_bad_programmes():
