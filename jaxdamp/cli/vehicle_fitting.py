@@ -13,6 +13,7 @@ from jaxdamp.bench import BenchSet, RideRecord
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.metric_words import pairs, span
+from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.options import decisions
 from jaxdamp.cli.results import another_page, results_folder
 from jaxdamp.cli.vehicle_fit_options import RideReadOptions, VehicleFitOptions, listed, numbers_of

@@ -109,10 +109,9 @@ def test_a_second_run_replaces_nothing_unasked(files: dict[str, Path], fitted: t
 def test_bench_records_guides_and_two_records_in_one_fit(files: dict[str, Path], tmp_path: Path) -> None:
     rig = vehicles.Guided(CAR, (vehicles.Guide(CoulombFriction(40.0, 0.01)),))
     sweep = roads.sweep_sine(0.7, 12.0, duration=3.0, velocity_amplitude=0.15)
-    how: dict[str, Any] = {"sampling_rate": 250.0, "finer": 4}
     names = {"a": 250.0, "b": 200.0}
     for name, rate in names.items():
-        made = identify.virtual_ride(rig, sweep, NOISE, name=name, **(how | {"sampling_rate": rate}))
+        made = identify.virtual_ride(rig, sweep, NOISE, name=name, sampling_rate=rate, finer=4)
         made.to_csv(tmp_path / f"{name}.csv")
     dyno = bench.VirtualDyno(CAR.damper, force_noise=10.0, gas_force=-80.0, sampling_rate=200.0)
     dyno.run([bench.SineTest(0.02, 1.0), bench.SineTest(0.02, 3.0)]).write(tmp_path / "bench")

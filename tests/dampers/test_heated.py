@@ -64,7 +64,7 @@ def test_a_fit_takes_the_temperature_channel_of_the_records():
     heat = Rig(temperature_slope=0.002, heating=0.03, cooling=1 / 300)
     dyno = bench.VirtualDyno(Bilinear(2600.0, 1500.0, 0.01), 100.0, rig=heat, force_noise=3.0, temperature_channel=True)
     (run,) = dyno.run([bench.SineTest(amplitude=0.02, frequency=1.5, cycles=30)])
-    assert np.ptp(run.temperature) > 10.0
+    assert run.temperature is not None and np.ptp(run.temperature) > 10.0
     start = Heated(Bilinear(2000.0, 2000.0, 0.01), 0.001, 200.0)
     known = ["initial_rise", "cooling_time", "static_force_slope"]
     result = fit(start, run, freeze=known, samples_per_cycle=40, starts=1)
