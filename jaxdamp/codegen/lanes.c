@@ -83,9 +83,9 @@ static int64_t size(void *buffer, int64_t axis)
 
 XLA_FFI_Error *loop(XLA_FFI_CallFrame *frame)
 {
-    XLA_FFI_Extension_Base *extension = frame->extension_start;
-    if (extension && extension->type == XLA_FFI_Extension_Metadata) {
-        XLA_FFI_Metadata *about = ((XLA_FFI_Metadata_Extension *)extension)->metadata;
+    XLA_FFI_Metadata_Extension *asked = (XLA_FFI_Metadata_Extension *)frame->extension_start;
+    if (asked && asked->extension_base.type == XLA_FFI_Extension_Metadata) {
+        XLA_FFI_Metadata *about = asked->metadata;
         about->api_version.major_version = XLA_FFI_API_MAJOR;
         about->api_version.minor_version = XLA_FFI_API_MINOR;
         return 0;
