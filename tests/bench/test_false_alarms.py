@@ -13,7 +13,7 @@ def test_clean_random_motions_raise_nothing():
         assert found.findings == (), repr(found)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_false_alarms_over_random_motions_are_rare():
     runs = [clean(seed) for seed in range(150)]
     benches = [[run for run in runs[start : start + 50] if law in run.name] for start in (0, 50, 100) for law in LAWS]

@@ -145,7 +145,7 @@ def test_random_files(tmp_path_factory, check_property):
     check_property(tmp_path_factory, 40)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("check_property", PROPERTIES)
 def test_two_thousand_random_files(tmp_path_factory, check_property):
     check_property(tmp_path_factory, 2000)

@@ -86,7 +86,7 @@ def test_found_named_and_sized(artefact):
         check(artefact, seed)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("artefact", ARTEFACTS)
 def test_found_named_and_sized_over_many_seeds(artefact):
     for seed in range(50):

@@ -65,7 +65,7 @@ def test_an_artefact_is_found_named_and_sized(name):
         check(name, seed)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", ARTEFACTS)
 def test_an_artefact_is_found_over_many_seeds(name):
     for seed in range(50):
@@ -89,7 +89,7 @@ def test_clean_records_raise_nothing():
         assert found.findings == () and "nothing odd" in repr(found), repr(found)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_false_alarms_are_rare():
     alarms = [seed for seed in range(200) if preflight(clean(seed)).findings]
     assert len(alarms) < 4

@@ -16,7 +16,7 @@ from jaxdamp.vehicles.presets import quarter_car_000
 from .test_contract import LAWS
 
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.exhaustive
 
 STEPS = 200  # the same in all runs, so that each engine is compiled once a group
 NAMES = list(LAWS)

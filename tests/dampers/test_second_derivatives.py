@@ -83,13 +83,13 @@ def test_powers_and_limits_on_the_bench(rng):
     assert_agree(bench, ["Bouc and Wen", "power 0.4, offsets", "bump stop"], rng)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("names", GROUPS[:6], ids=lambda names: f"{names[0]} to {names[-1]}")
 def test_every_law_on_the_bench(names, rng):
     assert_agree(bench, names, rng)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("names", KIND_GROUPS[:2], ids=lambda names: f"{names[0]} to {names[-1]}")
 def test_every_kind_of_law_in_a_ride(names, rng):
     assert_agree(ride, names, rng, with_differences=False)
