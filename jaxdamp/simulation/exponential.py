@@ -115,9 +115,9 @@ class Exponential(AbstractFixedStep):
         substeps: steps between two instants; as many as the steepest law needs (friction at standstill, a bristle, oil)
             if left out, so that every step is stable. The road stays straight between instants.
         printed: print the loop over time as C and let the machine's C compiler (gcc, clang) make vector code of it: for
-            a `Ride` in a `sweep` or under `jax.vmap`, in double precision, on a CPU. The same numbers to rounding,
-            1.3 to 1.7 times as fast for laws without a loop inside; derivatives do not pass. What cannot be printed is
-            refused with the reason (`NotImplementedError`).
+            a `Ride` in a `sweep` or under `jax.vmap`, in double precision, on a CPU. The same numbers to rounding, with
+            a lag 1.4 times as fast, for other laws about as fast as XLA; derivatives do not pass. What cannot be
+            printed is refused with the reason (`NotImplementedError`).
 
     >>> from jaxdamp import roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)

@@ -75,8 +75,7 @@ class Response(eqx.Module):
         time: uniform instants [s], shape (time,).
         motion: q and q̇ in SI units, shape (time, n).
         port_force: force of each element [N], positive when it resists extension, shape (time, ports).
-        road: heights under the wheels [m, up], shape (time, wheels).
-        road_rate: their rates [m/s], shape (time, wheels).
+        road, road_rate: heights under the wheels [m, up] and their rates [m/s], shape (time, wheels).
         final_state: states of each element at the end.
         axle_timing: when each axle met the road.
         whole: the response that this one is a part of, and the number of its first instant there.
@@ -106,12 +105,7 @@ class Response(eqx.Module):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What to know of this run beside its numbers, a sentence each.
-
-        Tyres that pulled on the road, and dampers that left the range that their laws were fitted to.
-
-        Empty if there is nothing to say, and while JAX traces.
-        """
+        """Tyres that pulled on the road, dampers that left the fitted range of their laws; empty while JAX traces."""
         if _checks.concrete(self.motion) is None:
             return ()
         tyres = tyres_in_tension(self.system, np.asarray(self.time), self.__getitem__)
