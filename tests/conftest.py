@@ -1,5 +1,6 @@
 import gc
 import os
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,6 +25,17 @@ MOST_MAPS = 30_000  # Linux allows a process 65 530, and every compiled program 
 
 # Traced programs are millions of objects, and looking through all of them for cycles takes seconds each time.
 gc.set_threshold(100_000, 20, 100)
+
+
+@pytest.hookimpl(tryfirst=True)  # before the choice by `-m`
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of the cases of a test marked `slow_one_in(n)`, one in n is slow; the others run before a release."""
+    cases: Counter[str] = Counter()
+    for item in items:
+        if mark := item.get_closest_marker("slow_one_in"):
+            test = item.nodeid.partition("[")[0]
+            item.add_marker("exhaustive" if cases[test] % mark.args[0] else "slow")
+            cases[test] += 1
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -63,6 +63,7 @@ def fitted(files: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> 
     return out, jaxdamp("fit-vehicle", files["car.toml"], files["lab.csv"], *words).output
 
 
+@pytest.mark.slow
 def test_a_file_of_another_lab_gives_the_vehicle(fitted: tuple[Path, str]) -> None:
     out, text = fitted
     car = from_json(out / "vehicle.json")

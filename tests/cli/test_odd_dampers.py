@@ -38,7 +38,7 @@ def _fit(law: AbstractDamper, folder: Path, laws: str) -> Path:
     return folder / "fit"
 
 
-@pytest.mark.slow
+@pytest.mark.slow_one_in(3)
 @pytest.mark.parametrize("name", DAMPERS)
 def test_odd_dampers_give_laws_tables_and_pictures(tmp_path: Path, name: str) -> None:
     laws = ["besinger_series_spring", "bouc_wen", "linear", "lugre_spring"]

@@ -4,6 +4,7 @@ Every law is held to this by `check_alike_ports` in `test_contract.py`; here thr
 """
 
 import numpy as np
+import pytest
 
 from jaxdamp import roads, simulate
 from jaxdamp.parameters import free_parameters
@@ -16,6 +17,7 @@ from .test_contract import LAWS
 ONCE_CRASHED = ["scheduled", "network and spring", "lag of a network"]
 
 
+@pytest.mark.slow
 def test_laws_that_could_not_be_stacked():
     """`simulate`, against the same laws of which one is wrapped, so that each is called by itself."""
     front = {slot: LAWS[name]() for slot, name in zip(SLOTS, ONCE_CRASHED, strict=False)}

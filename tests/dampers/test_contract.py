@@ -239,14 +239,8 @@ def test_every_law_is_held_to_the_contract():
 IN_PLACES = {"inside wrappers", "alike ports"}  # these run below, the second with several laws in a car
 
 
-def some_exhaustive(names):
-    """One in five runs with the slow tests, the others before a release."""
-    marks = [pytest.mark.exhaustive if i % 5 else pytest.mark.slow for i in range(len(names))]
-    return [pytest.param(name, marks=[mark]) for name, mark in zip(names, marks, strict=True)]
-
-
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] if name in FURTHER | LONG else []) for name in LAWS]
+    "name", [pytest.param(name, marks=[pytest.mark.slow_one_in(3)] if name in FURTHER | LONG else []) for name in LAWS]
 )
 def test_contract(name):
     law, broken = LAWS[name](), EXCEPTIONS.get(name, {})
@@ -259,7 +253,8 @@ def test_contract(name):
             method(jnp.zeros(()), jnp.zeros(3), law.initial_state())
 
 
-@pytest.mark.parametrize("name", some_exhaustive([name for name in LAWS if name not in FURTHER]))
+@pytest.mark.slow_one_in(5)
+@pytest.mark.parametrize("name", [name for name in LAWS if name not in FURTHER])
 def test_inside_every_wrapper(name):
     check_inside_wrappers(LAWS[name]())
 
@@ -267,7 +262,7 @@ def test_inside_every_wrapper(name):
 GROUPS = [list(LAWS)[i : i + len(SLOTS)] for i in range(0, len(LAWS), len(SLOTS))]
 
 
-@pytest.mark.slow
+@pytest.mark.slow_one_in(4)
 @pytest.mark.parametrize("group", GROUPS, ids=lambda group: f"{group[0]} to {group[-1]}")
 def test_at_alike_ports(group):
     check_alike_ports(*(LAWS[name]() for name in group))

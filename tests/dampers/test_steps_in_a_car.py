@@ -13,7 +13,7 @@ from jaxdamp.vehicles.presets import quarter_car_000
 from .test_contract import LAWS
 
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.slow_one_in(3)
 
 ROUGH = roads.iso8608("C", 20.0, 2.0, seed=1)
 # one law for each way in which a step can be too long: smooth, kinked, steep at rest, explicit states, own steps

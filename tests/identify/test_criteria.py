@@ -33,6 +33,7 @@ def test_spikes_hardly_move_a_robust_fit(spiky, loss):
     assert robust.to_dict()["criterion"] == robust.criterion and robust.criterion in robust.table().title
 
 
+@pytest.mark.slow
 def test_standard_errors_of_robust_fits_hold_with_normal_noise(sines):
     robust = [fit(Linear(1000.0), sines(Linear(1500.0), noise=20.0, seed=s), loss="huber") for s in range(40)]
     scores = [(r["rate"].value - 1500.0) / r["rate"].standard_error for r in robust]

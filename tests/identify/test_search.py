@@ -52,6 +52,7 @@ def test_without_noise_the_law_comes_back_exactly(sines, name):
     assert np.allclose([e.value for e in result.parameters], free_parameters(truth).values, rtol=1e-6, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_standard_errors_cover_the_scatter(sines):
     z = np.array([errors(fit(BESINGER, sines(BESINGER, noise=20.0, seed=seed)), BESINGER) for seed in range(20)])
     assert np.all(np.abs(z) < 4.5)

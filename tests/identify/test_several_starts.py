@@ -52,6 +52,7 @@ def test_the_published_set_is_found_where_one_start_ends_elsewhere(first_records
     assert np.array_equal(again.covariance, result.covariance) and again.minima == result.minima
 
 
+@pytest.mark.slow
 def test_a_bad_instance_ends_where_the_truth_does(first_records):
     from_bad, from_truth = fit(BAD, first_records), fit(PUBLISHED, first_records)
     for one, other in zip(from_bad.parameters, from_truth.parameters, strict=True):

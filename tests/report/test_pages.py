@@ -98,6 +98,7 @@ def test_a_page_on_records_beside_a_law(comparison: Comparison) -> None:
     assert changes == pytest.approx([0.0, -50.0], abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_page_on_the_whole_chain(comparison: Comparison, rides: dict[str, Response], tuned: TuneResult) -> None:
     runs = comparison.best.result.runs
     evaluation, found = bench.evaluate(runs), bench.preflight(runs)

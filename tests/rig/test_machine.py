@@ -147,7 +147,7 @@ def test_numbers_that_no_machine_has(name, value):
         dataclasses.replace(Rig(), **{name: value})
 
 
-@pytest.mark.parametrize("temperature", [None, 320.0])
+@pytest.mark.parametrize("temperature", [None, pytest.param(320.0, marks=pytest.mark.slow)])
 def test_a_delay_of_half_a_sample_is_exact_where_friction_turns_within_one(temperature):
     """The motion is interpolated, not the force, which turns from one sample to the next."""
     rig = Rig(gas_force=-120.0, friction=30.0, friction_velocity=0.005, force_delay=1e-3, temperature_slope=2e-3)

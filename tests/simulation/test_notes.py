@@ -24,6 +24,7 @@ def over_a_bump(car, height=0.06, count=401):
     return simulate(car, tracks(bumps(0.05 + 0.1 * np.arange(len(car.wheel_names)), count, height, 0.08)))
 
 
+@pytest.mark.slow
 def test_a_truck_whose_tyres_pull_says_so_and_one_whose_tyres_lift_does_not():
     pulling = over_a_bump(presets.truck_001())
     load = pulling["front_dynamic_tyre_load"] + pulling.vehicle.static_wheel_loads()[0]

@@ -56,7 +56,7 @@ def test_closed_form_optima_are_those_of_paper_000():
     assert pytest.approx(5536.5, abs=0.05) == BEST_TYRE
 
 
-@pytest.mark.slow
+@pytest.mark.slow_one_in(3)
 @pytest.mark.parametrize("preset", ["quarter_car_000", "quarter_car_mathworks", "golden_car"])
 def test_simulated_roads_find_the_optimum_within_their_sampling_error(preset):
     """Roads that repeat after the run hold every wave whole times; their optima scatter little."""
@@ -253,6 +253,7 @@ def test_on_a_white_road_the_rear_axle_follows_the_front():
     assert abs(float(together / expected) - 1.0) > 0.05
 
 
+@pytest.mark.slow
 def test_what_people_feel_can_be_tuned_on_both_kinds_of_road():
     car, felt = vehicles.presets.quarter_car_000(dampers.Linear(2500.0)), "weighted_rms_sprung_acceleration"
     white = roads.white("C", 20.0)

@@ -85,6 +85,7 @@ def test_designs_between_the_points_fill_the_front(front):
     assert fine.objectives == pytest.approx(exact(fine.designs[:, 0])[:, :2], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_two_parameters_agree_with_a_search_under_a_limit():
     car = vehicles.presets.half_car_002(dampers.Linear(1000.0))
     chosen = ["rms_sprung_acceleration", "rms_front_dynamic_tyre_load"]

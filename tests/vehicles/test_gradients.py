@@ -12,7 +12,7 @@ from .by_hand import CASES
 from .fleet import bumps, full_quarter_car
 
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.slow_one_in(3)
 
 STEPS, DT = 500, 1e-3
 

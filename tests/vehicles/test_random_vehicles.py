@@ -12,7 +12,7 @@ from .by_hand import CASES
 from .newton import GRAVITY
 
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.slow_one_in(3)
 
 TIME = np.linspace(0.0, 0.3, 1201)  # steps of 0.25 ms
 FADE = 0.03  # s, in which the waves come up
