@@ -319,24 +319,19 @@ def _signal(name: str) -> str:
 
 def _refuse_missing(table: RawTable, role: str, found: Mapping[str, Column | None]) -> NoReturn:
     """Refuse a table without a stroke or a force; propose a column that is no other quantity."""
-    names = ", ".join(map(repr, table.names))
+    said = f"{table.where} has no column for the {role}: its columns are {', '.join(map(repr, table.names))}"
     settings = (Setting("stroke_from_velocity", True),) if role == "stroke" and found.get("velocity") else ()
     other = f" Or integrate the velocity, if the law needs no place of the stroke: {settings[0]}." if settings else ""
+    if settings and "time" not in found:
+        other = f" Points of a force-velocity curve are no record but a law: dampers.Table (docs/reading.md).{other}"
     taken = {column.index for column in found.values() if column is not None}
     left = [i for i, column in enumerate(table.columns) if i not in taken and not column.is_text]
     free = [i for i in left if not _is_other(table.columns[i], role)]
     if not free:
-        raise ArgumentError(
-            f"{table.where} has no column for the {role}: its columns are {names}, all of them other quantities. A "
-            f"record needs the {role}: export the file again with it.{other}",
-            *settings,
-        )
+        needed = f"A record needs the {role}: export the file again with it."
+        raise ArgumentError(f"{said}, all of them other quantities. {needed}{other}", *settings)
     choice = Setting("columns", {role: table.columns[free[0]].name or free[0]})
-    raise ArgumentError(
-        f"{table.where} has no column for the {role}: its columns are {names}. Name it, for example {choice}.{other}",
-        choice,
-        *settings,
-    )
+    raise ArgumentError(f"{said}. Name it, for example {choice}.{other}", choice, *settings)
 
 
 def _is_other(column: RawColumn, role: str) -> bool:

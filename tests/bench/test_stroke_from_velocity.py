@@ -23,6 +23,12 @@ def test_the_error_names_the_remedy(folder):
         read(folder)
 
 
+def test_points_of_a_curve_are_told_from_a_record(tmp_path):
+    (tmp_path / "points.csv").write_text("velocity [m/s],force [N]\n-0.2,-400\n-0.1,-250\n0,5\n0.1,300\n0.2,500\n")
+    with pytest.raises(ValueError, match=r"a force-velocity curve .*dampers\.Table"):
+        read(tmp_path)
+
+
 def test_stroke_is_integrated_without_drift_and_marked(folder, tmp_path):
     (run,) = read(folder, stroke_from_velocity=True)
     np.testing.assert_allclose(run.stroke, 0.02 * np.sin(3 * np.pi * run.time), atol=2e-4)
