@@ -7,13 +7,14 @@ from jaxdamp import bench
 from jaxdamp.bench import Evaluation
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.fitting import law_of, write_table
+from jaxdamp.cli.fitting import write_table
 from jaxdamp.cli.grouping import value_of
 from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.options import decisions
 from jaxdamp.cli.preflighting import checked
 from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 from jaxdamp.cli.results import results_folder
+from jaxdamp.cli.vehicle_words import read_law
 from jaxdamp.cli.wording import message
 from jaxdamp.report import Attempts, baseline_table, bench_report, law_evaluation, records_table
 
@@ -81,7 +82,7 @@ def run_bench(
 def _baseline(path: Path, evaluation: Evaluation, options: ReadOptions, processing: ProcessOptions) -> Evaluation:
     """The evaluation of a law on the bench of these records, or of other records at the same velocities."""
     if path.suffix == ".json":
-        return law_evaluation(law_of(path), evaluation)
+        return law_evaluation(read_law("baseline", path), evaluation)
     return bench.evaluate(processing.apply(options.read([path])), velocities=evaluation.velocities)
 
 

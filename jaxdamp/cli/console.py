@@ -27,7 +27,8 @@ class Screen:
     """Where a command writes what it does, and the times that its stages took."""
 
     def __init__(self) -> None:
-        self.console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_FILES, highlight=False)
+        self.live = sys.stdout.isatty()  # whatever colours are forced; a notebook and a pipe keep every frame
+        self.console = Console(width=None if self.live else _WIDTH_OF_FILES, highlight=False)
         self.times: dict[str, float] = {}
 
     def say(self, text: str = "", style: str = "") -> None:
@@ -80,7 +81,7 @@ class Screen:
         """
         interrupt.check()
         started = time.perf_counter()
-        if self.console.is_terminal:
+        if self.live:
             columns = [SpinnerColumn(), TextColumn("{task.description}", markup=False)]
             columns += [BarColumn(), MofNCompleteColumn()] if total else []
             columns += [TimeElapsedColumn(), TextColumn("{task.fields[detail]}", markup=False)]

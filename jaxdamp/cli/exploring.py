@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 from jaxdamp import export
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.exporting import new_file, read_law
+from jaxdamp.cli.exporting import new_file
 from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 from jaxdamp.cli.riding import USUAL, parse_road
-from jaxdamp.cli.vehicle_words import parse_vehicle
+from jaxdamp.cli.vehicle_words import parse_vehicle, read_law
 
 
 class RideOptions(NamedTuple):
@@ -40,7 +40,8 @@ def run_explore(
         ValueError: what the library refuses; a file that exists, unless it is to be replaced.
     """
     file = new_file(Path(f"{law.stem}.html") if out is None else out, replace)
-    damper, baseline = read_law(law), None if on.baseline is None else read_law(on.baseline)
+    damper = read_law("law", law)
+    baseline = None if on.baseline is None else read_law("baseline", on.baseline)
     kind, _, word = on.road.partition(":")
     length = on.duration or USUAL
     road = word if kind == "iso" else parse_road(on.road, speed=on.speed, duration=length, seed=on.seed)

@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks, export
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.vehicle_words import read_law
 from jaxdamp.dampers import AbstractDamper
 
 
@@ -32,7 +33,7 @@ def run_export(
     """
     _checks.one_of("to", to, sorted(PROGRAMS | TABLES))
     ending, write = (PROGRAMS | TABLES)[to]
-    damper = read_law(law)
+    damper = read_law("law", law)
     file = new_file(Path(law.stem.replace("-", "_") + ending) if out is None else out, replace)
     if to in PROGRAMS:
         if velocities is not None:
@@ -44,13 +45,6 @@ def run_export(
         written = write(damper, file, grid)
     files: Sequence[Path] = written if isinstance(written, list) else [written]
     screen.points([f"written: {each}" for each in files])
-
-
-def read_law(path: Path) -> AbstractDamper:
-    """The law of a file."""
-    law = export.from_json(path)
-    _checks.instance("path_or_text", law, AbstractDamper, "hold a damper law", "Give the JSON of a law.")
-    return law
 
 
 def new_file(file: Path, replace: bool) -> Path:

@@ -16,6 +16,7 @@ from jaxdamp.cli.options import decisions, law_names, split
 from jaxdamp.cli.preflighting import checked
 from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 from jaxdamp.cli.results import Results, another_page, results_folder
+from jaxdamp.cli.vehicle_words import read_law
 from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, CrossValidation, Failure, Rung
@@ -72,7 +73,7 @@ def run_fit(
     names = law_names(laws)
     _checks.one_of("weighting", weighting, ("samples", "runs"))
     machine = identify.machine_names("rig", rig)
-    beside = None if baseline is None else law_of(baseline)
+    beside = None if baseline is None else read_law("baseline", baseline)
     attempts = Attempts(interrupt.check, message)
     if report is not None and group_by is not None:
         _checks.refuse("report", "be left out with --group-by, which writes a page for each group", str(report))
@@ -174,13 +175,6 @@ class FitJob(NamedTuple):
             self.screen.table(validation.record_table())
             return validation
         return None
-
-
-def law_of(path: Path) -> AbstractDamper:
-    """The damper law of the option --baseline."""
-    law = export.from_json(path)
-    _checks.instance("baseline", law, AbstractDamper, "be a file with a damper law")
-    return law
 
 
 def fit_laws(

@@ -9,9 +9,23 @@ from typer.core import TyperGroup
 
 
 _typed: list[str] = []  # the command that is running, as it was typed
+_words: dict[str, str] = {}  # of its arguments and options: what they are called there, by their name in Python
 
 
-ORDER = ("demo", "bench", "fit", "fit-vehicle", "ride", "tune", "sweep", "explore", "export", "laws", "vehicles")
+ORDER = (
+    "demo",
+    "bench",
+    "fit",
+    "fit-vehicle",
+    "ride",
+    "tune",
+    "sweep",
+    "report",
+    "explore",
+    "export",
+    "laws",
+    "vehicles",
+)
 
 
 class Commands(TyperGroup):
@@ -27,10 +41,24 @@ class Commands(TyperGroup):
         ctx.call_on_close(_typed.clear)
         return super().parse_args(ctx, args)
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command of the first word."""
+        name, command, rest = super().resolve_command(ctx, args)
+        for p in [] if command is None else command.params:
+            positional = p.param_type_name == "argument"
+            _words[str(p.name)] = str(p.name).upper() if positional else f"Option {p.opts[0]}"
+        ctx.call_on_close(_words.clear)
+        return name, command, rest
+
 
 def command_line() -> str:
     """The command that is running, as it was typed; empty if a function was called from Python."""
     return "".join(_typed)
+
+
+def own_words() -> dict[str, str]:
+    """What the arguments and options of the running command are called there, by their name in Python."""
+    return _words
 
 
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
@@ -66,6 +94,10 @@ Road = Annotated[
     typer.Argument(help="iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height."),
 ]
 Baseline = Annotated[Path | None, typer.Option(help="Another law to compare with, as JSON.")]
+BaselineVehicle = Annotated[
+    Path | None, typer.Option(help="To compare with: another law, or another tuning's vehicle.json, as JSON.")
+]
+Limit = Annotated[list[str], typer.Option(help="Hard limits [SI]: travel=0.1,grip=900, or NAME=LOWER:UPPER.")]
 Start = Annotated[Path | None, typer.Option(help="A law as JSON for all dampers, instead of the vehicle's own.")]
 Speed = Annotated[float, typer.Option(help="Of the vehicle [m/s].")]
 Duration = Annotated[float | None, typer.Option(help="Of each ride [s]; the road's own, or 10.")]

@@ -1,4 +1,4 @@
-"""Commands that drive vehicles: ride, tune, sweep."""
+"""Commands that drive vehicles: ride, tune, sweep, and report on the whole chain."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,8 +8,11 @@ import typer
 from jaxdamp.cli.application import app
 from jaxdamp.cli.option_types import (
     Baseline,
+    BaselineVehicle,
     Debug,
     Duration,
+    Files,
+    Limit,
     Replace,
     Road,
     Seed,
@@ -18,6 +21,7 @@ from jaxdamp.cli.option_types import (
     Step,
     Vehicle,
 )
+from jaxdamp.cli.record_options import ProcessOptions, ReadOptions, spread
 
 
 @app.command()
@@ -58,7 +62,7 @@ def tune_command(
     road: Road,
     start: Start = None,
     minimise: Annotated[str, typer.Option(help="comfort, travel, grip, or the name of a ride metric.")] = "comfort",
-    limit: Annotated[list[str], typer.Option(help="Hard limits [SI]: travel=0.1,grip=900, or NAME=LOWER:UPPER.")] = [],  # noqa: B006
+    limit: Limit = [],  # noqa: B006
     over: Annotated[
         list[str], typer.Option(help='Parameters to tune, by path or pattern, such as "damper.*_rate".')
     ] = ["*damper*"],  # noqa: B006
@@ -74,9 +78,7 @@ def tune_command(
     ] = 1,
     starts: Annotated[int, typer.Option(help="Searches side by side, from inside the bounds.")] = 1,
     max_steps: Annotated[int, typer.Option(help="Of the search.")] = 100,
-    baseline: Annotated[
-        Path | None, typer.Option(help="To compare with: another law, or another tuning's vehicle.json, as JSON.")
-    ] = None,
+    baseline: BaselineVehicle = None,
     speed: Speed = 20.0,
     duration: Duration = None,
     dt: Step = 1e-3,
@@ -107,6 +109,49 @@ def tune_command(
         raise typer.Exit(1)
 
 
+@app.command()
+@spread
+def report(
+    files: Files,
+    *,
+    vehicle: Annotated[
+        str, typer.Option(help='A published vehicle, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.')
+    ] = "quarter_car_000",
+    road: Annotated[
+        str, typer.Option(help="iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file of position, height.")
+    ] = "iso:C",
+    law: Annotated[
+        list[str], typer.Option(help='Names of laws to fit, see "jaxdamp laws": "linear,besinger"; or "all".')
+    ] = ["all"],  # noqa: B006
+    minimise: Annotated[str, typer.Option(help="comfort, travel, grip, or the name of a ride metric.")] = "comfort",
+    limit: Limit = [],  # noqa: B006
+    over: Annotated[list[str], typer.Option(help="Parameters to tune, by path or pattern.")] = ["*damper*"],  # noqa: B006
+    reading: ReadOptions,
+    processing: ProcessOptions,
+    speed: Speed = 20.0,
+    duration: Duration = None,
+    dt: Step = 1e-3,
+    seed: Seed = 0,
+    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-report"),
+    replace: Replace = False,
+    debug: Debug = False,
+) -> None:
+    """The whole chain on one page: bench records, fitted laws, rides on the best one, and its tuning.
+
+    Writes the laws, the tuned vehicle, tables, pictures and the page. Ends with exit code 1 if a limit is not met.
+    """
+    from jaxdamp.cli import chaining, console, tuning
+
+    with console.plain_errors(debug):
+        console.prepare()
+        on = tuning.RoadOptions(vehicle, road, None, speed, duration, dt, seed)
+        options = tuning.TuneOptions(minimise, tuple(limit), tuple(over))
+        screen, where = console.Screen(), {"out": out, "replace": replace}
+        result = chaining.run_report(screen, files, reading, processing, on, options, laws=law, **where)
+    if not tuning.meets_limits(result):
+        raise typer.Exit(1)
+
+
 @app.command(name="sweep")
 def sweep_command(
     vehicle: Vehicle,
@@ -116,6 +161,8 @@ def sweep_command(
     metric: Annotated[
         str, typer.Option(help="comfort, travel, grip, or names of ride metrics.")
     ] = "comfort,travel,grip",
+    limit: Limit = [],  # noqa: B006
+    baseline: BaselineVehicle = None,
     speed: Speed = 20.0,
     duration: Duration = None,
     dt: Step = 1e-3,
@@ -130,4 +177,5 @@ def sweep_command(
     with console.plain_errors(debug):
         console.prepare()
         on = tuning.RoadOptions(vehicle, road, start, speed, duration, dt, seed)
-        tuning.run_sweep(console.Screen(), on, over=over, metrics=metric, out=out, replace=replace)
+        marks = {"limit": limit, "baseline": baseline}
+        tuning.run_sweep(console.Screen(), on, over=over, metrics=metric, **marks, out=out, replace=replace)

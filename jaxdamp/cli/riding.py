@@ -10,7 +10,7 @@ from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.run_warnings import with_step_warnings, without_range_warnings
 from jaxdamp.cli.unusual import unusual
-from jaxdamp.cli.vehicle_words import parse_vehicle
+from jaxdamp.cli.vehicle_words import parse_vehicle, read_law
 from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.report import Attempts, Table, axles_sentence, notes_of, ride_report, ride_tables
@@ -62,7 +62,7 @@ def run_ride(
     make = parse_vehicle(vehicle)
     _checks.positive("speed", speed)
     files = ({} if baseline is None else {"baseline": baseline}) | {"law": law}
-    laws = {name: export.from_json(path) for name, path in files.items()}
+    laws = {name: read_law(name, path) for name, path in files.items()}
     screen.points(unusual(road, speed), style="yellow")
     attempts = Attempts(interrupt.check, message)
     with results_folder(out, "ride", replace=replace) as results:

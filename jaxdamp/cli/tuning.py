@@ -1,7 +1,7 @@
 """`jaxdamp tune`: the free parameters of a vehicle for a ride metric, with limits; and `jaxdamp sweep`."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,12 @@ from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.riding import USUAL, parse_road
 from jaxdamp.cli.unusual import unusual
-from jaxdamp.cli.vehicle_words import parse_vehicle, with_law, write_laws
+from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
 from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.report import Attempts, sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
-from jaxdamp.tune import Status, TuneResult
+from jaxdamp.tune import Status, TuneResult, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -37,7 +37,7 @@ class RoadOptions:
 
     def car(self) -> AbstractVehicle:
         """The vehicle, with the law at each damper if one is given."""
-        return parse_vehicle(self.vehicle)(None if self.start is None else export.from_json(self.start))
+        return parse_vehicle(self.vehicle)(None if self.start is None else read_law("start", self.start))
 
     def roads(self, count: int = 1) -> tuple[list[Any], dict[str, Any]]:
         """So many realisations of the road, and the options of a run over them."""
@@ -49,9 +49,9 @@ class RoadOptions:
             return [roads.white(rest, self.speed)] * count, {}
         length = self.duration or USUAL
         seeds = range(self.seed, self.seed + count)
-        made = [parse_road(self.road, speed=self.speed, duration=length, seed=seed) for seed in seeds]
-        own = length if self.duration or kind == "iso" else made[0].duration or length
-        return made, {"duration": own, "dt": self.dt}
+        realisations = [parse_road(self.road, speed=self.speed, duration=length, seed=seed) for seed in seeds]
+        own = length if self.duration or kind == "iso" else realisations[0].duration or length
+        return realisations, {"duration": own, "dt": self.dt}
 
 
 @dataclass(frozen=True)
@@ -79,42 +79,16 @@ def run_tune(
     replace: bool = False,
 ) -> TuneResult[Any]:
     """Tune a vehicle, and write the law, the vehicle, tables, then pictures and a page."""
-    if options.roads < 1:
-        _checks.refuse("roads", "be 1 or more", options.roads)
     car = on.car()
     beside = None if baseline is None else _baseline(baseline, car)
-    made, run = on.roads(options.roads)
-    white = isinstance(made[0], WhiteRoad)
-    if options.roads > 1 and (white or not on.road.startswith("iso:")):
-        _checks.refuse("roads", "be 1 for a road that is not random", options.roads, "Take iso:CLASS.")
-    objective = objective_word(options.minimise, car, white=white)
-    limits = limit_words(options.limit, car, white=white)
-    bounds = {name: span("bound", value) for name, value in pairs("bound", options.bound)}
+    call = tuning_arguments(car, on, options)
     screen.points(unusual(on.road, on.speed), style="yellow")
     attempts = Attempts(interrupt.check, message)
     with results_folder(out, "tune", replace=replace) as results:
-        with screen.stage("Tuning") as advance:
-            result = tune.minimise(
-                objective,
-                car,
-                made[0] if len(made) == 1 else tune.Scenarios(made),
-                over=options.over,
-                freeze=options.freeze,
-                bounds=bounds,
-                tie=dict(pairs("tie", options.tie)),
-                limits=limits,
-                starts=options.starts,
-                max_steps=options.max_steps,
-                progress=lambda step, value: advance(f"step {step}: {value:.5g}", step),
-                **run,
-            )
-        for table in (result.parameter_table(), result.table()):
-            screen.table(table)
-        screen.say(result.summary)
-        screen.points([*result.active, *result.warnings], style="yellow")
+        result = tuned(screen, call)
         interrupt.keep()
         with interrupt.saving(), screen.stage("Law, vehicle and tables"):
-            _write(results.draft, result)
+            write_tuning(results.draft, result)
             results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
             page = tuning_report(result, baseline=beside, folder=results.draft, attempts=attempts)
@@ -124,13 +98,44 @@ def run_tune(
     return result
 
 
+def tuning_arguments(car: AbstractVehicle, on: RoadOptions, options: TuneOptions) -> dict[str, Any]:
+    """The arguments of `tune.minimise`."""
+    if options.roads < 1:
+        _checks.refuse("roads", "be 1 or more", options.roads)
+    roads_driven, run = on.roads(options.roads)
+    white = isinstance(roads_driven[0], WhiteRoad)
+    if options.roads > 1 and (white or not on.road.startswith("iso:")):
+        _checks.refuse("roads", "be 1 for a road that is not random", options.roads, "Take iso:CLASS.")
+    return run | {
+        "metric": objective_word(options.minimise, car, white=white),
+        "vehicle": car,
+        "road": roads_driven[0] if len(roads_driven) == 1 else tune.Scenarios(roads_driven),
+        "over": options.over,
+        "freeze": options.freeze,
+        "bounds": {name: span("bound", value) for name, value in pairs("bound", options.bound)},
+        "tie": dict(pairs("tie", options.tie)),
+        "limits": limit_words(options.limit, car, white=white),
+        "starts": options.starts,
+        "max_steps": options.max_steps,
+    }
+
+
+def tuned(screen: Screen, call: Mapping[str, Any]) -> TuneResult[Any]:
+    """The result of `tune.minimise` with these arguments, shown at the terminal."""
+    with screen.stage("Tuning") as advance:
+        result = tune.minimise(**call, progress=lambda step, value: advance(f"step {step}: {value:.5g}", step))
+    for table in (result.parameter_table(), result.table()):
+        screen.table(table)
+    screen.say(result.summary)
+    screen.points([*result.active, *result.warnings], style="yellow")
+    return result
+
+
 def _baseline(path: Path, car: AbstractVehicle) -> AbstractVehicle:
     """The vehicle of the option --baseline: with another law, or that of another tuning."""
-    thing = export.from_json(path)
-    if isinstance(thing, AbstractDamper):
-        return with_law(car, thing)
-    _checks.instance("baseline", thing, type(car), f"be a damper law or a {type(car).__name__}")
-    return thing
+    kinds, words = (AbstractDamper, type(car)), f"a law or a {type(car).__name__}"
+    module = read_module("baseline", path, kinds, words, "`jaxdamp tune` writes law.json and vehicle.json.")
+    return with_law(car, module) if isinstance(module, AbstractDamper) else module
 
 
 def meets_limits(result: TuneResult[Any]) -> bool:
@@ -138,7 +143,7 @@ def meets_limits(result: TuneResult[Any]) -> bool:
     return result.status is not Status.LIMIT_NOT_MET
 
 
-def _write(folder: Path, result: TuneResult[Any]) -> None:
+def write_tuning(folder: Path, result: TuneResult[Any]) -> None:
     """The tuned laws, the vehicle, tables, and all of it as JSON."""
     import json
 
@@ -161,6 +166,8 @@ def run_sweep(
     *,
     over: Sequence[str],
     metrics: str,
+    limit: Sequence[str] = (),
+    baseline: Path | None = None,
     out: Path,
     replace: bool = False,
 ) -> Any:
@@ -169,7 +176,11 @@ def run_sweep(
     (road,), run = on.roads()
     white = isinstance(road, WhiteRoad)
     words = [word.strip() for word in metrics.split(",")]
-    names = list(dict.fromkeys(n for word in words for n in metric_names("metric", word, car, white=white)))
+    limits = limit_words(limit, car, white=white)
+    names = [n for word in words for n in metric_names("metric", word, car, white=white)]
+    names = list(dict.fromkeys([*names, *limits]))
+    limit_spans(limits, names)  # refuses what is no limit before anything is driven
+    beside = None if baseline is None else _baseline(baseline, car)
     axes = axis_words(over)
     ride = Ride(car, road, metrics=names, **run)
     ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})
@@ -187,7 +198,9 @@ def run_sweep(
             data.to_netcdf(results.draft / "sweep.nc", engine="scipy")
             results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
-            page = sweep_report(data, remarks=remarks, folder=results.draft, attempts=attempts)
+            drawn = {"folder": results.draft, "attempts": attempts}
+            marks = {"limits": limits, "baseline": None if beside is None else dict(ride.on_axles_of(beside)())}
+            page = sweep_report(data, remarks=remarks, **marks, **drawn)
             page.write(results.draft / "report.html", command_line())
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")

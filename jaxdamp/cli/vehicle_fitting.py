@@ -17,7 +17,7 @@ from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.options import decisions
 from jaxdamp.cli.results import another_page, results_folder
 from jaxdamp.cli.vehicle_fit_options import RideReadOptions, VehicleFitOptions, listed, numbers_of
-from jaxdamp.cli.vehicle_words import parse_vehicle, write_laws
+from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, write_laws
 from jaxdamp.cli.wording import message
 from jaxdamp.dampers import CoulombFriction
 from jaxdamp.identify import VehicleFit
@@ -47,7 +47,7 @@ def run_fit_vehicle(
     replace: bool = False,
 ) -> VehicleFit:
     """Read the records, fit the vehicle, and write vehicle, laws, tables, then pictures and a page."""
-    car = parse_vehicle(vehicle)(None if start is None else export.from_json(start))
+    car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     _checks.one_of("initial_motion", options.initial_motion, ("rest", "free"))
     attempts = Attempts(interrupt.check, message)
     with another_page(report, out, replace=replace), results_folder(out, "fit-vehicle", replace=replace) as results:

@@ -1,6 +1,7 @@
 """What a vehicle is called on the command line: a published one, or a file of one's own."""
 
 import inspect
+import json
 import tomllib
 from collections.abc import Callable, Mapping
 from fnmatch import fnmatchcase
@@ -50,18 +51,50 @@ def parse_vehicle(word: str) -> MakeCar:
     if path.suffix not in (".json", ".toml"):
         _checks.one_of("vehicle", word, presets())
         return lambda law: presets()[word](damper=law)
-    if not path.is_file():
-        _checks.refuse("vehicle", "be a file that is there", repr(word), 'Or a name, see "jaxdamp vehicles".')
     if path.suffix == ".json":
-        car = export.from_json(path)
-        remedy = "`export.to_json(vehicle)` writes it."
-        _checks.instance("vehicle", car, AbstractVehicle, "be a file with a vehicle", remedy)
+        car = read_module("vehicle", path, AbstractVehicle, "a vehicle", 'Or give a name, see "jaxdamp vehicles".')
         return lambda law: car if law is None else with_law(car, law)
+    if not path.is_file():
+        _checks.refuse("vehicle", "be a file that is there", word, 'Or a name, see "jaxdamp vehicles".')
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"Option --vehicle: {word} is not TOML: {error}.") from error
+        _checks.refuse("vehicle", "be TOML", f"{word}: {error}", EXAMPLE)
     return _preset(word, document)
+
+
+def read_law(argument: str, path: Path) -> AbstractDamper:
+    """The law of a JSON file.
+
+    Arguments:
+        argument: that gives the file, for messages.
+        path: of the file.
+    """
+    return read_module(argument, path, AbstractDamper, "a law", "`jaxdamp fit` writes best_law.json from records.")
+
+
+def read_module(argument: str, path: Path, kinds: type | tuple[type, ...], words: str, remedy: str = "") -> Any:
+    """What a JSON file of `export.to_json` holds.
+
+    Arguments:
+        argument: that gives the file, for messages.
+        path: of the file.
+        kinds: allowed classes.
+        words: these in words.
+        remedy: where such a file comes from.
+
+    Raises:
+        ValueError: no such file, one that is not JSON, or that holds something else.
+    """
+    if not path.is_file():
+        _checks.refuse(argument, "be a file that is there", path, remedy)
+    try:
+        json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:  # also of bytes that are no text
+        _checks.refuse(argument, f"be {words} as JSON", f"{path}: {error}", remedy)
+    module = export.from_json(path)
+    _checks.instance(argument, module, kinds, f"be {words} as JSON", remedy)
+    return module
 
 
 def _preset(word: str, document: Mapping[str, Any]) -> MakeCar:

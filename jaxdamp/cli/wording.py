@@ -4,6 +4,7 @@ import shlex
 from typing import Any
 
 from jaxdamp._checks import ArgumentError, Setting
+from jaxdamp.cli.option_types import own_words
 
 
 OPTIONS = (
@@ -107,8 +108,6 @@ def message(error: Exception) -> str:
     """What an error says, in the language of the command line."""
     if not isinstance(error, ArgumentError):
         return str(error)
-    text = in_options(str(error), error.settings)
-    name = error.argument
-    if name in OPTIONS:
-        return text.replace(f"Argument `{name}`", f"Option {option(name)}")
-    return text.replace(f"Argument `{name}`", OTHER_WORDS[name]) if name in OTHER_WORDS else text
+    text, name = in_options(str(error), error.settings), error.argument
+    words = own_words().get(name) or OTHER_WORDS.get(name) or (f"Option {option(name)}" if name in OPTIONS else "")
+    return text.replace(f"Argument `{name}`", words) if words else text

@@ -1,10 +1,11 @@
 """Common style of all pictures: figure, colours, labels with unit and sign, legends."""
 
 import textwrap
+import zlib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from jaxdamp import _checks
+from jaxdamp import _checks, dampers
 from jaxdamp.dampers import AbstractDamper, Sum
 
 
@@ -15,7 +16,17 @@ if TYPE_CHECKING:
 
 # Okabe and Ito: distinguishable with every kind of colour vision; without the pale yellow; black is for baselines.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-DASHES = ("-", "--", ":", "-.")
+DASHES = ("-", "--", "-.", ":")
+FAMILIES = (  # of laws, by the number of their colour
+    (dampers.Linear, dampers.Bilinear, dampers.PiecewiseLinear),  # straight pieces
+    (dampers.Besinger, dampers.Degressive, dampers.DigressiveProgressive, dampers.Saturating),  # valves that open
+    (dampers.PowerLaw, dampers.Polynomial, dampers.SegmentedPolynomial),  # powers of the velocity
+    (dampers.BoucWen, dampers.ModifiedBoucWen, dampers.Dahl, dampers.LuGre, dampers.ViscoPlastic, dampers.Play,
+     dampers.CoulombFriction, dampers.StribeckFriction, dampers.HyperbolicTangent, dampers.KaradayiMasada),  # friction
+    (dampers.Table, dampers.SplineTable, dampers.ForceSurface, dampers.AccelerationSurface, dampers.NeuralHysteresis,
+     dampers.Hybrid),  # numbers without a formula
+    (dampers.MonoTube, dampers.PistonFlow, dampers.FrequencySelective),  # hydraulics
+)  # fmt: skip
 BLACK = "#222222"
 GREY = "#7F7F7F"
 SHADE = "#F5EEDF"  # behind what is extrapolated
@@ -36,6 +47,34 @@ def new_figure(width: float, height: float) -> "matplotlib.figure.Figure":
 def line_style(index: int) -> dict[str, Any]:
     """Colour and dash of the curve of that number; the dash changes once the colours are used up."""
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index // len(COLOURS) % len(DASHES)]}
+
+
+def law_styles(laws: Mapping[str, AbstractDamper]) -> dict[str, dict[str, Any]]:
+    """Colour and dash of laws by name: a law has the colour of its family, solid, in every figure.
+
+    Of several laws of one family in a figure, all but the first are dashed, in colours that no family there has as long
+    as there are any.
+    """
+    own = {name: _family(law) for name, law in laws.items()}
+    spare = [colour for colour in range(len(COLOURS)) if colour not in own.values()]
+    more = [(colour, dash) for dash in range(1, len(DASHES)) for colour in (*spare, *sorted(set(own.values())))]
+    chosen: dict[str, tuple[int, int]] = {}
+    for name, family in own.items():
+        unused = [place for place in ((family, 0), *more) if place not in chosen.values()]
+        chosen[name] = unused[0] if unused else (family, 0)
+    return {name: {"color": COLOURS[colour], "linestyle": DASHES[dash]} for name, (colour, dash) in chosen.items()}
+
+
+def _family(law: AbstractDamper) -> int:
+    """The number of the colour of a law: that of its family, or of the first law inside a sum or a wrapper.
+
+    Laws of your own have one by their name.
+    """
+    families = [number for number, family in enumerate(FAMILIES) if isinstance(law, family)]
+    inside = law.inner_laws()
+    if families or not inside:
+        return families[0] if families else zlib.crc32(type(law).__name__.encode()) % len(COLOURS)
+    return _family(inside[0])
 
 
 def graded(index: int, count: int) -> tuple[float, float, float, float]:

@@ -49,8 +49,9 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
             _spectrum(figure.add_subplot(below[place]), channel, result.start.units[channel], pair)
     points = np.asarray(velocities, dtype=float)
     gaps = []
-    for number, (name, pair) in enumerate(pairs.items()):
-        colour = _style.COLOURS[number % len(_style.COLOURS)]
+    styles = _style.law_styles({name: after for name, (_, after) in pairs.items()})
+    for name, pair in pairs.items():
+        colour = styles[name]["color"]
         held = [quasi_static(law, points) for law in pair]
         old, new = (np.asarray(curve.force) for curve in held)
         gaps += [f"{name}{when}: {c.note}" for when, c in zip(("before", "after"), held, strict=True) if c.note]

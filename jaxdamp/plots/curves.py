@@ -28,9 +28,12 @@ def force_velocity(
     *,
     baseline: str | None = None,
     note: str = "",
+    title: str = "",
     bands: Band | Mapping[str, Band] | None = None,
 ) -> "matplotlib.figure.Figure":
     """Force over velocity of one law or several, over the samples and the peak-velocity points of records.
+
+    A law has the same colour in every figure, that of its family.
 
     A law with states is drawn at constant velocity with settled states: the curve in the middle of its loops. Where it
     has no settled or no finite force the curve has a gap, and a remark under the picture gives the reason. Outside the
@@ -42,6 +45,7 @@ def force_velocity(
         runs: measured records to draw under the curves.
         baseline: name of the law to draw as a dashed black line, for comparison.
         note: a remark to write under the picture.
+        title: above the picture; the only law and the records if left out.
         bands: 95 % bands of the laws by name (`FitResult.band`), or that of the only law.
 
     Raises:
@@ -67,7 +71,10 @@ def force_velocity(
     curves, gaps = draw_laws(axes, laws, points, baseline, bands)
     handles += curves
     handles += fitted_range.shade(axes, laws.values(), points)
-    _style.dress(axes, _style.VELOCITY, _style.FORCE, "Force over velocity")
+    over = [runs[0].name if len(runs) == 1 else f"{len(runs)} records"] if runs else []
+    named = ", ".join([*([alone] if alone else []), *over])
+    title = title or "Force over velocity" + (f": {named}" if named else "")
+    _style.dress(axes, _style.VELOCITY, _style.FORCE, title)
     _style.cross(axes)
     axes.set_xlim(float(points.min()), float(points.max()))
     _style.legend_beside(figure, handles)
@@ -83,15 +90,14 @@ def draw_laws(
     bands: Mapping[str, Band] = MappingProxyType({}),
 ) -> tuple[list, list[str]]:
     """One curve for each law; the handles for the legend, and remarks on gaps in the curves."""
-    handles, gaps, number = [], [], 0
+    handles, gaps = [], []
+    styles = _style.law_styles({name: law for name, law in laws.items() if name != baseline})
+    styles |= {baseline: {"color": _style.BLACK, "linestyle": "--", "zorder": 2.5}} if baseline else {}
     for name, law in laws.items():
         curve = quasi_static(law, velocities)
         gaps += [f"{name}: {curve.note}"] if curve.note else []
         label = f"{name} (settled)" if law.initial_state().size else name
-        if name == baseline:
-            style = {"color": _style.BLACK, "linestyle": "--", "zorder": 2.5}
-        else:
-            style, number = _style.line_style(number), number + 1
+        style = styles[name]
         force = np.asarray(curve.force)
         handles += fitted_range.curve(axes, law, velocities, force, linewidth=1.8, label=label, **style)
         if name in bands:

@@ -44,22 +44,22 @@ def damper_use(
     records = {name: _record(response, damper) for name, response in responses.items()}
     reach = 1.02 * max(float(np.max(np.abs(velocity))) for velocity, _ in records.values())
     edges = np.linspace(-reach, reach, _BINS + 1)
-    middles, handles, laws, gaps = 0.5 * (edges[1:] + edges[:-1]), [], [], []
-    for number, (name, (velocity, force)) in enumerate(records.items()):
-        style = _style.line_style(number)
-        law = responses[name].vehicle.frame().element(damper).law
+    middles, handles, gaps = 0.5 * (edges[1:] + edges[:-1]), [], []
+    laws = {name: response.vehicle.frame().element(damper).law for name, response in responses.items()}
+    styles = _style.law_styles(laws)
+    for name, (velocity, force) in records.items():
+        style, law = styles[name], laws[name]
         held = np.linspace(velocity.min(), velocity.max(), _POINTS)
         trace.plot(velocity, force, color=style["color"], linewidth=0.5, alpha=0.5)
         curve = quasi_static(law, held)
         gaps += [f"{name or 'law'}: {curve.note}"] if curve.note else []
         force_held = np.asarray(curve.force)
         handles += fitted_range.curve(trace, law, held, force_held, linewidth=1.8, label=name or "law", **style)
-        laws.append(law)
         shares = metrics.velocity_histogram(velocity, edges), metrics.dissipation_histogram(force, velocity, edges)
         for axes, share in zip((time_share, energy_share), shares, strict=True):
             axes.step(middles, 100.0 * np.asarray(share), where="mid", linewidth=1.4, **style)
     reached = np.linspace(-reach, reach, _SHADE_POINTS)
-    shaded = [fitted_range.shade(axes, laws, reached) for axes in (trace, time_share, energy_share)]
+    shaded = [fitted_range.shade(axes, laws.values(), reached) for axes in (trace, time_share, energy_share)]
     handles += shaded[0]
     words = f"{damper.replace('_', ' ')}: ride (thin), constant velocity (thick)"
     _style.dress(trace, _style.VELOCITY, _style.FORCE, words)

@@ -30,19 +30,22 @@ def damper_comparison(comparison: DamperComparison) -> "matplotlib.figure.Figure
     handles = []
     for number, name in enumerate(others):
         rows = np.arange(len(metrics)) + 0.7 * ((number + 0.5) / len(others) - 0.5)
-        found = [comparison.difference(metric, name) for metric in metrics]
-        change, margin, own = (
-            np.array([getattr(d, key) for d in found]) for key in ("change", "margin", "from_parameters")
+        differences = [comparison.difference(metric, name) for metric in metrics]
+        change, margin, from_parameters = (
+            np.array([getattr(d, key) for d in differences]) for key in ("change", "margin", "from_parameters")
         )
         colour = _style.COLOURS[number % len(_style.COLOURS)]
-        faces = [colour if d.significant else "white" for d in found]
+        faces = [colour if d.significant else "white" for d in differences]
+        thick = {"ecolor": colour, "linewidth": 3.5, "alpha": 0.6}
         axes.errorbar(change, rows, xerr=_finite(margin), fmt="none", ecolor=colour, capsize=3.0, linewidth=1.0)
-        axes.errorbar(change, rows, xerr=_finite(own), fmt="none", ecolor=colour, linewidth=3.5, alpha=0.6)
+        axes.errorbar(change, rows, xerr=_finite(from_parameters), fmt="none", **thick)
         axes.scatter(change, rows, 40.0, faces, edgecolors=colour, zorder=3)
         handles.append(axes.scatter([], [], 40.0, colour, label=f"{name} relative to {first}"))
     axes.set_yticks(range(len(metrics)), [metric.replace("_", " ") for metric in metrics])
     axes.invert_yaxis()
-    _style.dress(axes, "change [%]", "")
+    roads = len(next(iter(comparison.values[first].values())))
+    where = f"on the same {roads} roads" if roads > 1 else "on a white road"
+    _style.dress(axes, "change [%]", "", f"Ride metrics beside those of {first}, {where}")
     axes.grid(False, axis="y")
     _style.cross(axes, horizontal=False)
     _style.legend_above(figure, handles)

@@ -80,7 +80,7 @@ def _points(
         mark = MARKS[i % len(MARKS)]
         handles.append(axes.scatter(values[x], values[y], 45.0, colour, marker=mark, label=name, zorder=4))
     handles += _limits(axes, front, x, y)
-    _style.dress(axes, *(_label(front, name) for name in (x, y)))
+    _style.dress(axes, _label(front, x), _label(front, y), f"Front of {len(front)} designs")
     return handles
 
 

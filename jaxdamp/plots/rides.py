@@ -1,6 +1,6 @@
 """Rides: time histories and the spectrum of the body acceleration."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +33,7 @@ def ride(
     window: tuple[float | int, float | int] | None = None,
     reference: str | None = None,
     frequencies: tuple[float | int, float | int] = (0.3, 30.0),
+    title: str = "",
 ) -> "matplotlib.figure.Figure":
     """Channels over time and the power spectral density of the first of them, overlaid for several responses.
 
@@ -49,6 +50,7 @@ def ride(
             largest first channel. The spectrum and the RMS are of the whole run.
         reference: name of the response to draw as a broad grey line beneath the others.
         frequencies: range of the spectrum [Hz].
+        title: above the picture, such as the road; the vehicle and the length of the ride if left out.
 
     Raises:
         ValueError: no response, no channel or an unknown one, an unknown weighting, a window without samples.
@@ -69,7 +71,7 @@ def ride(
     rows += [figure.add_subplot(grid[i, 0], sharex=rows[0]) for i in range(1, len(channels))]
     spectrum = figure.add_subplot(grid[:, 1])
     handles = []
-    styles = _line_styles(responses, reference)
+    styles = _ride_styles(responses, reference)
     for name, response in responses.items():
         style = styles[name]
         time, all_channels = np.asarray(response.time), response.channels
@@ -97,21 +99,25 @@ def ride(
     figure.align_ylabels(rows)
     rows[-1].set_xlabel("time [s]")
     rows[0].set_xlim(start, stop)
-    title = _label(first, channels[0]).split(" [")[0]
     unit = _unit(first, channels[0])
-    words = f"Spectrum of the {title}" + (f", dotted: weighted by {weighting}" if weighting else "")
+    name = _label(first, channels[0]).split(" [")[0]
+    words = f"Spectrum of the {name}" + (f", dotted: weighted by {weighting}" if weighting else "")
     _style.dress(spectrum, "frequency [Hz]", f"power spectral density [({unit})²/Hz]", words)
     spectrum.grid(True, which="minor", color="0.95", linewidth=0.5)
     spectrum.set_xlim(*frequencies)
     _style.legend_above(figure, handles)
+    figure.suptitle(title or f"{type(first.vehicle).__name__}, ride of {float(first.time[-1] - first.time[0]):g} s")
     fitted_range.footnotes(figure, responses)
     return figure
 
 
-def _line_styles(names: Iterable[str], reference: str | None) -> dict[str, dict[str, Any]]:
-    """How to draw each response: the later over the earlier, the reference broad beneath all."""
-    others = [name for name in names if name != reference]
-    styles = {name: _style.line_style(number) | {"linewidth": 1.2} for number, name in enumerate(others)}
+def _ride_styles(responses: Mapping[str, Response], reference: str | None) -> dict[str, dict[str, Any]]:
+    """How to draw each response: in the colour of its first damper's law, the reference broad beneath all."""
+    others = [name for name in responses if name != reference]
+    laws = {name: r.vehicle.frame().element(r.dampers[0]).law for name, r in responses.items() if r.dampers}
+    known = all(name in laws for name in others)
+    styles = _style.law_styles({name: laws[name] for name in others}) if known else {}
+    styles = {n: (styles[n] if known else _style.line_style(i)) | {"linewidth": 1.2} for i, n in enumerate(others)}
     return styles if reference is None else {reference: {"color": "0.7", "linewidth": 3.5}} | styles
 
 

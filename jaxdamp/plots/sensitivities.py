@@ -50,7 +50,7 @@ def sensitivity(result: Sensitivity, *, most: int = MOST) -> "matplotlib.figure.
 
 
 def record_sensitivity(result: RecordSensitivity) -> "matplotlib.figure.Figure":
-    """What follows from a fit, by the measured force: how it changes for 10 N more at each sample, over the velocity.
+    """The change of functions of a fitted law for 10 N more measured force at each sample, over the velocity.
 
     Arguments:
         result: of `FitResult.sensitivity_to_records`.
@@ -86,9 +86,9 @@ def _band(
     at_rest = (np.insert(a, middle, 0.0) for a in (curve.velocity, curve.force, result.curve_effects(damper)[metric]))
     velocity, force, effect = at_rest
     force[middle] = np.interp(0.0, curve.velocity, curve.force)
-    half = 0.06 * float(np.ptp(force) or 1.0)
+    half_width = 0.06 * float(np.ptp(force) or 1.0)
     fine = np.linspace(velocity[0], velocity[-1], 301)
-    low, high = np.interp(fine, velocity, force) - half, np.interp(fine, velocity, force) + half
+    low, high = np.interp(fine, velocity, force) - half_width, np.interp(fine, velocity, force) + half_width
     cells = [
         [(fine[i], low[i]), (fine[i + 1], low[i + 1]), (fine[i + 1], high[i + 1]), (fine[i], high[i])]
         for i in range(len(fine) - 1)

@@ -68,6 +68,7 @@ def sweep(
         _checks.one_of("limits", name, names)
     figure = _style.new_figure(7.0, 4.6)
     plot = figure.add_subplot()
+    plot.set_title(f"{_words(metric)} over {' and '.join(map(_words, axes))}", loc="left", fontsize="medium")
     (_curves if curves else _map)(figure, plot, data, metric, chosen, rest, _ends(data, spans))
     return figure
 
@@ -195,9 +196,14 @@ def _hatch(
 
 def _label(data: Any, name: str) -> str:
     """A name in words with its unit."""
-    words = name.rpartition(".")[2].replace("_", " ")
+    words = _words(name)
     unit = typeset_unit(data[name].attrs.get("units", ""))
     return f"{words} [{unit}]" if unit else words
+
+
+def _words(name: str) -> str:
+    """The last part of a name in words."""
+    return name.rpartition(".")[2].replace("_", " ")
 
 
 def _unit(data: Any, name: str) -> str:

@@ -43,7 +43,7 @@ def valving(result: ValvingResult) -> "matplotlib.figure.Figure":
             shade = axes.axvspan(*span, color=_style.SHADE, zorder=0, label="out of reach")
         if part is result.out_of_reach[0]:
             handles.append(shade)
-    _style.dress(forces, "", _style.FORCE)
+    _style.dress(forces, "", _style.FORCE, f"Valving: wanted and reached force, error {result.error_percent:.2g} %")
     _style.dress(errors, _style.VELOCITY, "error [N]")
     for axes in (forces, errors):
         _style.cross(axes)

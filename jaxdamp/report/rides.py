@@ -74,7 +74,7 @@ def add_rides(report: Report, responses: Mapping[str, Response], title: str, pre
     """
     for table in ride_tables(responses).values():
         report.table(table)
-    report.picture(lambda: plots.ride(responses, weighting="Wk"), title, f"{prefix}ride.png")
+    report.picture(lambda: plots.ride(responses, weighting="Wk", title=title), title, f"{prefix}ride.png")
     for damper in next(iter(responses.values())).dampers:
         caption = f"Use of the {damper.replace('_', ' ')} during the ride"
         report.picture(lambda name=damper: plots.damper_use(responses, damper=name), caption, f"{prefix}{damper}.png")

@@ -1,12 +1,14 @@
 """A page on a sweep: a table of all points, and a curve or a map of each result."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from jaxdamp import plots
+from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
+from jaxdamp.tune import limit_spans
 
 
 if TYPE_CHECKING:
@@ -21,6 +23,8 @@ def sweep_report(
     *,
     title: str = "Sweep",
     remarks: Sequence[str] = (),
+    limits: Mapping[str, Any] | None = None,
+    baseline: Mapping[str, Any] | None = None,
     folder: Path | None = None,
     attempts: Attempts | None = None,
 ) -> Report:
@@ -30,6 +34,8 @@ def sweep_report(
         data: of `jaxdamp.sweep`.
         title: of the page.
         remarks: on the results, such as the reasons of failed points.
+        limits: `{result: largest value}` or `{result: (smallest, largest)}`; hatched in maps, ringed on curves.
+        baseline: results of another design by name, to which the best points are compared.
         folder: folder for the pictures as separate files; without it they are only in the page.
         attempts: collects parts that fail; a new one if left out.
 
@@ -39,12 +45,50 @@ def sweep_report(
     True
     """
     report = Report(title, folder, attempts)
+    report.verdict(*best_points(data, limits, baseline))
     report.points(remarks)
     if len(data["failed"].dims) <= MOST_AXES:
         for name in data.data_vars:
             metric = str(name)
-            report.picture(lambda m=metric: plots.sweep(data, m), metric.replace("_", " "), f"{metric}.png")
+            report.picture(
+                lambda m=metric: plots.sweep(data, m, limits=limits), metric.replace("_", " "), f"{metric}.png"
+            )
     else:
         report.text(f"Grids of more than {MOST_AXES} axes are not drawn.")
     report.table(data.jaxdamp.table())
     return report
+
+
+def best_points(
+    data: "xarray.Dataset", limits: Mapping[str, Any] | None = None, baseline: Mapping[str, Any] | None = None
+) -> list[str]:
+    """The smallest value of each result in a sentence, where it is, within the limits, and beside a baseline.
+
+    Arguments:
+        data: of `jaxdamp.sweep`.
+        limits: as in `sweep_report`.
+        baseline: as in `sweep_report`.
+    """
+    dims = data["failed"].dims
+    names = [str(name) for name in data.data_vars if data[name].dims == dims]
+    axes = [str(name) for name in data.coords if name not in ("failed", "reason") and set(data[name].dims) & set(dims)]
+    allowed = ~data["failed"]
+    for name, (lower, upper) in limit_spans(limits, names).items():
+        allowed = allowed & (data[name] >= lower) & (data[name] <= upper)
+    count, total = int(allowed.sum()), int(allowed.size)
+    sentences = [f"{count} of {total} points are within all limits."] if limits else []
+    for name in names if count else ():
+        values = data[name].where(allowed)
+        place = values.isel(values.argmin(...)).coords
+        where = ", ".join(f"{axis} = {_in_words(data, axis, place[axis])}" for axis in axes)
+        beside = ""
+        if baseline is not None and (change := percent_change(float(baseline[name]), float(values.min()))) is not None:
+            beside = f", {change:+.1f} % from the baseline ({_in_words(data, name, baseline[name])})"
+        sentences.append(
+            f"Smallest {name.replace('_', ' ')}: {_in_words(data, name, values.min())} at {where}{beside}."
+        )
+    return sentences
+
+
+def _in_words(data: "xarray.Dataset", name: str, value: Any) -> str:
+    return f"{float(value):.4g} {typeset_unit(data[name].attrs.get('units', ''))}".rstrip()

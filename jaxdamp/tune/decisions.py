@@ -50,7 +50,7 @@ class FittedLaw(Protocol):
         ...
 
 
-class _Rated(NamedTuple):
+class _DamperMetrics(NamedTuple):
     """Metrics of one damper on each road, and the variance of their means due to its parameters."""
 
     values: Float[np.ndarray, "roads metrics"]
@@ -95,32 +95,35 @@ def compare_dampers(
     """
     _check(dampers, vehicle, roads)
     listed: list[Any] = [roads] if isinstance(roads, WhiteRoad) else list(roads)
-    rated, warnings, units = {}, [], {}
+    by_damper, warnings, units = {}, [], {}
+    run: dict[str, Any] = {"duration": duration, "dt": dt}
+    heights = None
     with Progress("Comparing dampers") as shown:
         for number, (name, damper) in enumerate(dampers.items()):
             shown(f"{name}, {number + 1} of {len(dampers)}")
             law = damper if isinstance(damper, AbstractDamper) else damper.law
             car = vehicle(law)
             check_module("vehicle", car, (AbstractVehicle,), "compare_dampers(dampers, vehicle, roads)")
-            rides = [
-                Ride(car, road, metrics=_chosen(car, listed, metrics), duration=duration, dt=dt) for road in listed
-            ]
-            units = {m.name: m.unit(car.units) for m in rides[0].metrics}
-            rated[name], doubts = _rated(damper, vehicle, rides)
-            warnings += [f"{name}: {doubt}" for doubt in doubts]
-    order, (first, *others) = list(units), list(rated)
-    by_metric = {name: dict(zip(order, one.values.T, strict=True)) for name, one in rated.items()}
+            ride = Ride(car, listed[0], metrics=_chosen(car, listed, metrics), **run)
+            if ride.heights is not None and heights is None:  # the same roads for all dampers
+                rides = (ride, *(Ride(car, road, metrics=ride.metrics, **run) for road in listed[1:]))
+                heights = jnp.stack([each.heights for each in rides if each.heights is not None])
+            units = {m.name: m.unit(car.units) for m in ride.metrics}
+            by_damper[name], notes = _metrics_of(damper, vehicle, ride, heights)
+            warnings += [f"{name}: {note}" for note in notes]
+    order, (first, *others) = list(units), list(by_damper)
+    by_metric = {name: dict(zip(order, one.values.T, strict=True)) for name, one in by_damper.items()}
     count = len(listed)
     return DamperComparison(
         values=by_metric,
         parameter_errors={
-            name: dict(zip(order, map(float, np.sqrt(one.variance)), strict=True)) for name, one in rated.items()
+            name: dict(zip(order, map(float, np.sqrt(one.variance)), strict=True)) for name, one in by_damper.items()
         },
         road_errors={
             name: {metric: _standard_error(values[metric]) for metric in order} for name, values in by_metric.items()
         },
         differences=tuple(
-            _difference(name, metric, rated[first], rated[name], i, count)
+            _difference(name, metric, by_damper[first], by_damper[name], i, count)
             for name in others
             for i, metric in enumerate(order)
         ),
@@ -155,21 +158,22 @@ def _chosen(car: AbstractVehicle, roads: Sequence[Any], metrics: Sequence[str | 
     return [m for m in known if m.statistic.differentiable and not m.statistic.signed]
 
 
-def _rated(
-    damper: AbstractDamper | FittedLaw, vehicle: Callable[[AbstractDamper], AbstractVehicle], rides: Sequence[Ride]
-) -> tuple[_Rated, list[str]]:
+def _metrics_of(
+    damper: AbstractDamper | FittedLaw,
+    vehicle: Callable[[AbstractDamper], AbstractVehicle],
+    ride: Ride,
+    heights: Array | None,
+) -> tuple[_DamperMetrics, list[str]]:
     """The metrics of a damper on all roads side by side, with exact derivatives by its estimates."""
     law = damper if isinstance(damper, AbstractDamper) else damper.law
     free = free_parameters(law)
     estimates, names = ([], free.names) if isinstance(damper, AbstractDamper) else (damper.parameters, free.names)
     effects = _effects(estimates, names)
-    order = [m.name for m in rides[0].metrics]
-    driven = [ride.heights for ride in rides if ride.heights is not None]
-    heights = jnp.stack(driven) if driven else None
-    values, slopes = _metrics_on_roads(rides[0].side_by_side(), vehicle, free, heights, jnp.asarray(effects), order)
+    order = [m.name for m in ride.metrics]
+    values, slopes = _metrics_on_roads(ride.side_by_side(), vehicle, free, heights, jnp.asarray(effects), order)
     values, slopes = np.asarray(values, np.float64), np.asarray(slopes, np.float64).mean(axis=0)
     if isinstance(damper, AbstractDamper):
-        return _Rated(values, np.zeros(len(order))), []
+        return _DamperMetrics(values, np.zeros(len(order))), []
     covariance = np.array(damper.covariance, np.float64)
     unknown = ~np.isfinite(np.diag(covariance))
     size = np.abs(effects.T @ np.asarray(free.values, np.float64)) * np.abs(slopes)
@@ -182,7 +186,7 @@ def _rated(
         for e, column in zip(estimates, matters.T, strict=True)
         if column.any()
     ]
-    return _Rated(values, variance), notes
+    return _DamperMetrics(values, variance), notes
 
 
 def _effects(estimates: Sequence[Any], names: Sequence[str]) -> Float[np.ndarray, "numbers free"]:
@@ -228,12 +232,12 @@ def _metrics_on_roads(
 
     still = {name: jnp.zeros(count, free.values.dtype) for name in columns}
     if not columns:
-        found = on_roads(still)
-        values = jnp.stack([found[name] for name in order], axis=-1)
+        metrics = on_roads(still)
+        values = jnp.stack([metrics[name] for name in order], axis=-1)
         return values, jnp.zeros((*values.shape, 0))
-    found, slopes = value_and_jacobian(on_roads, still, of=order)
+    metrics, slopes = value_and_jacobian(on_roads, still, of=order)
     rows = [jnp.stack([slopes[name][column] for column in columns], axis=-1) for name in order]
-    return jnp.stack([found[name] for name in order], axis=-1), jnp.stack(rows, axis=1)
+    return jnp.stack([metrics[name] for name in order], axis=-1), jnp.stack(rows, axis=1)
 
 
 def _standard_error(values: Float[np.ndarray, " roads"]) -> float:
@@ -241,7 +245,7 @@ def _standard_error(values: Float[np.ndarray, " roads"]) -> float:
     return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
 
 
-def _difference(name: str, metric: str, first: _Rated, other: _Rated, i: int, roads: int) -> Difference:
+def _difference(name: str, metric: str, first: _DamperMetrics, other: _DamperMetrics, i: int, roads: int) -> Difference:
     """The change of a metric in percent, with both errors to first order and the interval by Student's t."""
     from scipy.special import ndtri, stdtrit
 

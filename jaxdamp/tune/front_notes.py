@@ -1,4 +1,4 @@
-"""What is to be said of a front: which points belong to it, how their searches ended, and doubts in words."""
+"""Which points belong to a front, how their searches ended, and warnings in words."""
 
 from collections.abc import Sequence
 

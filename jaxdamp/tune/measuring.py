@@ -21,7 +21,7 @@ class Measurement:
     """The metrics of a vehicle and the value of the objective, as functions of the vehicle.
 
     Arguments:
-        vehicle: where the checks are made.
+        vehicle: with which the checks of a ride are done.
         road: one road, or scenarios.
         objective: with all metrics.
         free: parameters that change.

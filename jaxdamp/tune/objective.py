@@ -58,7 +58,7 @@ class Objective(NamedTuple):
 
 
 @final
-class _Asked(Mapping[str, Scalar]):
+class _NameRecorder(Mapping[str, Scalar]):
     """Metrics with the value one, which record the names that a function uses."""
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -106,22 +106,22 @@ def objective_of(
     extra += beside
     all_metrics = (*vehicle.ride_metrics, *extra)
     known = {m.name: m for m in all_metrics if not white or is_stationary(m, vehicle.layout.by_name)}
-    names, functions, asked = [], {}, [m.name for m in extra]
+    names, functions, used = [], {}, [m.name for m in extra]
     for one in wanted:
         if isinstance(one, str | Metric):
             names.append(current_name(one, known) if isinstance(one, str) else one.name)
-            asked.append(names[-1])
+            used.append(names[-1])
             continue
         names.append(_name(one))
         functions[names[-1]] = one
-        asked += _asked_by(one, list(known), argument)
+        used += _metrics_used_by(one, list(known), argument)
         if names[-1] in known:
             remedy = "Give the function another name."
             _checks.refuse(argument, "have a name that no metric has", repr(names[-1]), remedy)
     if len(set(names)) < len(names):
         remedy = "Functions need different names: use `def` instead of `lambda`."
         _checks.refuse(argument, "have different names", names, remedy)
-    for place, name in [*((argument, name) for name in asked), *(("limits", name) for name in limited)]:
+    for place, name in [*((argument, name) for name in used), *(("limits", name) for name in limited)]:
         _checks.one_of(place, name, known)
         if not known[name].statistic.differentiable:
             remedy = (
@@ -129,7 +129,7 @@ def objective_of(
             )
             _checks.refuse(place, "have a slope", f"{name!r}, a count", remedy)
     # Further metrics for information: those without weightings, counts and means, which may be negative.
-    chosen = [m for m in known.values() if m.name in (*asked, *limited) or _for_information(m)]
+    chosen = [m for m in known.values() if m.name in (*used, *limited) or _for_information(m)]
     return Objective(tuple(names), functions, tuple(chosen), beside)
 
 
@@ -149,10 +149,10 @@ def _name(function: Any) -> str:
     return name if name.isidentifier() else "objective"
 
 
-def _asked_by(function: Function, names: Sequence[str], argument: str) -> list[str]:
+def _metrics_used_by(function: Function, names: Sequence[str], argument: str) -> list[str]:
     """The metrics that a function uses, after a check that it returns one number."""
-    asked = _Asked(names)
-    value = function(asked)
+    used = _NameRecorder(names)
+    value = function(used)
     if np.shape(value) != () or not np.issubdtype(jnp.result_type(value), np.floating):
         _checks.refuse(argument, "give one number", f"{_checks.described(value)} from {_name(function)!r}")
-    return list(asked.names)
+    return list(used.names)

@@ -94,7 +94,7 @@ def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> di
     if not isinstance(bounds, Mapping):
         remedy = "Write `{'damper.rate': (1000.0, 5000.0)}`."
         _checks.refuse(argument, "be a mapping of parameters to bounds", _checks.described(bounds), remedy)
-    known, leaders, found = [p.path for p in parameters(free.tree)], dict(free.ties), {}
+    known, leaders, by_path = [p.path for p in parameters(free.tree)], dict(free.ties), {}
     paths = [p.path for p in free.chosen]
     for name, bound in bounds.items():
         named = [leaders.get(path, path) for path in match_paths(known, [name])]
@@ -102,8 +102,8 @@ def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> di
         if not chosen:
             remedy = f"The free parameters are {', '.join(paths)}: add it to `over`, or leave its bounds out."
             _checks.refuse(f"{argument}[{name!r}]", "bound a parameter that is free", "one that is not", remedy)
-        found |= dict.fromkeys(chosen, _pair(argument, name, bound))
-    return found
+        by_path |= dict.fromkeys(chosen, _pair(argument, name, bound))
+    return by_path
 
 
 def _pair(argument: str, name: str, bound: Any) -> Pair:

@@ -8,10 +8,11 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._field_types import check_module
 from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
-from jaxdamp.roads import AbstractRoad
+from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenarios import Scenarios
@@ -124,8 +125,16 @@ def rescore(
     >>> bool(np.all(fresh.change("rms_dynamic_tyre_load") < -0.1))
     True
     """
-    if not roads:
-        _checks.refuse("roads", "hold one or more", roads)
+    from jaxdamp.tune.result import TuneResult
+
+    call = "rescore(result, [road, road])"
+    remedy = f"The call is `{call}` with the result of `tune.minimise`."
+    _checks.instance("result", result, TuneResult, "be the result of a tuning", remedy)
+    if isinstance(roads, str) or not isinstance(roads, Sequence) or not roads:
+        _checks.refuse("roads", "be a list of one or more", _checks.described(roads), f"The call is `{call}`.")
+    for i, road in enumerate(roads):
+        if not isinstance(road, Scenarios):
+            check_module(f"roads[{i}]", road, (AbstractRoad, WhiteRoad), call)
     known, objective = list(result.start.ride_metrics), result.objective
     known += [m for m in (objective.metrics if objective else ()) if m not in known]
     units = {m.name: m.unit(result.start.units) for m in known} | (objective.units(result.start) if objective else {})
@@ -164,9 +173,9 @@ def rescored(
 def other_roads(road: Any, count: int) -> list[Any]:
     """So many other realisations of a random road, or of scenarios on random roads; none of others."""
     if isinstance(road, Scenarios):
-        found = [road.on_other_roads(FIRST_SEED + i) for i in range(count)]
+        roads = [road.on_other_roads(FIRST_SEED + i) for i in range(count)]
     elif isinstance(road, AbstractRoad):
-        found = [road.reseeded(FIRST_SEED + i) for i in range(count)]
+        roads = [road.reseeded(FIRST_SEED + i) for i in range(count)]
     else:
-        found = []
-    return [other for other in found if other is not None]
+        roads = []
+    return [other for other in roads if other is not None]

@@ -105,8 +105,8 @@ class ScenarioRide(eqx.Module):
             field = "road" if isinstance(self.roads, WhiteRoad) else "heights"
             return dict(eqx.tree_at(lambda ride: getattr(ride, field), ride, road)())
 
-        found = jax.vmap(one)(self.roads, self.factors, self.offsets)
-        return MetricValues.with_units({m.name: found[m.name] for m in self.metrics}, self.units)
+        by_name = jax.vmap(one)(self.roads, self.factors, self.offsets)
+        return MetricValues.with_units({m.name: by_name[m.name] for m in self.metrics}, self.units)
 
     def refuse_moved_axles(self, argument: str, build: Callable[[Any], AbstractVehicle], values: Any) -> None:
         """Refuse values that move an axle, where the road under it has been sampled already."""
@@ -118,7 +118,7 @@ class ScenarioRide(eqx.Module):
 
     def __call__(self, point: Mapping[str, Any] | None = None) -> dict[str, Scalar]:
         """The metrics by name, one number for all scenarios."""
-        values = {name: self.risk(found, self.weights) for name, found in self.each(point).items()}
+        values = {name: self.risk(each, self.weights) for name, each in self.each(point).items()}
         return MetricValues.with_units(values, self.units)
 
 
@@ -154,10 +154,10 @@ def scenario_ride(
     if len(counts) > 1:
         lengths = ", ".join(sorted(f"{(count - 1) * first.dt:g} s" for count in counts))
         _checks.refuse("roads", "be driven for the same time", lengths, "Pass `duration`.")
-    found: Any = [ride.road if white else ride.heights for ride in rides]
-    common = eqx.tree_at(lambda r: (r.vehicle, r.road), first, (vehicle, found[0] if white else None), is_leaf=_none)
+    inputs: Any = [ride.road if white else ride.heights for ride in rides]
+    common = eqx.tree_at(lambda r: (r.vehicle, r.road), first, (vehicle, inputs[0] if white else None), is_leaf=_none)
     weights = jnp.asarray([scenario.weight for scenario in scenarios])
-    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *found)
+    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *inputs)
     changes = [{path: jnp.stack(change) for path, change in side.items()} for side in (factors, offsets)]
     names = tuple(scenario.name for scenario in scenarios)
     delays = not white and any(ride.road is not None for ride in rides)
@@ -197,12 +197,12 @@ def _changes(
 
 def numbers(tree: Any) -> dict[str, Any]:
     """All parameters and settings of a module by path."""
-    found = {}
+    by_path = {}
     for prefix, module in modules_inside(tree):
         for field in type(module).__dataclass_fields__.values():  # type: ignore[attr-defined]
             if "parameter" in field.metadata or "setting" in field.metadata:
-                found[prefix + field.name] = getattr(module, field.name)
-    return found
+                by_path[prefix + field.name] = getattr(module, field.name)
+    return by_path
 
 
 def _by_path(known: Mapping[str, Any], changes: Mapping[str, Any], argument: str) -> dict[str, Any]:

@@ -116,11 +116,11 @@ class Scenarios:
             )
         object.__setattr__(self, "risk", risk_of(risk))
         object.__setattr__(self, "_counts", (len(roads), len(conditions)))
-        made = (
+        scenarios = (
             Scenario(", ".join(filter(None, (road_name, name))), road, condition, float(share))
             for ((road_name, road), (name, condition)), share in zip(pairs, shares / shares.sum(), strict=True)
         )
-        object.__setattr__(self, "scenarios", tuple(made))
+        object.__setattr__(self, "scenarios", tuple(scenarios))
 
     def __len__(self) -> int:
         return len(self.scenarios)

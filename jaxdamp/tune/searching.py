@@ -51,10 +51,10 @@ class Evaluator:
     def at(self, values: Float[np.ndarray, " free"]) -> tuple[dict[str, float], dict[str, np.ndarray]]:
         """Metrics, and their derivatives with respect to the physical values."""
         if self._last[0] != values.tobytes():
-            found, slopes = (np.asarray(a, np.float64) for a in self._evaluate(values))
+            numbers, slopes = (np.asarray(a, np.float64) for a in self._evaluate(values))
             self._last = (
                 values.tobytes(),
-                {name: float(x) for name, x in zip(self.names, found, strict=True)},
+                {name: float(x) for name, x in zip(self.names, numbers, strict=True)},
                 dict(zip(self.names, slopes, strict=True)),
             )
         return self._last[1], self._last[2]
@@ -71,12 +71,12 @@ def one_at_a_time(measured: Measured, free: FreeParameters, names: Sequence[str]
     @eqx.filter_jit
     def evaluate(free: FreeParameters, values: Array) -> tuple[Array, Array]:
         def stacked(values: Array) -> tuple[Array, Array]:
-            found = measured(free.build(values))
-            stacked = jnp.stack([found[name] for name in names])
+            values_by_name = measured(free.build(values))
+            stacked = jnp.stack([values_by_name[name] for name in names])
             return stacked, stacked
 
-        slopes, found = jax.jacfwd(stacked, has_aux=True)(values)
-        return found, slopes
+        slopes, numbers = jax.jacfwd(stacked, has_aux=True)(values)
+        return numbers, slopes
 
     return lambda values: evaluate(free, jnp.asarray(values, free.values.dtype))
 
@@ -187,11 +187,11 @@ def _slope_left(
     evaluator: Evaluator, space: SearchRange, values: np.ndarray, metric: str, limits: Sequence[Limit]
 ) -> float:
     """Length of the scaled gradient after projection on bounds and active limits, relative to the metric."""
-    found, slopes = evaluator.at(values)
+    metrics, slopes = evaluator.at(values)
     unbound = np.array([not side for side in space.side(values)])
     gradient = (slopes[metric] * space.unit)[unbound]
-    tight = active(limits, found, evaluator.tolerance)
+    tight = active(limits, metrics, evaluator.tolerance)
     if tight and gradient.size:
         walls = np.stack([(slopes[limit.name] * space.unit)[unbound] for limit in tight], axis=1)
         gradient = gradient - walls @ np.linalg.lstsq(walls, gradient, rcond=None)[0]
-    return float(np.linalg.norm(gradient)) / max(abs(found[metric]), 1e-300)
+    return float(np.linalg.norm(gradient)) / max(abs(metrics[metric]), 1e-300)

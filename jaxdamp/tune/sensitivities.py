@@ -73,9 +73,9 @@ def sensitivity(
             function of them.
 
     >>> from jaxdamp import roads, vehicles
-    >>> car = vehicles.presets.quarter_car_000()
-    >>> found = sensitivity("rms_sprung_acceleration", car, roads.white("C", 20.0), over=["damper.rate", "sprung_mass"])
-    >>> {name: round(float(value), 3) for name, value in found.elasticities("rms_sprung_acceleration").items()}
+    >>> car, road = vehicles.presets.quarter_car_000(), roads.white("C", 20.0)
+    >>> result = sensitivity("rms_sprung_acceleration", car, road, over=["damper.rate", "sprung_mass"])
+    >>> {name: round(float(value), 3) for name, value in result.elasticities("rms_sprung_acceleration").items()}
     {'sprung_mass': -0.648, 'damper.rate': -0.276}
     """
     wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
@@ -165,10 +165,10 @@ def _reach(vehicle: AbstractVehicle, road: Any, run: Mapping[str, Any]) -> float
     velocities = {m.channel for m in layout.metrics if layout.by_name[m.channel].kind is ChannelKind.DAMPER_VELOCITY}
     metrics = [Metric(channel, "rms") for channel in sorted(velocities)]
     if isinstance(road, Scenarios):
-        found = road.with_risk("worst").ride(vehicle, metrics=metrics, **run)()
+        peaks = road.with_risk("worst").ride(vehicle, metrics=metrics, **run)()
     else:
-        found = Ride(vehicle, road, metrics=metrics, **run)()
-    return REACH * max(float(value) for value in found.values())
+        peaks = Ride(vehicle, road, metrics=metrics, **run)()
+    return REACH * max(float(value) for value in peaks.values())
 
 
 def _free(
@@ -211,8 +211,8 @@ def _derivatives(
     @eqx.filter_jit
     def both(x: jax.Array) -> tuple[jax.Array, jax.Array]:
         def stacked(x: jax.Array) -> tuple[jax.Array, jax.Array]:
-            found = measured(x)
-            values = jnp.stack([found[name] for name in names])
+            results = measured(x)
+            values = jnp.stack([results[name] for name in names])
             return values, values
 
         return jax.jacfwd(stacked, has_aux=True)(x)
@@ -227,8 +227,8 @@ def _second(measured: Callable[[Any], Any], names: Sequence[str], point: np.ndar
     @eqx.filter_jit
     def twice(x: jax.Array) -> jax.Array:
         def stacked(part: jax.Array) -> jax.Array:
-            found = measured(x.at[chosen].set(part))
-            return jnp.stack([found[name] for name in names])
+            results = measured(x.at[chosen].set(part))
+            return jnp.stack([results[name] for name in names])
 
         return jax.jacfwd(jax.jacfwd(stacked))(x[chosen])
 
@@ -239,12 +239,12 @@ def _curve_parts(
     vehicle: AbstractVehicle, hatted: AbstractVehicle, paths: Sequence[str], names: Sequence[str], slopes: np.ndarray
 ) -> dict[str, CurveSensitivity]:
     """The derivatives by the forces of each curve."""
-    found, begin = {}, 0
+    curves, begin = {}, 0
     for path in sorted(paths, key=damper_paths(vehicle).index):
         hats = get(hatted, path).terms[-1]
         end = begin + hats.forces.size
         velocities = np.asarray(hats.velocities, float)
         force = np.asarray(held_force(get(vehicle, path), jnp.asarray(velocities)), float)
-        found[path] = CurveSensitivity(velocities, force, dict(zip(names, slopes[:, begin:end], strict=True)))
+        curves[path] = CurveSensitivity(velocities, force, dict(zip(names, slopes[:, begin:end], strict=True)))
         begin = end
-    return found
+    return curves

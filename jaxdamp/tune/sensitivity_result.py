@@ -45,7 +45,7 @@ class Sensitivity:
         point: the numbers where the derivatives are taken.
         gradient: for each metric its derivative by each number, in their units.
         curves: derivatives by the force at each velocity, for each damper by its path.
-        hessian: for each metric its second derivatives by the numbers; None if they were not asked for.
+        hessian: for each metric its second derivatives by the numbers; None without `second_order`.
     """
 
     values: dict[str, float]
@@ -72,7 +72,7 @@ class Sensitivity:
         rows = []
         for i in order:
             name = self.parameters[i]
-            cells = (None if np.isnan(found[name]) else found[name] for found in by_metric.values())
+            cells = (None if np.isnan(slopes[name]) else slopes[name] for slopes in by_metric.values())
             rows.append((name, float(self.point[i]), typeset_unit(self.parameter_units[i], "–"), *cells))
         return Table("Change of the metrics for 1 % of each parameter", columns, tuple(rows))
 
@@ -103,7 +103,7 @@ class Sensitivity:
         """How far each principal direction of the parameters can go for 1 % of the metric, in sentences.
 
         The directions are the eigenvectors of the second derivatives by relative changes. Along a direction of negative
-        curvature the point is no minimum. A slope that is left is said first.
+        curvature the point is no minimum. A slope that remains is stated first.
 
         Raises:
             ValueError: no second derivatives, an unknown metric.

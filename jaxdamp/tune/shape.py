@@ -136,12 +136,12 @@ class ShapeNumbers:
 
     def __call__(self, vehicle: AbstractVehicle) -> dict[str, Scalar]:
         """The numbers by name."""
-        found = {}
+        numbers_by_name = {}
         for shape, path in self._pairs:
             velocities = jnp.asarray(shape.velocities)
             numbers = shape.numbers(velocities, held_force(get(vehicle, path), velocities))
-            found |= dict(zip(_names(shape, path), numbers, strict=True))
-        return found
+            numbers_by_name |= dict(zip(_names(shape, path), numbers, strict=True))
+        return numbers_by_name
 
     @property
     def names(self) -> list[str]:
@@ -150,13 +150,13 @@ class ShapeNumbers:
 
     def limits(self, start: Mapping[str, float]) -> list[Limit]:
         """The limits of the numbers; their distances are scaled by the largest number of the curve at the start."""
-        found = []
+        limits = []
         for shape, path in self._pairs:
             names = _names(shape, path)
             size = scaled(*shape.span, max(abs(start[name]) for name in names))
             of = f"{shape.name} of {path}"
-            found += [Limit(name, of, *shape.span, size, shape.unit, is_shape=True) for name in names]
-        return found
+            limits += [Limit(name, of, *shape.span, size, shape.unit, is_shape=True) for name in names]
+        return limits
 
 
 def damper_paths(vehicle: AbstractVehicle) -> list[str]:
@@ -165,11 +165,11 @@ def damper_paths(vehicle: AbstractVehicle) -> list[str]:
     Arguments:
         vehicle: the vehicle.
     """
-    found: list[str] = []
+    laws: list[str] = []
     for prefix, _ in laws_inside(vehicle):
-        if not any(prefix.startswith(f"{path}.") for path in found):
-            found.append(prefix.removesuffix("."))
-    return found
+        if not any(prefix.startswith(f"{path}.") for path in laws):
+            laws.append(prefix.removesuffix("."))
+    return laws
 
 
 def held_force(law: AbstractDamper, velocities: Curve) -> Curve:

@@ -172,31 +172,31 @@ class Lane:
         near.at, near.now = at, now
         return near
 
-    def learn(self, at: np.ndarray, found: Computed) -> None:
+    def learn(self, at: np.ndarray, computed: Computed) -> None:
         """Update the curvature by the derivatives at another point (damped BFGS, so that it stays positive)."""
         step = at - self.at
-        if not np.all(np.isfinite(found.slopes)) or not step.any():
+        if not np.all(np.isfinite(computed.slopes)) or not step.any():
             return
-        for matrix, change in zip(self.curvature, found.slopes - self.now.slopes, strict=True):
+        for matrix, change in zip(self.curvature, computed.slopes - self.now.slopes, strict=True):
             along = matrix @ step
             old, new = step @ along, step @ change
             share = 1.0 if new >= 0.2 * old else 0.8 * old / (old - new)
             damped = share * change + (1.0 - share) * along
             matrix += np.outer(damped, damped) / (step @ damped) - np.outer(along, along) / old
 
-    def take(self, at: np.ndarray, found: Computed, promised: float, scaling: Scaling) -> None:
+    def take(self, at: np.ndarray, computed: Computed, promised: float, scaling: Scaling) -> None:
         """Move to a tried point if it is better, and adapt the trust region."""
-        before, after = (scaling.merit(c.rows, self.aim) for c in (self.now, found))
-        gain = (before - after) / promised if np.isfinite(after) and np.isfinite(found.slopes).all() else -1.0
+        before, after = (scaling.merit(c.rows, self.aim) for c in (self.now, computed))
+        gain = (before - after) / promised if np.isfinite(after) and np.isfinite(computed.slopes).all() else -1.0
         length = float(np.abs(at - self.at).max())
-        self.learn(at, found)
+        self.learn(at, computed)
         self.steps += 1
         if gain < 0.25:
             self.radius = 0.5 * length
         elif gain > 0.75 and length > 0.99 * self.radius:
             self.radius *= 2.0
         if gain > 1e-4:
-            self.at, self.now = at, found
+            self.at, self.now = at, computed
         self.open = self.radius > LEAST_RADIUS
 
 
@@ -265,6 +265,6 @@ def solve_together(
         progress()
         if not tried:
             return
-        found = evaluator.at(np.stack([at for _, at, _ in tried]))
-        for (lane, at, promised), computed in zip(tried, found, strict=True):
+        results = evaluator.at(np.stack([at for _, at, _ in tried]))
+        for (lane, at, promised), computed in zip(tried, results, strict=True):
             lane.take(at, computed, promised, scaling)

@@ -48,11 +48,11 @@ def spectra(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the notes of the tuning say it
         response = simulate(vehicle, road, duration=duration, dt=dt)
-    found = {}
+    by_channel = {}
     for name in channels:
         values = np.asarray(response[name])
         segment = min(round(1.2 / (LOWEST * dt)), len(values))
         frequency, density = (np.asarray(a) for a in power_spectral_density(values - values.mean(), dt, segment))
         inside = (frequency >= LOWEST) & (frequency <= HIGHEST)
-        found[name] = Spectrum(frequency[inside], density[inside])
-    return found
+        by_channel[name] = Spectrum(frequency[inside], density[inside])
+    return by_channel

@@ -113,20 +113,20 @@ class Desk:
 
     def __init__(self, evaluate: Evaluate, count: int) -> None:
         self._evaluate, self._count = evaluate, count
-        self._active, self._asked = set(range(count)), dict[int, np.ndarray]()
-        self._answers: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._active, self._requests = set(range(count)), dict[int, np.ndarray]()
+        self._results: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self._error: BaseException | None = None
         self._changed = threading.Condition()
 
     def ask(self, index: int, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The numbers and slopes of a point, computed with those of the other searches."""
         with self._changed:
-            self._asked[index] = values.copy()
+            self._requests[index] = values.copy()
             self._changed.notify_all()
-            self._changed.wait_for(lambda: index in self._answers or self._error is not None)
+            self._changed.wait_for(lambda: index in self._results or self._error is not None)
             if self._error is not None:
                 raise self._error
-            return self._answers.pop(index)
+            return self._results.pop(index)
 
     def leave(self, index: int) -> None:
         """A search is at its end."""
@@ -146,17 +146,17 @@ class Desk:
         try:
             while True:
                 with self._changed:
-                    self._changed.wait_for(lambda: self._error is not None or self._active <= set(self._asked))
+                    self._changed.wait_for(lambda: self._error is not None or self._active <= set(self._requests))
                     if self._error is not None:
                         raise self._error
                     if not self._active:
                         return
-                    asked, self._asked = self._asked, {}
-                found, slopes = self._batch(list(asked.values()))
+                    requests, self._requests = self._requests, {}
+                values, slopes = self._batch(list(requests.values()))
                 rounds += 1
                 progress(rounds)
                 with self._changed:
-                    self._answers |= {i: (found[k], slopes[k]) for k, i in enumerate(asked)}
+                    self._results |= {i: (values[k], slopes[k]) for k, i in enumerate(requests)}
                     self._changed.notify_all()
         except BaseException as error:
             self.fail(error)
@@ -164,11 +164,11 @@ class Desk:
 
     def alone(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The numbers and slopes of one point, by the same program."""
-        found, slopes = self._batch([values])
-        return found[0], slopes[0]
+        values, slopes = self._batch([values])
+        return values[0], slopes[0]
 
     def _batch(self, points: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Points in a batch of always the same size."""
         padded = np.stack(points + [points[0]] * (self._count - len(points)))
-        found, slopes = self._evaluate(padded)
-        return np.asarray(found, np.float64), np.asarray(slopes, np.float64)
+        values, slopes = self._evaluate(padded)
+        return np.asarray(values, np.float64), np.asarray(slopes, np.float64)

@@ -1,4 +1,4 @@
-"""What a search over the designs of a vehicle is asked for: objectives, free parameters, limits and shapes."""
+"""The task of a search over designs of a vehicle: objectives, free parameters, limits and shapes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Generic, final
@@ -122,7 +122,7 @@ class DesignTask(Generic[V]):
         return {name: span[1] if np.isinf(span[0]) else span for name, span in self.allowed.items()}
 
     def notes_on_runs(self, design: AbstractVehicle) -> list[str]:
-        """What is to be said of the step and of the fitted ranges for a design, on every road."""
+        """Notes on the step and on the fitted ranges for a design, on every road."""
         notes = []
         for ride_of in self.measured.rides_of():
             coarse = [] if self.measured.white else step_notes(self.vehicle, design, ride_of)

@@ -70,16 +70,16 @@ def tolerance_effects(
         remedy = "Call it once for each metric."
         _checks.refuse("metric", "be a single one", _checks.described(metric), remedy)
     run: dict[str, Any] = {"duration": duration, "dt": dt}
-    found = sensitivity(metric, vehicle, road, over=list(scatter), dampers=None, second_order=True, **run)
-    ((name, value),) = found.values.items()
-    assert found.hessian is not None
-    known = [parameter.partition("[")[0] for parameter in found.parameters]
-    by_path = {path: s for pattern, s in scatter.items() for path in match_paths(known, [pattern])}
+    result = sensitivity(metric, vehicle, road, over=list(scatter), dampers=None, second_order=True, **run)
+    ((name, value),) = result.values.items()
+    assert result.hessian is not None
+    paths = [parameter.partition("[")[0] for parameter in result.parameters]
+    by_path = {path: s for pattern, s in scatter.items() for path in match_paths(paths, [pattern])}
     effects = []
-    for i, parameter in enumerate(found.parameters):
-        s = by_path[known[i]]
-        first = found.gradient[name][i] * found.point[i] * s / value
-        second = found.hessian[name][i, i] * (found.point[i] * s) ** 2 / value
+    for i, parameter in enumerate(result.parameters):
+        s = by_path[paths[i]]
+        first = result.gradient[name][i] * result.point[i] * s / value
+        second = result.hessian[name][i, i] * (result.point[i] * s) ** 2 / value
         effects.append(ToleranceEffect(parameter, s, 0.5 * second, float(np.hypot(first, second / np.sqrt(2.0)))))
     return tuple(sorted(effects, key=lambda effect: -effect.deviation))
 

@@ -14,7 +14,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
-from jaxdamp.bench import BenchRun
+from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, MonoTube
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import march, quasi_static, respond
@@ -128,9 +128,9 @@ def valving(
     with Progress("Choosing the valving") as shown:
         for number, begin in enumerate(_starts(space, starts)):
             shown(f"start {number + 1} of {starts}")
-            found = _search(space, force_of, wanted.all_forces, begin, max_steps)
-            if np.isfinite(found.cost) and (best is None or found.cost < best.cost):
-                best = found
+            end = _search(space, force_of, wanted.all_forces, begin, max_steps)
+            if np.isfinite(end.cost) and (best is None or end.cost < best.cost):
+                best = end
             if best is not None and np.sqrt(2 * best.cost / len(wanted.all_forces)) < CLOSE_ENOUGH * tolerance * size:
                 break
     if best is None:
@@ -189,9 +189,9 @@ def _wanted(target: Any, start: MonoTube, velocities: Any, motions: Sequence[tup
         points, curve = (np.asarray(values, float) for values in target)
         _checks.finite("target", np.concatenate([points, curve]))
         return Wanted(points, curve, ())
-    runs = [target] if isinstance(target, BenchRun) else list(target)
-    for run in runs:
-        _checks.instance("target", run, BenchRun, "be a law, a pair of velocities and forces, or records")
+    runs = as_runs(target, "target", "valving(law or (velocities, forces) or records, start)")
+    if not runs:
+        _checks.refuse("target", "hold a record", _checks.described(target), "`bench.read(paths)` gives records.")
     loops = [(r, float(r.time[-1] - r.time[0]) / (len(r.time) - 1)) for r in runs]
     cut = tuple(Loop(dt, r.stroke, r.velocity, r.force, int(SETTLING * len(r.time))) for r, dt in loops)
     return Wanted(none, none, cut)
@@ -231,8 +231,8 @@ def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> Any:
         return force, slopes
 
     def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        found = forces(free, jnp.asarray(values, free.values.dtype))
-        return np.asarray(found[0], np.float64), np.asarray(found[1], np.float64)
+        computed = forces(free, jnp.asarray(values, free.values.dtype))
+        return np.asarray(computed[0], np.float64), np.asarray(computed[1], np.float64)
 
     return evaluate
 

@@ -16,7 +16,7 @@ from jaxdamp.tune.smooth import exact_counterpart
 from jaxdamp.tune.starts import Attempt
 
 
-LOST = 0.5  # share of an improvement: if less is left on fresh roads, that is said
+LOST = 0.5  # share of an improvement: if less is left on fresh roads, a warning states it
 ALIKE = 1e-3  # relative difference of metrics at ends that count as one optimum
 
 

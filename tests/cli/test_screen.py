@@ -2,6 +2,7 @@
 
 import io
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -35,6 +36,7 @@ def test_a_stage_shows_progress_and_keeps_its_time(terminal: bool, monkeypatch: 
     clock = iter([100.0, 102.34])
     monkeypatch.setattr(console, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
     screen = Screen()
+    screen.live = terminal
     screen.console = Console(file=io.StringIO(), force_terminal=terminal, width=100)
     with screen.stage("Work [N]", 2) as advance:
         advance("[m/s]", 0)
@@ -43,6 +45,16 @@ def test_a_stage_shows_progress_and_keeps_its_time(terminal: bool, monkeypatch: 
     assert isinstance(file, io.StringIO) and "Work [N]: done in 2.3 s" in file.getvalue()
     assert screen.times["Work [N]"] == pytest.approx(2.34)
     assert screen.times_table().rows[0][0] == "Work [N]"
+
+
+def test_a_pipe_with_colours_gets_no_live_frames(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    screen = Screen()
+    with screen.stage("Work", 2) as advance:
+        advance("a part", 1)
+    text = capsys.readouterr().out
+    assert "\x1b[32m" in text  # colours are wanted
+    assert "Work ..." in text and not any(mark in text for mark in ("⠋", "a part", "\x1b[2K", "\x1b[?25l"))
 
 
 def test_brackets_are_not_taken_for_markup() -> None:

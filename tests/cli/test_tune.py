@@ -61,13 +61,24 @@ def test_a_limit_that_is_not_met_ends_with_an_exit_code(tmp_path: Path) -> None:
     assert "is not met" in jaxdamp("tune", "quarter_car_000", "white:C", *words, code=1).output
 
 
-def test_sweep_of_a_vehicle_from_a_file_writes_a_table_and_pictures(tmp_path: Path) -> None:
+def test_sweep_of_a_vehicle_from_a_file_writes_a_table_and_pictures(law: Path, tmp_path: Path) -> None:
     to_json(vehicles.presets.half_car_002(), tmp_path / "car.json")
     words = ["--over", "front.damper.rate=1000:2000:2", "--over", "rear.damper.rate=800;1600", "--metric", "comfort"]
+    words += ["--limit", "travel=0.076,grip=550", "--baseline", law]
     out = tmp_path / "swept"
     jaxdamp("sweep", tmp_path / "car.json", "bump:0.05:4", "--duration", "1.5", "--dt", "2e-3", *words, "--out", out)
     rows = list(csv.DictReader((out / "sweep.csv").read_text().splitlines()))
     assert len(rows) == 4 and "weighted_rms_sprung_acceleration [m/s²]" in rows[0]
+    largest = (("working_space", 0.076), ("tyre_load", 550.0))
+    limits = {name: most for word, most in largest for name in rows[0] if word in name}
+    within = [row for row in rows if all(float(row[name]) <= most for name, most in limits.items())]
+    assert len(limits) == 4 and 0 < len(within) < 4
+    page, comfort = (out / "report.html").read_text(), "weighted_rms_sprung_acceleration [m/s²]"
+    assert f"{len(within)} of 4 points are within all limits" in page
+    best = min(within, key=lambda row: float(row[comfort]))
+    place = f"front.damper.rate = {best['front.damper.rate [N s/m]']} N s/m"
+    assert f"Smallest weighted rms sprung acceleration: {float(best[comfort]):.4g} m/s² at {place}" in page
+    assert "% from the baseline" in page
     assert (out / "weighted_rms_sprung_acceleration.png").is_file() and (out / "sweep.nc").is_file()
 
 
@@ -91,17 +102,26 @@ def test_words_for_metrics() -> None:
 
 WRONG = [
     (["tune", "quarter_car_00", "white:C"], "Did you mean 'quarter_car_000'?"),
-    (["tune", "car.json", "white:C"], "Option --vehicle must be a file that is there"),
-    (["tune", "LAW", "white:C"], "be a file with a vehicle"),
-    (["tune", "BAD", "white:C"], "is not TOML"),
+    (["tune", "car.json", "white:C"], "VEHICLE must be a file that is there"),
+    (["tune", "CSV", "white:C"], "VEHICLE must be one of"),
+    (["ride", "LAW", "--vehicle", "quarter_car"], "Option --vehicle must be one of"),
+    (["ride", "CSV"], "LAW must be a law as JSON, but is {CSV}"),
+    (["ride", "none.json"], "LAW must be a file that is there, but is none.json"),
+    (["ride", "LAW", "--baseline", "CSV"], "Option --baseline must be a law as JSON, but is {CSV}"),
+    (["tune", "quarter_car_000", "white:C", "--start", "CSV"], "`jaxdamp fit` writes best_law.json"),
+    (["tune", "quarter_car_000", "white:C", "--start", "CAR"], "Option --start must be a law as JSON, but is a Quart"),
+    (["tune", "quarter_car_000", "white:C", "--baseline", "CSV"], "Option --baseline must be a law or a QuarterCar as"),
+    (["export", "CSV", "--to", "c"], "LAW must be a law as JSON, but is {CSV}"),
+    (["tune", "LAW", "white:C"], "VEHICLE must be a vehicle as JSON, but is a Linear"),
+    (["tune", "BAD", "white:C"], "VEHICLE must be TOML, but is {BAD}"),
     (["tune", "ODD", "white:C"], "be a TOML file of preset and [parameters]"),
     (["tune", "UNKNOWN", "white:C"], "must be one of"),
     (["tune", "WRONG", "white:C"], "did you mean 'sprung_mass'"),
     (["tune", "NEGATIVE", "white:C"], "must be positive"),
     (["tune", "quarter_car_000", "white:K"], "must be one of 'A'"),
-    (["tune", "quarter_car_000", "grey:C"], "Option --road must be iso:CLASS"),
+    (["tune", "quarter_car_000", "grey:C"], "ROAD must be iso:CLASS"),
     (["tune", "quarter_car_000", "bump:3"], "bump:HEIGHT:LENGTH"),
-    (["tune", "quarter_car_000", "white:C", "--start", "none.json"], "There is no file"),
+    (["tune", "quarter_car_000", "white:C", "--start", "none.json"], "Option --start must be a file that is there"),
     (["tune", "quarter_car_000", "white:C", "--minimise", "confort"], "Did you mean 'comfort'?"),
     (["tune", "quarter_car_000", "white:C", "--limit", "travel"], "Option --limit must read like NAME=VALUE"),
     (["tune", "quarter_car_000", "white:C", "--limit", "trawel=0.1"], "Did you mean 'travel'?"),
@@ -125,6 +145,9 @@ WRONG = [
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1:2:0"], "have one value or more"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rat=1;2"], "did you mean 'rate'"),
     (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--metric", "confort"], "Did you mean 'comfort'?"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--limit", "trawel=1"], "Did you mean 'travel'?"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--limit", "grip"], "must read like NAME=VALUE"),
+    (["sweep", "quarter_car_000", "white:C", "--over", "rate=1;2", "--limit", "grip=2:1"], "in increasing order"),
 ]
 FILES = {
     "BAD": "preset = ",
@@ -138,4 +161,11 @@ FILES = {
 @pytest.mark.parametrize(("words", "message"), WRONG, ids=[" ".join(words[1:]) for words, _ in WRONG])
 def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], message: str) -> None:
     files = {"LAW": law} | {word: _toml(tmp_path, FILES[word]) for word in words if word in FILES}
+    if "CSV" in words:
+        files["CSV"] = tmp_path / "law.csv"
+        files["CSV"].write_text("velocity [m/s],force [N]\n0,1\n")
+    if "CAR" in words:
+        files["CAR"] = tmp_path / "car.json"
+        to_json(vehicles.presets.quarter_car_000(), files["CAR"])
+    message = message.format_map({word: str(file) for word, file in files.items()})
     assert message in refused(tmp_path, *(files.get(word, word) for word in words), "--out", tmp_path / "out")

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from jaxdamp import bench, identify, roads, tune, vehicles
+from jaxdamp import bench, identify, plots, roads, tune, vehicles
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.dampers import Bilinear
 from jaxdamp.identify import Posterior, Spread, TargetFit
@@ -97,3 +97,13 @@ def test_every_result_with_a_table_has_a_picture() -> None:
             kind = getattr(package, name)
             if isinstance(kind, type) and hasattr(kind, "table") and name not in words:
                 assert hasattr(kind, "plot"), f"{name} has a table and no picture"
+
+
+def test_figures_say_what_they_show(runs: BenchSet) -> None:
+    law = Bilinear(2600.0, 1200.0)
+    assert titles(plots.force_velocity(law, runs=list(runs)[:1])) == ["Force over velocity: Bilinear, 0.5Hz"]
+    assert titles(plots.force_velocity({"a": law}, runs=list(runs))) == ["Force over velocity: 3 records"]
+    assert titles(plots.force_velocity(law, title="Twin")) == ["Twin"]
+    pair = {"A": law, "B": Bilinear(3000.0, 1500.0)}
+    compared = tune.compare_dampers(pair, vehicles.presets.quarter_car_000, roads.white("C", 20.0))
+    assert titles(compared.plot()) == ["Ride metrics beside those of A, on a white road"]

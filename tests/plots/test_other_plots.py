@@ -13,8 +13,9 @@ from matplotlib.patches import Rectangle
 import jaxdamp
 from jaxdamp import metrics, plots, sweeps
 from jaxdamp.bench import BenchSet, peak_velocity_points
-from jaxdamp.dampers import Bilinear, Dahl, Lag, Linear
+from jaxdamp.dampers import Besinger, Bilinear, CoulombFriction, Dahl, Lag, Linear
 from jaxdamp.identify import Comparison
+from jaxdamp.plots import _style
 from jaxdamp.simulation import Response
 from jaxdamp.tune import TuneResult
 
@@ -58,6 +59,24 @@ def test_the_baseline_is_a_dashed_black_line() -> None:
     assert new.get_linestyle() == "-" and new.get_color() != old.get_color()
     with pytest.raises(ValueError, match="Did you mean 'old'"):
         plots.force_velocity({"old": Linear(1000.0)}, baseline="odl")
+
+
+def test_a_law_has_the_colour_of_its_family_in_every_figure(responses: dict[str, Response]) -> None:
+    besinger = Besinger(1600.0, 4200.0, 900.0, limit_velocity=0.13, transition_velocity=0.35)
+    laws = {"linear": Linear(2e3), "lag": Lag(besinger, 0.01), "friction": Linear(1e3) + CoulombFriction(50.0, 0.01)}
+
+    def styles(figure: Figure) -> dict[str, tuple[str, str]]:
+        lines = {str(line.get_label()): line for line in figure.axes[0].get_lines()}
+        return {name: (str(line.get_color()), str(line.get_linestyle())) for name, line in lines.items()}
+
+    together = styles(plots.force_velocity(laws, np.linspace(-1.0, 1.0, 5)))
+    assert together["linear"] == ("#0072B2", "-") and together["lag (settled)"] == ("#D55E00", "-")
+    assert together["friction"][1] == "--" and len({colour for colour, _ in together.values()} - {"0.6"}) == 3
+    alone = styles(plots.force_velocity({"b": laws["lag"]}, np.linspace(-1.0, 1.0, 5)))
+    assert alone["b (settled)"] == together["lag (settled)"]
+    assert styles(plots.damper_use(responses))["soft"] == together["linear"]  # bilinear, of the same family
+    many = _style.law_styles({str(i): Linear(1.0) for i in range(18)})
+    assert len({tuple(style.values()) for style in many.values()}) == 18
 
 
 def test_measured_points_lie_under_the_curves(runs: BenchSet) -> None:

@@ -68,6 +68,26 @@ def on_roads():
     return laws, listed, tune.compare_dampers(laws, quarter_car, listed, metrics=[COMFORT, TYRE], duration=2.0, dt=2e-3)
 
 
+def test_roads_are_sampled_once_for_all_dampers(monkeypatch):
+    phases = []
+
+    def counted(vehicle, road, *more):
+        phases.append(float(road.phase[0]))
+        return sampled(vehicle, road, *more)
+
+    from jaxdamp.simulation import ride
+
+    sampled = ride.sampled
+    monkeypatch.setattr(ride, "sampled", counted)
+    listed = [roads.iso8608("C", speed=20.0, seed=seed) for seed in range(3)]
+    laws = {"A": dampers.Linear(2000.0), "B": dampers.Linear(3000.0), "C": dampers.Linear(4000.0)}
+    compared = tune.compare_dampers(laws, quarter_car, listed, metrics=[COMFORT], duration=0.2, dt=2e-3)
+    first, *others = (float(road.phase[0]) for road in listed)
+    assert phases == [first, *others, first, first]  # the first one with each damper, to check the step
+    alone = Ride(quarter_car(laws["C"]), listed[2], metrics=[COMFORT], duration=0.2, dt=2e-3)()
+    assert compared.values["C"][COMFORT][2] == pytest.approx(float(alone[COMFORT]), rel=1e-9)
+
+
 def test_values_are_those_of_rides_and_common_roads_cancel(on_roads):
     laws, listed, found = on_roads
     ride = Ride(quarter_car(laws["A"]), listed[3], metrics=[COMFORT, TYRE], duration=2.0, dt=2e-3)

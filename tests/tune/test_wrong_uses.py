@@ -34,6 +34,10 @@ def compare(**change: Any) -> Any:
     return tune.compare_dampers(**{"dampers": PAIR, "vehicle": QUARTER, "roads": WHITE} | change)
 
 
+def tuned() -> Any:
+    return tune.minimise(TYRE, CAR, WHITE, max_steps=1)
+
+
 def white(speed: float) -> Any:
     return roads.white("C", speed)
 
@@ -92,6 +96,12 @@ CASES = [
     (lambda: tune.Targets([COMFORT]), "targets", "a list of 1", "Write `{'rms_"),
     (lambda: tune.Targets({COMFORT: ("a", "b")}), f"targets['{COMFORT}']", "('a', 'b')", "Write (1.2"),
     (lambda: tune.valving(LINEAR(1.0), LINEAR(1.0)), "start", "a Linear", "valving(target, start)"),
+    (lambda: tune.valving(3.0, dampers.MonoTube.reference()), "target", "the number 3.0", "bench.read"),
+    (lambda: tune.valving([LINEAR(1.0)], dampers.MonoTube.reference()), "target[0]", "a Linear", "bench.read"),
+    (lambda: tune.valving([], dampers.MonoTube.reference()), "target", "a list of 0", "bench.read"),
+    (lambda: tune.rescore(3.0, [BUMP]), "result", "the number 3.0", "rescore(result, [road, road])"),
+    (lambda: tune.rescore(tuned(), BUMP), "roads", "a Bump", "rescore(result, [road, road])"),
+    (lambda: tune.rescore(tuned(), [3]), "roads[0]", "the number 3", "roads.iso8608"),
     (lambda: compare(dampers={"A": LINEAR(1.0)}), "dampers", "a dict of 1", "The call is"),
     (lambda: compare(dampers=PAIR | {"B": 3.0}), "dampers['B']", "the number 3.0", "dampers.Linear"),
     (lambda: compare(vehicle=CAR), "vehicle", "a QuarterCar", "Write `lambda law"),
