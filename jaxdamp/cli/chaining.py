@@ -75,7 +75,7 @@ def run_report(
                 (results.draft / f"ride_{name}.csv").write_text(table.to_csv(), encoding="utf-8")
             results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
-            words = {"title": f"From bench records to a better damper: {title}", "remarks": remarks, "runs": tuple(runs)}
+            words = {"title": f"Bench records to a better damper: {title}", "remarks": remarks, "runs": tuple(runs)}
             page = chain_report(
                 fits.comparison, {title: rides}, result, preflight=preflight, **words,
                 folder=results.draft, attempts=attempts,

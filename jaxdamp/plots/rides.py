@@ -106,7 +106,8 @@ def ride(
     spectrum.grid(True, which="minor", color="0.95", linewidth=0.5)
     spectrum.set_xlim(*frequencies)
     _style.legend_above(figure, handles)
-    figure.suptitle(title or f"{type(first.vehicle).__name__}, ride of {float(first.time[-1] - first.time[0]):g} s")
+    title = title or f"{type(first.vehicle).__name__}, ride of {float(first.time[-1] - first.time[0]):g} s"
+    rows[0].set_title(title, loc="left", fontsize="medium")
     fitted_range.footnotes(figure, responses)
     return figure
 

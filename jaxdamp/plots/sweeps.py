@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 LEVELS = 14  # of a map
 MOST_CURVES = 6
+LABEL_LENGTH = 36  # characters, of two labels beside each other above a picture
 HATCHES = ("////", "\\\\\\\\", "xxxx", "....")
 
 
@@ -68,7 +69,8 @@ def sweep(
         _checks.one_of("limits", name, names)
     figure = _style.new_figure(7.0, 4.6)
     plot = figure.add_subplot()
-    plot.set_title(f"{_words(metric)} over {' and '.join(map(_words, axes))}", loc="left", fontsize="medium")
+    over_axes = " and ".join(_words(data, name) for name in axes)
+    plot.set_title(f"{_words(data, metric)} over {over_axes}", loc="left", fontsize="medium")
     (_curves if curves else _map)(figure, plot, data, metric, chosen, rest, _ends(data, spans))
     return figure
 
@@ -103,7 +105,7 @@ def _curves(
         if end.name == metric:
             plot.axhline(end.value, color=colour, linestyle="--", linewidth=1.0)
     if marks:
-        _style.legend_above(figure, marks, 2)
+        _style.legend_above(figure, marks, _legend_columns(marks))
     if failed.any():
         crossed = where[failed.any(axis=0)]
         foot = np.zeros(len(crossed))
@@ -148,8 +150,13 @@ def _map(
     plot.grid(False)
     plot.set_xlim(x.min(), x.max())
     plot.set_ylim(y.min(), y.max())
-    handles, _ = plot.get_legend_handles_labels()
-    _style.legend_above(figure, [*handles, *hatched], 2)
+    handles = [*plot.get_legend_handles_labels()[0], *hatched]
+    _style.legend_above(figure, handles, _legend_columns(handles))
+
+
+def _legend_columns(handles: Sequence[Any]) -> int:
+    """Two, if their labels fit beside each other."""
+    return 2 if max((len(str(handle.get_label())) for handle in handles), default=0) <= LABEL_LENGTH else 1
 
 
 class _End(NamedTuple):
@@ -196,14 +203,16 @@ def _hatch(
 
 def _label(data: Any, name: str) -> str:
     """A name in words with its unit."""
-    words = _words(name)
+    words = _words(data, name)
     unit = typeset_unit(data[name].attrs.get("units", ""))
     return f"{words} [{unit}]" if unit else words
 
 
-def _words(name: str) -> str:
-    """The last part of a name in words."""
-    return name.rpartition(".")[2].replace("_", " ")
+def _words(data: Any, name: str) -> str:
+    """The last part of a name in words; the whole path if another axis has the same last part."""
+    last = name.rpartition(".")[2]
+    alike = [axis for axis in map(str, data.coords) if axis.rpartition(".")[2] == last and axis != name]
+    return (name.replace(".", " ") if alike else last).replace("_", " ")
 
 
 def _unit(data: Any, name: str) -> str:

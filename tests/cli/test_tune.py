@@ -76,7 +76,7 @@ def test_sweep_of_a_vehicle_from_a_file_writes_a_table_and_pictures(law: Path, t
     page, comfort = (out / "report.html").read_text(), "weighted_rms_sprung_acceleration [m/s²]"
     assert f"{len(within)} of 4 points are within all limits" in page
     best = min(within, key=lambda row: float(row[comfort]))
-    place = f"front.damper.rate = {best['front.damper.rate [N s/m]']} N s/m"
+    place = f"front.damper.rate = {float(best['front.damper.rate [N s/m]']):g} N s/m"
     assert f"Smallest weighted rms sprung acceleration: {float(best[comfort]):.4g} m/s² at {place}" in page
     assert "% from the baseline" in page
     assert (out / "weighted_rms_sprung_acceleration.png").is_file() and (out / "sweep.nc").is_file()

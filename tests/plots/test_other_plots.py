@@ -296,6 +296,16 @@ def test_limits_hatch_a_map_and_ring_points_of_curves() -> None:
         plots.sweep(data, "height", limits={"hight": 1.0})
 
 
+def test_axes_with_the_same_last_part_are_told_apart() -> None:
+    def stiffness(p: dict) -> dict:
+        return {"total": p["front.damper.rate"] + p["rear.damper.rate"]}
+
+    data = jaxdamp.sweep(stiffness, {"front.damper.rate": [1.0, 2.0], "rear.damper.rate": [3.0, 4.0]})
+    axes, _ = plots.sweep(data, "total").axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("front damper rate", "rear damper rate")
+    assert axes.get_title(loc="left") == "total over front damper rate and rear damper rate"
+
+
 def test_a_sweep_over_one_axis_has_a_curve_for_each_value_of_another() -> None:
     data = _grid()
     (axes,) = plots.sweep(data, "height", over="a").axes
