@@ -25,6 +25,7 @@ from jaxdamp.dampers.command import takes_command, with_command
 from jaxdamp.dampers.conditions import keeps_conditions, margins
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
 from jaxdamp.dampers.coverage import coverage, require_finite_force
+from jaxdamp.dampers.creeping_visco_plastic import CreepingViscoPlastic
 from jaxdamp.dampers.dahl import Dahl
 from jaxdamp.dampers.degressive import Degressive
 from jaxdamp.dampers.digressive_progressive import DigressiveProgressive
@@ -88,6 +89,7 @@ __all__ = [
     "BumpStop",
     "Bushing",
     "CoulombFriction",
+    "CreepingViscoPlastic",
     "Dahl",
     "Degressive",
     "DigressiveProgressive",

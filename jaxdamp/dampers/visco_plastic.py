@@ -1,5 +1,6 @@
 """Yielding elements in parallel with a concave viscous force: magnetorheological and other friction dampers."""
 
+from abc import abstractmethod
 from typing import final
 
 import jax
@@ -32,47 +33,20 @@ def element_force(
     return sliding_force * dead_zone(deflection, clearance) / travel
 
 
+def mean_decay(periods: ScalarLike) -> Scalar:
+    """(1 − e⁻ᵖ)/p, the mean of e⁻ᵖ over a step of p relaxation times."""
+    return jnp.where(periods > 1e-6, -jnp.expm1(-periods) / jnp.where(periods > 1e-6, periods, 1.0), 1.0)
+
+
 def element_step(deflection: ScalarLike, travel: ScalarLike, periods: ScalarLike, limit: ScalarLike) -> Scalar:
     """Deflection [m] after a travel [m] in one direction that took so many relaxation times, within ± the limit [m]."""
-    grown = jnp.where(periods > 1e-6, -jnp.expm1(-periods) / jnp.where(periods > 1e-6, periods, 1.0), 1.0)
-    return within(deflection * jnp.exp(-periods) + travel * grown, -limit, limit)
+    return within(deflection * jnp.exp(-periods) + travel * mean_decay(periods), -limit, limit)
 
 
-@final
-class ViscoPlastic(AbstractDamper):
-    """F = F_y tanh(v/v_f) + K |v|ⁿ sgn v + Σ Yᵢ dz(dᵢ, δᵢ)/eᵢ, ḋᵢ = v − dᵢ/τᵢ within ±(δᵢ + eᵢ).
+class AbstractViscoPlastic(AbstractDamper):
+    """A yield curve of Herschel and Bulkley beside yielding elements, whose relaxation derived classes define.
 
-    The first two terms are the yield curve of Herschel and Bulkley (1926), concave for n < 1, rounded over the flow
-    velocity v_f; they follow the velocity at once. Each element beside them is a spring that yields: after a reversal
-    it is unloaded, is free over its clearance 2 δᵢ, is loaded over eᵢ, and then slides with Yᵢ (the element of Prandtl
-    and Iwan, with a clearance). At rest its force decays with the relaxation time τᵢ. In compression, all forces are
-    multiplied by an asymmetry a. Passive for any parameters.
-
-    In records of a magnetorheological damper the force falls at every reversal to a shelf over 0.2 to 0.3 mm and then
-    jumps to its plateau: one element without and one with clearance (`notebooks/magnetorheological.ipynb`). A gas
-    force or an offset of the load cell stands beside it: `ViscoPlastic(...) + Spring(...)`.
-
-    States: the deflections dᵢ [m]. The step is exact for steady motion, reversals included, second order in general,
-    and stable for any stiffness Yᵢ/eᵢ.
-
-    Arguments:
-        yield_force: F_y [N].
-        viscous_force: K [N] at 1 m/s.
-        exponent: n.
-        flow_velocity: v_f [m/s].
-        sliding_forces: Yᵢ [N], shape (elements,).
-        elastic_travels: eᵢ [m], shape (elements,).
-        clearances: δᵢ [m], shape (elements,).
-        relaxation_times: τᵢ [s], shape (elements,).
-        asymmetry: a, force in compression relative to rebound.
-
-    Raises:
-        ValueError: elements whose four vectors are not of equal length.
-
-    >>> import jax.numpy as jnp
-    >>> law = ViscoPlastic(200.0, 500.0, 0.5, 0.005, [300.0], [1e-4], [1e-4], [1.0])
-    >>> [round(float(law.force(0.0, 0.0, jnp.array([deflection]))), 6) for deflection in (5e-5, 1.5e-4, -2e-4)]
-    [0.0, 150.0, -300.0]
+    F = F_y tanh(v/v_f) + K |v|ⁿ sgn v + Σ Yᵢ dz(dᵢ, δᵢ)/eᵢ, with the deflections dᵢ [m] within ±(δᵢ + eᵢ) as states.
     """
 
     yield_force: Number = parameter("N", "F_y, yield force that follows the velocity at once", nonnegative, linear=True)
@@ -114,11 +88,19 @@ class ViscoPlastic(AbstractDamper):
         elements = jax.vmap(element_force)(deflections, self.sliding_forces, self.elastic_travels, self.clearances)
         return self._sided(v, flow) + jnp.sum(jax.vmap(self._sided)(deflections, elements))
 
+    @abstractmethod
+    def relaxation_rates(self, deflections: State) -> State:
+        """Rates [m/s] at which the deflections [m] decrease at rest."""
+
+    @abstractmethod
+    def steps(self, deflections: State, travel: ScalarLike, duration: ScalarLike) -> State:
+        """The deflections [m] after a travel [m] in one direction over a time [s]."""
+
     def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
         """Rates of the deflections [m/s], zero while an element slides."""
         del x
         deflections = self._deflections(state)
-        rate = v - deflections / self.relaxation_times
+        rate = v - self.relaxation_rates(deflections)
         slides = (jnp.abs(deflections) >= self.clearances + self.elastic_travels) & (deflections * rate > 0)
         return jnp.where(slides, 0.0, rate)
 
@@ -128,15 +110,14 @@ class ViscoPlastic(AbstractDamper):
         """Exact for a constant velocity before and after a reversal."""
         del x0, x1
         state = self._deflections(state)
-        limit = self.clearances + self.elastic_travels
         before, after = travels(v0, v1, dt)
         reversed_at = jnp.where(v0 * v1 < 0, v0 / jnp.where(v0 * v1 < 0, v0 - v1, 1.0), 0.0)
         for travel, share in ((before, reversed_at), (after, 1.0 - reversed_at)):
-            state = jax.vmap(element_step, (0, None, 0, 0))(state, travel, share * dt / self.relaxation_times, limit)
+            state = self.steps(state, travel, share * dt)
         return state
 
     @classmethod
-    def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "ViscoPlastic":
+    def guess(cls, velocity: np.ndarray, force: np.ndarray) -> "AbstractViscoPlastic":
         """Start values from measured data: sliding force at once, after 0.1 mm, and after a clearance.
 
         The viscous force is that at the highest velocities, for n = 0.5.
@@ -147,3 +128,50 @@ class ViscoPlastic(AbstractDamper):
         return cls(
             0.3 * level, viscous, 0.5, 0.1 * fastest, [0.3 * level, 0.5 * level], [1e-4] * 2, [0.0, 1.5e-4], [1.0] * 2
         )
+
+
+@final
+class ViscoPlastic(AbstractViscoPlastic):
+    """F = F_y tanh(v/v_f) + K |v|ⁿ sgn v + Σ Yᵢ dz(dᵢ, δᵢ)/eᵢ, ḋᵢ = v − dᵢ/τᵢ within ±(δᵢ + eᵢ).
+
+    The first two terms are the yield curve of Herschel and Bulkley (1926), concave for n < 1, rounded over the flow
+    velocity v_f; they follow the velocity at once. Each element beside them is a spring that yields: after a reversal
+    it is unloaded, is free over its clearance 2 δᵢ, is loaded over eᵢ, and then slides with Yᵢ (the element of Prandtl
+    and Iwan, with a clearance). At rest its force decays with the relaxation time τᵢ. In compression, all forces are
+    multiplied by an asymmetry a. Passive for any parameters.
+
+    In records of a magnetorheological damper the force falls at every reversal to a shelf over 0.2 to 0.3 mm and then
+    jumps to its plateau: one element without and one with clearance (`notebooks/magnetorheological.ipynb`). A gas
+    force or an offset of the load cell stands beside it: `ViscoPlastic(...) + Spring(...)`.
+
+    States: the deflections dᵢ [m]. The step is exact for steady motion, reversals included, second order in general,
+    and stable for any stiffness Yᵢ/eᵢ.
+
+    Arguments:
+        yield_force: F_y [N].
+        viscous_force: K [N] at 1 m/s.
+        exponent: n.
+        flow_velocity: v_f [m/s].
+        sliding_forces: Yᵢ [N], shape (elements,).
+        elastic_travels: eᵢ [m], shape (elements,).
+        clearances: δᵢ [m], shape (elements,).
+        relaxation_times: τᵢ [s], shape (elements,).
+        asymmetry: a, force in compression relative to rebound.
+
+    Raises:
+        ValueError: elements whose four vectors are not of equal length.
+
+    >>> import jax.numpy as jnp
+    >>> law = ViscoPlastic(200.0, 500.0, 0.5, 0.005, [300.0], [1e-4], [1e-4], [1.0])
+    >>> [round(float(law.force(0.0, 0.0, jnp.array([deflection]))), 6) for deflection in (5e-5, 1.5e-4, -2e-4)]
+    [0.0, 150.0, -300.0]
+    """
+
+    def relaxation_rates(self, deflections: State) -> State:
+        """dᵢ/τᵢ [m/s]."""
+        return deflections / self.relaxation_times
+
+    def steps(self, deflections: State, travel: ScalarLike, duration: ScalarLike) -> State:
+        """Exact for a constant velocity."""
+        periods, limit = duration / self.relaxation_times, self.clearances + self.elastic_travels
+        return jax.vmap(element_step, (0, None, 0, 0))(deflections, travel, periods, limit)

@@ -50,10 +50,11 @@ class Priors(AbstractResiduals):
     """Prior knowledge of parameters as residuals."""
 
     paths: tuple[str, ...] = eqx.field(static=True)
-    mean: Float[Array, " priors"]
-    deviation: Float[Array, " priors"]
+    mean: Float[Array, "priors *numbers"]
+    deviation: Float[Array, "priors *numbers"]
     size: int = eqx.field(static=True)  # numbers of all parameters together
     noise: Float[Array, ""]  # standard deviation of the noise of a weighted sample
+    weak: bool = eqx.field(static=True, default=False)  # whether they only determine what the records do not
 
     def __call__(self, model: Model) -> Float[Array, " samples"]:
         """Distance of the values from their means, in standard deviations, times that of the noise."""
@@ -109,11 +110,12 @@ def solve_by(
         The problem of the last round, with its weights, and its solution.
     """
     plain, solution = problem, solve(problem, starts)
-    priors = any(isinstance(part, Priors) for part in problem.residuals)
+    priors = [part for part in problem.residuals if isinstance(part, Priors)]
     if loss == "squares" and not priors:
         return problem, solution
+    rounds = 1 if loss == "squares" and all(part.weak for part in priors) else ROUNDS
     root = np.ones(solution.best.residual.size)  # of the weight of each sample
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         best = solution.best
         if not best.finite or problem.is_rounding(best.squares):
             break

@@ -8,8 +8,10 @@ import scipy.special
 from jaxtyping import Bool, Float
 
 from jaxdamp.dampers import Reach
+from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.ends import at_ends
 from jaxdamp.identify.identifiability import on_identifiability
+from jaxdamp.identify.model import START_PATH
 from jaxdamp.identify.noise import Noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.profile import Profile, profile
@@ -52,12 +54,16 @@ def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     free, found = problem.free, solution.best
     uncertain, variance = uncertainty(found.jacobian, found.residual, noise), noise.variance
     large = large_changes(free, found.values, np.linalg.norm(found.jacobian, axis=0) / problem.level)
+    of_start, sizes = _weakly_known(problem)
+    large = np.where(of_start, sizes, large)
     sides, minima = at_ends(problem.coordinates, found.values), minima_of(solution, free.names, variance)
     errors = np.sqrt(np.diag(uncertain.covariance))
     numbers = ~problem.coordinates.ordered
-    firm = numbers & (errors <= WEAK * large) & (sides == 0)
+    firm = numbers & ~of_start & (errors <= WEAK * large) & (sides == 0)
     spans = _spans(free, problem.reach)
-    doubt = np.any((np.abs(found.values) > spans) | (numbers & ~firm)) or any(m.chi_square < NEARLY for m in minima[1:])
+    doubt = np.any((np.abs(found.values) > spans) | (numbers & ~of_start & ~firm)) or any(
+        m.chi_square < NEARLY for m in minima[1:]
+    )
     far = WEAK * large
     moved = Profile(errors, np.zeros(errors.shape, bool))
     if not solution.closed_form and doubt and found.converged and not problem.is_rounding(found.squares):
@@ -74,6 +80,19 @@ def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     return Estimates(estimates, uncertain.covariance, minima, tuple(notes))
 
 
+def _weakly_known(problem: Problem) -> tuple[Bool[np.ndarray, " free"], Float[np.ndarray, " free"]]:
+    """Which numbers are states at the beginning of a record, and the standard deviation expected of them."""
+    sizes = {
+        path: deviation
+        for part in problem.residuals
+        if isinstance(part, Priors) and part.weak
+        for path, deviation in zip(part.paths, np.asarray(part.deviation), strict=True)
+    }
+    each = [np.ravel(sizes.get(p.path, np.full(p.value.shape, np.nan))) for p in problem.free.chosen]
+    known = np.concatenate(each)
+    return np.isfinite(known), known
+
+
 def _estimates(
     problem: Problem,
     found: SearchEnd,
@@ -85,6 +104,7 @@ def _estimates(
     free = problem.free
     lower, upper = free.limits()
     reach = float(scipy.special.stdtrit(dof, 0.975))  # quantile of Student's t
+    begins = {START_PATH.format(i): run for i, run in enumerate(problem.runs)}
     rows = []
     for i, (name, p, tied) in enumerate(zip(free.names, free.owners, free.followers, strict=True)):
         value, error = float(found.values[i]), float(errors[i])
@@ -93,6 +113,8 @@ def _estimates(
         meaning = p.meaning
         if p.path in problem.per_record:
             meaning += f" in record {problem.runs[int(name.rpartition('[')[2][:-1])].name!r}"
+        elif p.path in begins:
+            meaning += f" of record {begins[p.path].name!r}"
         rows.append(Estimate(name, value, p.unit, error, interval, meaning, note, tied=tied))
     return tuple(rows)
 

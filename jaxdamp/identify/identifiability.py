@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.estimates import Estimate
+from jaxdamp.identify.model import STARTS
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.traces import Batch
@@ -97,6 +98,7 @@ def on_identifiability(
             others = [estimates[j].name for members, _ in groups if i in members for j in sorted(members - {i})]
             reason = _reason(effect, others)
             remedy = (effect and effect.remedy) or "Freeze it or add records that excite it."
+            remedy = "It keeps the value that is expected from the motion." if e.name.startswith(STARTS) else remedy
             notes.append(
                 f"{e.name} is not identifiable from these records ({e.value:.3g} ± {e.standard_error:.2g}{unit})"
                 + f": {reason}" * bool(reason)

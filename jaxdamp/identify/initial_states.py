@@ -1,4 +1,4 @@
-"""The states of a law at the start of a record: at rest, after a warm-up cycle, or in the periodic solution."""
+"""The states of a law at the start of a record: at rest, after a warm-up cycle, periodic, or estimated."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -14,7 +14,9 @@ from jaxdamp.bench import BenchRun, moving_part
 from jaxdamp.dampers import AbstractDamper
 
 
-INITIAL_STATES = ("warm_up", "rest", "periodic")
+INITIAL_STATES = ("warm_up", "rest", "periodic", "estimated")
+REST_WINDOW = 1.0  # s, of rest before the motion whose force tells the states of a record that is predicted
+SHARE_OF_REST = 0.5  # of it at most
 LEAST_CYCLES = 1.25  # of a periodic record, so that a part of it can be compared with the next cycle
 ALIKE = 0.1  # difference of the stroke from that one cycle later, relative to its RMS, of a periodic record
 DOUBLINGS = 20  # of the number of cycles that an extrapolation covers
@@ -40,6 +42,11 @@ def moving_samples(run: BenchRun) -> slice:
     return _moving[run]
 
 
+def rest_window(run: BenchRun) -> int:
+    """Samples at the beginning of rest before the motion, whose mean force tells the states of the law there."""
+    return int(min(REST_WINDOW * run.sampling_rate, SHARE_OF_REST * moving_samples(run).start))
+
+
 def is_periodic(run: BenchRun) -> bool:
     """Whether the stroke of a whole record repeats from cycle to cycle."""
     cycle = round(run.sampling_rate / run.frequency)
@@ -51,6 +58,8 @@ def is_periodic(run: BenchRun) -> bool:
 
 def start_of(run: BenchRun, initial_state: str) -> str:
     """How a record starts: "rest" also if the record begins at rest, "periodic" only if it is periodic."""
+    if initial_state == "estimated":
+        return initial_state
     if initial_state == "rest" or moving_samples(run).start > 0:
         return "rest"
     return "periodic" if initial_state == "periodic" and is_periodic(run) else "warm_up"
@@ -61,7 +70,12 @@ def starts_in_words(runs: Sequence[BenchRun], initial_state: str) -> str:
     if initial_state == "warm_up":
         return ""
     starts = [start_of(run, initial_state) for run in runs]
-    words = {"rest": "from rest", "periodic": "in the periodic solution", "warm_up": "after a warm-up cycle"}
+    words = {
+        "rest": "from rest",
+        "periodic": "in the periodic solution",
+        "warm_up": "after a warm-up cycle",
+        "estimated": "with states estimated from their force",
+    }
     if len(set(starts)) == 1:
         return f"all records start {words[starts[0]]}"
     names = {kind: [run.name for run, start in zip(runs, starts, strict=True) if start == kind] for kind in words}

@@ -12,7 +12,7 @@ from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.estimating import estimate, on_misfit
 from jaxdamp.identify.left_out import left_out
-from jaxdamp.identify.model import Model, OnRig, is_memoryless, law_of, rig_of, with_range
+from jaxdamp.identify.model import Model, is_memoryless, law_of, of_record, on_rig, rig_of, starts_in, with_range
 from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.predicting import predict_runs
 from jaxdamp.identify.problem import Problem
@@ -47,7 +47,8 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     estimates = estimate(problem, solution, noise)
     models, model = _fitted(problem, best.values)
     law, rig = law_of(model), rig_of(model)
-    percent, rmse, scores = score(models or model, problem.runs, np.isfinite(problem.sigma), problem.initial_state)
+    fitted = np.isfinite(problem.sigma)
+    percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
     notes = [f"The search did not converge: {best.status.sentence} {_REMEDY}"] * (not best.converged)
     notes += [*notes_on(law, problem.fitted_to), *estimates.notes, *on_misfit(noise), *left_out(problem, best)]
     return FitResult(
@@ -67,7 +68,8 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         record_laws=tuple(map(law_of, models)),
         rig=rig,
         initial_state=problem.initial_state,
-        record_rigs=tuple(m.rig for m in models if isinstance(m, OnRig)),
+        record_rigs=tuple(rig for rig in map(rig_of, models) if rig is not None),
+        record_starts=starts_in(model),
         evidence=Evidence(problem, best, noise, estimates.covariance),
     )
 
@@ -75,10 +77,15 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
 def _fitted(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:
     """The fitted model of each record, where they differ, and the one with the mean of what differs."""
     built = with_range(problem.free.started_at(values).tree, covered_range(problem.fitted_to))
+    if starts := starts_in(built):
+        fitted = [s if np.isfinite(sigma) else None for s, sigma in zip(starts, problem.sigma, strict=True)]
+        built = on_rig(law_of(built), rig_of(built), fitted)
     own = {path: get(built, path) for path in problem.per_record}
     if not own:
         return [], built
-    models = [with_values(built, {path: v[i] for path, v in own.items()}) for i in range(len(problem.runs))]
+    models = [
+        of_record(with_values(built, {path: v[i] for path, v in own.items()}), i) for i in range(len(problem.runs))
+    ]
     return models, with_values(built, {path: jnp.mean(v) for path, v in own.items()})
 
 

@@ -14,6 +14,7 @@ from jaxdamp.dampers import (
     Bilinear,
     BoucWen,
     CoulombFriction,
+    CreepingViscoPlastic,
     Dahl,
     Lag,
     Linear,
@@ -58,7 +59,11 @@ _MEMORYLESS = {
     "besinger": Besinger.guess,
     "linear_friction": _friction,
 }
-_BESIDE_SPRING = {"lugre_spring": LuGre.guess, "visco_plastic_spring": ViscoPlastic.guess}
+_BESIDE_SPRING = {
+    "lugre_spring": LuGre.guess,
+    "visco_plastic_spring": ViscoPlastic.guess,
+    "creeping_visco_plastic_spring": CreepingViscoPlastic.guess,
+}
 LEARNT = "neural_hysteresis_spring"
 LAWS = tuple(name for name, law in NAMED_LAWS.items() if not law.optional)
 

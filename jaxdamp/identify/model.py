@@ -1,32 +1,64 @@
 """What explains the records of a bench: a law, or a law on a machine that adds to its force."""
 
+import dataclasses
+from collections.abc import Sequence
 from typing import final
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxdamp._types import Scalar, State
+from jaxdamp._types import Scalar, State, Vector
 from jaxdamp.dampers import AbstractDamper, FittedRange, with_fitted_range
 from jaxdamp.identify.initial_states import Cycle, periodic_state
-from jaxdamp.parameters import Module
+from jaxdamp.parameters import Module, parameter
 from jaxdamp.rig import Rig, march
+
+
+STARTS = "records."  # with which the paths of the states at the beginning of records begin
+START_PATH = STARTS + "{}.initial_state"  # by the number of the record
+
+
+@final
+class RecordStart(Module):
+    """The states of a law at the first sample of a record."""
+
+    initial_state: Vector = parameter("", "state of the law at the beginning")
 
 
 @final
 class OnRig(Module):
-    """A law on a machine; paths of parameters begin with `law.` and `rig.`."""
+    """A law on a machine; paths of parameters begin with `law.`, `rig.` and `records.`.
+
+    Arguments:
+        law: the law.
+        rig: the machine, if there is one.
+        records: how each record begins, if this is estimated; None where it is not known.
+    """
 
     law: AbstractDamper
-    rig: Rig
+    rig: Rig | None
+    records: tuple[RecordStart | None, ...] = ()
 
 
 Model = AbstractDamper | OnRig
 
 
-def on_rig(law: AbstractDamper, rig: Rig | None) -> Model:
-    """The law, on the machine if there is one."""
-    return law if rig is None else OnRig(law, rig)
+def on_rig(law: AbstractDamper, rig: Rig | None, records: Sequence[RecordStart | None] = ()) -> Model:
+    """The law, on the machine if there is one, with the beginnings of the records if they are estimated."""
+    return law if rig is None and not records else OnRig(law, rig, tuple(records))
+
+
+def starts_in(model: Model) -> tuple[RecordStart | None, ...]:
+    """How each record begins, if this is estimated."""
+    return model.records if isinstance(model, OnRig) else ()
+
+
+def of_record(model: Model, number: int) -> Model:
+    """The model of one record: the same, with the beginning of this record only."""
+    starts = starts_in(model)
+    return dataclasses.replace(model, records=(starts[number],)) if starts else model  # type: ignore[call-arg]
 
 
 def law_of(model: Model) -> AbstractDamper:
@@ -41,7 +73,8 @@ def rig_of(model: Model) -> Rig | None:
 
 def effects_of(model: Model) -> tuple[str, ...]:
     """What of the machine depends on more than the instant (`Rig.effects`); asked of known numbers, not traced ones."""
-    return model.rig.effects() if isinstance(model, OnRig) else ()
+    rig = rig_of(model)
+    return () if rig is None else rig.effects()
 
 
 def is_memoryless(model: Model) -> bool:
@@ -57,17 +90,22 @@ def can_rest(model: Model) -> bool:
     return law_of(model).initial_state().size > 0
 
 
+def initial_state_for(model: Model, initial_state: str) -> str:
+    """How records start with this model: there is nothing to be estimated for a law without states."""
+    return initial_state if can_rest(model) or initial_state != "estimated" else "warm_up"
+
+
 def with_range(model: Model, fitted_to: FittedRange) -> Model:
     """The same with the range that the law was fitted to."""
-    return on_rig(with_fitted_range(law_of(model), fitted_to), rig_of(model))
+    return on_rig(with_fitted_range(law_of(model), fitted_to), rig_of(model), starts_in(model))
 
 
 def blind_end(model: Model, dt: float) -> int:
     """So many samples at the end of a record cannot be predicted: their force needs the motion behind the end."""
-    if not effects_of(model):
+    rig = rig_of(model)
+    if rig is None or not rig.effects():
         return 0
-    assert isinstance(model, OnRig)
-    return 2 + int(np.ceil(np.max(np.abs(np.asarray(model.rig.force_delay))) / dt))
+    return 2 + int(np.ceil(np.max(np.abs(np.asarray(rig.force_delay))) / dt))
 
 
 def marched(
@@ -81,22 +119,45 @@ def marched(
     state: State | None,
 ) -> Float[Array, " time"]:
     """Force [N] in a record with this motion, for use inside compiled functions, from this state if one is given."""
-    if isinstance(model, AbstractDamper):
-        return march(model, dt, stroke, velocity, substeps, temperature, state)
-    return model.rig.march(model.law, effects, dt, stroke, velocity, temperature, substeps, state).force
+    law, rig = law_of(model), rig_of(model)
+    if rig is None:
+        return march(law, dt, stroke, velocity, substeps, temperature, state)
+    return rig.march(law, effects, dt, stroke, velocity, temperature, substeps, state).force
+
+
+def law_in(model: Model, temperature: Float[Array, " time"] | None) -> AbstractDamper:
+    """The law in a record, with its oil at the first temperature of the record where it depends on one."""
+    law = law_of(model)
+    if temperature is None or not law.traits().temperature_dependent:
+        return law
+    return law.at_temperature(temperature[0])
+
+
+def state_history(
+    model: Model, dt: Array, stroke: Float[Array, " time"], velocity: Float[Array, " time"], temperature: Array | None
+) -> Float[Array, "time states"]:
+    """The states of the law at every sample of a motion [m, m/s] that begins at rest."""
+    law = law_in(model, temperature)
+
+    def step(state: State, ends: tuple[Array, ...]) -> tuple[State, State]:
+        state = law.advance(*ends, state, dt)
+        return state, state
+
+    begin = law.initial_state()
+    ends = (stroke[:-1], velocity[:-1], stroke[1:], velocity[1:])
+    return jnp.concatenate([begin[None], jax.lax.scan(step, begin, ends)[1]])
 
 
 def initial_state(
     model: Model, effects: tuple[str, ...], cycle: Cycle, temperature: Float[Array, " time"] | None
 ) -> tuple[State, Scalar]:
     """The states at the start of a record: periodic, or at rest; and how much they still change over the cycle."""
-    if isinstance(model, OnRig):
+    rig = rig_of(model)
+    if rig is not None:
         before = [jnp.concatenate([channel[:-1], channel]) for channel in (cycle.stroke, cycle.velocity)]
-        stroke, velocity = model.rig.delayed_motion(effects, cycle.dt, *before)
+        stroke, velocity = rig.delayed_motion(effects, cycle.dt, *before)
         again = -cycle.stroke.size
-        cycle = cycle._replace(stroke=stroke[again:] - model.rig.stroke_offset, velocity=velocity[again:])
-    law = law_of(model)
-    if temperature is not None and law.traits().temperature_dependent:
-        law = law.at_temperature(temperature[0])
+        cycle = cycle._replace(stroke=stroke[again:] - rig.stroke_offset, velocity=velocity[again:])
+    law = law_in(model, temperature)
     state, change = periodic_state(law, cycle)
     return jnp.where(cycle.periodic, state, law.initial_state()), jnp.where(cycle.periodic, change, 0.0)

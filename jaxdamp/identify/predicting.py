@@ -9,8 +9,9 @@ from jaxtyping import Array
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import require_finite_force, without_fitted_ranges
-from jaxdamp.identify.initial_states import start_of
-from jaxdamp.identify.model import Model, blind_end, is_memoryless, law_of
+from jaxdamp.identify.estimated_states import with_first_states
+from jaxdamp.identify.initial_states import rest_window, start_of
+from jaxdamp.identify.model import Model, blind_end, initial_state_for, is_memoryless, law_of, of_record, starts_in
 from jaxdamp.identify.rows import samples_in_block, settling_time
 from jaxdamp.identify.traces import Batch, batches
 
@@ -45,6 +46,8 @@ def predict_runs(model: Model, runs: Sequence[BenchRun], initial_state: str = "w
         ValueError: forces that are not finite; states that drift in a motion that is said to be periodic.
     """
     model = without_fitted_ranges(model)
+    if initial_state == "estimated":
+        model = with_first_states(model, runs)
     memoryless = is_memoryless(model)
     per_cycle = None if memoryless else PREDICTED_PER_CYCLE
     made, ranges = batches(model, runs, [1.0] * len(runs), per_cycle, (), initial_state)
@@ -74,7 +77,7 @@ def predict_by_record(
     if isinstance(model, Sequence):
         pairs = zip(model, runs, strict=True)
         return list(model), [predict_runs(own, [run], initial_state)[0] for own, run in pairs]
-    return [model] * len(runs), predict_runs(model, runs, initial_state)
+    return [of_record(model, i) for i in range(len(runs))], predict_runs(model, runs, initial_state)
 
 
 def used_samples(model: Model, run: BenchRun, memoryless: bool, initial_state: str = "warm_up") -> slice:
@@ -83,5 +86,14 @@ def used_samples(model: Model, run: BenchRun, memoryless: bool, initial_state: s
         return slice(0, None)
     block = samples_in_block(run, PREDICTED_PER_CYCLE)
     blind = blind_end(model, block / run.sampling_rate) * block
-    settling = settling_time(run) if start_of(run, initial_state) == "warm_up" else 0.0
-    return slice(int(np.ceil(settling * run.sampling_rate)), len(run) - blind)
+    return slice(_first_used(model, run, initial_state), len(run) - blind)
+
+
+def _first_used(model: Model, run: BenchRun, initial_state: str) -> int:
+    """The first sample of a record that is compared: not those that told the states, nor those of settling."""
+    start = start_of(run, initial_state_for(model, initial_state))
+    if start == "estimated" and not any(starts_in(model)):
+        if rest_window(run):
+            return rest_window(run)
+        start = "warm_up"
+    return int(np.ceil(settling_time(run) * run.sampling_rate)) if start == "warm_up" else 0

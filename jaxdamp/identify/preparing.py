@@ -1,6 +1,7 @@
 """`prepare`: a law and bench records as a least-squares problem."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -8,10 +9,21 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import Reach
-from jaxdamp.identify.criteria import FIRST_NOISE, priors_on
+from jaxdamp.identify.criteria import FIRST_NOISE, Priors, priors_on
+from jaxdamp.identify.estimated_states import first_states
 from jaxdamp.identify.initial_states import INITIAL_STATES, moving_samples, starts_in_words
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
-from jaxdamp.identify.model import Model, can_rest, is_memoryless, on_rig
+from jaxdamp.identify.model import (
+    START_PATH,
+    Model,
+    RecordStart,
+    can_rest,
+    initial_state_for,
+    is_memoryless,
+    law_of,
+    on_rig,
+    rig_of,
+)
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.identify.traces import batches, owners
@@ -70,6 +82,11 @@ def prepare(
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
     begin, machine = started_on(law, fitted_to, rig)
     model, absent = on_rig(begin, machine), absent_paths(machine)
+    initial_state = initial_state_for(model, initial_state)
+    expected: tuple[Priors, ...] = ()
+    if initial_state == "estimated":
+        model, expected, unfitted = _with_estimated_states(model, runs, sigma)
+        absent = [*absent, *unfitted]
     own = _per_record(model, per_record, sigma, absent)
     frozen = [*name_patterns("freeze", freeze), *frozen_by(law), *absent]
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
@@ -79,12 +96,30 @@ def prepare(
     weighted = (np.asarray(part.force) * np.asarray(part.weight) for part in residuals)
     level = float(np.sqrt(sum(np.sum(np.square(force)) for force in weighted)))
     reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in fitted_to), max(r.peak_velocity for r in fitted_to))
-    known = priors_on(free, priors or {}, FIRST_NOISE * level / np.sqrt(max(np.count_nonzero(owner >= 0), 1)))
+    noise = FIRST_NOISE * level / np.sqrt(max(np.count_nonzero(owner >= 0), 1))
+    known = (*priors_on(free, priors or {}, noise), *(replace(prior, noise=jnp.asarray(noise)) for prior in expected))
     owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in known)])
     residuals = (*residuals, *known)
     steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
     each, sigma = weighting == "runs", tuple(sigma)
     return Problem(free, residuals, level, runs, sigma, owner, reach, begin, own, each, steps, initial_state)
+
+
+def _with_estimated_states(
+    model: Model, runs: Sequence[BenchRun], sigma: Sequence[float]
+) -> tuple[Model, tuple[Priors, ...], list[str]]:
+    """The model with a start of the states of each record, what is expected of them, and those that are not fitted.
+
+    A state is expected where the motion alone would put it, with a standard deviation as large as it becomes in the
+    motion: weak knowledge, which determines only what the records do not.
+    """
+    states = first_states(model, runs)
+    starts = [RecordStart(jnp.asarray(state)) for state in states.at_rest]
+    fitted = np.isfinite(sigma)
+    paths = np.array([START_PATH.format(i) for i in range(len(runs))])
+    moments = (jnp.asarray(a[fitted]) for a in (states.expected, states.size))
+    prior = Priors(tuple(map(str, paths[fitted])), *moments, states.size[fitted].size, jnp.ones(()), weak=True)
+    return on_rig(law_of(model), rig_of(model), starts), (prior,), [str(path) for path in paths[~fitted]]
 
 
 def records_in_words(problem: Problem) -> str:

@@ -15,7 +15,7 @@ from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.bayes import Posterior, posterior
 from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
-from jaxdamp.identify.model import Model, is_memoryless, on_rig
+from jaxdamp.identify.model import Model, RecordStart, is_memoryless, on_rig
 from jaxdamp.identify.predicting import predict_by_record, predict_runs, used_samples
 from jaxdamp.identify.profile_curve import ProfileCurve, profile_curve
 from jaxdamp.identify.propagation import Band, Evidence, Propagated, band, propagate
@@ -149,13 +149,20 @@ class AbstractFitted:
         """What was fitted to the records: the law, on a machine if that was fitted too."""
         return on_rig(self.law, self.rig)
 
+    def model_of(self, runs: Sequence[BenchRun]) -> Model:
+        """What predicts these records: `model`, with all that the fit says of how they begin."""
+        del runs
+        return self.model
+
     def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
         """Force [N] that the fit expects at every sample of records, old or new, of the same machine."""
-        return predict_runs(self.model, as_runs(runs), self.initial_state)
+        runs = as_runs(runs)
+        return predict_runs(self.model_of(runs), runs, self.initial_state)
 
     def score(self, runs: Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
         """Fit percent, RMSE [N] and the scores by record, on other records."""
-        return score(self.model, as_runs(runs), initial_state=self.initial_state)
+        runs = as_runs(runs)
+        return score(self.model_of(runs), runs, initial_state=self.initial_state)
 
     def to_dict(self) -> dict[str, Any]:
         """The result as numbers with units and words, ready for JSON; numbers that are not finite are None.
@@ -189,6 +196,7 @@ class FitResult(AbstractFitted):
         record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
         record_rigs: the test machine of each record, as `record_laws`.
         criterion: loss, priors and what is special about the records in words; empty for plain least squares.
+        record_starts: the states at the first sample of each record if they were estimated, None for one left out.
         evidence: the minimum and the noise, for `band`, `propagate`, `profile` and `posterior`.
     """
 
@@ -202,6 +210,17 @@ class FitResult(AbstractFitted):
     record_rigs: tuple[Rig, ...] = ()
     criterion: str = ""
     evidence: Evidence | None = None
+    record_starts: tuple[RecordStart | None, ...] = ()
+
+    def model_of(self, runs: Sequence[BenchRun]) -> Model:
+        """The model, with the estimated states at the beginning of those of the records that were fitted."""
+        known = {id(run): start for run, start in zip(self.runs, self.record_starts, strict=False)}
+        return on_rig(self.law, self.rig, [known.get(id(run)) for run in runs] if known else ())
+
+    @property
+    def initial_states(self) -> tuple[Float[np.ndarray, " states"] | None, ...]:
+        """The states at the first sample of each record, if they were estimated; None for records left out."""
+        return tuple(None if start is None else np.asarray(start.initial_state) for start in self.record_starts)
 
     def __getitem__(self, name: str) -> Estimate:
         """The estimate of that name, or of the only name that ends with it: `"rate"` for `"law.rate"`."""
@@ -215,7 +234,9 @@ class FitResult(AbstractFitted):
     def error_shares(self) -> ErrorShares:
         """Shares of the squared error over the records: shape, hysteresis, rest (`identify.error_shares`)."""
         rigs = self.record_rigs or (None,) * len(self.record_laws)
-        return error_shares([*map(on_rig, self.record_laws, rigs)] or self.model, self.runs, self.initial_state)
+        starts = [(start,) for start in self.record_starts] or [()] * len(self.record_laws)
+        models = [on_rig(*of) for of in zip(self.record_laws, rigs, starts, strict=True)] if self.record_laws else []
+        return error_shares(models or self.model_of(self.runs), self.runs, self.initial_state)
 
     def table(self, truth: AbstractDamper | None = None, *, true_rig: Rig | None = None, title: str = "") -> Table:
         """The parameters with units, standard errors and meanings, compared with a true law if one is given.

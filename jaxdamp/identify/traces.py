@@ -14,7 +14,17 @@ from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import command_paths, takes_command, with_command
 from jaxdamp.identify.initial_states import Cycle
-from jaxdamp.identify.model import Model, can_rest, effects_of, initial_state, is_memoryless, law_of, marched, rig_of
+from jaxdamp.identify.model import (
+    Model,
+    can_rest,
+    effects_of,
+    initial_state,
+    is_memoryless,
+    law_of,
+    marched,
+    rig_of,
+    starts_in,
+)
 from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.rows import Row, averaged, cycles_of, on_device, resting_blocks, row_of, samples_in_block
 from jaxdamp.parameters import get, with_values
@@ -48,17 +58,27 @@ class Batch(AbstractResiduals):
         """The forces [N], and the change of the states over the cycle before a record that starts periodically."""
 
         def one(
-            dt: Array, x: Array, v: Array, temperature: Array | None, cycle: Cycle | None, values: dict[str, Array]
+            dt: Array,
+            x: Array,
+            v: Array,
+            temperature: Array | None,
+            cycle: Cycle | None,
+            state: Array | None,
+            values: dict[str, Array],
         ) -> tuple[Array, Array]:
-            own = with_values(model, values)
-            state, change = (
-                (None, jnp.zeros(())) if cycle is None else initial_state(own, self.effects, cycle, temperature)
-            )
+            own, change = with_values(model, values), jnp.zeros(())
+            if cycle is not None:
+                state, change = initial_state(own, self.effects, cycle, temperature)
             return marched(own, self.effects, dt, x, v, temperature, self.substeps, state), change
 
-        own = {path: get(model, path)[self.number] for path in self.per_record}
-        motion = (self.dt, self.stroke, self.velocity, self.temperature, self.cycle)
-        return jax.vmap(one)(*motion, self.fixed | own)
+        starts = [start.initial_state for start in starts_in(model) if start is not None]
+        estimated = jnp.stack(starts)[self.number] if starts else None
+        motion = (self.dt, self.stroke, self.velocity, self.temperature, self.cycle, estimated)
+        return jax.vmap(one)(*motion, self.own_values(model))
+
+    def own_values(self, model: Model) -> dict[str, Array]:
+        """The values that differ from record to record, by path."""
+        return self.fixed | {path: get(model, path)[self.number] for path in self.per_record}
 
     def __call__(self, model: Model) -> Float[Array, " samples"]:
         """Weighted difference of the model's force from the measured one; zero where the weight is, even beside NaN."""

@@ -17,6 +17,7 @@ from jaxdamp.dampers import (
     BumpStop,
     Bushing,
     CoulombFriction,
+    CreepingViscoPlastic,
     Dahl,
     Degressive,
     DigressiveProgressive,
@@ -147,6 +148,9 @@ LAWS = {
     "piston flow": lambda: PistonFlow(1.42e-3, 1.6e-6, 1.2e6, 1.2e11, 2.5e-5, 5e5, 4e10, 4e-5, 2e-13),
     "mono-tube": MonoTube.reference,
     "visco-plastic": lambda: ViscoPlastic(
+        100.0, 900.0, 0.6, 0.02, [200.0, 300.0], [2e-3, 1e-3], [2e-4, 1e-3], [0.5, 0.1], 0.8
+    ),
+    "creeping visco-plastic": lambda: CreepingViscoPlastic(
         100.0, 900.0, 0.6, 0.02, [200.0, 300.0], [2e-3, 1e-3], [2e-4, 1e-3], [0.5, 0.1], 0.8
     ),
     "modified Bouc and Wen, published": lambda: ModifiedBoucWen.prototype(1.5),

@@ -1,0 +1,102 @@
+"""States of a law at the first sample of each record: before a fit estimates them, and in records to be predicted."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxdamp._types import State
+from jaxdamp.bench import BenchRun
+from jaxdamp.identify.initial_states import rest_window
+from jaxdamp.identify.model import Model, OnRig, RecordStart, law_of, marched, on_rig, rig_of, starts_in, state_history
+from jaxdamp.identify.traces import Batch, batches
+from jaxdamp.parameters import with_values
+
+
+SAMPLES_PER_CYCLE = 100  # of the motion that shows how large the states become
+NEWTON_STEPS = 20  # to states with the force of the rest
+
+
+class FirstStates(NamedTuple):
+    """The states of a law at the first sample of records, as far as they are known without the force of the motion.
+
+    Attributes:
+        expected: without any force: those of the law itself in records that begin at rest, else those after a cycle.
+        size: largest change of each state in the motion.
+        at_rest: in records that begin at rest those nearest to the expected ones, relative to their size, that give the
+            mean force of the first second of rest (of the first half, if this is less); else the expected ones.
+    """
+
+    expected: Float[np.ndarray, "runs states"]
+    size: Float[np.ndarray, "runs states"]
+    at_rest: Float[np.ndarray, "runs states"]
+
+
+def first_states(model: Model, runs: Sequence[BenchRun]) -> FirstStates:
+    """The states at the first sample of each record.
+
+    Arguments:
+        model: a law with states, on a machine or not.
+        runs: the records.
+    """
+    made, ranges = batches(model, runs, [1.0] * len(runs), SAMPLES_PER_CYCLE)
+    windows = [rest_window(run) for run in runs]
+    targets = [float(np.mean(run.force[:n])) if n else np.nan for run, n in zip(runs, windows, strict=True)]
+    by_batch = []
+    for number, batch in enumerate(made):
+        rows = sorted(
+            (at.row, at.start, at.stop, y) for at, y in zip(ranges, targets, strict=True) if at.batch == number
+        )
+        _, start, stop, target = (jnp.asarray(column) for column in zip(*rows, strict=True))
+        by_batch.append([np.asarray(a) for a in _first_states(batch, model, start, stop, target)])
+    return FirstStates(*(np.stack([by_batch[at.batch][k][at.row] for at in ranges]) for k in range(3)))
+
+
+@eqx.filter_jit
+def _first_states(batch: Batch, model: Model, start: Array, stop: Array, target: Array) -> tuple[Array, Array, Array]:
+    def one(
+        dt: Array, x: Array, v: Array, warm: Array | None, values: dict[str, Array], start: Array, stop: Array, y: Array
+    ) -> tuple[State, State, State]:
+        own = with_values(model, values)
+        history = state_history(own, dt, x, v, warm)
+        changes = jnp.where(jnp.arange(x.size)[:, None] < stop, jnp.abs(history - history[:1]), 0.0)
+        size = jnp.max(changes, axis=0)
+        size = jnp.where(size > 0, size, 1.0)
+        rest, still = jnp.full(4, x[start]), jnp.zeros(4)
+        constant = None if warm is None else jnp.full(4, warm[0])
+
+        def force(state: State) -> Array:
+            return marched(own, batch.effects, dt, rest, still, constant, 1, state)[0]
+
+        expected = history[start]
+        at_rest = _states_with_force(force, expected, size, y)
+        return expected, size, jnp.where(jnp.isfinite(y), at_rest, expected)
+
+    motion = (batch.dt, batch.stroke, batch.velocity, batch.temperature, batch.own_values(model))
+    return jax.vmap(one)(*motion, start, stop, target)
+
+
+def _states_with_force(force, expected: State, size: State, target: Array) -> State:
+    """The nearest states that give a force [N], by Newton's method; at most their size away from the expected ones."""
+
+    def step(state: State, _: None) -> tuple[State, None]:
+        slope = jax.grad(force)(state) * size**2
+        gain = jnp.sum(jax.grad(force)(state) * slope)
+        moved = state + slope * (target - force(state)) / jnp.where(gain > 0, gain, 1.0)
+        return expected + jnp.clip(moved - expected, -size, size), None
+
+    return jax.lax.scan(step, expected, None, NEWTON_STEPS)[0]
+
+
+def with_first_states(model: Model, runs: Sequence[BenchRun]) -> Model:
+    """The model with states at the first sample of every record: those it has, or those by the force at rest."""
+    known = starts_in(model) or (None,) * len(runs)
+    if law_of(model).initial_state().size == 0 or all(start is not None for start in known):
+        return model
+    states = first_states(on_rig(law_of(model), rig_of(model)), runs).at_rest
+    starts = [own or RecordStart(jnp.asarray(s)) for own, s in zip(known, states, strict=True)]
+    return OnRig(law_of(model), rig_of(model), tuple(starts))
