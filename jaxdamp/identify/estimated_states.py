@@ -1,6 +1,6 @@
 """States of a law at the first sample of each record: before a fit estimates them, and in records to be predicted."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -80,7 +80,7 @@ def _first_states(batch: Batch, model: Model, start: Array, stop: Array, target:
     return jax.vmap(one)(*motion, start, stop, target)
 
 
-def _states_with_force(force, expected: State, size: State, target: Array) -> State:
+def _states_with_force(force: Callable[[State], Array], expected: State, size: State, target: Array) -> State:
     """The nearest states that give a force [N], by Newton's method; at most their size away from the expected ones."""
 
     def step(state: State, _: None) -> tuple[State, None]:

@@ -100,7 +100,10 @@ def fit(
         initial_state: of a law with states at the first sample of a record: `"warm_up"`, as above; `"rest"`, the law's
             own, for records that begin with the first motion; or `"periodic"`, for records cut out of a motion that had
             lasted long: in those whose stroke repeats from cycle to cycle the law has settled, however slow it is, and
-            all samples are compared. Other records start as with `"warm_up"`. How each starts stands in `criterion`.
+            all samples are compared. Other records start as with `"warm_up"`. Or `"estimated"`: free numbers of each
+            record, fitted with the law (`initial_states` of the result; paths then begin with `law.`, `rig.` or
+            `records.`). A record that was not fitted is predicted from its mean force in the first second of rest,
+            which is not scored, or after a warm-up cycle. How each starts stands in `criterion`.
         samples_per_cycle: see above; `None` uses every sample.
         starts: largest number of starts: `law` first, then those that its laws propose (`other_starts`); all of them if
             left out. With 1, the search starts from `law` only.

@@ -139,8 +139,9 @@ def state_history(
     """The states of the law at every sample of a motion [m, m/s] that begins at rest."""
     law = law_in(model, temperature)
 
-    def step(state: State, ends: tuple[Array, ...]) -> tuple[State, State]:
-        state = law.advance(*ends, state, dt)
+    def step(state: State, ends: tuple[Array, Array, Array, Array]) -> tuple[State, State]:
+        x0, v0, x1, v1 = ends
+        state = law.advance(x0, v0, x1, v1, state, dt)
         return state, state
 
     begin = law.initial_state()

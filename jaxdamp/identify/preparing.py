@@ -117,8 +117,8 @@ def _with_estimated_states(
     starts = [RecordStart(jnp.asarray(state)) for state in states.at_rest]
     fitted = np.isfinite(sigma)
     paths = np.array([START_PATH.format(i) for i in range(len(runs))])
-    moments = (jnp.asarray(a[fitted]) for a in (states.expected, states.size))
-    prior = Priors(tuple(map(str, paths[fitted])), *moments, states.size[fitted].size, jnp.ones(()), weak=True)
+    mean, deviation = (jnp.asarray(a[fitted]) for a in (states.expected, states.size))
+    prior = Priors(tuple(map(str, paths[fitted])), mean, deviation, mean.size, jnp.ones(()), weak=True)
     return on_rig(law_of(model), rig_of(model), starts), (prior,), [str(path) for path in paths[~fitted]]
 
 

@@ -127,6 +127,7 @@ class AbstractFitted:
         status: how the search ended.
         rig: the fitted test machine, if one was fitted.
         initial_state: how records start, as in `fit`.
+        record_starts: the states at the first sample of each record if they were estimated, None for one left out.
     """
 
     law: AbstractDamper
@@ -138,6 +139,7 @@ class AbstractFitted:
     status: Status
     rig: Rig | None = dataclasses.field(default=None, kw_only=True)
     initial_state: str = dataclasses.field(default="warm_up", kw_only=True)
+    record_starts: tuple[RecordStart | None, ...] = dataclasses.field(default=(), kw_only=True)
 
     @property
     def converged(self) -> bool:
@@ -150,9 +152,9 @@ class AbstractFitted:
         return on_rig(self.law, self.rig)
 
     def model_of(self, runs: Sequence[BenchRun]) -> Model:
-        """What predicts these records: `model`, with all that the fit says of how they begin."""
-        del runs
-        return self.model
+        """`model`, with the estimated states at the beginning of those of these records that were fitted."""
+        known = {id(run): start for run, start in zip(self.runs, self.record_starts, strict=False)}
+        return on_rig(self.law, self.rig, [known.get(id(run)) for run in runs] if known else ())
 
     def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
         """Force [N] that the fit expects at every sample of records, old or new, of the same machine."""
@@ -196,7 +198,6 @@ class FitResult(AbstractFitted):
         record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
         record_rigs: the test machine of each record, as `record_laws`.
         criterion: loss, priors and what is special about the records in words; empty for plain least squares.
-        record_starts: the states at the first sample of each record if they were estimated, None for one left out.
         evidence: the minimum and the noise, for `band`, `propagate`, `profile` and `posterior`.
     """
 
@@ -210,12 +211,6 @@ class FitResult(AbstractFitted):
     record_rigs: tuple[Rig, ...] = ()
     criterion: str = ""
     evidence: Evidence | None = None
-    record_starts: tuple[RecordStart | None, ...] = ()
-
-    def model_of(self, runs: Sequence[BenchRun]) -> Model:
-        """The model, with the estimated states at the beginning of those of the records that were fitted."""
-        known = {id(run): start for run, start in zip(self.runs, self.record_starts, strict=False)}
-        return on_rig(self.law, self.rig, [known.get(id(run)) for run in runs] if known else ())
 
     @property
     def initial_states(self) -> tuple[Float[np.ndarray, " states"] | None, ...]:
@@ -235,7 +230,7 @@ class FitResult(AbstractFitted):
         """Shares of the squared error over the records: shape, hysteresis, rest (`identify.error_shares`)."""
         rigs = self.record_rigs or (None,) * len(self.record_laws)
         starts = [(start,) for start in self.record_starts] or [()] * len(self.record_laws)
-        models = [on_rig(*of) for of in zip(self.record_laws, rigs, starts, strict=True)] if self.record_laws else []
+        models = [on_rig(*each) for each in zip(self.record_laws, rigs, starts, strict=False)]
         return error_shares(models or self.model_of(self.runs), self.runs, self.initial_state)
 
     def table(self, truth: AbstractDamper | None = None, *, true_rig: Rig | None = None, title: str = "") -> Table:

@@ -47,7 +47,7 @@ def test_the_states_of_fitted_records_are_estimated_with_their_errors(result):
         assert estimate.value == state[0] == pytest.approx(true, abs=4 * estimate.standard_error)
         assert estimate.standard_error < 0.2 and estimate.note == ""
     assert estimate.meaning == "state of the law at the beginning of record 'three'"
-    for name, true in (("sliding_force", 100.0), ("rate", 500.0)):
+    for name, true in (("friction_force", 100.0), ("rate", 500.0)):
         assert abs(result[name].value - true) < 4 * result[name].standard_error
     assert "records.1.initial_state[0]" in repr(result) and result.rmse == pytest.approx(1.0, rel=0.1)
 

@@ -1,0 +1,58 @@
+"""How well laws predict measured records that they were not fitted to: `python -m benchmarks.whole_records`.
+
+The magnetorheological records in `JAXDAMP_DATA`, at each current: the last four cycles of the motion, and whole records
+with rest before and after it, these also with states estimated at the beginning (`docs/fitting.md` says what of a
+record that is held out may then be used, and is not scored). With `--nested` the law of each record is chosen without
+it.
+"""
+
+import argparse
+import os
+from pathlib import Path
+
+import jaxdamp
+
+
+jaxdamp.configure()
+
+from jaxdamp import bench, identify  # noqa: E402
+from jaxdamp._tables import Column, Table  # noqa: E402
+
+
+CURRENTS = {"*_0A": 0.0, "*_0.5A": 0.5, "*_1.0A": 1.0}
+SEARCH = {"samples_per_cycle": 100, "max_steps": 30, "starts": 1}
+PARTS = ("moving", "whole", "estimated")
+LAWS = ["lugre_spring", "visco_plastic_spring", "creeping_visco_plastic_spring"]
+
+
+def score(part: str, laws: list[str], nested: bool) -> identify.CrossValidation:
+    """Every record predicted by laws fitted to the others of the same current."""
+    folder = Path(os.environ["JAXDAMP_DATA"]) / "mr_damper"
+    records = bench.read(folder / "*.csv", sign="rebound-positive", command=CURRENTS)
+    runs = bench.BenchSet(run.last_cycles(4) for run in records) if part == "moving" else records
+    how = {"by": lambda run: f"{run.command} A", "weighting": "runs", "nested": nested, **SEARCH}
+    initial_state = "estimated" if part == "estimated" else "warm_up"
+    return identify.cross_validate(identify.ladder_starts(laws), runs, initial_state=initial_state, **how)
+
+
+def main() -> None:
+    """Print the scores."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--parts", nargs="+", default=PARTS, choices=PARTS)
+    parser.add_argument("--laws", nargs="+", default=LAWS)
+    parser.add_argument("--nested", action="store_true")
+    options = parser.parse_args()
+    rows = []
+    for part in options.parts:
+        scores = score(part, options.laws, options.nested)
+        print(f"\n{part}\n{scores.record_table().to_text()}", *scores.verdict, sep="\n", flush=True)
+        groups = [scores.fit_percent(scores.best, group) for group in scores.groups]
+        rows.append((part, scores.best, *groups, scores.fit_percent(scores.best)))
+        if options.nested:
+            rows.append((part, "chosen", None, None, None, scores.chosen_fit_percent))
+    columns = [Column(name, "%", ".1f") for name in ("0 A", "0.5 A", "1 A", "all")]
+    print(Table("Fit of held-out records", (Column("records"), Column("law"), *columns), tuple(rows)).to_text())
+
+
+if __name__ == "__main__":
+    main()
