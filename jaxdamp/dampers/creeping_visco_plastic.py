@@ -3,24 +3,22 @@
 from typing import final
 
 import jax
-import jax.numpy as jnp
 
 from jaxdamp._elementary import logarithm, power
 from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers.play import dead_zone
-from jaxdamp.dampers.visco_plastic import AbstractViscoPlastic, mean_decay
+from jaxdamp.dampers.visco_plastic import AbstractViscoPlastic, element_step
 from jaxdamp.parameters import interval, parameter
 
 
-UNLOADED = 1e-4  # share of the elastic travel below which creep is as slow as there
+UNLOADED = 1e-4  # share of the largest deflection below which creep is as slow as there
 
 
 def creep_periods(load: ScalarLike, periods: ScalarLike, exponent: ScalarLike) -> Scalar:
-    """ln(1 + m |u|ᵐ p)/m, the logarithm of the ratio in which a load |u| falls over p creep times at rest.
+    """ln(1 + m |u|ᵐ p)/m, the logarithm of the ratio in which a deflection falls over p creep times at rest.
 
     Arguments:
-        load: u, share of the sliding force.
+        load: u, share of the largest deflection.
         periods: p, time over the creep time τ.
         exponent: m > 0, of u̇ = −u |u|ᵐ/τ.
     """
@@ -28,30 +26,22 @@ def creep_periods(load: ScalarLike, periods: ScalarLike, exponent: ScalarLike) -
 
 
 def creep_step(
-    deflection: ScalarLike,
-    travel: ScalarLike,
-    periods: ScalarLike,
-    elastic_travel: ScalarLike,
-    clearance: ScalarLike,
-    exponent: ScalarLike,
+    deflection: ScalarLike, travel: ScalarLike, periods: ScalarLike, limit: ScalarLike, exponent: ScalarLike
 ) -> Scalar:
-    """Deflection [m] after a travel [m] in one direction over so many creep times."""
-    limit = clearance + elastic_travel
+    """Deflection [m] after a travel [m] in one direction over so many creep times, within ± the limit [m]."""
     middle = within(deflection + 0.5 * travel, -limit, limit)
-    decay = creep_periods(dead_zone(middle, clearance) / elastic_travel, periods, exponent)
-    crept = dead_zone(deflection, clearance) * jnp.expm1(-decay)
-    return within(deflection + crept + travel * mean_decay(decay), -limit, limit)
+    return element_step(deflection, travel, creep_periods(middle / limit, periods, exponent), limit)
 
 
 @final
 class CreepingViscoPlastic(AbstractViscoPlastic):
-    """The law `ViscoPlastic` with elements that creep: ḋᵢ = v − (eᵢ/τᵢ) uᵢ |uᵢ|ᵐ, uᵢ = dz(dᵢ, δᵢ)/eᵢ.
+    """The law `ViscoPlastic` with elements that creep: ḋᵢ = v − (dᵢ/τᵢ) |uᵢ|ᵐ, uᵢ = dᵢ/(δᵢ + eᵢ).
 
-    Creep by a power of the load is the law of Norton (1929). At rest the force of an element is
-    Yᵢ uᵢ (1 + m |uᵢ|ᵐ t/τᵢ)^(−1/m): it falls fast from the sliding force, and what is left hardly moves for minutes,
+    Creep by a power of the load is the law of Norton (1929), here of the deflection. At rest
+    uᵢ(t) = uᵢ (1 + m |uᵢ|ᵐ t/τᵢ)^(−1/m): the force falls fast at first, and what is left hardly moves for minutes,
     whereas the elements of `ViscoPlastic` forget all in a few τᵢ. So the force at which a record begins is a trace of
-    earlier motion: `fit(..., initial_state="estimated")`. In slow motion an element flows before it slides, with
-    Yᵢ (v τᵢ/eᵢ)^(1/(m + 1)).
+    earlier motion: `fit(..., initial_state="estimated")`. In slow motion an element flows before it slides, at
+    uᵢ = (v τᵢ/(δᵢ + eᵢ))^(1/(m + 1)).
 
     States: the deflections dᵢ [m]. The step is exact at rest and while all elements slide, second order in general, and
     stable for any stiffness Yᵢ/eᵢ.
@@ -64,9 +54,9 @@ class CreepingViscoPlastic(AbstractViscoPlastic):
         sliding_forces: Yᵢ [N], shape (elements,).
         elastic_travels: eᵢ [m], shape (elements,).
         clearances: δᵢ [m], shape (elements,).
-        relaxation_times: τᵢ [s], shape (elements,), time in which an element at its sliding force would creep by eᵢ.
+        relaxation_times: τᵢ [s], shape (elements,), relaxation time of an element that slides.
         asymmetry: a, force in compression relative to rebound.
-        creep_exponent: m; the force of an element relaxes the longer, the larger m.
+        creep_exponent: m; the larger m, the slower an element creeps after a while.
 
     Raises:
         ValueError: elements whose four vectors are not of equal length.
@@ -83,12 +73,11 @@ class CreepingViscoPlastic(AbstractViscoPlastic):
     )
 
     def relaxation_rates(self, deflections: State) -> State:
-        """(eᵢ/τᵢ) uᵢ |uᵢ|ᵐ [m/s]."""
-        loaded = dead_zone(deflections, self.clearances)
-        load = loaded / self.elastic_travels
-        return loaded / self.relaxation_times * power(load * load + UNLOADED**2, 0.5 * self.creep_exponent)
+        """(dᵢ/τᵢ) |uᵢ|ᵐ [m/s]."""
+        load = deflections / (self.clearances + self.elastic_travels)
+        return deflections / self.relaxation_times * power(load * load + UNLOADED**2, 0.5 * self.creep_exponent)
 
     def steps(self, deflections: State, travel: ScalarLike, duration: ScalarLike) -> State:
         """Exact at rest and while all elements slide."""
-        own = (duration / self.relaxation_times, self.elastic_travels, self.clearances)
-        return jax.vmap(creep_step, (0, None, 0, 0, 0, None))(deflections, travel, *own, self.creep_exponent)
+        periods, limit = duration / self.relaxation_times, self.clearances + self.elastic_travels
+        return jax.vmap(creep_step, (0, None, 0, 0, None))(deflections, travel, periods, limit, self.creep_exponent)

@@ -33,14 +33,10 @@ def element_force(
     return sliding_force * dead_zone(deflection, clearance) / travel
 
 
-def mean_decay(periods: ScalarLike) -> Scalar:
-    """(1 − e⁻ᵖ)/p, the mean of e⁻ᵖ over a step of p relaxation times."""
-    return jnp.where(periods > 1e-6, -jnp.expm1(-periods) / jnp.where(periods > 1e-6, periods, 1.0), 1.0)
-
-
 def element_step(deflection: ScalarLike, travel: ScalarLike, periods: ScalarLike, limit: ScalarLike) -> Scalar:
     """Deflection [m] after a travel [m] in one direction that took so many relaxation times, within ± the limit [m]."""
-    return within(deflection * jnp.exp(-periods) + travel * mean_decay(periods), -limit, limit)
+    grown = jnp.where(periods > 1e-6, -jnp.expm1(-periods) / jnp.where(periods > 1e-6, periods, 1.0), 1.0)
+    return within(deflection * jnp.exp(-periods) + travel * grown, -limit, limit)
 
 
 class AbstractViscoPlastic(AbstractDamper):

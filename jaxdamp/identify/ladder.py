@@ -14,7 +14,6 @@ from jaxdamp.dampers import (
     Bilinear,
     BoucWen,
     CoulombFriction,
-    CreepingViscoPlastic,
     Dahl,
     Lag,
     Linear,
@@ -59,11 +58,7 @@ _MEMORYLESS = {
     "besinger": Besinger.guess,
     "linear_friction": _friction,
 }
-_BESIDE_SPRING = {
-    "lugre_spring": LuGre.guess,
-    "visco_plastic_spring": ViscoPlastic.guess,
-    "creeping_visco_plastic_spring": CreepingViscoPlastic.guess,
-}
+_BESIDE_SPRING = {"lugre_spring": LuGre.guess, "visco_plastic_spring": ViscoPlastic.guess}
 LEARNT = "neural_hysteresis_spring"
 LAWS = tuple(name for name, law in NAMED_LAWS.items() if not law.optional)
 

@@ -37,9 +37,6 @@ NAMED_LAWS = {
     "besinger_play": NamedLaw(True, "besinger behind a clearance: worn joint, loose mount, void in the oil"),
     "series_spring_dahl": NamedLaw(True, "piecewise_linear in series with a spring, elastic friction, a spring"),
     "visco_plastic_spring": NamedLaw(True, "concave viscous force, two yielding elements, a spring"),
-    "creeping_visco_plastic_spring": NamedLaw(
-        True, "visco_plastic_spring whose elements creep at rest; for whole records, only by name", optional=True
-    ),
     "neural_hysteresis_spring": NamedLaw(
         True, "one coefficient, hysteresis learnt by a network, a spring; takes minutes, only by name", optional=True
     ),

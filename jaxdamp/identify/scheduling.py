@@ -194,6 +194,9 @@ def fit_scheduled(
     runs = settings_stated(as_runs(runs, call=CALL))
     _checks.one_of("weighting", weighting, ("samples", "runs"))
     frozen = [*name_patterns("freeze", freeze), *frozen_by(law)]
+    if options.get("initial_state") == "estimated":
+        remedy = 'Estimate states in fits of one setting: `fit(law, runs, initial_state="estimated")`.'
+        _checks.refuse("initial_state", "be the same at every fit of a chain of settings", "'estimated'", remedy)
     chain = Chain(law, runs, common, rig, options | {"weighting": weighting, "freeze": frozen})
     with Progress("Fitting by setting") as line:
         shown = progress or line

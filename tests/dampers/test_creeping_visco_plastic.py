@@ -13,13 +13,13 @@ ELEMENTS = ([150.0, 400.0], [1e-4, 5e-5], [0.0, 2e-4])
 LAW = CreepingViscoPlastic(0.0, 0.0, 0.5, 0.002, *ELEMENTS, [0.2, 0.05], 0.8, creep_exponent=2.5)
 
 
-def test_the_force_at_rest_falls_by_a_power_of_time_in_steps_of_any_length():
-    state = jnp.array([8e-5, -2.4e-4])  # loads 0.8 and −0.8
+def test_the_deflections_at_rest_fall_by_a_power_of_time_in_steps_of_any_length():
+    state = jnp.array([8e-5, -2.4e-4])  # loads 0.8 and −0.96
     advance = jax.jit(lambda duration: LAW.advance(0.0, 0.0, 0.0, 0.0, state, duration))
     for duration in (1e-3, 1.0, 100.0):
-        after = advance(duration)
-        left = [0.8 * (1.0 + 2.5 * 0.8**2.5 * duration / tau) ** (-1.0 / 2.5) for tau in (0.2, 0.05)]
-        assert float(LAW.force(0.0, 0.0, after)) == pytest.approx(150.0 * left[0] - 0.8 * 400.0 * left[1], rel=1e-6)
+        for after, before, load, tau in zip(advance(duration), state, (0.8, 0.96), (0.2, 0.05), strict=True):
+            left = (1.0 + 2.5 * load**2.5 * duration / tau) ** (-1.0 / 2.5)
+            assert float(after) == pytest.approx(float(before) * left, rel=1e-6)
 
 
 def test_in_slow_motion_an_element_flows_before_it_slides():
