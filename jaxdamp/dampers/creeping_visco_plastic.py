@@ -74,8 +74,12 @@ class CreepingViscoPlastic(AbstractViscoPlastic):
 
     def relaxation_rates(self, deflections: State) -> State:
         """(dᵢ/τᵢ) |uᵢ|ᵐ [m/s]."""
-        load = deflections / (self.clearances + self.elastic_travels)
-        return deflections / self.relaxation_times * power(load * load + UNLOADED**2, 0.5 * self.creep_exponent)
+
+        def slowed(deflection: Scalar, limit: Scalar) -> Scalar:
+            load = deflection / limit
+            return deflection * power(load * load + UNLOADED**2, 0.5 * self.creep_exponent)
+
+        return jax.vmap(slowed)(deflections, self.clearances + self.elastic_travels) / self.relaxation_times
 
     def steps(self, deflections: State, travel: ScalarLike, duration: ScalarLike) -> State:
         """Exact at rest and while all elements slide."""
