@@ -9,14 +9,13 @@ from jaxtyping import Array
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import require_finite_force, without_fitted_ranges
-from jaxdamp.identify.initial_states import start_of
+from jaxdamp.identify.initial_states import DRIFT, start_of
 from jaxdamp.identify.model import Model, blind_end, is_memoryless, law_of
 from jaxdamp.identify.rows import samples_in_block, settling_time
 from jaxdamp.identify.traces import Batch, batches
 
 
 PREDICTED_PER_CYCLE = 1000  # samples at which a law with states is evaluated; straight lines between them: error 5e-6
-DRIFT = 1e-4  # relative change of the states over a cycle of what should be the periodic solution
 
 
 @eqx.filter_jit
