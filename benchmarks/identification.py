@@ -4,8 +4,8 @@
   Law and machine are fitted together. The peers have the same model in NumPy, with cubic splines of the motion for the
   delay, the same start and finite differences.
 - `many`: `benchmarks.fit_many`.
-- `posterior`: of the law's numbers from three records, beside a random walk (Metropolis) in NumPy with the best step
-  for a normal distribution, and lmfit with emcee (`pip install emcee`), each from the minimum.
+- `posterior`: of the law's numbers from three records, compiled anew in each call, beside a random walk (Metropolis) in
+  NumPy with the best step for a normal distribution, and lmfit with emcee (`pip install emcee`), all from the minimum.
 
 All stages, or those that are named:
 
@@ -13,6 +13,7 @@ All stages, or those that are named:
 """
 
 import argparse
+import functools
 import importlib.util
 import sys
 from collections.abc import Callable, Sequence
@@ -99,15 +100,15 @@ def rig() -> None:
             found = np.array([e.value for e in found.parameters])
         rows.append([by, *cost, float(np.sqrt(np.mean(model.misses(found) ** 2))), found])
 
-    for by, options in (("fit, every sample", {"samples_per_cycle": None}), ("fit, 400 a cycle", {})):
-        row(f"{by}, compiling", lambda options=options: fit(start, runs, rig=begin, starts=1, **options))
-        row(by, lambda options=options: fit(start, runs, rig=begin, starts=1, **options), repeats=3)
+    for by, count in (("fit, every sample", None), ("fit, 400 a cycle", 400)):
+        work = functools.partial(fit, start, runs, rig=begin, starts=1, samples_per_cycle=count)
+        row(f"{by}, compiling", work)
+        row(by, work, repeats=3)
     row("SciPy least_squares", model.by_scipy)
     row("lmfit", model.by_lmfit)
     for own in rows:
         found = own.pop()
-        own += [float(np.max(np.abs(found - rows_found) / errors)) for rows_found in (SEEN,)]
-        own += [", ".join(f"{value:.5g}" for value in found)]
+        own += [float(np.max(np.abs(found - SEEN) / errors)), ", ".join(f"{value:.5g}" for value in found)]
     title = f"Law and machine from {len(runs)} records, {model.force.size} samples; {', '.join(NAMES)}"
     head = ["by", "s", "processor s", "RMSE, N", "largest error, standard errors", "values"]
     report("identification_rig", title, head, rows, 6)
@@ -137,7 +138,9 @@ def posterior() -> None:
     velocity, force = (np.concatenate([getattr(run, name) for run in runs]) for name in ("velocity", "force"))
     result = fit(Besinger(*fit_many.START), runs, starts=1)
     centre = np.array([e.value for e in result.parameters])
-    misses = lambda numbers: fit_many.besinger(numbers, velocity) - force  # noqa: E731
+
+    def misses(numbers: np.ndarray) -> np.ndarray:
+        return fit_many.besinger(numbers, velocity) - force
 
     def logarithm(numbers: np.ndarray) -> float:
         residual = misses(numbers)
@@ -153,7 +156,6 @@ def posterior() -> None:
             lambda p: misses(np.array([p[name].value for name in fit_many.NAMES])) / sigma,
             parameters,
             method="emcee",
-            params=parameters,
             nwalkers=WALKERS,
             steps=WALKER_STEPS,
             burn=WALKER_STEPS // 5,
@@ -164,6 +166,7 @@ def posterior() -> None:
 
     works: dict[str, Callable[[], Any]] = {
         "FitResult.posterior (NUTS), compiling": lambda: result.posterior(),
+        "the same, 5000 samples a chain": lambda: result.posterior(samples=5000),
         "random walk in NumPy": lambda: walks(logarithm, centre, np.asarray(result.covariance)),
         "lmfit with emcee": emcee,
     }
@@ -189,16 +192,18 @@ def posterior() -> None:
     report("identification_posterior", f"Posterior of {centre.size} numbers, {force.size} samples", head, rows)
 
 
+STAGES: dict[str, Callable[[], None]] = {"rig": rig, "many": lambda: fit_many.run(200), "posterior": posterior}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    stages = {"rig": rig, "many": None, "posterior": posterior}
-    parser.add_argument("stages", nargs="*", choices=[*stages, []], help="rig, many, posterior; all if left out")
-    parser.add_argument("--dampers", type=int, default=200, help="of the stage `many`")
-    given = parser.parse_args()
-    for name in given.stages or stages:
+    parser.add_argument("stages", nargs="*", help=f"of {', '.join(STAGES)}; all if left out")
+    stages = parser.parse_args().stages or list(STAGES)
+    for unknown in set(stages) - set(STAGES):
+        parser.error(f"unknown stage {unknown!r}: choose from {', '.join(STAGES)}")
+    for name in stages:
         progress(name)
-        work = stages[name]
-        fit_many.run(given.dampers) if work is None else work()
+        STAGES[name]()
 
 
 if __name__ == "__main__":
