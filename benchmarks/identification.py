@@ -7,7 +7,7 @@
 - `posterior`: of the law's numbers from three records, compiled anew in each call, beside a random walk (Metropolis) in
   NumPy with the best step for a normal distribution, and lmfit with emcee (`pip install emcee`), all from the minimum.
 
-All stages, or those that are named:
+The extras `benchmarks` and `bayes` are needed. All stages, or those that are named:
 
     python -m benchmarks.identification rig many posterior
 """

@@ -11,6 +11,8 @@ from jaxdamp import identify
 from jaxdamp.bench import BenchRun, SineTest, VirtualDyno
 from jaxdamp.dampers import AbstractDamper, Bilinear, Lag, Linear, Scheduled, with_command
 from jaxdamp.identify import Status, fit, fit_many
+from jaxdamp.identify.rows import Row
+from jaxdamp.identify.traces import _grouped
 from jaxdamp.parameters import free_parameters, get
 from jaxdamp.rig import Rig
 
@@ -66,6 +68,12 @@ def test_records_cut_out_of_a_long_motion_start_in_the_periodic_solution():
     assert np.all(np.abs(fit_many(start, cut).values[:, 1] / [0.5, 0.4] - 1.0) > 0.1)
     drifting = dataclasses.replace(many, drift=np.array([0.0, 0.01]))
     assert drifting.remarks[1] == "its states are not periodic: over a cycle they still change by 0.01"
+
+
+@pytest.mark.parametrize(("each", "groups"), [(10, 2), (200, 3)])
+def test_further_batches_are_compiled_for_many_records_only(each, groups):
+    rows = [Row(1e-3, [], np.ones(size), 0, 0, 1, 1) for size in (2000, 700, 200) for _ in range(each)]
+    assert sorted(len(group) for group in _grouped(rows))[-1] == each * (4 - groups) and len(_grouped(rows)) == groups
 
 
 def test_shared_parameters_follow_the_setting(clicks):
