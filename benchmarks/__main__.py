@@ -16,7 +16,7 @@ QUESTIONS = (
     ["work_precision"],
     ["fit"],
     ["printed"],
-    ["fit_many"],
+    ["identification"],
     ["pareto"],
 )
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 
@@ -27,6 +27,27 @@ def first_and_warm(work: Callable[[], Any], repeats: int = 9) -> tuple[float, fl
         jax.block_until_ready(work())
         samples.append(time.perf_counter() - start)
     return samples[0], min(samples[1:])
+
+
+class Cost(NamedTuple):
+    """Seconds of one piece of work."""
+
+    wall: float
+    processor: float  # on all cores, which other work on the machine changes less
+
+    def times(self, share: float) -> "Cost":
+        """That of a part of the work, or of a multiple."""
+        return Cost(share * self.wall, share * self.processor)
+
+
+def cost_of(work: Callable[[], Any], repeats: int = 1) -> tuple[Cost, Any]:
+    """The least of several repeats, each clock for itself, and the last answer."""
+    costs, answer = [], None
+    for _ in range(repeats):
+        wall, processor = time.perf_counter(), time.process_time()
+        answer = work()
+        costs.append((time.perf_counter() - wall, time.process_time() - processor))
+    return Cost(*map(min, zip(*costs, strict=True))), answer
 
 
 def best(work: Callable[[], Any], repeats: int = 3) -> float:

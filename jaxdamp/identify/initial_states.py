@@ -22,6 +22,7 @@ ALIKE = 0.1  # difference of the stroke from that one cycle later, relative to i
 DOUBLINGS = 20  # of the number of cycles that an extrapolation covers
 MOST_ROUNDS = 30  # of the search for the periodic solution
 SETTLED = 1e-9  # change of the states over a cycle, relative to their largest values, of the periodic solution
+DRIFT = 1e-4  # such a change of what should be the periodic solution, from which it is refused
 
 _moving: WeakKeyDictionary[BenchRun, slice] = WeakKeyDictionary()  # records do not change
 

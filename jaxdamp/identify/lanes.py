@@ -1,8 +1,9 @@
 """The records of many dampers side by side, compared with one law with other numbers for each damper."""
 
 import dataclasses
+import functools
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
@@ -12,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from jaxdamp._jacobian import value_and_jacobian
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import laws_inside, margins
 from jaxdamp.identify.criteria import Priors
@@ -20,7 +22,7 @@ from jaxdamp.identify.traces import Batch, record_batches
 from jaxdamp.parameters import Coordinates
 
 
-CHUNK_SAMPLES = 16384  # of the records in one call, which should fit into the cache; all calls of a group are alike
+CHUNK_SAMPLES = 32768  # of the records in one call, which should fit into the cache; all calls of a group are alike
 
 
 class Group(NamedTuple):
@@ -61,6 +63,7 @@ class Missed(NamedTuple):
     force: Float[np.ndarray, " samples"]  # as measured, N
     residual: Float[np.ndarray, " samples"]  # weighted
     weight: Float[np.ndarray, " samples"]
+    drift: float  # relative change of the states over the cycle before a record that starts in the periodic solution
 
 
 class Lanes(NamedTuple):
@@ -84,7 +87,7 @@ class Lanes(NamedTuple):
         gram, keeps = np.zeros((count, size, size)), np.ones(count, bool)
         for group in self.groups:
             lane, record = self._pairs(group, lanes)
-            for part, (products, margin, _) in self._chunks(group, y, lane, record):
+            for part, (products, margin, *_) in self._chunks(group, y, lane, record):
                 np.add.at(gram, lane[part], products)
                 keeps[lane[part]] &= margin > 0
         if self.priors is not None:
@@ -95,20 +98,25 @@ class Lanes(NamedTuple):
 
     def residuals(self, y: Float[np.ndarray, "dampers free"]) -> list[Float[np.ndarray, "records time"]]:
         """Weighted residual of every record of each group, with one lane for each damper."""
+        return [residual for residual, _ in self._residuals_and_drift(y)]
+
+    def _residuals_and_drift(self, y: Float[np.ndarray, "dampers free"]) -> list[tuple[np.ndarray, np.ndarray]]:
         found = []
         for group in self.groups:
-            parts = self._chunks(group, y, group.damper, np.arange(group.damper.size))
-            found.append(np.concatenate([own for _, (_, _, own) in parts]) * group.level[:, None])
+            parts = [own for _, own in self._chunks(group, y, group.damper, np.arange(group.damper.size))]
+            residual, drift = (np.concatenate([own[k] for own in parts]) for k in (2, 3))
+            found.append((residual * group.level[:, None], drift))
         return found
 
     def missed(self, y: Float[np.ndarray, "dampers free"]) -> list[list[Missed]]:
         """What the law misses in every record of each damper, with one lane for each, at the samples that count."""
         found: list[list[Missed]] = [[] for _ in range(y.shape[0])]
-        for group, residual in zip(self.groups, self.residuals(y), strict=True):
+        for group, (residual, drift) in zip(self.groups, self._residuals_and_drift(y), strict=True):
             force, weight = np.asarray(group.batch.force), np.asarray(group.batch.weight)
             for k, (i, number) in enumerate(zip(group.damper, np.asarray(group.batch.number), strict=True)):
                 used = weight[k] > 0
-                found[i].append(Missed(int(number), force[k][used], residual[k][used], weight[k][used]))
+                own = (force[k][used], residual[k][used], weight[k][used])
+                found[i].append(Missed(int(number), *own, float(drift[k])))
         return found
 
     def levels(self) -> Float[np.ndarray, " dampers"]:
@@ -136,17 +144,24 @@ class Lanes(NamedTuple):
     ) -> Iterator[tuple[slice, list[np.ndarray]]]:
         """What `_compared` gives for pairs of a lane and a record, in pieces that are computed at the same time."""
         dtype, double = self.coordinates.free.values.dtype, jnp.result_type(float) == jnp.float64
+        problem = _flattened((self.coordinates, group.batch))
 
         def compared(part: slice) -> list[np.ndarray]:
             own, rows = (np.pad(a[part], (0, group.chunk - a[part].size), "edge") for a in (lane, record))
             point, level = y[own].astype(dtype), group.level[rows].astype(dtype)
             with jax.enable_x64(double):  # a thread begins with the precision of the process
-                found = _compared(self.coordinates, point, group.batch, rows, level)
+                found = _compared(problem.structure, problem.arrays, point, rows, level)
             return [np.asarray(a, np.float64)[: lane[part].size] for a in found]
 
         parts = group.parts(lane.size)
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            yield from zip(parts, pool.map(compared, parts), strict=True)
+        each = _workers().map(compared, parts) if len(parts) > 1 else map(compared, parts)
+        yield from zip(parts, each, strict=True)
+
+
+@functools.cache
+def _workers() -> ThreadPoolExecutor:
+    """Threads for the calls of all fits; starting them takes as long as a call."""
+    return ThreadPoolExecutor(os.cpu_count())
 
 
 @eqx.filter_jit
@@ -164,34 +179,50 @@ def _prior_rows(coordinates: Coordinates, y: Any, priors: Priors) -> Array:
     return jax.vmap(one)(y)
 
 
-@eqx.filter_jit
+class _Flattened(NamedTuple):
+    """A tree taken apart once for many calls; `eqx.filter_jit` would do it in each, which takes as long as the call."""
+
+    structure: Hashable  # and what is no array
+    arrays: list[Any]
+
+
+def _flattened(tree: Any) -> _Flattened:
+    dynamic, static = eqx.partition(tree, lambda leaf: isinstance(leaf, jax.Array | np.ndarray))
+    (arrays, shape), (others, rest) = jax.tree.flatten(dynamic), jax.tree.flatten(static)
+    return _Flattened((shape, rest, tuple(others)), arrays)
+
+
+@functools.partial(jax.jit, static_argnums=0)
 def _compared(
-    coordinates: Coordinates,
+    structure: Any,
+    arrays: list[Any],
     y: Any,  # Float[Array, "pairs free"]
-    batch: Batch,
     record: Any,  # Int[Array, " pairs"]
     level: Any,  # Float[Array, " pairs"]
-) -> tuple[Array, Array, Array]:
-    """For each pair of a lane and a record: the products of Jacobian and residual, the least margin, the residual."""
+) -> tuple[Array, Array, Array, Array]:
+    """For each pair of a lane and a record: products of Jacobian and residual, least margin, residual, drift."""
+    shape, rest, others = structure
+    coordinates, batch = eqx.combine(jax.tree.unflatten(shape, arrays), jax.tree.unflatten(rest, others))
     free = coordinates.free
     has_conditions = any(law.has_conditions() for _, law in laws_inside(free.tree))
-    fields = ("dt", "stroke", "velocity", "force", "weight", "number", "fixed", "temperature")
+    fields = ("dt", "stroke", "velocity", "force", "weight", "number", "fixed", "temperature", "cycle")
     rows = {name: jax.tree.map(lambda a: a[record][:, None], getattr(batch, name)) for name in fields}
 
-    def pair(y: Array, row: dict[str, Any], level: Array) -> tuple[Array, Array, Array]:
-        one = dataclasses.replace(batch, **row)
+    def compared(y: Array, row: dict[str, Any], level: Array) -> dict[str, Array]:
+        missed, drift = dataclasses.replace(batch, **row).missed_and_drift(free.build(coordinates.to_physical(y)))
+        return {"missed": missed / level, "drift": drift[0]}
 
-        def residual(y: Array) -> tuple[Array, Array]:
-            missed = one(free.build(coordinates.to_physical(y))) / level
-            return missed, missed
+    def least_margin(y: Array) -> Array:
+        return jnp.min(margins(free.build(coordinates.to_physical(y))))
 
-        slopes, missed = jax.jacfwd(residual, has_aux=True)(y)
-        both = jnp.concatenate([slopes, missed[:, None]], axis=1)
-        model = free.build(coordinates.to_physical(y))
-        margin = jnp.min(margins(model)) if has_conditions else jnp.ones((), y.dtype)
-        return both.T @ both, margin, missed
+    def side_by_side(point: dict[str, Array]) -> dict[str, Array]:
+        return jax.vmap(compared)(jnp.stack(list(point.values()), axis=1), rows, level)
 
-    return jax.vmap(pair)(y, rows, level)
+    columns = {f"{i:03}": column for i, column in enumerate(y.T)}
+    values, slopes = value_and_jacobian(side_by_side, columns, of=["missed"])
+    both = jnp.stack([*slopes["missed"].values(), values["missed"]], axis=1)
+    margin = jax.vmap(least_margin)(y) if has_conditions else jnp.ones(len(y), y.dtype)
+    return both @ both.transpose(0, 2, 1), margin, values["missed"], values["drift"]
 
 
 def grouped_records(
@@ -199,11 +230,12 @@ def grouped_records(
     records: Sequence[Sequence[BenchRun]],
     sigma: Sequence[Sequence[float]],
     samples_per_cycle: int | None,
+    initial_state: str = "warm_up",
 ) -> tuple[Group, ...]:
     """The records of all dampers in groups of equal length, prepared as `traces.batches` does for one damper."""
     owner = np.repeat(np.arange(len(records)), [len(runs) for runs in records])
     together = [run for runs in records for run in runs]
-    batches = record_batches(model, together, [s for own in sigma for s in own], samples_per_cycle)
+    batches = record_batches(model, together, [s for own in sigma for s in own], samples_per_cycle, initial_state)
     squares = np.zeros(len(records))
     for batch in batches:
         weighted = np.asarray(batch.force) * np.asarray(batch.weight)

@@ -14,6 +14,7 @@ from jaxdamp.dampers import Reach
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.criteria import FIRST_NOISE, LOSSES, priors_on
 from jaxdamp.identify.dependence import Dependence, dependence
+from jaxdamp.identify.initial_states import INITIAL_STATES
 from jaxdamp.identify.lanes import Evaluation, LanePriors, Lanes, grouped_records
 from jaxdamp.identify.lanes_search import LanesEnd, search_lanes
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
@@ -45,6 +46,7 @@ def fit_many(
     weighting: str = "samples",
     loss: str = "squares",
     priors: Mapping[str, tuple[float, float]] | None = None,
+    initial_state: str = "warm_up",
     samples_per_cycle: int | None = 400,
     starts: int = 1,
     max_steps: int = 200,
@@ -72,6 +74,8 @@ def fit_many(
         weighting: of the records of a damper: `"samples"` or `"runs"`, as in `fit`.
         loss: as in `fit`; each damper has its own weights.
         priors: as in `fit`, the same for every damper; they count against the noise that the standard errors assume.
+        initial_state: of a law with states, as in `fit`; dampers whose states drift in a motion that is said to be
+            periodic have a remark.
         samples_per_cycle: slow records are averaged in blocks down to this number.
         starts: largest number of starts of each damper, side by side: `law`, then those that it proposes.
         max_steps: largest number of steps of each search.
@@ -95,6 +99,7 @@ def fit_many(
     names, records = _named(dampers)
     _checks.one_of("weighting", weighting, ["samples", "runs"])
     _checks.one_of("loss", loss, LOSSES)
+    _checks.one_of("initial_state", initial_state, INITIAL_STATES)
     for name, count in (("max_steps", max_steps), ("starts", starts)):
         if count < 1:
             _checks.refuse(name, "be 1 or more", count)
@@ -109,7 +114,8 @@ def fit_many(
     _checks.finite("law", free.values)
     coordinates = Coordinates(free, smooth="ordered")
     sigma = [weights(weighting, runs) for runs in records]
-    lanes = Lanes(coordinates, grouped_records(model, records, sigma, samples_per_cycle), np.arange(len(names)))
+    groups = grouped_records(model, records, sigma, samples_per_cycle, initial_state)
+    lanes = Lanes(coordinates, groups, np.arange(len(names)))
     depends = dependence(free, shared, settings, len(names))
     if depends is not None and starts > 1:
         _checks.refuse("starts", "be 1 with shared parameters", starts, "Fit the dampers apart first.")
@@ -126,7 +132,7 @@ def fit_many(
     lanes = lanes._replace(damper=np.arange(len(names)))
     found = by_rounds(lanes, end.of(best), loss, lambda some, y: _solved(some, y, None, max_steps)[0])
     end, fitted = found.end, _physical(coordinates, found.end.y)
-    errors, percent, rmse, record_rmse = _judged(found, depends, [len(runs) for runs in records])
+    errors, percent, rmse, record_rmse, drift = _judged(found, depends, [len(runs) for runs in records])
     return ManyFits(
         names=tuple(names),
         records=tuple(records),
@@ -142,6 +148,7 @@ def fit_many(
         vector=vector,
         record_rmse=record_rmse,
         share_left_out=found.share_left_out,
+        drift=drift,
     )
 
 
@@ -220,11 +227,12 @@ def _solved(
 
 def _judged(
     found: Fitted, depends: Dependence | None, counts: Sequence[int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
-    """Standard errors [dampers, free], fit percent and RMSE [N] of each damper, and the RMSE of each of its records."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, ...], np.ndarray]:
+    """Of each damper: standard errors [dampers, free], fit percent, RMSE [N], RMSE of each of its records, drift."""
     lanes, y, gram = found.lanes, found.end.y, found.end.gram
     count, free = y.shape
     errors, percent, rmse = np.full((count, free), np.inf), np.zeros(count), np.zeros(count)
+    drift = np.zeros(count)
     first, by_record = np.cumsum([0, *counts]), tuple(np.zeros(n) for n in counts)
     slopes = np.asarray(_both(lanes.coordinates, jnp.asarray(y))[1], np.float64)
     inverse = [_inverse(own[:-1, :-1]) for own in (gram if depends is None else gram[:1])]
@@ -232,6 +240,7 @@ def _judged(
     noise, levels = np.zeros(count), lanes.levels()
     for i, records in enumerate(lanes.missed(y)):
         errors_of = [own.residual / own.weight for own in records]
+        drift[i] = max(own.drift for own in records)
         together, measured = np.concatenate(errors_of), np.concatenate([own.force for own in records])
         rmse[i] = np.sqrt(np.mean(together**2))
         spread = np.linalg.norm(measured - measured.mean())
@@ -248,7 +257,7 @@ def _judged(
         covariance = variance * to_values @ whole[np.ix_(columns, columns)] @ to_values.T
         undetermined = np.any(lost[columns] & (to_values != 0), axis=1)
         errors[i] = np.where(undetermined, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-    return errors, percent, rmse, by_record
+    return errors, percent, rmse, by_record, drift
 
 
 def _inverse(products: Float[np.ndarray, "free free"]) -> tuple[np.ndarray, np.ndarray]:

@@ -16,6 +16,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.dependence import Dependence
 from jaxdamp.identify.estimates import rounded
+from jaxdamp.identify.initial_states import DRIFT
 from jaxdamp.identify.model import Model, law_of, rig_of, with_range
 from jaxdamp.parameters import Coordinates, FreeParameters
 from jaxdamp.rig import Rig
@@ -51,6 +52,8 @@ class ManyFits:
         vector: the numbers that the dependence is made of.
         record_rmse: of each record of each damper [N].
         share_left_out: of the samples of each damper, to which a robust loss gives less than half weight.
+        drift: largest relative change of the states of each damper over the cycle before a record that starts in the
+            periodic solution.
     """
 
     names: tuple[str, ...]
@@ -67,6 +70,7 @@ class ManyFits:
     vector: Float[np.ndarray, " size"] | None = None
     record_rmse: tuple[Float[np.ndarray, " _"], ...] = ()
     share_left_out: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
+    drift: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
 
     @property
     def converged(self) -> bool:
@@ -133,6 +137,8 @@ class ManyFits:
     def remarks(self) -> tuple[str, ...]:
         """For each damper how its search failed and in what it differs from the others; empty for most."""
         texts: list[list[str]] = [[] if s is Status.CONVERGED else [s.sentence] for s in self.status]
+        for i in np.flatnonzero(self.drift > DRIFT):
+            texts[i].append(f"its states are not periodic: over a cycle they still change by {self.drift[i]:.2g}")
         misfit = 100.0 - self.fit_percent
         for i, score in enumerate(_robust_scores(misfit, None)):
             if score > OUTLYING:

@@ -10,14 +10,13 @@ from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import require_finite_force, without_fitted_ranges
 from jaxdamp.identify.estimated_states import with_first_states
-from jaxdamp.identify.initial_states import rest_window, start_of
+from jaxdamp.identify.initial_states import DRIFT, rest_window, start_of
 from jaxdamp.identify.model import Model, blind_end, initial_state_for, is_memoryless, law_of, of_record, starts_in
 from jaxdamp.identify.rows import samples_in_block, settling_time
 from jaxdamp.identify.traces import Batch, batches
 
 
 PREDICTED_PER_CYCLE = 1000  # samples at which a law with states is evaluated; straight lines between them: error 5e-6
-DRIFT = 1e-4  # relative change of the states over a cycle of what should be the periodic solution
 
 
 @eqx.filter_jit

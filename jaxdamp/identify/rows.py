@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.initial_states import Cycle, moving_samples, repeated_motion, start_of
-from jaxdamp.identify.model import Model, blind_end, can_rest, initial_state_for, is_memoryless
+from jaxdamp.identify.model import Model, blind_end
 
 
 STEP_ANGLE = 0.06  # rad of the dominant frequency per step: keeps the error of a law's step near 1e-4
@@ -82,16 +82,17 @@ def row_of(
     sigma: float,
     samples_per_cycle: int | None,
     model: Model,
+    can_rest: bool,
     channels: Sequence[str],
     initial_state: str,
     number: int,
 ) -> Row:
-    """A record as `traces.batches` says."""
+    """A record as `traces.batches` says; `can_rest` is asked of the model once for all records, which is slow."""
     omega = dominant_rate(run)
     block = samples_in_block(run, samples_per_cycle)
     dt = block / run.sampling_rate
     substeps = int(np.clip(np.ceil(omega * dt / STEP_ANGLE), 1, 8))
-    start = "rest" if is_memoryless(model) else start_of(run, initial_state_for(model, initial_state))
+    start = start_of(run, initial_state)
     warm_up = 0 if start in ("rest", "estimated") else int(min(2 * np.pi / omega, run.duration) / dt)
     signals = [averaged(values, block) for values in _with_warm_up(run, warm_up * block, channels)]
     repeated = None
@@ -101,7 +102,7 @@ def row_of(
     weight = np.full(len(signals[0]), np.sqrt(block) / sigma)
     weight[len(weight) - blind_end(model, dt) :] = 0.0
     weight[: warm_up + (int(np.ceil(settling_time(run) / dt)) if start == "warm_up" else 0)] = 0.0
-    if not can_rest(model):
+    if not can_rest:
         weight[warm_up:][resting_blocks(run, block)] = 0.0
     return Row(dt, signals, weight, number, warm_up, block, substeps, repeated)
 

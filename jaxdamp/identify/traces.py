@@ -19,6 +19,7 @@ from jaxdamp.identify.model import (
     can_rest,
     effects_of,
     initial_state,
+    initial_state_for,
     is_memoryless,
     law_of,
     marched,
@@ -31,6 +32,7 @@ from jaxdamp.parameters import get, with_values
 
 
 MOST_GROUPS = 2  # batches of a law with states: each is compiled on its own
+RECORDS_IN_GROUP = 200  # of many dampers, for which a further batch saves a quarter of the work
 
 
 @final
@@ -82,7 +84,12 @@ class Batch(AbstractResiduals):
 
     def __call__(self, model: Model) -> Float[Array, " samples"]:
         """Weighted difference of the model's force from the measured one; zero where the weight is, even beside NaN."""
-        return jnp.ravel(jnp.where(self.weight > 0, (self.predict(model) - self.force) * self.weight, 0.0))
+        return self.missed_and_drift(model)[0]
+
+    def missed_and_drift(self, model: Model) -> tuple[Float[Array, " samples"], Float[Array, " runs"]]:
+        """The weighted difference, and the second of `settled_forces`."""
+        force, drift = self.settled_forces(model)
+        return jnp.ravel(jnp.where(self.weight > 0, (force - self.force) * self.weight, 0.0)), drift
 
     def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "Batch":
         """The same with every weight times a factor."""
@@ -122,6 +129,7 @@ def _grouped(rows: Sequence[Row]) -> list[list[int]]:
 
     All records of a group take the steps of the longest. A step costs about as much as 16 records in parallel.
     """
+    most = max(MOST_GROUPS, len(rows) // RECORDS_IN_GROUP)
 
     def cost(group: list[int]) -> int:
         steps = max(len(rows[i].weight) for i in group) * max(rows[i].substeps for i in group)
@@ -132,7 +140,7 @@ def _grouped(rows: Sequence[Row]) -> list[list[int]]:
         alike.setdefault((_round_up(len(row.weight)), row.substeps), []).append(i)
     groups = list(alike.values())
 
-    while len(groups) > MOST_GROUPS:
+    while len(groups) > most:
         pairs = [(a, b) for a in range(len(groups)) for b in range(a)]
         a, b = min(pairs, key=lambda p: cost(groups[p[0]] + groups[p[1]]) - cost(groups[p[0]]) - cost(groups[p[1]]))
         groups[b] = groups[b] + groups.pop(a)
@@ -254,10 +262,14 @@ def batches(
 
 
 def record_batches(
-    model: Model, runs: Sequence[BenchRun], sigma: Sequence[float], samples_per_cycle: int | None
+    model: Model,
+    runs: Sequence[BenchRun],
+    sigma: Sequence[float],
+    samples_per_cycle: int | None,
+    initial_state: str,
 ) -> tuple[Batch, ...]:
     """Records prepared as in `batches`, but always with a row for each record, also for a model without memory."""
-    return _row_batches(model, runs, sigma, samples_per_cycle, (), "warm_up")[2]
+    return _row_batches(model, runs, sigma, samples_per_cycle, (), initial_state)[2]
 
 
 def _row_batches(
@@ -269,7 +281,8 @@ def _row_batches(
     initial_state: str,
 ) -> tuple[list[Row], list[list[int]], tuple[Batch, ...]]:
     """A row for each record, the groups of rows, and the batch of each group."""
-    how = (samples_per_cycle, model, _channels(model, runs), initial_state)
+    start = "rest" if is_memoryless(model) else initial_state_for(model, initial_state)
+    how = (samples_per_cycle, model, can_rest(model), _channels(model, runs), start)
     rows = [row_of(run, s, *how, number) for number, (run, s) in enumerate(zip(runs, sigma, strict=True))]
     groups, fixed = _grouped(rows), _stated(model, runs)
     members = [([rows[i] for i in group], [runs[i] for i in group]) for group in groups]

@@ -33,7 +33,7 @@ def lagged(values: Signal, samples: Scalar) -> Signal:
     weights = (mean - kept, 1.0 - mean)
 
     def step(y: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:
-        y = kept * y + weights[0] * ends[0] + weights[1] * ends[1]
-        return y, y
+        return kept * y + weights[0] * ends[0] + weights[1] * ends[1], y  # the one before, as in `march`
 
-    return jnp.append(values[:1], jax.lax.scan(step, values[0], (values[:-1], values[1:]))[1])
+    last, before = jax.lax.scan(step, values[0], (values[:-1], values[1:]))
+    return jnp.append(before, last)

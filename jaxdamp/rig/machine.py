@@ -221,9 +221,10 @@ def _temperature_rise(rig: Rig, dt: Scalar, law_power: Signal, friction_power: S
     def step(rise: Array, powers: tuple[Array, Array]) -> tuple[Array, Array]:
         law, friction = powers
         decay = 0.5 * dt * (rig.cooling + rig.heating * rig.temperature_slope * law)
-        rise = ((1.0 - decay) * rise + dt * rig.heating * (law + friction)) / (1.0 + decay)
-        return rise, rise
+        after = ((1.0 - decay) * rise + dt * rig.heating * (law + friction)) / (1.0 + decay)
+        return after, rise  # the one before, as in `march`
 
     law_mean, friction_mean = (0.5 * (power[:-1] + power[1:]) for power in (law_power, friction_power))
     start = rig.initial_rise + jnp.zeros_like(law_power[0])
-    return jnp.append(start, jax.lax.scan(step, start, (law_mean, friction_mean))[1])
+    last, before = jax.lax.scan(step, start, (law_mean, friction_mean))
+    return jnp.append(before, last)

@@ -263,18 +263,18 @@ def march(
             return own.advance(x0, v0, x1, v1, state, h), None
 
         if substeps == 1:
-            state = step(state, (ends[0][0], ends[1][0], ends[2][0], ends[3][0]))[0]
+            after = step(state, (ends[0][0], ends[1][0], ends[2][0], ends[3][0]))[0]
         else:
-            state = jax.lax.scan(step, state, ends)[0]
-        return state, state
+            after = jax.lax.scan(step, state, ends)[0]
+        return after, state  # the state before: XLA would compute that after the step twice, also to store it
 
     def grouped(values: Array) -> Array:
         return values.reshape(-1, substeps)
 
     grid = (grouped(fine_x[:-1]), grouped(fine_v[:-1]), grouped(fine_x[1:]), grouped(fine_v[1:]))
     between = None if warm is None else 0.5 * (warm[:-1] + warm[1:])
-    _, states = jax.lax.scan(sample, state, (grid, between))
-    states = jnp.concatenate([state[None], states])
+    last, states = jax.lax.scan(sample, state, (grid, between))
+    states = jnp.concatenate([states, last[None]])
     return jax.vmap(force)(stroke, velocity, states, warm)
 
 

@@ -11,7 +11,9 @@ from jaxdamp import identify
 from jaxdamp.bench import BenchRun, SineTest, VirtualDyno
 from jaxdamp.dampers import AbstractDamper, Bilinear, Lag, Linear, Scheduled, with_command
 from jaxdamp.identify import Status, fit, fit_many
-from jaxdamp.parameters import get
+from jaxdamp.identify.rows import Row
+from jaxdamp.identify.traces import _grouped
+from jaxdamp.parameters import free_parameters, get
 from jaxdamp.rig import Rig
 
 
@@ -52,6 +54,26 @@ def test_the_optimum_is_that_of_single_fits(clicks, start, options):
         assert many.rmse[i] == pytest.approx(single.rmse, rel=0.02)
         assert repr(many.laws[i].fitted_to) == repr(single.law.fitted_to)
         assert float(get(many.rigs[i], "gas_force")) == pytest.approx(-80.0, abs=2.0)
+
+
+def test_records_cut_out_of_a_long_motion_start_in_the_periodic_solution():
+    laws = [Lag(Linear(2000.0), 0.5), Lag(Linear(2300.0), 0.4)]
+    made = [VirtualDyno(law, sampling_rate=200.0).run(SineTest(0.02, 2.0, cycles=12)) for law in laws]
+    cut = [run.process(between=(4.8, 5.9)) for runs in made for run in runs]
+    start = Lag(Linear(2600.0), 0.65)
+    many = fit_many(start, cut, initial_state="periodic")
+    for law, fitted in zip(laws, many.laws, strict=True):
+        np.testing.assert_allclose(*(free_parameters(each).values for each in (fitted, law)), rtol=5e-3)
+    assert not any(many.remarks) and np.all(many.drift < 1e-6)
+    assert np.all(np.abs(fit_many(start, cut).values[:, 1] / [0.5, 0.4] - 1.0) > 0.1)
+    drifting = dataclasses.replace(many, drift=np.array([0.0, 0.01]))
+    assert drifting.remarks[1] == "its states are not periodic: over a cycle they still change by 0.01"
+
+
+@pytest.mark.parametrize(("each", "groups"), [(10, 2), (200, 3)])
+def test_further_batches_are_compiled_for_many_records_only(each, groups):
+    rows = [Row(1e-3, [], np.ones(size), 0, 0, 1, 1) for size in (2000, 700, 200) for _ in range(each)]
+    assert sorted(len(group) for group in _grouped(rows))[-1] == each * (4 - groups) and len(_grouped(rows)) == groups
 
 
 def test_shared_parameters_follow_the_setting(clicks):
