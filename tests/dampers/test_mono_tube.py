@@ -271,7 +271,7 @@ def test_start_from_records_and_geometry():
 
 
 def test_a_fit_takes_steps_that_resolve_the_front_of_the_force():
-    """With steps of a whole sample the true law is 2.7 N beside this record, which biases its estimates."""
+    """With steps of a whole sample the true law is 3.5 N beside this record, which biases its estimates."""
     frequency, samples = 12.0, 160
     x, v, force, _, _ = (np.tile(a, 3) for a in integrated(frequency, 0.005, cycles=3, samples=samples))
     run = BenchRun("12 Hz", np.arange(3 * samples) / (frequency * samples), x, v, force)
