@@ -148,7 +148,7 @@ class AbstractSeries(AbstractWrapper):
 
         def law_force(w: Scalar) -> Scalar:
             stroke = now.stroke + duration * w
-            return law.force(stroke, w, law.advance(now.stroke, w, stroke, w, now.inner, duration))
+            return law.force(stroke, w, law.implicit_stage(stroke, w, now.inner, duration))
 
         def deflections(w: Scalar) -> Deflections:
             return self.shared(free - duration * w, now.deflections, duration)
@@ -163,7 +163,7 @@ class AbstractSeries(AbstractWrapper):
             -limit,
             limit,
             steps=MOST_STEPS,
-            likely=likely,
+            likely=0 if law.traits().solves_equation else likely,
             close=1e-4,
         )
         pairs = zip(now.deflections, deflections(velocity), strict=True)

@@ -71,6 +71,13 @@ class AbstractDamper(Module):
         """An approximation of `advance` that may cost less, with which a solver predicts the force."""
         return self.advance(x0, v0, x1, v1, state, dt)
 
+    def implicit_stage(self, x: ScalarLike, v: ScalarLike, state: State, duration: ScalarLike) -> State:
+        """The states after a stage [s] of constant velocity v that ends at stroke x, in the step of a law in series.
+
+        By default a step. A law whose own step has several implicit stages gives one, first order, at less cost.
+        """
+        return self.advance(x - duration * v, v, x, v, state, duration)
+
     def inner_laws(self) -> list["AbstractDamper"]:
         """The laws directly inside, in the order of the fields."""
         values = [getattr(self, field.name) for field in dataclasses.fields(self)]

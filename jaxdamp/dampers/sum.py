@@ -68,6 +68,11 @@ class Sum(AbstractDamper):
         pairs = zip(self.terms, self._split(state), strict=True)
         return jnp.concatenate([term.predict(x0, v0, x1, v1, s, dt) for term, s in pairs])
 
+    def implicit_stage(self, x: ScalarLike, v: ScalarLike, state: State, duration: ScalarLike) -> State:
+        """The stages of all terms."""
+        pairs = zip(self.terms, self._split(state), strict=True)
+        return jnp.concatenate([term.implicit_stage(x, v, s, duration) for term, s in pairs])
+
     def _split(self, state: State) -> list[Array]:
         """The concatenated states cut into those of each term."""
         sizes = [term.initial_state().size for term in self.terms]

@@ -25,6 +25,10 @@ class Traits(NamedTuple):
             cannot tell the two apart.
         temperature_dependent: the force depends on the temperature of the oil, which a measured one may replace
             (`at_temperature`).
+        solves_equation: the step solves an equation by iteration, so that a law around it should write out none of its
+            own iterations: the compiled code would multiply.
+        step_angle: largest step of a fit, as an angle of the dominant frequency of a record [rad]. A law whose force
+            rises steeply after a reversal needs short steps.
     """
 
     has_feed_through: bool = True
@@ -35,10 +39,11 @@ class Traits(NamedTuple):
     has_explicit_step: bool = False
     contains_offset: bool = False
     temperature_dependent: bool = False
+    solves_equation: bool = False
+    step_angle: float = 0.06
 
 
 def combined_traits(traits: Iterable[Traits]) -> Traits:
     """The traits of a sum of laws."""
-    feed_through, extrapolable, linear, *others = zip(*traits, strict=True)
-    either = map(any, others)
-    return Traits(any(feed_through), all(extrapolable), all(linear), *either)
+    feed_through, extrapolable, linear, *others, angles = zip(*traits, strict=True)
+    return Traits(any(feed_through), all(extrapolable), all(linear), *map(any, others), step_angle=min(angles))

@@ -10,10 +10,7 @@ from jaxtyping import Array, Bool
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.initial_states import Cycle, moving_samples, repeated_motion, start_of
-from jaxdamp.identify.model import Model, blind_end
-
-
-STEP_ANGLE = 0.06  # rad of the dominant frequency per step: keeps the error of a law's step near 1e-4
+from jaxdamp.identify.model import Model, blind_end, law_of
 
 
 class Row(NamedTuple):
@@ -91,7 +88,7 @@ def row_of(
     omega = dominant_rate(run)
     block = samples_in_block(run, samples_per_cycle)
     dt = block / run.sampling_rate
-    substeps = int(np.clip(np.ceil(omega * dt / STEP_ANGLE), 1, 8))
+    substeps = int(np.clip(np.ceil(omega * dt / law_of(model).traits().step_angle), 1, 8))
     start = start_of(run, initial_state)
     warm_up = 0 if start in ("rest", "estimated") else int(min(2 * np.pi / omega, run.duration) / dt)
     signals = [averaged(values, block) for values in _with_warm_up(run, warm_up * block, channels)]

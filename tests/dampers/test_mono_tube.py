@@ -8,9 +8,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from jaxdamp import respond, roads, simulate
-from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.bench import BenchRun, SineTest, VirtualDyno
 from jaxdamp.dampers import CoulombFriction, GasSpring, MonoTube, SeriesSpring
-from jaxdamp.identify import fit
+from jaxdamp.identify import fit, prepare
 from jaxdamp.parameters import free_parameters, get, parameters, replace
 from jaxdamp.rig import quasi_static
 from jaxdamp.simulation import Adaptive
@@ -268,6 +268,16 @@ def test_start_from_records_and_geometry():
         MonoTube.guess(*samples)
     with pytest.raises(ValueError, match=r"`rod_diameter` must be below the piston's 0\.02 m"):
         MonoTube.guess(*samples, piston_diameter=0.02, rod_diameter=0.03)
+
+
+def test_a_fit_takes_steps_that_resolve_the_front_of_the_force():
+    """With steps of a whole sample the true law is 3.5 N beside this record, which biases its estimates."""
+    frequency, samples = 12.0, 160
+    x, v, force, _, _ = (np.tile(a, 3) for a in integrated(frequency, 0.005, cycles=3, samples=samples))
+    run = BenchRun("12 Hz", np.arange(3 * samples) / (frequency * samples), x, v, force)
+    problem = prepare(LAW, run, samples_per_cycle=None)
+    error = np.asarray(problem.residuals[0](LAW))[problem.used] * problem.sigma[0]
+    assert 0.0 < np.sqrt(np.mean(error**2)) < 1.0
 
 
 @pytest.mark.slow

@@ -1,11 +1,13 @@
-"""The law of Karadayi and Masada as a case, the derivative by the clearance, laws that are refused."""
+"""The law of Karadayi and Masada as a case, a mono-tube, the derivative by the clearance, laws that are refused."""
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from jaxdamp.dampers import Bilinear, CoulombFriction, KaradayiMasada, Lag, Linear, Play, Saturating
+from jaxdamp import respond
+from jaxdamp.dampers import Bilinear, CoulombFriction, KaradayiMasada, Lag, Linear, MonoTube, Play, Saturating
 from jaxdamp.parameters import with_values
 from jaxdamp.rig import march
 
@@ -19,6 +21,22 @@ def test_around_a_dashpot_with_friction_it_is_the_law_of_karadayi_and_masada():
     one = last_cycle(Play(DASHPOT, 6e5, 3e-4), 9.0, 0.01, samples=300)[2]
     two = last_cycle(KaradayiMasada(2600.0, 1200.0, 40.0, 0.01, 6e5, 3e-4), 9.0, 0.01, samples=300)[2]
     np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.slow
+def test_around_a_mono_tube_it_agrees_with_another_solver():
+    law = Play(MonoTube.reference() + Linear(20.0), stiffness=4e6, clearance=1e-4)
+    t = np.linspace(0.0, 1 / 12, 301)
+    x, v = 0.006 * (1 - np.cos(24 * np.pi * t)), 0.144 * np.pi * np.sin(24 * np.pi * t)
+
+    @jax.jit
+    def rate(t, state):
+        return law.state_rate(0.006 * (1 - jnp.cos(24 * np.pi * t)), 0.144 * np.pi * jnp.sin(24 * np.pi * t), state)
+
+    solved = solve_ivp(rate, (0.0, t[-1]), np.zeros(2), "LSODA", t, rtol=1e-8, atol=1e-12, max_step=1e-3)
+    expected = jax.vmap(law.force)(jnp.asarray(x), jnp.asarray(v), jnp.asarray(solved.y.T))
+    error = respond(law, t, x, v) - expected
+    assert jnp.sqrt(jnp.mean(error**2)) < 3e-4 * jnp.max(jnp.abs(expected))
 
 
 @pytest.mark.parametrize("name", ["clearance", "stiffness"])

@@ -9,12 +9,14 @@ from jaxdamp.dampers import (
     BoucWen,
     Bushing,
     GasSpring,
+    Heated,
     KaradayiMasada,
     Lag,
     Linear,
     ModifiedBoucWen,
     MonoTube,
     MotionRatio,
+    Play,
     Scheduled,
     Spring,
     StrokeDependent,
@@ -98,6 +100,15 @@ def test_wrappers_around_a_sum_are_seen_through_term_by_term():
     assert [type(term) for term in schedule.side_by_side()] == [Linear, Spring]
     whole = Bushing(Linear(900.0) + Spring(1.0), 2e6, 6e5, 800.0)
     assert whole.side_by_side() == (whole,)
+
+
+def test_laws_around_a_mono_tube_take_its_short_steps_and_write_out_no_iterations():
+    tube = MonoTube.reference()
+    outer = [2.0 * tube, Linear(20.0) + tube, MotionRatio(tube, 0.8), Heated(tube), Play(tube + Linear(20.0), 1e6, 0.0)]
+    assert not Linear(20.0).traits().solves_equation
+    for law in outer:
+        assert law.traits().solves_equation
+        assert law.traits().step_angle == tube.traits().step_angle < Linear(20.0).traits().step_angle
 
 
 def test_stroke_limits_are_those_at_the_wheel():
