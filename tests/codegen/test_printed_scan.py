@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, roads, sweep, vehicles
-from jaxdamp.codegen import _native, compiler, printed_scan
+from jaxdamp.codegen import _native, _scan, compiler, printed_scan
 from jaxdamp.dampers import Besinger, SeriesSpring
 from jaxdamp.simulation import Exponential, simulate
 
@@ -59,6 +59,43 @@ def test_what_is_not_finite_stays_in_its_lane():
     stiffness = jnp.linspace(0.5, 3.0, 40).at[7].set(jnp.nan)
     found = np.asarray(jax.vmap(oscillator(printed_scan))(stiffness)["x"])
     assert np.isnan(found[7]).all() and np.isfinite(np.delete(found, 7, axis=0)).all()
+
+
+def test_limits_and_numbers_that_are_not_finite():
+    """A limit, or what it limits, that is NaN gives NaN, as in JAX."""
+    limit = jnp.linspace(0.5, 3.0, 40).at[3].set(jnp.nan).at[4].set(jnp.inf)
+    start = jnp.linspace(0.0, 2.0, 40).at[5].set(jnp.nan)
+
+    def run(scan):
+        def of_point(limit, start):
+            return scan(lambda x, row: jnp.maximum(jnp.minimum(x + row[0], limit), -limit + row[1]), start, ROWS)
+
+        return np.asarray(jax.vmap(of_point)(limit, start))
+
+    printed, plain = run(printed_scan), run(by_jax)
+    assert np.isnan(printed[[3, 5]]).all() and np.isfinite(np.delete(printed, [3, 5])).all()
+    np.testing.assert_allclose(printed, plain, rtol=1e-14)
+
+
+def test_a_value_at_the_end_of_a_step_is_that_at_the_beginning_of_the_next(monkeypatch):
+    texts = []
+    monkeypatch.setattr(_scan, "registered", lambda text: (texts.append(text), _native.registered(text))[1])
+
+    def run(scan, rate):
+        def force(v):
+            return jnp.tanh(rate * v) + 0.5 * v - 0.1 * v * rate
+
+        def step(now, row):
+            v, lagged = now
+            after = 0.9 * v - 0.01 * lagged + row[0] - 0.2 * rate * row[1]
+            return after, 0.7 * lagged + 0.1 * force(v) + 0.2 * force(after)
+
+        return scan(step, (jnp.asarray(1.0), jnp.asarray(0.0)), ROWS)
+
+    rates = jnp.linspace(0.5, 3.0, 5)
+    printed, plain = (jax.vmap(lambda rate, scan=scan: run(scan, rate))(rates) for scan in (printed_scan, by_jax))
+    assert "KEPT = 1 " in texts[-1]
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12), printed, plain)
 
 
 def test_refused_by_name(monkeypatch):
