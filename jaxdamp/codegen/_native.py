@@ -27,6 +27,18 @@ def compiler() -> str | None:
     return next(filter(None, map(shutil.which, [*own[:1], "gcc", "clang", "cc"])), None)
 
 
+def compiled_by() -> str:
+    """The path of the C compiler.
+
+    Raises:
+        NotImplementedError: there is none.
+    """
+    tool = compiler()
+    if tool is None:
+        raise NotImplementedError("No C compiler is at hand. Install gcc or clang, or name one in the variable CC.")
+    return tool
+
+
 @functools.cache
 def _folder() -> Path:
     """Of this process, removed at its end."""
@@ -42,9 +54,7 @@ def registered(text: str) -> str:
     Raises:
         NotImplementedError: no C compiler, or one that refuses the text; the message holds what it says.
     """
-    tool = compiler()
-    if tool is None:
-        raise NotImplementedError("No C compiler is at hand. Install gcc or clang, or name one in the variable CC.")
+    tool = compiled_by()
     name = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
     source, target = _folder() / f"{name}.c", _folder() / f"{name}.so"
     source.write_text(text, encoding="utf-8")

@@ -57,11 +57,6 @@ class AbstractFixedStep(AbstractEngine):
         """Both: the loop has a fixed length. A step with a loop of its own may say otherwise."""
         return ("forward", "reverse")
 
-    @property
-    def runs_printed(self) -> bool:
-        """Whether the loop is printed as C and compiled by the machine's C compiler, for many cars side by side."""
-        return False
-
     @abstractmethod
     def stepper(self, equations: Equations, dt: Scalar) -> AbstractStepper:
         """What takes a step of dt [s], made once before the loop."""

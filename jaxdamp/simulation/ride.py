@@ -128,7 +128,12 @@ class Ride(eqx.Module):
 
     @property
     def lanes(self) -> int:
-        """How many cars a CPU core drives best side by side: if loops are fused, what stays in its nearest cache."""
+        """How many cars a CPU core drives best side by side: if loops are fused, what stays in its nearest cache.
+
+        A printed loop takes 32 at a time by itself; the more there are, the less its matrices cost.
+        """
+        if self.engine.runs_printed:
+            return 2048
         return 128 if target().fused_loops else 2048
 
     @property
