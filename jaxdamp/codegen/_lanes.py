@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxdamp.codegen import _arrays
 from jaxdamp.codegen._jaxprs import Inner
-from jaxdamp.codegen._languages import C
+from jaxdamp.codegen._languages import FUNCTIONS, C
 from jaxdamp.codegen._loop_passes import Kept, kept_values, sums_of_products
 from jaxdamp.codegen._lowering import evaluated, printing
 from jaxdamp.codegen._program import (
@@ -62,14 +62,17 @@ class Loop(NamedTuple):
     laned: tuple[bool, ...]
 
 
-def lanes_in_c(body: Inner, constants: Sequence[Operand], carry: Sequence[Operand], row: Sequence[Operand]) -> Loop:
+def lanes_in_c(
+    body: Inner, constants: Sequence[Operand], carry: Sequence[Operand], row: Sequence[Operand], *, arithmetic: bool
+) -> Loop:
     """Print a loop whose body maps (constants, carry, row) to the carry of the next step.
 
     What depends neither on the point nor on the step is computed once, what depends on the point alone before the
     loop, what depends on the step alone once for all points.
 
     Raises:
-        NotImplementedError: the body has loops or branches, which vectors cannot follow, or cannot be printed.
+        NotImplementedError: the body has loops or branches, which vectors cannot follow, or cannot be printed; with
+            `arithmetic`, it has elementary functions other than roots.
     """
     carry = list(carry)
     while True:
@@ -82,6 +85,8 @@ def lanes_in_c(body: Inner, constants: Sequence[Operand], carry: Sequence[Operan
         results = [atom for array in after for atom in array.ravel()]
         statements = _straight(pruned(writer.statements, names(results)))
         levels = _levels(statements, names_of.levels)
+        if arithmetic:
+            _refuse_functions(statements, levels)
         grown = [
             operand._replace(level=operand.level | max((_level(atom, levels) for atom in array.ravel()), default=0))
             for operand, array in zip(carry, after, strict=True)
@@ -134,6 +139,13 @@ def _straight(statements: list[Statement]) -> list[Define | Table]:
         message = "A loop or a branch inside a step cannot be printed for many points side by side."
         raise NotImplementedError(message)
     return straight
+
+
+def _refuse_functions(statements: list[Define | Table], levels: dict[str, int]) -> None:
+    """Refuse elementary functions, other than roots, of each point in each step."""
+    for s in statements:
+        if isinstance(s, Define) and s.operation in FUNCTIONS - {"sqrt"} and levels[s.target.name] == OF_BOTH:
+            raise NotImplementedError(f"A step with the function {s.operation!r} is not printed where XLA is faster.")
 
 
 def _levels(statements: Iterable[Define | Table], known: dict[str, int]) -> dict[str, int]:

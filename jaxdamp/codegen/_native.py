@@ -5,6 +5,7 @@ import ctypes
 import functools
 import hashlib
 import os
+import platform
 import shutil
 import subprocess
 import tempfile
@@ -25,6 +26,11 @@ def compiler() -> str | None:
     """The C compiler: the environment variable `CC`, or gcc, clang, cc on the path; None without one."""
     own = os.environ.get("CC", "").split()
     return next(filter(None, map(shutil.which, [*own[:1], "gcc", "clang", "cc"])), None)
+
+
+def compiles_for_x86() -> bool:
+    """Whether gcc is the compiler, and the processor is an x86-64: where printed loops were measured."""
+    return "gcc" in Path(compiler() or "").name and platform.machine() in ("x86_64", "AMD64")
 
 
 def compiled_by() -> str:

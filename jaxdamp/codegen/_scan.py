@@ -14,7 +14,7 @@ from jaxdamp.codegen._lowering import printing
 from jaxdamp.codegen._native import compiled_by, registered
 
 
-def printed_scan(step: Callable[[Any, Any], Any], carry: Any, rows: Any) -> Any:
+def printed_scan(step: Callable[[Any, Any], Any], carry: Any, rows: Any, *, arithmetic: bool = False) -> Any:
     """The carry after `carry = step(carry, row)` for each row, printed as C, for `jax.vmap` over many points.
 
     Points run side by side in vectors. What does not depend on the point, or not on the step, is computed once. The
@@ -24,6 +24,7 @@ def printed_scan(step: Callable[[Any, Any], Any], carry: Any, rows: Any) -> Any:
         step: of numbers and small arrays in double precision, without loops and branches inside.
         carry: a tree of arrays.
         rows: a tree of arrays, one row for each step along the first axis.
+        arithmetic: refuse a step with functions such as exponentials, which are faster in XLA.
 
     Raises:
         NotImplementedError: what cannot be printed, other types than float64, no C compiler, a device that is not a
@@ -44,7 +45,7 @@ def printed_scan(step: Callable[[Any, Any], Any], carry: Any, rows: Any) -> Any:
         inputs = iter([_operand(v, lane) for v, lane in zip(moving, laned[0], strict=True)])
         known = [next(inputs) if v is None else Operand(v.shape, 0, v) for v in values]
         carried = [_operand(v, lane, OF_STEP) for v, lane in zip(start, laned[1], strict=True)]
-        return lanes_in_c(body, known, carried, [Operand(x.shape[1:], OF_STEP) for x in rows])
+        return lanes_in_c(body, known, carried, [Operand(x.shape[1:], OF_STEP) for x in rows], arithmetic=arithmetic)
 
     def alone(moving: list[Any], start: list[Any], rows: list[Any]) -> list[Any]:
         """One point: no vectors, so it is left to XLA; what cannot be printed is refused all the same."""

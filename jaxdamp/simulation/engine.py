@@ -103,6 +103,10 @@ class AbstractEngine(AbstractLawEngine):
         """Whether the loop is printed as C and compiled by the machine's C compiler, for many cars side by side."""
         return False
 
+    def printed_if_faster(self) -> "AbstractEngine | None":
+        """The engine of a long sweep without derivatives, whose loop may be printed; None if it stays this one."""
+        return None
+
     def layout(self, states: int, *, side_by_side: bool) -> MemoryLayout:
         """How the vectors of a vehicle lie in memory.
 

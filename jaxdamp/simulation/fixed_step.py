@@ -57,6 +57,11 @@ class AbstractFixedStep(AbstractEngine):
         """Both: the loop has a fixed length. A step with a loop of its own may say otherwise."""
         return ("forward", "reverse")
 
+    @property
+    def prints_arithmetic(self) -> bool:
+        """Whether a loop with exponentials, powers and the like is refused, where it would be printed."""
+        return False
+
     @abstractmethod
     def stepper(self, equations: Equations, dt: Scalar) -> AbstractStepper:
         """What takes a step of dt [s], made once before the loop."""
@@ -130,7 +135,7 @@ class AbstractFixedStep(AbstractEngine):
         try:
             if jax.tree.leaves(observer.saved(carry[0], carry[1])):
                 raise NotImplementedError("Instants are saved, as `simulate` and metrics of a whole record need them.")
-            return printed_scan(step, carry, road)
+            return printed_scan(step, carry, road, arithmetic=self.prints_arithmetic)
         except NotImplementedError as error:
             message = f"{self} cannot print this run: {error} Leave `printed` out: XLA then compiles the loop."
             raise NotImplementedError(message) from error

@@ -7,7 +7,7 @@ import pytest
 
 from jaxdamp import Ride, roads, sweep, vehicles
 from jaxdamp.codegen import _native, _scan, compiler, printed_scan
-from jaxdamp.dampers import Besinger, SeriesSpring
+from jaxdamp.dampers import Besinger, PowerLaw, SeriesSpring
 from jaxdamp.simulation import Exponential, simulate
 
 
@@ -122,6 +122,27 @@ def test_a_sweep_of_all_ride_metrics():
     plain, printed = (sweep(Ride(CAR, ROAD, duration=0.4, engine=Exponential(printed=p)), over) for p in (False, True))
     for name in plain.data_vars:
         np.testing.assert_allclose(printed[name], plain[name], rtol=1e-11, atol=1e-14, err_msg=str(name))
+
+
+def test_a_long_sweep_prints_where_that_is_faster(monkeypatch):
+    """With the numbers of XLA, which takes over where derivatives, functions or a missing compiler stand in the way."""
+    ride = Ride(CAR, ROAD, metrics=["rms_sprung_acceleration"], duration=0.4)
+
+    def swept(function=ride, **options):
+        return sweep(function, {RATE: np.linspace(2e3, 5e3, 4)}, **options)
+
+    plain = swept()
+    monkeypatch.setattr("jaxdamp.simulation.ride.LONG_SWEEP", 0)
+    if _native.compiles_for_x86():
+        printed = swept()
+        assert printed.attrs["loop"].startswith("printed as C")
+        metric = "rms_sprung_acceleration"
+        np.testing.assert_allclose(printed[metric], plain[metric], rtol=1e-12)
+    powers = vehicles.presets.quarter_car_000(PowerLaw(1800.0, 0.55, 900.0, 0.55))
+    others = [plain, swept(gradients=True), sweep(Ride(powers, ROAD, duration=0.4), {"sprung_mass": [250.0, 300.0]})]
+    monkeypatch.setattr(_native, "compiler", lambda: None)
+    others += [swept()]
+    assert [data.attrs["loop"] for data in others] == ["compiled by XLA"] * 4
 
 
 def test_runs_that_cannot_be_printed():
