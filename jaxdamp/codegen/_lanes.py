@@ -54,12 +54,22 @@ class Loop(NamedTuple):
     """A printed loop.
 
     Attributes:
-        text: C.
+        parts: lines of C by what they depend on, and counts.
         laned: which of the carried values differ from point to point.
     """
 
-    text: str
+    parts: dict[str, str | list[str]]
     laned: tuple[bool, ...]
+
+    @property
+    def text(self) -> str:
+        """C for points side by side in vectors."""
+        return _filled("lanes.c", self.parts)
+
+    @property
+    def kernel(self) -> str:
+        """CUDA for a point in each thread; compiled as C, threads are a loop."""
+        return _filled("kernel.cu", self.parts)
 
 
 def lanes_in_c(
@@ -93,7 +103,7 @@ def lanes_in_c(
         ]
         if grown == carry:
             return Loop(
-                _text(statements, levels, names_of, before, after), tuple(c.level & OF_POINT > 0 for c in carry)
+                _parts(statements, levels, names_of, before, after), tuple(c.level & OF_POINT > 0 for c in carry)
             )
         carry = grown  # what seemed the same for all points is not
 
@@ -158,9 +168,9 @@ def _levels(statements: Iterable[Define | Table], known: dict[str, int]) -> dict
     return levels
 
 
-def _text(
+def _parts(
     statements: list[Define | Table], levels: dict[str, int], inputs: _Names, before: list[Atoms], after: list[Atoms]
-) -> str:
+) -> dict[str, str | list[str]]:
     printer = _InLanes()
     pairs = zip(before, after, strict=True)
     carried = {str(old.name): new for olds, news in pairs for old, new in zip(olds.ravel(), news.ravel(), strict=True)}
@@ -180,19 +190,17 @@ def _text(
     store += [f"{_kept_name(i)} = {value.target.name};" for i, value in enumerate(kept)]
     ends = [(name, printer.atom(new)) for name, new in carried.items() if Variable(name, "float64") != new]
     counts = inputs.counts
-    return _filled(
-        {
-            **{name: str(counts[name]) for name in ("shared", "own", "now", "state")},
-            "rows": str(counts["row"]),
-            "hoisted": str(len(hoisted)),
-            "kept": str(len(kept)),
-            "once": [*printer.lines(parts[0], 0)],
-            "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
-            "of_step": [*printer.lines(parts[OF_STEP], 0)],
-            "of_both": [*load, *printer.lines(parts[OF_BOTH], 0), *_assigned(ends, now=False)],
-            "next": _assigned(ends, now=True),
-        }
-    )
+    return {
+        **{name: str(counts[name]) for name in ("shared", "own", "now", "state")},
+        "rows": str(counts["row"]),
+        "hoisted": str(len(hoisted)),
+        "kept": str(len(kept)),
+        "once": [*printer.lines(parts[0], 0)],
+        "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
+        "of_step": [*printer.lines(parts[OF_STEP], 0)],
+        "of_both": [*load, *printer.lines(parts[OF_BOTH], 0), *_assigned(ends, now=False)],
+        "next": _assigned(ends, now=True),
+    }
 
 
 def _kept_name(number: int) -> str:
@@ -256,8 +264,8 @@ def _assigned(pairs: list[tuple[str, str]], *, now: bool) -> list[str]:
     return copies + [f"{target} = after{i};" for i, (target, _) in enumerate(pairs)]
 
 
-def _filled(marks: dict[str, str | list[str]]) -> str:
-    text = resources.files("jaxdamp.codegen").joinpath("lanes.c").read_text(encoding="utf-8")
+def _filled(template: str, marks: dict[str, str | list[str]]) -> str:
+    text = resources.files("jaxdamp.codegen").joinpath(template).read_text(encoding="utf-8")
     for mark, lines in marks.items():
         block = lines if isinstance(lines, str) else "\n".join(" " * WIDTH + line for line in lines)
         text = text.replace(f"@{mark}@", block)

@@ -5,7 +5,6 @@ import ctypes
 import functools
 import hashlib
 import os
-import platform
 import shutil
 import subprocess
 import tempfile
@@ -30,7 +29,7 @@ def compiler() -> str | None:
 
 def compiles_for_x86() -> bool:
     """Whether gcc is the compiler, and the processor is an x86-64: where printed loops were measured."""
-    return "gcc" in Path(compiler() or "").name and platform.machine() in ("x86_64", "AMD64")
+    return "gcc" in Path(compiler() or "").name and hasattr(os, "uname") and os.uname().machine == "x86_64"
 
 
 def compiled_by() -> str:
@@ -54,8 +53,12 @@ def _folder() -> Path:
 
 
 @functools.cache
-def registered(text: str) -> str:
+def registered(text: str, platform: str = "cpu") -> str:
     """The name under which XLA calls the function `loop` of a C text, compiled once in a process.
+
+    Arguments:
+        text: C.
+        platform: of XLA, "cpu" or "CUDA".
 
     Raises:
         NotImplementedError: no C compiler, or one that refuses the text; the message holds what it says.
@@ -65,10 +68,10 @@ def registered(text: str) -> str:
     source, target = _folder() / f"{name}.c", _folder() / f"{name}.so"
     source.write_text(text, encoding="utf-8")
     where = ["-I", jax.ffi.include_dir(), str(source), "-o", str(target)]
-    for flags, libraries in (([*_FLAGS, *_WIDE], ["-lmvec", "-lm"]), (_FLAGS, ["-lm"])):
+    for flags, libraries in (([*_FLAGS, *_WIDE], ["-lmvec", "-lm", "-ldl"]), (_FLAGS, ["-lm"])):
         done = subprocess.run([tool, *flags, *where, *libraries], capture_output=True, text=True)
         if done.returncode == 0:
             function = ctypes.CDLL(str(target)).loop
-            jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(function), platform="cpu")
+            jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(function), platform=platform)
             return name
     raise NotImplementedError(f"{tool} does not compile the printed loop: {done.stderr.strip()[-2000:]}")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, roads, sweep, vehicles
-from jaxdamp.codegen import _native, _scan, compiler, printed_scan
+from jaxdamp.codegen import _cuda, _lanes, _native, _scan, compiler, printed_scan
 from jaxdamp.dampers import Besinger, PowerLaw, SeriesSpring
 from jaxdamp.simulation import Exponential, simulate
 
@@ -96,6 +96,31 @@ def test_a_value_at_the_end_of_a_step_is_that_at_the_beginning_of_the_next(monke
     printed, plain = (jax.vmap(lambda rate, scan=scan: run(scan, rate))(rates) for scan in (printed_scan, by_jax))
     assert "KEPT = 1 " in texts[-1]
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12), printed, plain)
+
+
+def test_the_kernel_compiled_as_c(monkeypatch):
+    """The text that a GPU runs, with a loop in place of threads."""
+    monkeypatch.setattr(_lanes.Loop, "text", property(lambda loop: loop.kernel))
+    stiffness = jnp.linspace(0.5, 3.0, 5)
+    printed, plain = (jax.jit(jax.vmap(oscillator(scan)))(stiffness) for scan in (printed_scan, by_jax))
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12), printed, plain)
+
+
+def test_the_kernel_compiled_as_ptx(monkeypatch):
+    """All of a thread stays in registers, and the function that launches it compiles."""
+    loops = []
+    text = _lanes.Loop.text.fget
+    monkeypatch.setattr(_lanes.Loop, "text", property(lambda loop: (loops.append(loop), text(loop))[1]))
+    jax.vmap(oscillator(printed_scan))(jnp.linspace(0.5, 3.0, 5))
+    kernel = loops[-1].kernel
+    try:
+        found = [_cuda.ptx(kernel, architecture) for architecture in ("compute_80", "compute_90")]
+    except NotImplementedError as error:
+        pytest.skip(str(error))
+    assert all(b".entry steps_of_points" in text and b".local" not in text for text in found)
+    assert _native.registered(_cuda.launcher(kernel, "compute_90"), "CUDA").startswith("jaxdamp_loop_")
+    with pytest.raises(NotImplementedError, match=r"NVRTC does not compile.*error"):
+        _cuda.ptx("nothing", "compute_90")
 
 
 def test_refused_by_name(monkeypatch):
