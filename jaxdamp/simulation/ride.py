@@ -34,7 +34,7 @@ from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, mo
 from jaxdamp.vehicles import AbstractVehicle, is_stationary
 
 
-LONG_SWEEP = 1e9  # steps of cars, some seconds on a core: printing saves a fifth or more, and takes half a second
+LONG_SWEEP = 1e9  # steps of cars, some seconds on a core: printing saves a tenth or more of them
 
 
 @final
