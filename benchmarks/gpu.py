@@ -4,8 +4,8 @@
 
 Each way drives 10 s at 1 kHz in a process of its own, in float64 and float32 (the kernel in float64 only), with 2¹⁰ to
 2²⁰ cars, with and without gradients, beside one core of the processor. The difference is the largest of 16 cars from
-the processor in float64. What does not run is listed with the reason. Without a GPU only values of 1024 cars on the processor are
-computed.
+the processor in float64. What does not run is listed with the reason. Without a GPU only values of 1024 cars on the
+processor are computed.
 """
 
 import json
