@@ -117,6 +117,7 @@ def main() -> None:
             rows += c_rates(case, road, exact)
         if "--c-only" not in sys.argv and not QUICK:
             rows += other_rates(case, road, exact)
+        print(*(row for row in rows if row[0] == case), sep="\n", flush=True)  # of long runs, what is done
     ours_ = {row[0]: row[3] for row in rows if row[1] == "jaxdamp.sweep"}
     rows = [[*row, ours_[row[0]] / row[3]] for row in rows]
     head = ["car", "by", "1 core, M steps/s", "all cores", "error", "jaxdamp is so many times as fast"]

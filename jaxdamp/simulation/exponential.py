@@ -119,7 +119,7 @@ class Exponential(AbstractFixedStep):
             a CPU come 1.1 to 1.6 times as fast for laws of arithmetic and roots (`docs/speed.md`). On a GPU the loop is
             one CUDA kernel: it was compiled, and compared through the same text in C, but not yet run. Derivatives do
             not pass. What cannot be printed is refused with the reason (`NotImplementedError`), with "arithmetic" also
-            laws with exponentials, powers and the like. Left out, a long `sweep` prints where that is faster.
+            laws with exponentials, powers and the like. With None, a long `sweep` chooses.
 
     >>> from jaxdamp import roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)
@@ -129,7 +129,7 @@ class Exponential(AbstractFixedStep):
 
     dt: float | None = eqx.field(static=True, default=None)
     substeps: int | None = eqx.field(static=True, default=None)
-    printed: bool | Literal["arithmetic"] | None = eqx.field(static=True, default=None)
+    printed: bool | Literal["arithmetic"] | None = eqx.field(static=True, default=False)
 
     def __check_init__(self) -> None:
         if self.dt is not None:

@@ -72,8 +72,8 @@ def sweep(
 
     Returns:
         The results by name with the axes as dimensions (for a list, along `point`). Of a `Ride`, `attrs["loop"]` says
-        by what its loop was compiled: XLA, or as printed C by gcc where a long sweep is faster so; the numbers are the
-        same to rounding.
+        by what its loop was compiled: XLA, or as printed C by gcc where its engine leaves that choice to a long sweep;
+        the numbers are the same to rounding.
 
     Raises:
         ValueError: axes that are no numbers, a function that does not know an axis or returns no named numbers, no
