@@ -2,6 +2,8 @@
 
     python -m benchmarks.throughput            all peers
     python -m benchmarks.throughput --c-only   jaxdamp and C
+    python -m benchmarks.throughput --quick    jaxdamp and C on one core, fewer cars
+    python -m benchmarks.throughput --only lag,half_car    some cases
 
 All simulate the same road of class C at 20 m/s, 10 s at 1 kHz, each car with different dampers, in double precision,
 and compute the RMS of body acceleration. "error" is the largest relative error of four cars against adaptive
@@ -29,7 +31,8 @@ from jaxdamp.sweeps import points  # noqa: E402
 
 DURATION, DT, FEW = 10.0, 1e-3, 4
 STEPS = round(DURATION / DT)
-CARS = {"jaxdamp": 32_768, "c": 4096, "diffrax": 1024, "scipy": 4, "casadi": 64}
+QUICK = "--quick" in sys.argv
+CARS = {"jaxdamp": 8192 if QUICK else 32_768, "c": 4096, "diffrax": 1024, "scipy": 4, "casadi": 64}
 
 
 def swept(
@@ -54,7 +57,7 @@ def swept(
 
 def printed_rates(case: str, road: problem.Heights) -> list[float]:
     """Rates of the loop printed as C, on one core and on all; none of a law that cannot be printed."""
-    counts = (1, DONE.cpu_devices)
+    counts = (1, 1 if QUICK else DONE.cpu_devices)
     try:
         rates = [swept(case, road, CARS["jaxdamp"], n, printed=True)[0] for n in counts]
     except NotImplementedError:
@@ -66,7 +69,10 @@ def c_rates(case: str, road: problem.Heights, exact: np.ndarray) -> list[list[An
     table = problem.draw(case, CARS["c"])
     rows: list[list[Any]] = []
     for name, kernel in (("C, RK4", c.rk4), ("C, exponential step", c.exponential)):
-        rates = [CARS["c"] / best(lambda n=n, k=kernel: k(case, table, road, DT, threads=n), 5) for n in (1, 2)]
+        rates = [
+            CARS["c"] / best(lambda n=n, k=kernel: k(case, table, road, DT, threads=n), 5)
+            for n in ((1, 1) if QUICK else (1, 2))
+        ]
         error = problem.errors(kernel(case, table[:FEW], road, DT), exact).max()
         rows.append([case, name, *[rate * STEPS / 1e6 for rate in rates], float(error)])
     return rows
@@ -89,12 +95,19 @@ def other_rates(case: str, road: problem.Heights, exact: np.ndarray) -> list[lis
     return rows
 
 
+def cases() -> list[str]:
+    """Those named after `--only`, or all."""
+    words = sys.argv[1:]
+    return words[words.index("--only") + 1].split(",") if "--only" in words else list(problem.CASES)
+
+
 def main() -> None:
     rows: list[list[Any]] = []
-    for case in problem.CASES:
+    for case in cases():
         road = problem.heights(case, DURATION, DT)
         exact = problem.reference(case, problem.draw(case, FEW), road, DT)
-        both = [swept(case, road, CARS["jaxdamp"], n) for n in range(1, DONE.cpu_devices + 1)]
+        counts = (1,) if QUICK else range(1, DONE.cpu_devices + 1)
+        both = [swept(case, road, CARS["jaxdamp"], n) for n in counts]
         alone, all_cores = both[0][0], both[-1][0]
         error = problem.errors(problem.simulated(case, problem.draw(case, FEW), road, DT), exact).max()
         rows.append([case, "jaxdamp.sweep", alone * STEPS / 1e6, all_cores * STEPS / 1e6, float(error)])
@@ -102,8 +115,9 @@ def main() -> None:
             rows.append([case, "jaxdamp.sweep, printed as C", *printed, float(error)])
         if c.available():
             rows += c_rates(case, road, exact)
-        if "--c-only" not in sys.argv:
+        if "--c-only" not in sys.argv and not QUICK:
             rows += other_rates(case, road, exact)
+        print(*(row for row in rows if row[0] == case), sep="\n", flush=True)  # of long runs, what is done
     ours_ = {row[0]: row[3] for row in rows if row[1] == "jaxdamp.sweep"}
     rows = [[*row, ours_[row[0]] / row[3]] for row in rows]
     head = ["car", "by", "1 core, M steps/s", "all cores", "error", "jaxdamp is so many times as fast"]

@@ -1,6 +1,6 @@
 """The jaxprs of JAX: the only file that knows how JAX holds a traced function."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -64,9 +64,14 @@ def with_constants_as_inputs(function: Callable[..., Any], arguments: tuple[Any,
     closed = jax.make_jaxpr(function)(*arguments)
 
     def outside(constants: list[Any], *flat: Any) -> list[Any]:
-        return core.jaxpr_as_fun(core.ClosedJaxpr(closed.jaxpr, constants))(*flat)
+        return called(core.ClosedJaxpr(closed.jaxpr, constants), flat)
 
     return jax.make_jaxpr(outside)(closed.consts, *jax.tree.leaves(arguments)), closed.consts
+
+
+def called(closed: Inner, flat: Sequence[Any]) -> list[Any]:
+    """The results of a jaxpr on arrays, by JAX."""
+    return core.jaxpr_as_fun(closed)(*flat)
 
 
 def opened(inner: Inner) -> tuple[Any, list[np.ndarray]]:

@@ -8,12 +8,30 @@ import numpy as np
 
 from jaxdamp.codegen import _arrays
 from jaxdamp.codegen._jaxprs import Inner
-from jaxdamp.codegen._languages import C
+from jaxdamp.codegen._languages import FUNCTIONS, C
+from jaxdamp.codegen._loop_passes import Kept, kept_values, sums_of_products
 from jaxdamp.codegen._lowering import evaluated, printing
-from jaxdamp.codegen._program import Atom, Atoms, Define, Statement, Table, Variable, Writer, names, operands_of, pruned
+from jaxdamp.codegen._program import (
+    Atom,
+    Atoms,
+    Define,
+    Statement,
+    Table,
+    Variable,
+    Writer,
+    constant,
+    names,
+    operands_of,
+    pruned,
+)
 
 
 OF_POINT, OF_STEP = 1, 2  # what a number depends on: bits, both of them where it differs from point to point and step
+OF_BOTH = OF_POINT | OF_STEP
+# {1} is not NaN; a NaN of {0} is the result, as that of the second operand of a vector minimum is
+_LIMITS = {"min": "{1} < {0} ? {1} : {0}", "max": "{1} > {0} ? {1} : {0}"}
+_NAN = constant(np.nan, "float64")
+_SPOILT = ("for (int i = 0; i < STATE; i++)", "    state[i][lane] += missing;")
 WIDTH = 16  # of the printed block in the template
 
 
@@ -36,22 +54,35 @@ class Loop(NamedTuple):
     """A printed loop.
 
     Attributes:
-        text: C.
+        parts: lines of C by what they depend on, and counts.
         laned: which of the carried values differ from point to point.
     """
 
-    text: str
+    parts: dict[str, str | list[str]]
     laned: tuple[bool, ...]
 
+    @property
+    def text(self) -> str:
+        """C for points side by side in vectors."""
+        return _filled("lanes.c", self.parts)
 
-def lanes_in_c(body: Inner, constants: Sequence[Operand], carry: Sequence[Operand], row: Sequence[Operand]) -> Loop:
+    @property
+    def kernel(self) -> str:
+        """CUDA for a point in each thread; compiled as C, threads are a loop."""
+        return _filled("kernel.cu", self.parts)
+
+
+def lanes_in_c(
+    body: Inner, constants: Sequence[Operand], carry: Sequence[Operand], row: Sequence[Operand], *, arithmetic: bool
+) -> Loop:
     """Print a loop whose body maps (constants, carry, row) to the carry of the next step.
 
     What depends neither on the point nor on the step is computed once, what depends on the point alone before the
     loop, what depends on the step alone once for all points.
 
     Raises:
-        NotImplementedError: the body has loops or branches, which vectors cannot follow, or cannot be printed.
+        NotImplementedError: the body has loops or branches, which vectors cannot follow, or cannot be printed; with
+            `arithmetic`, it has elementary functions other than roots.
     """
     carry = list(carry)
     while True:
@@ -64,15 +95,26 @@ def lanes_in_c(body: Inner, constants: Sequence[Operand], carry: Sequence[Operan
         results = [atom for array in after for atom in array.ravel()]
         statements = _straight(pruned(writer.statements, names(results)))
         levels = _levels(statements, names_of.levels)
+        if arithmetic:
+            _refuse_functions(statements, levels)
         grown = [
             operand._replace(level=operand.level | max((_level(atom, levels) for atom in array.ravel()), default=0))
             for operand, array in zip(carry, after, strict=True)
         ]
         if grown == carry:
             return Loop(
-                _text(statements, levels, names_of, before, after), tuple(c.level & OF_POINT > 0 for c in carry)
+                _parts(statements, levels, names_of, before, after), tuple(c.level & OF_POINT > 0 for c in carry)
             )
         carry = grown  # what seemed the same for all points is not
+
+
+class _InLanes(C):
+    """C with limits that are the same in all steps."""
+
+    def own(self, operation: str, texts: list[str], dtypes: list[str], dtype: str) -> str | None:
+        """As in C."""
+        first, _, limit = operation.partition("limiting ")
+        return super().own(operation, texts, dtypes, dtype) if first else _LIMITS[limit].format(*texts)
 
 
 class _Names:
@@ -109,6 +151,13 @@ def _straight(statements: list[Statement]) -> list[Define | Table]:
     return straight
 
 
+def _refuse_functions(statements: list[Define | Table], levels: dict[str, int]) -> None:
+    """Refuse elementary functions, other than roots, of each point in each step."""
+    for s in statements:
+        if isinstance(s, Define) and s.operation in FUNCTIONS - {"sqrt"} and levels[s.target.name] == OF_BOTH:
+            raise NotImplementedError(f"A step with the function {s.operation!r} is not printed where XLA is faster.")
+
+
 def _levels(statements: Iterable[Define | Table], known: dict[str, int]) -> dict[str, int]:
     levels = dict(known)
     for statement in statements:
@@ -119,47 +168,104 @@ def _levels(statements: Iterable[Define | Table], known: dict[str, int]) -> dict
     return levels
 
 
-def _text(
+def _parts(
     statements: list[Define | Table], levels: dict[str, int], inputs: _Names, before: list[Atoms], after: list[Atoms]
-) -> str:
-    printer = C()
+) -> dict[str, str | list[str]]:
+    printer = _InLanes()
+    pairs = zip(before, after, strict=True)
+    carried = {str(old.name): new for olds, news in pairs for old, new in zip(olds.ravel(), news.ravel(), strict=True)}
+    kept, carried, statements = _with_kept(statements, levels, carried)
+    inside = {name for name, level in levels.items() if level == OF_BOTH}
+    statements = sums_of_products(statements, inside, carried.values())
+    statements, limits = _limited(statements, levels)
     parts: dict[int, list[Define | Table]] = {level: [] for level in range(4)}
     for statement in statements:
-        parts[levels[statement.target.name]].append(statement)
-    pairs = [
-        (str(old.name), printer.atom(new))
-        for olds, news in zip(before, after, strict=True)
-        for old, new in zip(olds.ravel(), news.ravel(), strict=True)
-        if old != new
-    ]
-    late = names([atom for s in parts[OF_POINT | OF_STEP] for atom in operands_of(s)])
-    late |= names([atom for array in after for atom in array.ravel()])
+        parts[levels.get(statement.target.name, OF_BOTH)].append(statement)
+    late = names([atom for s in parts[OF_BOTH] for atom in operands_of(s)]) | names(carried.values())
     hoisted = [s.target for s in parts[OF_POINT] if s.target.name in late]
     store = [f"hoisted[{i}][lane] = {v.name};" for i, v in enumerate(hoisted)]
     load = [f"const {printer.types[v.dtype]} {v.name} = hoisted[{i}][lane];" for i, v in enumerate(hoisted)]
+    store += _missing(limits)
+    store += printer.lines(dict.fromkeys(s for value in kept for s in value.first), 0)
+    store += [f"{_kept_name(i)} = {value.target.name};" for i, value in enumerate(kept)]
+    ends = [(name, printer.atom(new)) for name, new in carried.items() if Variable(name, "float64") != new]
     counts = inputs.counts
-    return _filled(
-        {
-            **{name: str(counts[name]) for name in ("shared", "own", "now", "state")},
-            "rows": str(counts["row"]),
-            "hoisted": str(len(hoisted)),
-            "once": [*printer.lines(parts[0], 0)],
-            "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
-            "of_step": [*printer.lines(parts[OF_STEP], 0)],
-            "of_both": [*load, *printer.lines(parts[3], 0), *_assigned([p for p in pairs if p[0].startswith("state")])],
-            "next": _assigned([p for p in pairs if p[0].startswith("now")]),
-        }
-    )
+    return {
+        **{name: str(counts[name]) for name in ("shared", "own", "now", "state")},
+        "rows": str(counts["row"]),
+        "hoisted": str(len(hoisted)),
+        "kept": str(len(kept)),
+        "once": [*printer.lines(parts[0], 0)],
+        "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
+        "of_step": [*printer.lines(parts[OF_STEP], 0)],
+        "of_both": [*load, *printer.lines(parts[OF_BOTH], 0), *_assigned(ends, now=False)],
+        "next": _assigned(ends, now=True),
+    }
 
 
-def _assigned(pairs: list[tuple[str, str]]) -> list[str]:
-    """All at once: values are read before any of them changes."""
+def _kept_name(number: int) -> str:
+    return f"kept[{number}][lane]"
+
+
+def _with_kept(
+    statements: list[Define | Table], levels: dict[str, int], carried: dict[str, Atom]
+) -> tuple[list[Kept], dict[str, Atom], list[Define | Table]]:
+    """The values that the step before has computed, what is then carried, and the statements that read them."""
+    still = {name: Variable(name, "float64") for name, level in levels.items() if not level & OF_STEP}
+    kept = [
+        value
+        for value in kept_values(statements, still | carried, carried.values())
+        if levels[value.target.name] == levels[value.again.name] == OF_BOTH
+    ]
+    given: dict[Atom, Atom] = {value.target: Variable(_kept_name(i), "float64") for i, value in enumerate(kept)}
+    levels |= {_kept_name(i): OF_BOTH for i in range(len(kept))}
+    carried = carried | {_kept_name(i): value.again for i, value in enumerate(kept)}
+    carried = {name: given.get(new, new) for name, new in carried.items()}
+
+    def reading(s: Define | Table) -> Define | Table:
+        atoms = tuple(given.get(a, a) for a in (s.operands if isinstance(s, Define) else s.entries))
+        return Define(s.target, s.operation, atoms) if isinstance(s, Define) else Table(s.target, atoms)
+
+    return kept, carried, _straight(pruned([reading(s) for s in statements], names(carried.values())))
+
+
+def _limited(
+    statements: list[Define | Table], levels: dict[str, int]
+) -> tuple[list[Define | Table], dict[str, Variable]]:
+    """Limits that are the same in all steps as one vector operation each, and those of them that may be NaN."""
+    limits: dict[str, Variable] = {}
+
+    def limited(s: Define | Table) -> Define | Table:
+        if not isinstance(s, Define) or s.operation not in _LIMITS or s.target.dtype != "float64":
+            return s
+        if levels.get(s.target.name) != OF_BOTH:
+            return s
+        still = [atom != _NAN and not _level(atom, levels) & OF_STEP for atom in s.operands]
+        if not any(still):
+            return s
+        value, limit = s.operands if still[1] else s.operands[::-1]
+        if isinstance(limit, Variable):
+            limits[limit.name] = limit
+        return Define(s.target, f"limiting {s.operation}", (value, limit))
+
+    return [limited(s) for s in statements], limits
+
+
+def _missing(limits: Iterable[str]) -> list[str]:
+    """A point with a limit that is NaN is NaN from the start."""
+    tests = [f"({name} != {name} ? NAN : 0.0)" for name in limits]
+    return [f"const double missing = {' + '.join(tests)};", *_SPOILT] if tests else []
+
+
+def _assigned(pairs: list[tuple[str, str]], *, now: bool) -> list[str]:
+    """What is the same for all points, or the rest, all at once: values are read before any of them changes."""
+    pairs = [pair for pair in pairs if pair[0].startswith("now") == now]
     copies = [f"const double after{i} = {value};" for i, (_, value) in enumerate(pairs)]
     return copies + [f"{target} = after{i};" for i, (target, _) in enumerate(pairs)]
 
 
-def _filled(marks: dict[str, str | list[str]]) -> str:
-    text = resources.files("jaxdamp.codegen").joinpath("lanes.c").read_text(encoding="utf-8")
+def _filled(template: str, marks: dict[str, str | list[str]]) -> str:
+    text = resources.files("jaxdamp.codegen").joinpath(template).read_text(encoding="utf-8")
     for mark, lines in marks.items():
         block = lines if isinstance(lines, str) else "\n".join(" " * WIDTH + line for line in lines)
         text = text.replace(f"@{mark}@", block)

@@ -41,7 +41,7 @@ _OF_FLOATS = {
     "max": "{0} > {1} || {0} != {0} ? {0} : {1}",
     "min": "{0} < {1} || {0} != {0} ? {0} : {1}",
 }
-_FUNCTIONS = frozenset(
+FUNCTIONS = frozenset(
     "exp expm1 log log1p sqrt cbrt pow sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh "
     "floor ceil".split()
 )
@@ -134,7 +134,7 @@ class AbstractLanguage(ABC):
 
     def expression(self, operation: str, texts: list[str], dtypes: list[str], dtype: str) -> str:
         """An operation on operands that are names or numbers."""
-        if operation in _FUNCTIONS and dtype.startswith("float"):
+        if operation in FUNCTIONS and dtype.startswith("float"):
             return f"{self.call(operation, dtype)}({', '.join(texts)})"
         if operation in _LOGICAL and dtypes[0] == "bool":
             return f"{texts[0]} {_LOGICAL[operation]} {texts[1]}"

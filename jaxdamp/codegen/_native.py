@@ -13,10 +13,10 @@ from pathlib import Path
 import jax
 
 
-# As fast as XLA's own code may be, which fuses and reorders, too; what is not finite stays so.
+# Multiplications and additions are fused as XLA fuses them; sums stay in their order, what is not finite stays so.
 _FLAGS = (
     "-std=gnu11 -O3 -march=native -fPIC -shared -w -fopenmp-simd -fno-math-errno -fno-trapping-math -fno-signed-zeros "
-    "-fassociative-math -freciprocal-math -ffp-contract=fast"
+    "-freciprocal-math -ffp-contract=fast"
 ).split()
 _WIDE = ("-mprefer-vector-width=512", "-mrecip")  # of gcc for x86
 
@@ -25,6 +25,23 @@ def compiler() -> str | None:
     """The C compiler: the environment variable `CC`, or gcc, clang, cc on the path; None without one."""
     own = os.environ.get("CC", "").split()
     return next(filter(None, map(shutil.which, [*own[:1], "gcc", "clang", "cc"])), None)
+
+
+def compiles_for_x86() -> bool:
+    """Whether gcc is the compiler, and the processor is an x86-64: where printed loops were measured."""
+    return "gcc" in Path(compiler() or "").name and hasattr(os, "uname") and os.uname().machine == "x86_64"
+
+
+def compiled_by() -> str:
+    """The path of the C compiler.
+
+    Raises:
+        NotImplementedError: there is none.
+    """
+    tool = compiler()
+    if tool is None:
+        raise NotImplementedError("No C compiler is at hand. Install gcc or clang, or name one in the variable CC.")
+    return tool
 
 
 @functools.cache
@@ -36,23 +53,25 @@ def _folder() -> Path:
 
 
 @functools.cache
-def registered(text: str) -> str:
+def registered(text: str, platform: str = "cpu") -> str:
     """The name under which XLA calls the function `loop` of a C text, compiled once in a process.
+
+    Arguments:
+        text: C.
+        platform: of XLA, "cpu" or "CUDA".
 
     Raises:
         NotImplementedError: no C compiler, or one that refuses the text; the message holds what it says.
     """
-    tool = compiler()
-    if tool is None:
-        raise NotImplementedError("No C compiler is at hand. Install gcc or clang, or name one in the variable CC.")
+    tool = compiled_by()
     name = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
     source, target = _folder() / f"{name}.c", _folder() / f"{name}.so"
     source.write_text(text, encoding="utf-8")
     where = ["-I", jax.ffi.include_dir(), str(source), "-o", str(target)]
-    for flags, libraries in (([*_FLAGS, *_WIDE], ["-lmvec", "-lm"]), (_FLAGS, ["-lm"])):
+    for flags, libraries in (([*_FLAGS, *_WIDE], ["-lmvec", "-lm", "-ldl"]), (_FLAGS, ["-lm"])):
         done = subprocess.run([tool, *flags, *where, *libraries], capture_output=True, text=True)
         if done.returncode == 0:
             function = ctypes.CDLL(str(target)).loop
-            jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(function), platform="cpu")
+            jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(function), platform=platform)
             return name
     raise NotImplementedError(f"{tool} does not compile the printed loop: {done.stderr.strip()[-2000:]}")

@@ -24,7 +24,7 @@ VECTORS double expm1(double);
 VECTORS double log1p(double);
 #endif
 
-enum { SHARED = @shared@, OWN = @own@, NOW = @now@, STATE = @state@, ROWS = @rows@, HOISTED = @hoisted@ };
+enum { SHARED = @shared@, OWN = @own@, NOW = @now@, STATE = @state@, ROWS = @rows@, HOISTED = @hoisted@, KEPT = @kept@ };
 
 /* shared and own: numbers of all points, and of each point; now and state: what is carried from step to step, the same
    for all points, and of each. Numbers of points lie one after the other, (number, point). */
@@ -39,6 +39,7 @@ static void run(const double *restrict shared, const double *restrict own_in, co
         ROW(own, OWN);
         ROW(state, STATE);
         ROW(hoisted, HOISTED);
+        ROW(kept, KEPT); /* of the step before */
         double now[NOW ? NOW : 1];
         /* lanes without a point of their own repeat the last */
         for (int i = 0; i < OWN; i++)
@@ -50,7 +51,7 @@ static void run(const double *restrict shared, const double *restrict own_in, co
         for (int i = 0; i < NOW; i++)
             now[i] = now_in[i];
         for (int lane = 0; lane < LANES; lane++) {
-            (void)own;
+            (void)own, (void)kept;
 @of_point@
         }
         for (int64_t step = 0; step < steps; step++) {

@@ -98,6 +98,15 @@ class AbstractEngine(AbstractLawEngine):
         """Steps from one instant to the next; 1 also where the engine chooses its own."""
         return 1
 
+    @property
+    def runs_printed(self) -> bool:
+        """Whether the loop is printed as C and compiled by the machine's C compiler, for many cars side by side."""
+        return False
+
+    def printed_if_faster(self) -> "AbstractEngine | None":
+        """The engine of a long sweep without derivatives, whose loop may be printed; None if it stays this one."""
+        return None
+
     def layout(self, states: int, *, side_by_side: bool) -> MemoryLayout:
         """How the vectors of a vehicle lie in memory.
 

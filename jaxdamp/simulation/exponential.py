@@ -8,7 +8,7 @@ and Ostermann, Exponential integrators, Acta Numerica 2010).
 """
 
 import dataclasses
-from typing import Any, NamedTuple, final
+from typing import Any, Literal, NamedTuple, final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -115,9 +115,11 @@ class Exponential(AbstractFixedStep):
         substeps: steps between two instants; as many as the steepest law needs (friction at standstill, a bristle, oil)
             if left out, so that every step is stable. The road stays straight between instants.
         printed: print the loop over time as C and let the machine's C compiler (gcc, clang) make vector code of it: for
-            a `Ride` in a `sweep` or under `jax.vmap`, in double precision, on a CPU. The same numbers to rounding, with
-            a lag 1.4 times as fast, for other laws about as fast as XLA; derivatives do not pass. What cannot be
-            printed is refused with the reason (`NotImplementedError`).
+            a `Ride` in a `sweep` or under `jax.vmap`, in double precision. The numbers are the same to rounding, and on
+            a CPU come 1.1 to 1.6 times as fast for laws of arithmetic and roots (`docs/speed.md`). On a GPU the loop is
+            one CUDA kernel: it was compiled, and compared through the same text in C, but not yet run. Derivatives do
+            not pass. What cannot be printed is refused with the reason (`NotImplementedError`), with "arithmetic" also
+            laws with exponentials, powers and the like. With None, a long `sweep` chooses.
 
     >>> from jaxdamp import roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)
@@ -127,7 +129,7 @@ class Exponential(AbstractFixedStep):
 
     dt: float | None = eqx.field(static=True, default=None)
     substeps: int | None = eqx.field(static=True, default=None)
-    printed: bool = eqx.field(static=True, default=False)
+    printed: bool | Literal["arithmetic"] | None = eqx.field(static=True, default=False)
 
     def __check_init__(self) -> None:
         if self.dt is not None:
@@ -156,7 +158,16 @@ class Exponential(AbstractFixedStep):
     @property
     def runs_printed(self) -> bool:
         """As asked for."""
-        return self.printed
+        return bool(self.printed)
+
+    @property
+    def prints_arithmetic(self) -> bool:
+        """As asked for."""
+        return self.printed == "arithmetic"
+
+    def printed_if_faster(self) -> "Exponential | None":
+        """With laws of arithmetic and roots, if nobody has said."""
+        return dataclasses.replace(self, printed="arithmetic") if self.printed is None else None
 
     @property
     def derivatives(self) -> tuple[Mode, ...]:

@@ -58,8 +58,8 @@ class AbstractFixedStep(AbstractEngine):
         return ("forward", "reverse")
 
     @property
-    def runs_printed(self) -> bool:
-        """Whether the loop is printed as C and compiled by the machine's C compiler, for many cars side by side."""
+    def prints_arithmetic(self) -> bool:
+        """Whether a loop with exponentials, powers and the like is refused, where it would be printed."""
         return False
 
     @abstractmethod
@@ -135,7 +135,7 @@ class AbstractFixedStep(AbstractEngine):
         try:
             if jax.tree.leaves(observer.saved(carry[0], carry[1])):
                 raise NotImplementedError("Instants are saved, as `simulate` and metrics of a whole record need them.")
-            return printed_scan(step, carry, road)
+            return printed_scan(step, carry, road, arithmetic=self.prints_arithmetic)
         except NotImplementedError as error:
             message = f"{self} cannot print this run: {error} Leave `printed` out: XLA then compiles the loop."
             raise NotImplementedError(message) from error

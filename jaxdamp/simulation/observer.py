@@ -45,7 +45,7 @@ def _constant_dot(row: np.ndarray, vector: Vector, start: Scalar) -> Scalar:
 class Accumulators(NamedTuple):
     """What the loop carries beside the vehicle: the last channels, the states of weightings, the statistics."""
 
-    channels: tuple[Scalar, ...]
+    channels: tuple[Scalar, ...]  # where a metric is weighted
     weighting_states: tuple[tuple[Scalar, ...], ...]
     statistics: tuple[Gathered, ...]
     rest: tuple[Scalar, ...]  # channels that count from the static equilibrium, as they are there
@@ -81,8 +81,9 @@ class MetricObserver(AbstractObserver):
         rest = tuple(values[self.names.index(name)] for name in self.from_rest)
         samples = self._samples(values, still, rest)
         gathered = tuple(m.statistic.begin(y) for m, y in zip(self.metrics, samples, strict=True))
+        before = values if self.weighted else ()
         instant = jnp.zeros((), int) if any(m.window for m in self.metrics) else None
-        return Accumulators(values, still, gathered, rest, self._saved(samples), instant)
+        return Accumulators(before, still, gathered, rest, self._saved(samples), instant)
 
     def add(self, gathered: Accumulators, now: StepState, road: RoadInput) -> Accumulators:
         """One instant more."""
@@ -95,7 +96,9 @@ class MetricObserver(AbstractObserver):
         instant = None if gathered.instant is None else gathered.instant + 1
         parts = zip(self.metrics, self.windows, gathered.statistics, samples, strict=True)
         statistics = tuple(_with_sample(*part, instant) for part in parts)
-        return Accumulators(values, states, statistics, gathered.rest, self._saved(samples), instant)
+        return Accumulators(
+            values if self.weighted else (), states, statistics, gathered.rest, self._saved(samples), instant
+        )
 
     def saved(self, now: StepState, gathered: Accumulators) -> tuple[Scalar, ...]:
         """The samples of the metrics that need the whole record."""

@@ -15,6 +15,7 @@ from jaxdamp._jacobian import Mode
 from jaxdamp._many_points import outside_domains
 from jaxdamp._types import Scalar
 from jaxdamp._vectors import MemoryLayout
+from jaxdamp.codegen import compiles_for_x86
 from jaxdamp.configuration import target
 from jaxdamp.dampers import RangeUse, has_fitted_range
 from jaxdamp.metrics import Metric, MetricValues
@@ -31,6 +32,9 @@ from jaxdamp.simulation.stationary import stationary_metrics, stationary_range_u
 from jaxdamp.simulation.step_size import RunCheck
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
 from jaxdamp.vehicles import AbstractVehicle, is_stationary
+
+
+LONG_SWEEP = 1e9  # steps of cars, some seconds on a core: printing saves a tenth or more of them
 
 
 @final
@@ -128,7 +132,12 @@ class Ride(eqx.Module):
 
     @property
     def lanes(self) -> int:
-        """How many cars a CPU core drives best side by side: if loops are fused, what stays in its nearest cache."""
+        """How many cars a CPU core drives best side by side: if loops are fused, what stays in its nearest cache.
+
+        A printed loop takes 32 at a time by itself; the more there are, the less its matrices cost.
+        """
+        if self.engine.runs_printed:
+            return 2048
         return 128 if target().fused_loops else 2048
 
     @property
@@ -157,6 +166,19 @@ class Ride(eqx.Module):
         """The same, compiled for many cars at a time: for `jax.vmap`. `sweep` does it itself."""
         layout = self.engine.layout(2 * len(self.vehicle.coordinates), side_by_side=True)
         return eqx.tree_at(lambda ride: ride.layout, self, layout)
+
+    def printed_side_by_side(self, points: int) -> "Ride | None":
+        """The same with its loop printed as C, for a sweep of so many points, if it may be faster.
+
+        That is where numbers are double, gcc is at hand on an x86-64 processor, for which it was measured, and the
+        sweep is long enough to pay for the compiler.
+        """
+        engine = self.engine.printed_if_faster()
+        if engine is None or self.heights is None or self.heights.dtype != jnp.float64:
+            return None
+        if points * self.heights.shape[0] * self.substeps < LONG_SWEEP or not compiles_for_x86():
+            return None
+        return eqx.tree_at(lambda ride: ride.engine, self, engine).side_by_side()
 
     def range_use(self, point: Mapping[str, Any] | None = None) -> dict[str, list[RangeUse]]:
         """What each damper does at a point beside the range that its law was fitted to; only of laws that have one.

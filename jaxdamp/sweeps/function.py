@@ -49,6 +49,15 @@ class HasSideBySide(Protocol):
 
 
 @runtime_checkable
+class HasPrinted(Protocol):
+    """A function whose loop can be printed as C where that is faster."""
+
+    def printed_side_by_side(self, points: int) -> Callable[[dict[str, Any]], Any] | None:
+        """The form for a sweep of so many points without derivatives, on processors; None if XLA is to compile it."""
+        ...
+
+
+@runtime_checkable
 class HasDomain(Protocol):
     """A function that not all points have."""
 
@@ -57,7 +66,7 @@ class HasDomain(Protocol):
         ...
 
 
-class SweepFunction(HasUnits, HasLanes, HasDerivatives, HasSideBySide, HasDomain, Protocol):
+class SweepFunction(HasUnits, HasLanes, HasDerivatives, HasSideBySide, HasPrinted, HasDomain, Protocol):
     """A function that says all of it, as `jaxdamp.Ride` does."""
 
     def __call__(self, point: Mapping[str, Any]) -> Mapping[str, Any]:

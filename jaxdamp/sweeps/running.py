@@ -3,6 +3,7 @@
 import os
 import re
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, final
 
@@ -14,11 +15,12 @@ from jaxdamp._progress import Progress
 from jaxdamp._types import Scalar
 from jaxdamp.sweeps import processes
 from jaxdamp.sweeps.axes import AbstractPoints, as_points
+from jaxdamp.sweeps.devices import choose_devices
 from jaxdamp.sweeps.file import SweepFile
-from jaxdamp.sweeps.function import HasDomain, HasLanes, HasSideBySide, HasUnits
+from jaxdamp.sweeps.function import HasDomain, HasLanes, HasPrinted, HasSideBySide, HasUnits
 from jaxdamp.sweeps.program import Program, forget_errors, prepare, quiet, with_chunk
 from jaxdamp.sweeps.table import Table, extent
-from jaxdamp.sweeps.tracing import trace
+from jaxdamp.sweeps.tracing import Traced, trace
 
 
 if TYPE_CHECKING:
@@ -69,7 +71,9 @@ def sweep(
         progress: called with the number of points done and of all points; a line in the terminal if it is left out.
 
     Returns:
-        The results by name with the axes as dimensions (for a list, along `point`).
+        The results by name with the axes as dimensions (for a list, along `point`). Of a `Ride`, `attrs["loop"]` says
+        by what its loop was compiled: XLA, or as printed C by gcc where its engine leaves that choice to a long sweep;
+        the numbers are the same to rounding.
 
     Raises:
         ValueError: axes that are no numbers, a function that does not know an axis or returns no named numbers, no
@@ -93,9 +97,10 @@ def sweep(
         kept.resume()
     _leave_out(function, table)
     left = np.flatnonzero(~table.done)
-    lanes = function.lanes if isinstance(function, HasLanes) else None
+    loop = "compiled by XLA"
     if left.size:
-        runner = _Runner(prepare(traced, len(left), chunk, devices, lanes), points)
+        program, loop = _prepared(function, traced, len(left), chunk, devices)
+        runner = _Runner(program, points)
         with Progress("Sweeping") as shown, quiet():
             try:
                 for indices, results in runner.results(left):
@@ -108,7 +113,30 @@ def sweep(
                     kept.save(now=True)
             runner.close()
     table.warn()
-    return table.label()
+    data = table.label()
+    return data.assign_attrs(loop=loop) if isinstance(function, HasPrinted) else data
+
+
+def _prepared(function: Any, traced: Traced, count: int, chunk: int | None, devices: Any) -> tuple[Program, str]:
+    """The compiled program, and by what its loop is compiled: printed as C where the function says that it is faster.
+
+    What cannot be printed or compiled after all is left to XLA.
+    """
+    on_cpu = choose_devices(devices)[0].platform == "cpu" and not processes.several()
+    if traced.mode is None and on_cpu and isinstance(function, HasPrinted):
+        printed = function.printed_side_by_side(count)
+        if printed is not None:
+            try:
+                with warnings.catch_warnings(action="ignore"):  # of axes, which were given before
+                    own = trace(printed, list(traced.axes), False)._replace(fingerprint=traced.fingerprint)
+                return prepare(own, count, chunk, devices, _lanes(printed)), "printed as C, compiled by gcc"
+            except NotImplementedError:
+                pass
+    return prepare(traced, count, chunk, devices, _lanes(function)), "compiled by XLA"
+
+
+def _lanes(function: Any) -> int | None:
+    return function.lanes if isinstance(function, HasLanes) else None
 
 
 def _leave_out(function: Any, table: Table) -> None:

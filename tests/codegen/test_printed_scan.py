@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, roads, sweep, vehicles
-from jaxdamp.codegen import _native, compiler, printed_scan
-from jaxdamp.dampers import Besinger, SeriesSpring
+from jaxdamp.codegen import _cuda, _lanes, _native, _scan, compiler, printed_scan
+from jaxdamp.dampers import Besinger, PowerLaw, SeriesSpring
 from jaxdamp.simulation import Exponential, simulate
 
 
@@ -61,6 +61,68 @@ def test_what_is_not_finite_stays_in_its_lane():
     assert np.isnan(found[7]).all() and np.isfinite(np.delete(found, 7, axis=0)).all()
 
 
+def test_limits_and_numbers_that_are_not_finite():
+    """A limit, or what it limits, that is NaN gives NaN, as in JAX."""
+    limit = jnp.linspace(0.5, 3.0, 40).at[3].set(jnp.nan).at[4].set(jnp.inf)
+    start = jnp.linspace(0.0, 2.0, 40).at[5].set(jnp.nan)
+
+    def run(scan):
+        def of_point(limit, start):
+            return scan(lambda x, row: jnp.maximum(jnp.minimum(x + row[0], limit), -limit + row[1]), start, ROWS)
+
+        return np.asarray(jax.vmap(of_point)(limit, start))
+
+    printed, plain = run(printed_scan), run(by_jax)
+    assert np.isnan(printed[[3, 5]]).all() and np.isfinite(np.delete(printed, [3, 5])).all()
+    np.testing.assert_allclose(printed, plain, rtol=1e-14)
+
+
+def test_a_value_at_the_end_of_a_step_is_that_at_the_beginning_of_the_next(monkeypatch):
+    texts = []
+    monkeypatch.setattr(_scan, "registered", lambda text: (texts.append(text), _native.registered(text))[1])
+
+    def run(scan, rate):
+        def force(v):
+            return jnp.tanh(rate * v) + 0.5 * v - 0.1 * v * rate
+
+        def step(now, row):
+            v, lagged = now
+            after = 0.9 * v - 0.01 * lagged + row[0] - 0.2 * rate * row[1]
+            return after, 0.7 * lagged + 0.1 * force(v) + 0.2 * force(after)
+
+        return scan(step, (jnp.asarray(1.0), jnp.asarray(0.0)), ROWS)
+
+    rates = jnp.linspace(0.5, 3.0, 5)
+    printed, plain = (jax.vmap(lambda rate, scan=scan: run(scan, rate))(rates) for scan in (printed_scan, by_jax))
+    assert "KEPT = 1 " in texts[-1]
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12), printed, plain)
+
+
+def test_the_kernel_compiled_as_c(monkeypatch):
+    """The text that a GPU runs, with a loop in place of threads."""
+    monkeypatch.setattr(_lanes.Loop, "text", property(lambda loop: loop.kernel))
+    stiffness = jnp.linspace(0.5, 3.0, 5)
+    printed, plain = (jax.jit(jax.vmap(oscillator(scan)))(stiffness) for scan in (printed_scan, by_jax))
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12), printed, plain)
+
+
+def test_the_kernel_compiled_as_ptx(monkeypatch):
+    """All of a thread stays in registers, and the function that launches it compiles."""
+    loops = []
+    text = _lanes.Loop.text.fget
+    monkeypatch.setattr(_lanes.Loop, "text", property(lambda loop: (loops.append(loop), text(loop))[1]))
+    jax.vmap(oscillator(printed_scan))(jnp.linspace(0.5, 3.0, 5))
+    kernel = loops[-1].kernel
+    try:
+        found = [_cuda.ptx(kernel, architecture) for architecture in ("compute_80", "compute_90")]
+    except NotImplementedError as error:
+        pytest.skip(str(error))
+    assert all(b".entry steps_of_points" in text and b".local" not in text for text in found)
+    assert _native.registered(_cuda.launcher(kernel, "compute_90"), "CUDA").startswith("jaxdamp_loop_")
+    with pytest.raises(NotImplementedError, match=r"NVRTC does not compile.*error"):
+        _cuda.ptx("nothing", "compute_90")
+
+
 def test_refused_by_name(monkeypatch):
     def run(step, start, rows=ROWS):
         return jax.vmap(lambda x: printed_scan(lambda c, row: step(c, row, x), start, rows))(jnp.arange(3.0))
@@ -85,6 +147,32 @@ def test_a_sweep_of_all_ride_metrics():
     plain, printed = (sweep(Ride(CAR, ROAD, duration=0.4, engine=Exponential(printed=p)), over) for p in (False, True))
     for name in plain.data_vars:
         np.testing.assert_allclose(printed[name], plain[name], rtol=1e-11, atol=1e-14, err_msg=str(name))
+
+
+def test_a_long_sweep_prints_where_that_is_faster(monkeypatch):
+    """With the numbers of XLA, which takes over where derivatives, functions or a missing compiler stand in the way."""
+    choosing = Exponential(printed=None)
+    ride = Ride(CAR, ROAD, metrics=["rms_sprung_acceleration"], duration=0.4, engine=choosing)
+
+    def swept(function=ride, **options):
+        return sweep(function, {RATE: np.linspace(2e3, 5e3, 4)}, **options)
+
+    plain = swept()
+    monkeypatch.setattr("jaxdamp.simulation.ride.LONG_SWEEP", 0)
+    if _native.compiles_for_x86():
+        printed = swept()
+        assert printed.attrs["loop"].startswith("printed as C")
+        metric = "rms_sprung_acceleration"
+        np.testing.assert_allclose(printed[metric], plain[metric], rtol=1e-12)
+    powers = vehicles.presets.quarter_car_000(PowerLaw(1800.0, 0.55, 900.0, 0.55))
+    others = [
+        plain,
+        swept(gradients=True),
+        sweep(Ride(powers, ROAD, duration=0.4, engine=choosing), {"sprung_mass": [250.0, 300.0]}),
+    ]
+    monkeypatch.setattr(_native, "compiler", lambda: None)
+    others += [swept()]
+    assert [data.attrs["loop"] for data in others] == ["compiled by XLA"] * 4
 
 
 def test_runs_that_cannot_be_printed():

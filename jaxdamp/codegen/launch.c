@@ -1,0 +1,93 @@
+/* Launches a kernel on the stream of XLA through the driver of CUDA, which is loaded when it is first needed. */
+#include <dlfcn.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#include "xla/ffi/api/c_api.h"
+
+#define THREADS 128 /* of a block */
+#define DEVICES 64
+
+static const char ptx[] = {@ptx@, 0};
+
+typedef int (*Load)(void **, const void *);
+typedef int (*Find)(void **, void *, const char *);
+typedef int (*Launch)(void *, unsigned, unsigned, unsigned, unsigned, unsigned, unsigned, unsigned, void *, void **,
+                      void **);
+typedef int (*ContextOf)(void *, void **);
+typedef int (*Push)(void *);
+typedef int (*Pop)(void **);
+
+static XLA_FFI_Error *failed(XLA_FFI_CallFrame *frame, const char *what, int code)
+{
+    char text[200];
+    snprintf(text, sizeof text, "The printed kernel did not run: %s of the CUDA driver failed with code %d.", what, code);
+    XLA_FFI_Error_Create_Args error = {XLA_FFI_Error_Create_Args_STRUCT_SIZE, 0, text, XLA_FFI_Error_Code_INTERNAL};
+    return frame->api->XLA_FFI_Error_Create(&error);
+}
+
+/* The kernel in a context, loaded once for each; two threads that come at once may load it twice, which does no harm. */
+static int function_in(void *context, void *driver, void **function)
+{
+    static struct {
+        void *context, *function;
+    } known[DEVICES];
+    void *module;
+    for (int i = 0; i < DEVICES && known[i].context; i++)
+        if (known[i].context == context) {
+            *function = known[i].function;
+            return 0;
+        }
+    int code = ((Load)dlsym(driver, "cuModuleLoadData"))(&module, ptx);
+    if (!code)
+        code = ((Find)dlsym(driver, "cuModuleGetFunction"))(function, module, "steps_of_points");
+    for (int i = 0; !code && i < DEVICES; i++)
+        if (!known[i].context) {
+            known[i].function = *function;
+            known[i].context = context;
+            break;
+        }
+    return code;
+}
+
+static void *data(void *buffer)
+{
+    return ((XLA_FFI_Buffer *)buffer)->data;
+}
+
+XLA_FFI_Error *loop(XLA_FFI_CallFrame *frame)
+{
+    XLA_FFI_Metadata_Extension *asked = (XLA_FFI_Metadata_Extension *)frame->extension_start;
+    if (asked && asked->extension_base.type == XLA_FFI_Extension_Metadata) {
+        XLA_FFI_Metadata *about = asked->metadata;
+        about->api_version.major_version = XLA_FFI_API_MAJOR;
+        about->api_version.minor_version = XLA_FFI_API_MINOR;
+        return 0;
+    }
+    void *driver = dlopen("libcuda.so.1", RTLD_NOW), *context, *function, *before;
+    if (!driver)
+        return failed(frame, "the loading of libcuda.so.1", 0);
+    XLA_FFI_Stream_Get_Args stream = {XLA_FFI_Stream_Get_Args_STRUCT_SIZE, 0, frame->ctx, 0};
+    XLA_FFI_Error *error = frame->api->XLA_FFI_Stream_Get(&stream);
+    if (error)
+        return error;
+    void **in = frame->args.args, **out = frame->rets.rets;
+    int64_t steps = ((XLA_FFI_Buffer *)in[4])->dims[0], points = ((XLA_FFI_Buffer *)in[3])->dims[1];
+    void *a[] = {data(in[0]), data(in[1]), data(in[2]), data(in[3]), data(in[4]), data(out[0]), data(out[1])};
+    void *arguments[] = {&a[0], &a[1], &a[2], &a[3], &a[4], &steps, &points, &a[5], &a[6]};
+    int code = ((ContextOf)dlsym(driver, "cuStreamGetCtx"))(stream.stream, &context);
+    if (code)
+        return failed(frame, "cuStreamGetCtx", code);
+    code = ((Push)dlsym(driver, "cuCtxPushCurrent_v2"))(context);
+    if (code)
+        return failed(frame, "cuCtxPushCurrent", code);
+    code = function_in(context, driver, &function);
+    const char *what = "the loading of the kernel";
+    if (!code) {
+        what = "cuLaunchKernel";
+        code = ((Launch)dlsym(driver, "cuLaunchKernel"))(function, (unsigned)((points + THREADS - 1) / THREADS), 1, 1,
+                                                         THREADS, 1, 1, 0, stream.stream, arguments, 0);
+    }
+    ((Pop)dlsym(driver, "cuCtxPopCurrent_v2"))(&before);
+    return code ? failed(frame, what, code) : 0;
+}
