@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 
 from jaxdamp.codegen._jaxprs import Equation, Inner, scan_sizes
-from jaxdamp.codegen._program import Assign, Atom, Atoms, Branch, Constant, Leave, Loop, Writer, constant
+from jaxdamp.codegen._program import COUNTER, Assign, Atom, Atoms, Branch, Constant, Leave, Loop, Writer, constant
 
 
 Evaluate = Callable[[Writer, Inner, list[Atoms]], list[Atoms]]
 ControlRule = Callable[[Writer, Equation, list[Atoms], Evaluate], list[Atoms]]
-COUNTER = "int32"
 
 
 def _call(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: Evaluate) -> list[Atoms]:
@@ -68,18 +67,14 @@ def _scan(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: E
     now = _declared(writer, equation, operands[first:second])
     each_step = list(zip(equation.shapes, equation.dtypes, strict=True))[carried:]
     saved = [_arrays(writer, shape[1:], dtype, length) for shape, dtype in each_step]
-    count = writer.declare(COUNTER, constant(0, COUNTER))
-    with writer.block() as body:
-        writer.put(Leave(writer.define("lt", (count, constant(length, COUNTER)), "bool")))
+    with writer.counted(length) as count:
         place = writer.define("sub", (constant(length - 1, COUNTER), count), COUNTER) if p["reverse"] else count
         here = [_entries(writer, tables, place) for tables in rows]
         after = evaluate(writer, p["jaxpr"], [*operands[:first], *now, *here])
         for arrays, values in zip(saved, after[carried:], strict=True):
             for array, value in zip(arrays.ravel(), values.ravel(), strict=True):
                 writer.put(Assign(array, value, place))
-        following = writer.define("add", (count, constant(1, COUNTER)), COUNTER)
-        _assign(writer, [*now, np.array(count)], [*after[:carried], np.array(following)])
-    writer.put(Loop(body))
+        _assign(writer, now, after[:carried])
     return [*now, *(_read(writer, arrays, length) for arrays in saved)]
 
 
