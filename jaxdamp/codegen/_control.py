@@ -63,6 +63,8 @@ def _scan(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: E
     p = equation.parameters
     length, (first, carried) = p["length"], scan_sizes(equation, operands)
     second = first + carried
+    if length <= p["unroll"]:
+        return _written_out(writer, equation, operands, (first, second), evaluate)
     rows = [_tables(writer, array, length) for array in operands[second:]]
     now = _declared(writer, equation, operands[first:second])
     each_step = list(zip(equation.shapes, equation.dtypes, strict=True))[carried:]
@@ -76,6 +78,23 @@ def _scan(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: E
                 writer.put(Assign(array, value, place))
         _assign(writer, now, after[:carried])
     return [*now, *(_read(writer, arrays, length) for arrays in saved)]
+
+
+def _written_out(
+    writer: Writer, equation: Equation, operands: list[Atoms], ends: tuple[int, int], evaluate: Evaluate
+) -> list[Atoms]:
+    """A scan that asks to be written out: the steps one after the other, on numbers that do not change."""
+    p, (first, second) = equation.parameters, ends
+    places = range(p["length"])[::-1] if p["reverse"] else range(p["length"])
+    now, carried = operands[first:second], second - first
+    saved = [np.empty(shape, object) for shape in equation.shapes[carried:]]
+    for place in places:
+        rows = [np.asarray(array[place], object) for array in operands[second:]]
+        after = evaluate(writer, p["jaxpr"], [*operands[:first], *now, *rows])
+        now = after[:carried]
+        for array, values in zip(saved, after[carried:], strict=True):
+            array[place] = values[()]
+    return [*now, *saved]
 
 
 def _read(writer: Writer, arrays: Atoms, length: int) -> Atoms:

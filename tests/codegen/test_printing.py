@@ -31,6 +31,13 @@ def series(x):
     return total, saved, lax.scan(lambda c, a: (0.5 * c + a, c), x[1], x, reverse=True)
 
 
+def written_out(x):
+    """Scans that ask to be written out."""
+    step = lambda c, row: (c + row[0] * row[1], c - row[1])  # noqa: E731
+    back = lax.scan(step, x[0], (x, jnp.outer(x, x)[0]), reverse=True, unroll=3)
+    return jnp.polyval(x, x[1]), lax.scan(lambda c, a: (c * a, None), x, x, unroll=True)[0], back
+
+
 def swapped(x):
     """Carried values that change places."""
     return lax.fori_loop(0, 5, lambda k, c: (c[1], c[0] + c[1]), (x[0], x[1]))
@@ -124,7 +131,7 @@ IN_DOUBLE = [root, slopes, known, solved]
 FUNCTIONS = {
     f.__name__: f
     for f in [
-        *(series, swapped, branch, entry, replaced, places, matrix, products, padded, reduced, limits),
+        *(series, written_out, swapped, branch, entry, replaced, places, matrix, products, padded, reduced, limits),
         *(rounded, powers, functions, whole, chosen, *IN_DOUBLE),
     ]
 }
