@@ -21,7 +21,12 @@ class Variable:
 
 @dataclass(frozen=True)
 class Constant:
-    """A number, held as Python writes it: 0.0 and −0.0 differ."""
+    """A number, held as Python writes it: 0.0 and −0.0 differ.
+
+    Attributes:
+        text: the number.
+        dtype: its type.
+    """
 
     text: str
     dtype: str

@@ -8,6 +8,7 @@ from jaxdamp.cli.exporting import PROGRAMS, TABLES
 from jaxdamp.dampers import Bilinear, FittedRange, with_fitted_range
 from jaxdamp.export import to_csv, to_json
 from jaxdamp.roads import sine
+from jaxdamp.vehicles.presets import quarter_car_000
 
 from .invoking import jaxdamp, refused
 
@@ -27,6 +28,16 @@ def test_every_format(law: Path, to: str) -> None:
     ending = (PROGRAMS | TABLES)[to][0]
     text = jaxdamp("export", law, "--to", to).output
     assert f"front_law{ending}" in text and (law.parent / f"front_law{ending}").stat().st_size > 100
+
+
+def test_a_vehicle(law: Path) -> None:
+    folder = law.parent
+    to_json(quarter_car_000(LAW), folder / "car.json")
+    assert "car_test.c" in jaxdamp("export", folder / "car.json", "--to", "c").output
+    assert "car_step(" in (folder / "car.h").read_text()
+    assert "must hold a damper law" in refused(folder, "export", folder / "car.json", "--to", "adams")
+    to_json(sine(amplitude=0.01, frequency=1.0), folder / "road.json")
+    assert "hold a damper law or a vehicle" in refused(folder, "export", folder / "road.json", "--to", "fmu")
 
 
 def test_velocities(law: Path) -> None:

@@ -13,7 +13,7 @@ from jaxdamp.dampers import Besinger, BoucWen, GasSpring, Lag, SeriesSpring
 from jaxdamp.export import to_c, to_fmu
 from jaxdamp.parameters import replace
 from jaxdamp.roads import from_profile
-from jaxdamp.vehicles import presets
+from jaxdamp.vehicles import RollCar, presets
 from tests.export.compiled import STRICT, compiler
 
 
@@ -22,7 +22,7 @@ VALVE = Besinger(900.0, 2800.0, 700.0, 0.25, 0.05)
 CARS = {
     "quarter": lambda: presets.quarter_car_000(Lag(VALVE, 0.004) + GasSpring(2e6, 6e-5, 1e-4, 1.3), tyre_lifts=True),
     "half": lambda: presets.half_car_002(BoucWen(800.0, 2000.0, 300.0, 1e-3, 0.75, 1.5)),
-    "full": lambda: presets.full_car_jazar(SeriesSpring(VALVE, 4e5, 1e8)),
+    "roll": lambda: RollCar(420.0, 820.0, presets.full_car_jazar(SeriesSpring(VALVE, 4e5, 1e8)).front),
     "truck": lambda: presets.truck_001(),
     "tracked": lambda: presets.m113_003(VALVE),
 }
