@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks, export
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.vehicle_words import read_law
+from jaxdamp.cli.vehicle_words import read_law, read_module
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -38,7 +38,8 @@ def run_export(
     if to in PROGRAMS:
         if velocities is not None:
             _checks.refuse("velocities", f"be left out for {to}", velocities, "It has the law itself, not a table.")
-        written = write(read_model(law), file)
+        kinds, remedy = (AbstractDamper, AbstractVehicle), "Give the JSON of a law or of a vehicle."
+        written = write(read_module("law", law, kinds, "a law or a vehicle", remedy), file)
     else:
         damper = read_law("law", law)
         grid = _grid(damper, velocities)
@@ -46,14 +47,6 @@ def run_export(
         written = write(damper, file, grid)
     files: Sequence[Path] = written if isinstance(written, list) else [written]
     screen.points([f"written: {each}" for each in files])
-
-
-def read_model(path: Path) -> AbstractDamper | AbstractVehicle:
-    """The law or the vehicle of a file."""
-    model = export.from_json(path)
-    must, remedy = "hold a damper law or a vehicle", "Give the JSON of a law or of a vehicle."
-    _checks.instance("law", model, (AbstractDamper, AbstractVehicle), must, remedy)
-    return model
 
 
 def new_file(file: Path, replace: bool) -> Path:

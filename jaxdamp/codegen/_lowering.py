@@ -94,7 +94,7 @@ def lower(function: Callable[..., Any], *arguments: Any, finite: bool = False) -
 def _atoms(leaf: Symbols) -> Atoms:
     result = np.empty(leaf.names.shape, object)
     for index in np.ndindex(*leaf.names.shape):
-        name = leaf.names[index]
+        name: Any = leaf.names[index]
         result[index] = name if isinstance(name, Constant) else Variable(name, leaf.dtype)
     return result
 

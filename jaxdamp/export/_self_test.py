@@ -64,7 +64,7 @@ def sample_heights(program: VehicleProgram) -> np.ndarray:
     """Heights under the wheels [m], shape (instants, wheels), which begin at zero and differ from wheel to wheel."""
     phase = np.arange(program.wheels) * 0.4
     angle = 2.0 * np.pi * np.arange(_INSTANTS)[:, None] * _STEP
-    return _HIGHEST * sum(np.sin(f * angle + phase) - np.sin(phase) for f in _FREQUENCIES)
+    return _HIGHEST * np.sum([np.sin(f * angle + phase) - np.sin(phase) for f in _FREQUENCIES], axis=0)
 
 
 def vehicle_test(program: VehicleProgram, name: str) -> str:

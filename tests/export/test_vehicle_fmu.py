@@ -143,8 +143,14 @@ def test_fmu(files, tmp_path, name):
     assert len(shown(name)) > 3
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("rates", [True, False])
+@pytest.mark.parametrize(
+    ("name", "rates"),
+    [
+        *(("quarter", True), ("quarter", False)),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in (("roll", True), ("roll", False), ("tracked", True))),
+        pytest.param("truck", False, marks=pytest.mark.slow),
+    ],
+)
 def test_co_simulation_in_the_master_of_fmpy(files, name, rates):
     """Right after a step inputs and outputs are extrapolated: the error falls with the square of the step."""
     errors = []
@@ -185,7 +191,7 @@ def integrated(unit, name, channels):
     return dict(zip(channels, np.array(rows).T, strict=True))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [name for name in NAMES if getattr(name, "values", None) != ("half",)])
 def test_model_exchange(files, tmp_path, name):
     """`simulate` converges to the states that a solver integrates, with the order of its step.
 
