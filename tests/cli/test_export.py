@@ -35,9 +35,9 @@ def test_a_vehicle(law: Path) -> None:
     to_json(quarter_car_000(LAW), folder / "car.json")
     assert "car_test.c" in jaxdamp("export", folder / "car.json", "--to", "c").output
     assert "car_step(" in (folder / "car.h").read_text()
-    assert "must hold a damper law" in refused(folder, "export", folder / "car.json", "--to", "adams")
+    assert "LAW must be a law as JSON" in refused(folder, "export", folder / "car.json", "--to", "adams")
     to_json(sine(amplitude=0.01, frequency=1.0), folder / "road.json")
-    assert "hold a damper law or a vehicle" in refused(folder, "export", folder / "road.json", "--to", "fmu")
+    assert "be a law or a vehicle as JSON" in refused(folder, "export", folder / "road.json", "--to", "fmu")
 
 
 def test_velocities(law: Path) -> None:
@@ -57,7 +57,7 @@ def test_refusals(law: Path) -> None:
     assert "--velocities must be FROM:TO:POINTS" in refused(folder, "export", law, "--to", "csv", "--velocities", "1")
     assert "be left out for fmu" in refused(folder, "export", law, "--to", "fmu", "--velocities", "-1:1:3")
     to_json(sine(amplitude=0.01, frequency=1.0), folder / "road.json")
-    assert "The law file must hold a damper law" in refused(folder, "export", folder / "road.json", "--to", "csv")
+    assert "LAW must be a law as JSON" in refused(folder, "export", folder / "road.json", "--to", "csv")
     jaxdamp("export", law, "--to", "csv")
     assert "Option --out must be a new file" in refused(folder, "export", law, "--to", "csv")
     jaxdamp("export", law, "--to", "csv", "--replace")
