@@ -1,4 +1,4 @@
-"""`jaxdamp export`: a law file in, C, an FMU or the table of a simulator out."""
+"""`jaxdamp export`: the file of a law or a vehicle in, C, an FMU or the table of a simulator out."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -8,8 +8,9 @@ import numpy as np
 
 from jaxdamp import _checks, export
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.vehicle_words import read_law
+from jaxdamp.cli.vehicle_words import read_law, read_module
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.vehicles import AbstractVehicle
 
 
 PROGRAMS: dict[str, tuple[str, Callable[..., Any]]] = {"c": (".c", export.to_c), "fmu": (".fmu", export.to_fmu)}
@@ -26,20 +27,21 @@ _USUAL, _POINTS = (-1.0, 1.0), 41  # m/s
 def run_export(
     screen: Screen, law: Path, to: str, *, out: Path | None, velocities: str | None, replace: bool = False
 ) -> None:
-    """Write a law in another format.
+    """Write a law, or a vehicle as a program, in another format.
 
     Raises:
         ValueError: what the library refuses; a file that exists, unless it is to be replaced.
     """
     _checks.one_of("to", to, sorted(PROGRAMS | TABLES))
     ending, write = (PROGRAMS | TABLES)[to]
-    damper = read_law("law", law)
     file = new_file(Path(law.stem.replace("-", "_") + ending) if out is None else out, replace)
     if to in PROGRAMS:
         if velocities is not None:
             _checks.refuse("velocities", f"be left out for {to}", velocities, "It has the law itself, not a table.")
-        written = write(damper, file)
+        kinds, remedy = (AbstractDamper, AbstractVehicle), "Give the JSON of a law or of a vehicle."
+        written = write(read_module("law", law, kinds, "a law or a vehicle", remedy), file)
     else:
+        damper = read_law("law", law)
         grid = _grid(damper, velocities)
         screen.say(f"Velocities: {grid.size} from {grid[0]:g} to {grid[-1]:g} m/s, positive in rebound.")
         written = write(damper, file, grid)

@@ -18,7 +18,9 @@ from jaxdamp.cli.record_options import ProcessOptions, ReadOptions, spread
 
 @app.command()
 def export(
-    law: Annotated[Path, typer.Argument(help="A law as JSON, such as best_law.json of jaxdamp fit.")],
+    law: Annotated[
+        Path, typer.Argument(help="A law as JSON, such as best_law.json of jaxdamp fit; or a vehicle, for c and fmu.")
+    ],
     to: Annotated[str, typer.Option(help="adams, assetto-corsa, c, carsim, csv, fmu or matlab.")],
     out: Annotated[Path | None, typer.Option(help="File to write; the name of the law with another ending.")] = None,
     velocities: Annotated[
@@ -27,7 +29,7 @@ def export(
     replace: Replace = False,
     debug: Debug = False,
 ) -> None:
-    """Write a law as C, as FMU or as the table of a simulator."""
+    """Write a law as C, as FMU or as the table of a simulator; or a whole vehicle as C or FMU."""
     from jaxdamp.cli import console, exporting
 
     with console.plain_errors(debug):

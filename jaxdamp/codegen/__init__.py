@@ -15,12 +15,14 @@ functions are those of the language's own library. A primitive that cannot be pr
 from jaxdamp.codegen._languages import AbstractLanguage, C, JavaScript, PrintedFunction
 from jaxdamp.codegen._lowering import Program, Symbols, lower, symbols
 from jaxdamp.codegen._native import compiler, compiles_for_x86
+from jaxdamp.codegen._program import Constant
 from jaxdamp.codegen._scan import printed_scan
 
 
 __all__ = [
     "AbstractLanguage",
     "C",
+    "Constant",
     "JavaScript",
     "PrintedFunction",
     "Program",

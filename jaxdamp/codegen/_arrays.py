@@ -8,7 +8,10 @@ import numpy as np
 
 from jaxdamp.codegen._elementwise import Rule
 from jaxdamp.codegen._jaxprs import Equation
-from jaxdamp.codegen._program import Atom, Atoms, Constant, Writer, constant
+from jaxdamp.codegen._program import COUNTER, Assign, Atom, Atoms, Constant, Writer, constant
+
+
+MOST_WRITTEN_OUT = 256  # products of two matrices; more are computed in loops, since compilers are slow on long texts
 
 
 def constants(value: np.ndarray) -> Atoms:
@@ -121,23 +124,52 @@ def _cumulative_sum(writer: Writer, equation: Equation, operands: list[Atoms]) -
 
 
 def _dot(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
-    (left_axes, right_axes), (batch, _) = equation.parameters["dimension_numbers"]
-    if batch:
-        raise NotImplementedError("The primitive 'dot_general' with batch dimensions cannot be printed.")
-    rows = _contracted_last(operands[0], left_axes)
-    columns = _contracted_last(operands[1], right_axes)
+    """The sums of products, written one by one, or as loops where they are many; batches one after the other."""
+    (left_axes, right_axes), (left_batch, right_batch) = equation.parameters["dimension_numbers"]
+    rows = _contracted_last(operands[0], left_batch, left_axes)
+    columns = _contracted_last(operands[1], right_batch, right_axes)
+    product = _looped_product if rows[0].size * columns.shape[1] > MOST_WRITTEN_OUT else _written_product
+    result = [product(writer, one, other, equation.dtype) for one, other in zip(rows, columns, strict=True)]
+    return [np.stack(result).reshape(equation.shape)]
+
+
+def _contracted_last(array: Atoms, batch: tuple[int, ...], axes: tuple[int, ...]) -> Atoms:
+    """As one matrix for each entry of a batch, whose columns are the contracted numbers."""
+    free = [axis for axis in range(array.ndim) if axis not in axes and axis not in batch]
+    counts = [int(np.prod([array.shape[axis] for axis in some])) for some in (batch, free, axes)]
+    return array.transpose(*batch, *free, *axes).reshape(counts)
+
+
+def _written_product(writer: Writer, rows: Atoms, columns: Atoms, dtype: str) -> Atoms:
     result = np.empty((len(rows), len(columns)), object)
     for i, k in np.ndindex(*result.shape):
-        products = [writer.define("mul", pair, equation.dtype) for pair in zip(rows[i], columns[k], strict=True)]
-        result[i, k] = _combined(writer, "add", products, equation.dtype, 0)
-    return [result.reshape(equation.shape)]
+        products = [writer.define("mul", pair, dtype) for pair in zip(rows[i], columns[k], strict=True)]
+        result[i, k] = _combined(writer, "add", products, dtype, 0)
+    return result
 
 
-def _contracted_last(array: Atoms, axes: tuple[int, ...]) -> Atoms:
-    """As a matrix whose columns are the contracted numbers."""
-    free = [axis for axis in range(array.ndim) if axis not in axes]
-    rows = int(np.prod([array.shape[axis] for axis in free]))
-    return array.transpose(*free, *axes).reshape(rows, int(np.prod([array.shape[axis] for axis in axes])))
+def _looped_product(writer: Writer, rows: Atoms, columns: Atoms, dtype: str) -> Atoms:
+    (height, length), width = rows.shape, len(columns)
+    left, right = writer.table(rows.ravel(), dtype), writer.table(columns.ravel(), dtype)
+    products = writer.declare(dtype, size=height * width)
+
+    def place(row: Atom, size: int, column: Atom) -> Atom:
+        return writer.define("add", (writer.define("mul", (row, constant(size, COUNTER)), COUNTER), column), COUNTER)
+
+    with writer.counted(height) as i, writer.counted(width) as k:
+        total = writer.declare(dtype, constant(0, dtype))
+        with writer.counted(length) as j:
+            entries = (
+                writer.define("look_up", (left, place(i, length, j)), dtype),
+                writer.define("look_up", (right, place(k, length, j)), dtype),
+            )
+            product = writer.define("mul", entries, dtype)
+            writer.assign([(total, writer.define("add", (total, product), dtype))])
+        writer.put(Assign(products, total, place(i, width, k)))
+    result = np.empty((height, width), object)
+    for number, index in enumerate(np.ndindex(*result.shape)):
+        result[index] = writer.define("look_up", (products, constant(number, COUNTER)), dtype)
+    return result
 
 
 def _split(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:

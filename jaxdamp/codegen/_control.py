@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 
 from jaxdamp.codegen._jaxprs import Equation, Inner, scan_sizes
-from jaxdamp.codegen._program import Assign, Atom, Atoms, Branch, Constant, Leave, Loop, Writer, constant
+from jaxdamp.codegen._program import COUNTER, Assign, Atom, Atoms, Branch, Constant, Leave, Loop, Writer, constant
 
 
 Evaluate = Callable[[Writer, Inner, list[Atoms]], list[Atoms]]
 ControlRule = Callable[[Writer, Equation, list[Atoms], Evaluate], list[Atoms]]
-COUNTER = "int32"
 
 
 def _call(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: Evaluate) -> list[Atoms]:
@@ -64,23 +63,38 @@ def _scan(writer: Writer, equation: Equation, operands: list[Atoms], evaluate: E
     p = equation.parameters
     length, (first, carried) = p["length"], scan_sizes(equation, operands)
     second = first + carried
+    if length <= p["unroll"]:
+        return _written_out(writer, equation, operands, (first, second), evaluate)
     rows = [_tables(writer, array, length) for array in operands[second:]]
     now = _declared(writer, equation, operands[first:second])
     each_step = list(zip(equation.shapes, equation.dtypes, strict=True))[carried:]
     saved = [_arrays(writer, shape[1:], dtype, length) for shape, dtype in each_step]
-    count = writer.declare(COUNTER, constant(0, COUNTER))
-    with writer.block() as body:
-        writer.put(Leave(writer.define("lt", (count, constant(length, COUNTER)), "bool")))
+    with writer.counted(length) as count:
         place = writer.define("sub", (constant(length - 1, COUNTER), count), COUNTER) if p["reverse"] else count
         here = [_entries(writer, tables, place) for tables in rows]
         after = evaluate(writer, p["jaxpr"], [*operands[:first], *now, *here])
         for arrays, values in zip(saved, after[carried:], strict=True):
             for array, value in zip(arrays.ravel(), values.ravel(), strict=True):
                 writer.put(Assign(array, value, place))
-        following = writer.define("add", (count, constant(1, COUNTER)), COUNTER)
-        _assign(writer, [*now, np.array(count)], [*after[:carried], np.array(following)])
-    writer.put(Loop(body))
+        _assign(writer, now, after[:carried])
     return [*now, *(_read(writer, arrays, length) for arrays in saved)]
+
+
+def _written_out(
+    writer: Writer, equation: Equation, operands: list[Atoms], ends: tuple[int, int], evaluate: Evaluate
+) -> list[Atoms]:
+    """A scan that asks to be written out: the steps one after the other, on numbers that do not change."""
+    p, (first, second) = equation.parameters, ends
+    places = range(p["length"])[::-1] if p["reverse"] else range(p["length"])
+    now, carried = operands[first:second], second - first
+    saved = [np.empty(shape, object) for shape in equation.shapes[carried:]]
+    for place in places:
+        rows = [np.asarray(array[place], object) for array in operands[second:]]
+        after = evaluate(writer, p["jaxpr"], [*operands[:first], *now, *rows])
+        now = after[:carried]
+        for array, values in zip(saved, after[carried:], strict=True):
+            array[place] = values[()]
+    return [*now, *saved]
 
 
 def _read(writer: Writer, arrays: Atoms, length: int) -> Atoms:

@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxdamp.codegen import _arrays, _control, _elementwise, _indexing
 from jaxdamp.codegen._jaxprs import Inner, equations, literal, opened, traced
-from jaxdamp.codegen._program import Atoms, Statement, Variable, Writer, pruned
+from jaxdamp.codegen._program import Atoms, Constant, Statement, Variable, Writer, pruned
 from jaxdamp.configuration import Target, compiling_for
 
 
@@ -28,7 +28,7 @@ class Symbols:
     """An input of a printed function: the text of each of its numbers.
 
     Attributes:
-        names: an array of texts such as `"p->rate"`, of the shape of the input.
+        names: an array of texts such as `"p->rate"`, of the shape of the input; a `Constant` where a number is known.
         dtype: the type of the numbers.
     """
 
@@ -63,12 +63,14 @@ class Program:
     results: Any
 
 
-def lower(function: Callable[..., Any], *arguments: Any) -> Program:
+def lower(function: Callable[..., Any], *arguments: Any, finite: bool = False) -> Program:
     """Translate a function of trees of arrays into scalar statements.
 
     Arguments:
         function: any function that JAX can trace, of arrays whose sizes are known.
         arguments: trees with `Symbols` in place of arrays.
+        finite: take all numbers for finite: products with zero and sums with zero are then not written, which makes
+            texts with large sparse matrices short.
 
     Raises:
         NotImplementedError: a primitive that cannot be printed; the message names it.
@@ -81,7 +83,7 @@ def lower(function: Callable[..., Any], *arguments: Any) -> Program:
         structure.append(shape)
         return results
 
-    writer = Writer()
+    writer = Writer(finite)
     with printing(), jax.enable_x64(any(leaf.dtype.endswith("64") for leaf in inputs)):
         jaxpr = traced(flat, [(leaf.names.shape, leaf.dtype) for leaf in inputs])
         results = evaluated(writer, jaxpr, [_atoms(leaf) for leaf in inputs])
@@ -92,7 +94,8 @@ def lower(function: Callable[..., Any], *arguments: Any) -> Program:
 def _atoms(leaf: Symbols) -> Atoms:
     result = np.empty(leaf.names.shape, object)
     for index in np.ndindex(*leaf.names.shape):
-        result[index] = Variable(str(leaf.names[index]), leaf.dtype)
+        name: Any = leaf.names[index]
+        result[index] = name if isinstance(name, Constant) else Variable(name, leaf.dtype)
     return result
 
 

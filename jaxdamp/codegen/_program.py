@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from jaxdamp.codegen._folding import folded
+from jaxdamp.codegen._folding import folded, simplified
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,12 @@ class Variable:
 
 @dataclass(frozen=True)
 class Constant:
-    """A number, held as Python writes it: 0.0 and −0.0 differ."""
+    """A number, held as Python writes it: 0.0 and −0.0 differ.
+
+    Attributes:
+        text: the number.
+        dtype: its type.
+    """
 
     text: str
     dtype: str
@@ -29,6 +34,7 @@ class Constant:
 
 Atom: TypeAlias = Variable | Constant
 Atoms: TypeAlias = npt.NDArray[np.object_]  # an array of JAX: one atom for each number
+COUNTER = "int32"  # the type of what counts the rounds of a loop
 
 
 def constant(value: Any, dtype: str) -> Constant:
@@ -99,8 +105,14 @@ Statement: TypeAlias = Define | Declare | Table | Assign | Leave | Loop | Branch
 
 @dataclass
 class Writer:
-    """Collects statements; an operation with the same operands is computed once in a block."""
+    """Collects statements; an operation with the same operands is computed once in a block.
 
+    Attributes:
+        statements: of the present block.
+        finite: whether all numbers are finite, so that a product with zero is zero.
+    """
+
+    finite: bool = False
     statements: list[Statement] = field(default_factory=list)
     _known: list[dict[tuple, Variable]] = field(default_factory=lambda: [{}])
     _count: int = 0
@@ -121,6 +133,11 @@ class Writer:
             value = folded(operation, known_numbers, dtype)
             if value is not None:
                 return constant(value, dtype)
+        if self.finite and len(operands) == 2:
+            texts = [operand.text if isinstance(operand, Constant) else operand.name for operand in operands]
+            place = simplified(operation, texts)
+            if place is not None:
+                return operands[place]
         key = operation, operands, dtype
         for known in reversed(self._known):
             if key in known:
@@ -164,6 +181,16 @@ class Writer:
         self._known.pop()
         self.statements = outer
 
+    @contextmanager
+    def counted(self, length: int) -> Iterator[Variable]:
+        """Statements written inside are repeated so many times; gives the number of the round, from zero."""
+        count = self.declare(COUNTER, constant(0, COUNTER))
+        with self.block() as body:
+            self.put(Leave(self.define("lt", (count, constant(length, COUNTER)), "bool")))
+            yield count
+            self.assign([(count, self.define("add", (count, constant(1, COUNTER)), COUNTER))])
+        self.put(Loop(body))
+
 
 def _number(atom: Constant) -> Any:
     kind = np.dtype(atom.dtype).type
@@ -184,6 +211,8 @@ def pruned(statements: list[Statement], needed: set[str]) -> list[Statement]:
 
 def _pruned_statement(statement: Statement, needed: set[str]) -> Statement | None:
     if isinstance(statement, Loop):
+        if not needed & _assigned(statement.body):
+            return None
         while True:  # what an earlier statement of the body uses may come from a later one, a round before
             before = len(needed)
             body = pruned(statement.body, needed)
@@ -196,6 +225,19 @@ def _pruned_statement(statement: Statement, needed: set[str]) -> Statement | Non
         return None
     needed |= names(operands_of(statement))
     return statement
+
+
+def _assigned(statements: list[Statement]) -> set[str]:
+    """The names of the variables that are assigned."""
+    assigned: set[str] = set()
+    for statement in statements:
+        if isinstance(statement, Loop):
+            assigned |= _assigned(statement.body)
+        elif isinstance(statement, Branch):
+            assigned = assigned.union(*map(_assigned, statement.bodies))
+        elif isinstance(statement, Assign):
+            assigned.add(statement.target.name)
+    return assigned
 
 
 def operands_of(statement: Define | Declare | Table | Assign | Leave) -> list[Atom | None]:

@@ -7,7 +7,7 @@ import jax
 
 from jaxdamp.codegen import JavaScript, PrintedFunction, Program, lower, symbols
 from jaxdamp.export._law_program import LawProgram
-from jaxdamp.export._vehicle_program import VehicleProgram
+from jaxdamp.export._ride_program import RideProgram
 from jaxdamp.roads import cosine_bump
 
 
@@ -24,16 +24,15 @@ def law_functions(law: LawProgram) -> dict[str, str]:
     }
 
 
-def vehicle_functions(vehicle: VehicleProgram) -> dict[str, str]:
-    """The functions of `VehicleProgram`, by names; results go into the arrays m, c and y."""
-    prepare = _filled("prepare(p, q, dt, m)", vehicle.prepare, "m")
-    start = _filled("start(m, h, r, c)", vehicle.start, "c")
+def vehicle_functions(vehicle: RideProgram) -> dict[str, str]:
+    """The functions of `RideProgram`, by names; results go into the arrays m, c, g and y."""
     return {
-        "prepare": prepare,
-        "start": start,
+        "prepare": _filled("prepare(p, q, dt, m)", vehicle.prepare, "m"),
+        "start": _filled("start(m, h, r, c)", vehicle.start, "c"),
+        "begin": _filled("begin(m, c, h, r, g)", vehicle.begin, "g"),
         "step": _filled("step(m, c, h0, r0, h1, r1)", vehicle.step, "c"),
-        "observe": _filled("observe(m, c, h, r)", vehicle.observe, "c", vehicle.first_channel),
-        "end": _filled("end(m, c, y)", vehicle.end, "y"),
+        "observe": _filled("observe(m, c, g, h, r)", vehicle.observe, "g"),
+        "end": _filled("end(m, g, y)", vehicle.end, "y"),
     }
 
 
@@ -56,9 +55,9 @@ def _returned(head: str, program: Program) -> str:
     return _function(head, program, (), program.results.item())
 
 
-def _filled(head: str, program: Program, target: str, first: int = 0) -> str:
+def _filled(head: str, program: Program, target: str) -> str:
     values = [atom for leaf in jax.tree.leaves(program.results) for atom in leaf.ravel()]
-    return _function(head, program, [(f"{target}[{first + k}]", value) for k, value in enumerate(values)], None)
+    return _function(head, program, [(f"{target}[{k}]", value) for k, value in enumerate(values)], None)
 
 
 def _function(head: str, program: Program, outputs: Sequence[Any], returned: Any) -> str:

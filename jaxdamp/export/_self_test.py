@@ -1,13 +1,17 @@
-"""A C program that compares a printed law with stored forces."""
+"""C programs that compare a printed law or vehicle with stored forces or channels."""
 
 import numpy as np
 
+from jaxdamp.export._c_text import array_text
 from jaxdamp.export._law_program import LawProgram
+from jaxdamp.export._vehicle_program import VehicleProgram
 from jaxdamp.rig import respond
+from jaxdamp.roads import from_profile
+from jaxdamp.simulation import simulate, substeps_needed
 
 
 _INSTANTS, _STEP = 201, 1e-3  # s
-_LONGEST_STROKE, _FREQUENCIES = 0.008, (6.0, 17.0)  # m, Hz
+_LONGEST_STROKE, _HIGHEST, _FREQUENCIES = 0.008, 0.004, (6.0, 17.0)  # m, m, Hz
 
 
 def sample_motion(program: LawProgram) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -23,20 +27,15 @@ def sample_motion(program: LawProgram) -> tuple[np.ndarray, np.ndarray, np.ndarr
     return time, stroke, reach * (0.7 * slow * np.cos(angles[0]) + 0.3 * fast * np.cos(angles[1]))
 
 
-def self_test(program: LawProgram, name: str) -> str:
-    """The text of the program; it returns zero if the greatest difference is due to rounding."""
+def law_test(program: LawProgram, name: str) -> str:
+    """The text of the program for a law; it returns zero if the greatest difference is due to rounding."""
     time, stroke, velocity = sample_motion(program)
     computed = respond(program.law, time, stroke, velocity)
     force = np.asarray(computed, float)
     real = "double" if program.dtype == "float64" else "float"
-    close = 1e-9 if program.dtype == computed.dtype == "float64" else 1e-3
-    arrays = [_array(label, values) for label, values in (("x", stroke), ("v", velocity), ("expected", force))]
-    return f"""/* Compares {name}.c with forces that jaxdamp computed:  cc {name}.c {name}_test.c -lm && ./a.out */
-#include "{name}.h"
-
-#include <math.h>
-#include <stdio.h>
-
+    close = _tolerance(program.dtype, computed.dtype)
+    arrays = [array_text(label, values) for label, values in (("x", stroke), ("v", velocity), ("expected", force))]
+    return f"""{_begin(name, "forces")}
 {"".join(arrays)}
 int main(void) {{
     {name}_parameters p;
@@ -61,6 +60,67 @@ int main(void) {{
 """
 
 
-def _array(name: str, values: np.ndarray) -> str:
-    rows = [", ".join(map(repr, row.tolist())) for row in np.array_split(values, len(values) // 5)]
-    return f"static const double {name}[{len(values)}] = {{\n    " + ",\n    ".join(rows) + "\n};\n"
+def sample_heights(program: VehicleProgram) -> np.ndarray:
+    """Heights under the wheels [m], shape (instants, wheels), which begin at zero and differ from wheel to wheel."""
+    phase = np.arange(program.wheels) * 0.4
+    angle = 2.0 * np.pi * np.arange(_INSTANTS)[:, None] * _STEP
+    return _HIGHEST * np.sum([np.sin(f * angle + phase) - np.sin(phase) for f in _FREQUENCIES], axis=0)
+
+
+def vehicle_test(program: VehicleProgram, name: str) -> str:
+    """The text of the program for a vehicle; it returns zero if the differences of all channels are due to rounding."""
+    heights, time = sample_heights(program), np.arange(_INSTANTS) * _STEP
+    count = substeps_needed(program.vehicle, _STEP)
+    response = simulate(program.vehicle, from_profile(time, heights), dt=_STEP, substeps=count)
+    expected = np.stack([np.asarray(response[channel.name]) for channel in program.channels])
+    greatest = np.abs(expected).max(axis=1)
+    real, upper = ("double" if program.dtype == "float64" else "float"), name.upper()
+    close = _tolerance(program.dtype, np.asarray(response[program.channels[0].name]).dtype)
+    rates = np.gradient(heights, _STEP, axis=0)
+    arrays = {"heights": heights.ravel(), "rates": rates.ravel(), "expected": expected[:, -1], "greatest": greatest}
+    return f"""{_begin(name, "the channels at the end of a run")}
+{"".join(array_text(label, values) for label, values in arrays.items())}
+int main(void) {{
+    static {name}_parameters p;
+    static {real} m[{upper}_MATRICES], c[{upper}_CARRY], y[{upper}_OUTPUTS];
+    {real} road[4][{upper}_WHEELS]; /* heights and rates at the beginning and the end of a step */
+    double worst = 0.0;
+    int i, j, k;
+    {name}_defaults(&p);
+    {name}_prepare(&p, ({real}){_STEP / count!r}, m);
+    for (i = 0; i < {_INSTANTS}; ++i) {{
+        for (j = 0; j < {count}; ++j) {{
+            for (k = 0; k < {upper}_WHEELS; ++k) {{
+                const int now = i * {upper}_WHEELS + k, before = i ? now - {upper}_WHEELS : now;
+                const double from = (double)j / {count}, to = (double)(j + 1) / {count};
+                road[0][k] = ({real})(heights[before] + from * (heights[now] - heights[before]));
+                road[1][k] = ({real})(rates[before] + from * (rates[now] - rates[before]));
+                road[2][k] = ({real})(heights[before] + to * (heights[now] - heights[before]));
+                road[3][k] = ({real})(rates[before] + to * (rates[now] - rates[before]));
+            }}
+            if (i) {name}_step(m, road[0], road[1], road[2], road[3], c);
+        }}
+        if (!i) {name}_start(m, road[2], road[3], c);
+    }}
+    {name}_outputs(m, c, road[2], road[3], y);
+    for (k = 0; k < {upper}_OUTPUTS; ++k) {{
+        const double error = fabs(y[k] - expected[k]) / (greatest[k] > 0.0 ? greatest[k] : 1.0);
+        if (!(error <= worst)) worst = error;
+    }}
+    printf("{name}: greatest difference %.1e of the largest value of a channel\\n", worst);
+    return worst <= {close!r} ? 0 : 1;
+}}
+"""
+
+
+def _tolerance(ours: object, computed: object) -> float:
+    return 1e-9 if ours == computed == "float64" else 1e-3
+
+
+def _begin(name: str, what: str) -> str:
+    return f"""/* Compares {name}.c with {what} that jaxdamp computed:  cc {name}.c {name}_test.c -lm && ./a.out */
+#include "{name}.h"
+
+#include <math.h>
+#include <stdio.h>
+"""

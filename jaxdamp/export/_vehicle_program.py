@@ -1,24 +1,25 @@
-"""A vehicle on one wheel with a law, and its ride metrics, as functions of its numbers, which are printed."""
+"""A vehicle as functions of its numbers, which are printed in other languages."""
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-from jaxdamp import _checks
-from jaxdamp._vectors import MemoryLayout
-from jaxdamp.codegen import Program, Symbols, lower, symbols
-from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
-from jaxdamp.export._law_program import LawProgram, law_numbers
-from jaxdamp.parameters import get, modules_inside, with_values
-from jaxdamp.simulation import Equations, Exponential, MetricObserver, RoadInput, settled
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp._vectors import MemoryLayout, scalars
+from jaxdamp.codegen import Constant, Program, Symbols, lower, symbols
+from jaxdamp.dampers import without_fitted_ranges
+from jaxdamp.export._law_program import law_numbers
+from jaxdamp.parameters import with_values
+from jaxdamp.simulation import Equations, Exponential, RoadInput, settled
+from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind
 
 
-class _Numbers:
+class FlatTree:
     """How the numbers of a tree lie in one array of the program."""
 
     def __init__(self) -> None:
@@ -39,139 +40,178 @@ class _Numbers:
         """The tree with these arrays."""
         return eqx.combine(jax.tree.unflatten(self._structure, leaves), self._rest)
 
-    def symbols(self, name: str, first: int = 0) -> list[Symbols]:
+    def symbols(self, name: str, dtype: str, first: int = 0) -> list[Symbols]:
         """The arrays as stretches of one array of the program, from a place on."""
         ends = np.cumsum([int(np.prod(shape)) for shape in self._shapes])
         names = np.array([f"{name}[{first + k}]" for k in range(self.count)], object)
         parts = np.split(names, ends[:-1]) if self._shapes else []
-        return [Symbols(part.reshape(shape)) for part, shape in zip(parts, self._shapes, strict=True)]
+        return [Symbols(part.reshape(shape), dtype) for part, shape in zip(parts, self._shapes, strict=True)]
 
 
 class VehicleProgram:
-    """A vehicle on one wheel with a law at its dampers, whose steps can be printed.
+    """A vehicle whose functions can be printed: those of a run of `simulate`, and those of solvers of other programs.
 
-    The functions of `_vehicle_program` are those of a `Ride`: the exponential step, the observer of the metrics.
+    What follows from the parameters and the step lies in an array m, which `prepare` fills. The carry of a run is an
+    array c; its first numbers are the states x of the equations of motion: q, q̇ and the states of the elements. The
+    road is the heights h [m] under the wheels and their rates r [m/s].
 
     Arguments:
-        law: the law, which the vehicle holds.
-        vehicle: with one wheel.
-        dt: interval of the instants [s].
-        count: number of the instants of a run.
+        vehicle: any vehicle.
+        dtype: the type of all numbers, "float64" or "float32".
+        member: what the language writes between `p` and the name of a number: "->" in C, "." in JavaScript.
 
     Attributes:
-        numbers: parameters and settings of the vehicle but those of the law.
-        metrics: the ride metrics that a run gathers.
-        channels: the channels whose values `observe` leaves in `c`.
+        vehicle: without the ranges that its laws were fitted to.
+        numbers: its parameters and settings.
+        wheels: their number.
     """
 
-    def __init__(self, law: LawProgram, vehicle: AbstractVehicle, dt: float, count: int) -> None:
-        wheels = vehicle.wheel_names
-        if len(wheels) != 1:
-            must, remedy = "be a vehicle with one wheel", "Take a `QuarterCar`."
-            _checks.refuse("vehicle", must, f"a {type(vehicle).__name__} with {len(wheels)}", remedy)
-        self.law, self.vehicle = law, without_fitted_ranges(vehicle)
-        inside = [(prefix, module) for prefix, module in modules_inside(self.vehicle) if prefix]
-        self._places = [prefix for prefix, module in inside if eqx.tree_equal(module, law.law)]
-        if not self._places:
-            remedy = "Build it with the law: `QuarterCar(..., damper=law)`."
-            _checks.refuse("vehicle", "hold the law as a damper", repr(type(vehicle).__name__), remedy)
-        own = law_numbers(self.vehicle)
-        self.numbers = [n for n in own if not any(n.path.startswith(prefix) for prefix in self._places)]
-        self.metrics = [m for m in vehicle.ride_metrics if not m.statistic.needs_record]
-        self.dt, self.count = dt, count
-        self._stepper, self._now, self._gathered = _Numbers(), _Numbers(), _Numbers()
-
-    @cached_property
-    def channels(self) -> list[str]:
-        """Names of the channels that the metrics need; their values lie in `c` from `first_channel` on."""
-        return list(dict.fromkeys(name for m in self.metrics for name in (m.channel, m.by) if name))
+    def __init__(self, vehicle: AbstractVehicle, dtype: str = "float64", member: str = "->") -> None:
+        self.vehicle, self.dtype, self.member = without_fitted_ranges(vehicle), dtype, member
+        self.numbers = law_numbers(self.vehicle)
+        self.layout, self.wheels = vehicle.layout, len(vehicle.wheel_names)
+        self._stepper, self._carry = FlatTree(), FlatTree()
+        self._state_sizes = [int(law.initial_state().size) for law in self.vehicle.elements()]
 
     @property
-    def first_channel(self) -> int:
-        """The place in `c` of the first channel."""
-        return self._now.count
+    def states(self) -> list[tuple[str, str]]:
+        """Name and unit of each state: coordinates, their rates, and the states of the elements, without units."""
+        names = self.layout.coordinates
+        units = [self.layout.units.get(name, "m") for name in names]
+        rates = [(f"{name}_rate", f"{unit}/s") for name, unit in zip(names, units, strict=True)]
+        sizes = zip(self.layout.ports, self._state_sizes, strict=True)
+        return [*zip(names, units, strict=True), *rates, *((f"{p}[{k}]", "") for p, n in sizes for k in range(n))]
+
+    @property
+    def heights(self) -> list[Channel]:
+        """The heights of the road, one for each wheel."""
+        return [channel for channel in self.layout.channels if channel.kind is ChannelKind.ROAD_HEIGHT]
+
+    @property
+    def channels(self) -> list[Channel]:
+        """The channels that the vehicle gives: all but the heights of the road."""
+        return [channel for channel in self.layout.channels if channel.kind is not ChannelKind.ROAD_HEIGHT]
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Lengths of the arrays m and c, once `prepare` and `start` are there."""
-        return {"m": self._stepper.count, "c": self._now.count + self._gathered.count}
-
-    def with_law(self, law: AbstractDamper) -> AbstractVehicle:
-        """The vehicle with another law at its dampers."""
-        return self._placed(self.vehicle, law)
+        """Lengths of the arrays m and c."""
+        _ = self.start
+        return {"m": self.prepare.results.size, "c": self._carry.count}
 
     @cached_property
     def prepare(self) -> Program:
-        """`prepare(p, q, dt)`: the matrices of a step of dt [s], with the numbers of the law: m."""
+        """`prepare(p, dt)`: m, the matrices of a step of dt [s] and the numbers of the laws."""
+        computed = [atom for part in self._matrices.results for atom in part.flat if not isinstance(atom, Constant)]
+        return Program(self._matrices.statements, np.array(computed, object))
 
-        def prepare(of_law: list[Any], own: list[Any], dt: Any) -> list[Any]:
-            car = with_values(self.vehicle, {n.path: value for n, value in zip(self.numbers, own, strict=True)})
-            car = self._placed(car, self.law.law_of(of_law))
-            equations = Equations(car.system(), MemoryLayout.SCALARS)
+    @cached_property
+    def _matrices(self) -> Program:
+        def prepare(values: Any, dt: Any) -> list[Any]:
+            equations = Equations(self.vehicle_of(values).system(), MemoryLayout.SCALARS)
             return self._stepper.taken(Exponential().stepper(equations, dt))
 
-        own = [symbols(f"q.{n.name}", n.value.shape) for n in self.numbers]
-        return lower(prepare, self.law.values(), own, symbols("dt"))
+        return lower(prepare, self.values(), self._symbols("dt"), finite=True)
+
+    @cached_property
+    def _held(self) -> list[Symbols]:
+        """The stepper: numbers that are known, such as the zeros of a matrix, and the rest as entries of m."""
+        place = itertools.count()
+        name = np.frompyfunc(lambda atom: atom if isinstance(atom, Constant) else f"m[{next(place)}]", 1, 1)
+        return [Symbols(np.array(name(part), object), self.dtype) for part in self._matrices.results]
 
     @cached_property
     def start(self) -> Program:
-        """`start(m, h, r)`: at rest on a road of height h [m] and rate r [m/s]: c."""
+        """`start(m, h, r)`: at rest in the static equilibrium on a road: c."""
 
         def start(held: list[Any], height: Any, rate: Any) -> list[Any]:
-            stepper, observer = self._engine(held)
-            road = RoadInput((height,), (rate,))
-            now = stepper.start(settled(stepper.equations.system, height[None]), road)
-            return [*self._now.taken(now), *self._gathered.taken(observer.begin(now, road))]
+            stepper = self._stepper.tree(held)
+            return self._carry.taken(stepper.start(settled(stepper.equations.system, height), road_input(height, rate)))
 
-        return lower(start, self._held, symbols("h"), symbols("r"))
+        return self._lowered(start, *self._road("h", "r"))
 
     @cached_property
     def step(self) -> Program:
-        """`step(m, c, h0, r0, h1, r1)`: the motion a step later, the first part of c."""
+        """`step(m, c, h0, r0, h1, r1)`: c a step later, the road being straight."""
 
         def step(held: list[Any], now: list[Any], *road: Any) -> list[Any]:
-            begin, end = (RoadInput((height,), (rate,)) for height, rate in (road[:2], road[2:]))
-            stepper, _ = self._engine(held)
-            return self._now.taken(stepper(self._now.tree(now), begin, end))
+            after = self._stepper.tree(held)(self._carry.tree(now), road_input(*road[:2]), road_input(*road[2:]))
+            return self._carry.taken(after)
 
-        return lower(step, self._held, self._carried[0], *map(symbols, ("h0", "r0", "h1", "r1")))
-
-    @cached_property
-    def observe(self) -> Program:
-        """`observe(m, c, h, r)`: the metrics with this instant, the second part of c."""
-
-        def observe(held: list[Any], now: list[Any], gathered: list[Any], height: Any, rate: Any) -> list[Any]:
-            _, observer = self._engine(held)
-            road = RoadInput((height,), (rate,))
-            return self._gathered.taken(observer.add(self._gathered.tree(gathered), self._now.tree(now), road))
-
-        return lower(observe, self._held, *self._carried, symbols("h"), symbols("r"))
+        return self._lowered(step, self._carried, *self._road("h0", "r0", "h1", "r1"))
 
     @cached_property
-    def end(self) -> Program:
-        """`end(m, c)`: the metrics, in the order of `metrics`."""
+    def resume(self) -> Program:
+        """`resume(m, c, h, r, ratio)`: c at this instant after another `prepare`; ratio of the steps, new to old."""
 
-        def end(held: list[Any], gathered: list[Any]) -> list[Any]:
-            _, observer = self._engine(held)
-            values = observer.end(self._gathered.tree(gathered), ())
-            return [values[m.name] for m in self.metrics]
+        def resume(held: list[Any], now: list[Any], height: Any, rate: Any, ratio: Any) -> list[Any]:
+            again = self._stepper.tree(held).resumed(self._carry.tree(now), road_input(height, rate), ratio)
+            return self._carry.taken(again)
 
-        return lower(end, self._held, self._carried[1])
+        return self._lowered(resume, self._carried, *self._road("h", "r"), self._symbols("ratio"))
+
+    @cached_property
+    def outputs(self) -> Program:
+        """`outputs(m, x, h, r)`: the channels, in the order of `channels`."""
+        return self._lowered(lambda held, *point: self._observed(self._equations(held), *point)[1], *self._point())
+
+    @cached_property
+    def state_rate(self) -> Program:
+        """`state_rate(m, x, h, r)`: the time derivatives of the states."""
+        return self._lowered(lambda held, *point: self._observed(self._equations(held), *point)[0], *self._point())
+
+    @cached_property
+    def derivative(self) -> Program:
+        """The changes of the rates of the states and of the channels for changes of p, x, h and r."""
+
+        def observed(values: Any, *point: Any) -> Any:
+            equations = Equations(self.vehicle_of(values).system(), MemoryLayout.SCALARS)
+            return self._observed(equations, *point)
+
+        arguments, changes = (self.values(), *self._point()), (self.values("dp"), *self._point("d"))
+        return lower(lambda point, change: jax.jvp(observed, point, change)[1], arguments, changes, finite=True)
+
+    def vehicle_of(self, values: Any) -> AbstractVehicle:
+        """The vehicle with other numbers, in the order of `numbers`."""
+        vehicle = jax.tree.map(lambda a: jnp.asarray(a, self.dtype) if eqx.is_inexact_array(a) else a, self.vehicle)
+        return with_values(vehicle, {n.path: value for n, value in zip(self.numbers, values, strict=True)})
+
+    def values(self, owner: str = "p") -> Any:
+        """All numbers, as members of an object of the program."""
+        return [symbols(f"{owner}{self.member}{n.name}", n.value.shape, self.dtype) for n in self.numbers]
+
+    def _observed(self, equations: Equations, motion: Any, states: Any, height: Any, rate: Any) -> tuple[Any, Any]:
+        """The rates of the states, and the channels."""
+        deflections = equations.at_ports(scalars(motion), road_input(height, rate))
+        force = jnp.asarray(equations.ports.force(*deflections, states), motion.dtype)
+        rates = equations.system.motion(motion, force, height, rate)
+        outputs = equations.system.channels([channel.name for channel in self.channels])
+        return (rates, equations.ports.state_rate(*deflections, states)), outputs(motion, force, height, rate)
+
+    def _equations(self, held: list[Any]) -> Equations:
+        return self._stepper.tree(held).equations
+
+    def _point(self, d: str = "") -> tuple[Any, ...]:
+        """The states and the road: motion, the states of each element, heights, rates."""
+        names = symbols(f"{d}x", (len(self.states),), self.dtype).names
+        motion, *states = np.split(names, np.cumsum([2 * len(self.layout.coordinates), *self._state_sizes])[:-1])
+        return Symbols(motion, self.dtype), [Symbols(s, self.dtype) for s in states], *self._road(f"{d}h", f"{d}r")
 
     @property
-    def _held(self) -> list[Symbols]:
-        _ = self.prepare
-        return self._stepper.symbols("m")
-
-    @property
-    def _carried(self) -> tuple[list[Symbols], list[Symbols]]:
+    def _carried(self) -> list[Symbols]:
         _ = self.start
-        return self._now.symbols("c"), self._gathered.symbols("c", self._now.count)
+        return self._carry.symbols("c", self.dtype)
 
-    def _engine(self, held: list[Any]) -> tuple[Any, MetricObserver]:
-        stepper = self._stepper.tree(held)
-        return stepper, MetricObserver(stepper.equations, self.metrics, self.dt, self.count)
+    def _lowered(self, function: Callable[..., Any], *arguments: Any) -> Program:
+        """A function of the stepper and other arguments."""
+        return lower(function, self._held, *arguments, finite=True)
 
-    def _placed(self, vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
-        places = [prefix[:-1] for prefix in self._places]
-        return eqx.tree_at(lambda car: [get(car, place) for place in places], vehicle, [law] * len(places))
+    def _road(self, *names: str) -> list[Symbols]:
+        return [symbols(name, (self.wheels,), self.dtype) for name in names]
+
+    def _symbols(self, name: str) -> Symbols:
+        return symbols(name, (), self.dtype)
+
+
+def road_input(height: Any, rate: Any) -> RoadInput:
+    """Heights and rates as scalars."""
+    return RoadInput(scalars(height), scalars(rate))

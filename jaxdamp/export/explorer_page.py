@@ -17,7 +17,7 @@ from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, laws_inside
 from jaxdamp.export._javascript import bump_function, closed, law_functions, vehicle_functions
 from jaxdamp.export._law_program import LawNumber, LawProgram
-from jaxdamp.export._vehicle_program import VehicleProgram
+from jaxdamp.export._ride_program import RideProgram
 from jaxdamp.export._write import write_whole
 from jaxdamp.export.module_file import to_json
 from jaxdamp.parameters import weight
@@ -84,13 +84,17 @@ def to_explorer(
         _checks.refuse("path", "be a file NAME.html", str(file))
     vehicle = presets.quarter_car_000(law) if vehicle is None else vehicle
     check_module("vehicle", vehicle, (AbstractVehicle,), "to_explorer(law, path, vehicle=QuarterCar(..., damper=law))")
+    wheels = len(vehicle.wheel_names)
+    if wheels != 1:
+        must = "be a vehicle with one wheel"
+        _checks.refuse("vehicle", must, f"a {type(vehicle).__name__} with {wheels}", "Take a `QuarterCar`.")
     _checks.positive("speed", speed)
     profile = road if isinstance(road, AbstractRoad) else None
     duration = (profile and profile.duration) or 10.0 if duration is None else duration
     drawn = iso8608("C" if profile else str(road), speed, duration, seed=seed)
     count = round(duration / _STEP) + 1
     program = LawProgram(law, member=".")
-    car = VehicleProgram(program, vehicle, _STEP, count)
+    car = RideProgram(program, vehicle, _STEP, count)
     ride = Ride(vehicle, profile or drawn, metrics=car.metrics[:1], duration=duration, dt=_STEP)
     functions = {"LAW": law_functions(program) | vehicle_functions(car)}
     about = _of_law(program, car, "as loaded")
@@ -98,7 +102,7 @@ def to_explorer(
     if baseline is not None:
         check_module("baseline", baseline, (AbstractDamper,), "to_explorer(law, path, baseline=law)")
         other = LawProgram(baseline, member=".")
-        other_car = VehicleProgram(other, car.with_law(other.law), _STEP, count)
+        other_car = RideProgram(other, car.with_law(other.law), _STEP, count)
         other_ride = Ride(other_car.vehicle, profile or drawn, metrics=car.metrics[:1], duration=duration, dt=_STEP)
         functions["BASELINE"] = law_functions(other) | vehicle_functions(other_car)
         compared, substeps = _of_law(other, other_car, "baseline"), max(substeps, other_ride.substeps)
@@ -114,7 +118,7 @@ def to_explorer(
         "vehicle": {"title": type(vehicle).__name__, "numbers": [_of_number(n) for n in car.numbers]},
         "metrics": [_of_metric(m, vehicle) for m in car.metrics],
         "channels": [
-            {"name": name, "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]} for name in car.channels
+            {"name": name, "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]} for name in car.needed
         ],
         "dt": _STEP,
         "count": count,
@@ -141,14 +145,14 @@ def _assembled(data: dict[str, Any], programs: str) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], text["page.html"])
 
 
-def _of_law(program: LawProgram, car: VehicleProgram, title: str) -> dict[str, Any]:
+def _of_law(program: LawProgram, car: RideProgram, title: str) -> dict[str, Any]:
     commands = [n.name for n in program.numbers if n.kind == "command"]
     return {
         "title": title,
         "states": program.states,
         "numbers": [_of_number(n) for n in program.numbers],
         "command": commands[0] if len(commands) == 1 else None,
-        "sizes": car.sizes | {"firstChannel": car.first_channel},
+        "sizes": car.sizes,
     }
 
 

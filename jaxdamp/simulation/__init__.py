@@ -14,6 +14,7 @@ from jaxdamp.simulation.recorder import recorded
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride
 from jaxdamp.simulation.run import simulate
+from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.stationary import DEVIATIONS
 from jaxdamp.simulation.step_size import CoarseStepWarning, RunCheck
 from jaxdamp.simulation.tables import comfort_table, metrics_table
@@ -46,4 +47,5 @@ __all__ = [
     "recorded",
     "settled",
     "simulate",
+    "substeps_needed",
 ]

@@ -11,6 +11,7 @@ import dataclasses
 from typing import Any, Literal, NamedTuple, final
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -97,6 +98,20 @@ class ExponentialStepper(AbstractStepper):
         states = ports.advance(*old, *new, now.states, self.dt)
         memory = StepBefore(now.force, ports.next_earlier(now.states, before.states))
         return StepState(motion, states, ports.force(*new, states), memory)
+
+    def resumed(self, now: StepState, road: RoadInput, ratio: Scalar) -> StepState:
+        """The same instant for this stepper after another, whose step was shorter or whose parameters differed.
+
+        The memory keeps its differences from the present, times the ratio of this step to the last one.
+        """
+        again = self.equations.at(now.motion, now.states, road)
+
+        def before(old: Any, then: Any, present: Any) -> Any:
+            return jax.tree.map(lambda old, then, present: present + ratio * (old - then), old, then, present)
+
+        held = [None if old is None else state for old, state in zip(now.memory.states[0], now.states, strict=True)]
+        earlier = tuple(before(states, held, held) for states in now.memory.states)
+        return again._replace(memory=StepBefore(before(now.memory.force, now.force, again.force), earlier))
 
     def _reached(self, motion: Vector, road: RoadInput) -> tuple[Vector, Vector]:
         deflection, rate = self.equations.at_ports(motion, road)

@@ -53,7 +53,12 @@ class Slopes(NamedTuple):
 
 
 def substeps_needed(vehicle: AbstractVehicle, dt: float) -> int:
-    """Steps of the exponential engine between instants dt [s] apart that keep every law stable: see `step_need`."""
+    """Steps of the exponential engine between two instants that keep every law stable: see `step_need`.
+
+    Arguments:
+        vehicle: any vehicle.
+        dt: spacing of the instants [s].
+    """
     system = vehicle.system()
     return step_need(system, law_slopes(system, dt), dt).substeps
 

@@ -8,6 +8,7 @@ from jaxdamp.cli.exporting import PROGRAMS, TABLES
 from jaxdamp.dampers import Bilinear, FittedRange, with_fitted_range
 from jaxdamp.export import to_csv, to_json
 from jaxdamp.roads import sine
+from jaxdamp.vehicles.presets import quarter_car_000
 
 from .invoking import jaxdamp, refused
 
@@ -29,6 +30,16 @@ def test_every_format(law: Path, to: str) -> None:
     assert f"front_law{ending}" in text and (law.parent / f"front_law{ending}").stat().st_size > 100
 
 
+def test_a_vehicle(law: Path) -> None:
+    folder = law.parent
+    to_json(quarter_car_000(LAW), folder / "car.json")
+    assert "car_test.c" in jaxdamp("export", folder / "car.json", "--to", "c").output
+    assert "car_step(" in (folder / "car.h").read_text()
+    assert "LAW must be a law as JSON" in refused(folder, "export", folder / "car.json", "--to", "adams")
+    to_json(sine(amplitude=0.01, frequency=1.0), folder / "road.json")
+    assert "be a law or a vehicle as JSON" in refused(folder, "export", folder / "road.json", "--to", "fmu")
+
+
 def test_velocities(law: Path) -> None:
     assert "5 from -0.6 to 0.8 m/s" in jaxdamp("export", law, "--to", "csv", "--velocities", "-0.6:0.8:5").output
     written = law.parent / "front_law.csv"
@@ -46,7 +57,7 @@ def test_refusals(law: Path) -> None:
     assert "--velocities must be FROM:TO:POINTS" in refused(folder, "export", law, "--to", "csv", "--velocities", "1")
     assert "be left out for fmu" in refused(folder, "export", law, "--to", "fmu", "--velocities", "-1:1:3")
     to_json(sine(amplitude=0.01, frequency=1.0), folder / "road.json")
-    assert "The law file must hold a damper law" in refused(folder, "export", folder / "road.json", "--to", "csv")
+    assert "LAW must be a law as JSON" in refused(folder, "export", folder / "road.json", "--to", "csv")
     jaxdamp("export", law, "--to", "csv")
     assert "Option --out must be a new file" in refused(folder, "export", law, "--to", "csv")
     jaxdamp("export", law, "--to", "csv", "--replace")

@@ -11,7 +11,7 @@ import pytest
 
 from jaxdamp.dampers import without_fitted_ranges
 from jaxdamp.export._law_program import LawProgram, law_numbers
-from jaxdamp.export.c_source import DERIVATIVES, functions, header
+from jaxdamp.export._law_source import DERIVATIVES, law_source
 from jaxdamp.parameters import with_values
 
 
@@ -69,7 +69,8 @@ def compiled(laws, folder):
     text = [PREAMBLE]
     for name, law in laws.items():
         program = LawProgram(law)
-        text += [header(program, name, DERIVATIVES), functions(program, name, DERIVATIVES), drive(name, program.states)]
+        printed = law_source(program, name, DERIVATIVES)
+        text += [printed.header(), printed.definitions(), drive(name, program.states)]
     source.write_text("\n".join(text), encoding="utf-8")
     command = [compiler(), *STRICT, "-O0", "-fPIC", "-shared", str(source), "-o", str(library), "-lm"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

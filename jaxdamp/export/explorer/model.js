@@ -86,25 +86,30 @@ function rates(heights, dt) {
 }
 
 // A run of the car: the metrics in their order, and the channels over time.
-function ride(program, sizes, p, q, road, dt, substeps, channels, firstChannel) {
+function ride(program, sizes, p, q, road, dt, substeps, channels) {
   const { heights, rate } = road, count = heights.length;
-  const m = new Float64Array(sizes.m), c = new Float64Array(sizes.c), metrics = [];
-  const records = channels.map(() => new Float64Array(count));
-  const save = (i) => records.forEach((record, k) => { record[i] = c[firstChannel + k]; });
+  const [m, c, g, from, to, fromRate, toRate] = [sizes.m, sizes.c, sizes.g, 1, 1, 1, 1].map((n) => new Float64Array(n));
+  const metrics = [], records = channels.map(() => new Float64Array(count));
+  const save = (i) => records.forEach((record, k) => { record[i] = g[k]; });
   program.prepare(p, q, dt / substeps, m);
-  program.start(m, heights[0], rate[0], c);
+  [from[0], fromRate[0]] = [heights[0], rate[0]];
+  program.start(m, from, fromRate, c);
+  program.begin(m, c, from, fromRate, g);
   save(0);
   for (let i = 1; i < count; ++i) {
     const h = heights[i - 1], r = rate[i - 1], rise = heights[i] - h, change = rate[i] - r;
-    if (substeps === 1) program.step(m, c, h, r, heights[i], rate[i]);
-    else for (let k = 0; k < substeps; ++k) {
+    for (let k = 0; k < substeps; ++k) {
       const a = k / substeps, b = (k + 1) / substeps;
-      program.step(m, c, h + a * rise, r + a * change, h + b * rise, r + b * change);
+      from[0] = h + a * rise;
+      fromRate[0] = r + a * change;
+      to[0] = k + 1 < substeps ? h + b * rise : heights[i];
+      toRate[0] = k + 1 < substeps ? r + b * change : rate[i];
+      program.step(m, c, from, fromRate, to, toRate);
     }
-    program.observe(m, c, heights[i], rate[i]);
+    program.observe(m, c, g, to, toRate);
     save(i);
   }
-  program.end(m, c, metrics);
+  program.end(m, g, metrics);
   return { metrics, records };
 }
 

@@ -66,7 +66,7 @@ function chooseRoad() {
 
 function drive(side, substeps) {
   const { program, sizes } = sides[side], q = numbersOf(DATA.vehicle.numbers, values.vehicle);
-  return ride(program, sizes, lawNumbers(side), q, state.road, DATA.dt, substeps, DATA.channels, sizes.firstChannel);
+  return ride(program, sizes, lawNumbers(side), q, state.road, DATA.dt, substeps, DATA.channels);
 }
 
 function refreshRide() {

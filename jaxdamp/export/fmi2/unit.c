@@ -1,10 +1,13 @@
-/* FMI 2.0, model exchange and co-simulation, of a damper law. It stands behind the functions of the law: law_parameters,
- * LAW_STATES, law_defaults, law_init, law_force, law_advance, law_state_rate and the derivatives of force and rate; GUID
- * is a text.
+/* FMI 2.0, model exchange and co-simulation, of a damper law or a vehicle. It stands behind the printed functions
+ * `model_...`, behind law.c or vehicle.c, which define PAIRS, OUTPUTS, STATES, CARRY, MATRICES, RATES_GIVEN, prepare,
+ * start, resume, advance, observe and observe_derivative; GUID is a text.
  *
- * Co-simulation has no delay of a step. A step ends at a stroke and a velocity that the importer knows only afterwards:
- * after fmi2DoStep they are extrapolated (or follow from fmi2SetRealInputDerivatives), and as soon as the inputs of the
- * new instant are set, the states are those of the step between the true inputs.
+ * Inputs come in pairs of a value and its rate: first all values, then all rates. The carry of a run begins with the
+ * continuous states.
+ *
+ * Co-simulation has no delay of a step. A step ends at inputs that the importer knows only afterwards: after fmi2DoStep
+ * they are extrapolated (or follow from fmi2SetRealInputDerivatives), and as soon as the inputs of the new instant are
+ * set, the states are those of the step between the true inputs.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -12,48 +15,76 @@
 
 #include "fmi2Functions.h"
 
-enum { STROKE, VELOCITY, FORCE, LONGEST_STEP, FIRST_NUMBER };
-#define NUMBERS (sizeof(law_parameters) / sizeof(double))
+#define INPUTS (2 * PAIRS)
+#define NUMBERS (sizeof(model_parameters) / sizeof(double))
+enum { FIRST_OUTPUT = INPUTS, LONGEST_STEP = INPUTS + OUTPUTS, FIRST_NUMBER };
 #define FIRST_STATE (FIRST_NUMBER + NUMBERS)
-#define FIRST_RATE (FIRST_STATE + LAW_STATES)
-#define UNUSED(name) ((void)(name))
+#define FIRST_RATE (FIRST_STATE + STATES)
 
 typedef struct {
-    law_parameters p;
-    double longest;              /* s, longest step of the law; longer communication steps are divided */
-    double state[LAW_STATES + 1]; /* at the beginning of the step that ends now */
-    double motion0[2], motion[2]; /* stroke and velocity at its beginning and its end */
-    double slope[2];             /* their rates, given by the importer */
-    int given[2];                /* whether the rates are known */
-    int guessed[2];              /* whether the end is extrapolated */
-    double h;                    /* its duration; zero before the first and for model exchange */
-    int started;                 /* initialisation is over */
+    model_parameters p;
+    double longest;                 /* s, longest step of the model; longer communication steps are divided */
+    double matrices[MATRICES + 1];  /* what follows from the parameters and this step */
+    double step;                    /* s */
+    double carry[CARRY + 1];        /* at the beginning of the step that ends now */
+    double end[CARRY + 1];          /* now */
+    double input0[INPUTS], input[INPUTS]; /* at the beginning of the step and at its end */
+    double used[INPUTS];            /* inputs now, with rates that follow from the values */
+    double slope[INPUTS];           /* their rates, given by the importer */
+    double slope_before[PAIRS];     /* of the values over the step before */
+    int given[INPUTS];              /* whether the importer has given a rate */
+    int guessed[INPUTS];            /* whether an input now is extrapolated */
+    int rated[PAIRS];               /* whether rates are inputs; otherwise they follow from the values */
+    double h;                       /* s, duration of the step; zero before the first and for model exchange */
+    int steps;                      /* the number of steps done, up to two */
+    int started;                    /* initialisation is over */
+    int changed;                    /* parameters have changed since `matrices` was computed */
+    int known;                      /* `end` and `used` are up to date */
 } Model;
 
 static void set_defaults(Model *m) {
+    int k;
     memset(m, 0, sizeof *m);
-    m->longest = 1e-3;
-    law_defaults(&m->p);
-    law_init(&m->p, m->state);
+    m->longest = DEFAULT_STEP;
+    m->step = DEFAULT_STEP;
+    m->changed = 1;
+    for (k = 0; k < PAIRS; ++k) m->rated[k] = RATES_GIVEN;
+    model_defaults(&m->p);
 }
 
-/* The states at the end of the step: the velocity is linear in time, the stroke the cubic with these velocities. */
-static void end_state(const Model *m, double *state) {
-    const double x0 = m->motion0[0], v0 = m->motion0[1], x1 = m->motion[0], v1 = m->motion[1], h = m->h;
-    int n = (int)ceil(h / m->longest - 1e-9), i;
-    double x = x0, v = v0;
-    memcpy(state, m->state, sizeof m->state);
-    if (h <= 0.0) return;
-    if (n < 1) n = 1;
-    for (i = 1; i <= n; ++i) {
-        const double s = (double)i / n, r = 1.0 - s;
-        const double rise = h * (v0 * s * r * r - v1 * s * s * r);
-        const double next = i == n ? x1 : x0 * (1.0 + 2.0 * s) * r * r + x1 * s * s * (3.0 - 2.0 * s) + rise;
-        const double faster = i == n ? v1 : v0 + s * (v1 - v0);
-        law_advance(&m->p, x, v, next, faster, h / n, state);
-        x = next;
-        v = faster;
+/* Rates at both ends of the step where they are no inputs: the mean of the slopes before and after its beginning, and
+ * the slope extrapolated to its end. */
+static void use_slopes(Model *m, double *u0) {
+    int k;
+    for (k = 0; k < PAIRS; ++k) {
+        const double slope = (m->input[k] - m->input0[k]) / m->h;
+        const double before = m->steps > 1 ? m->slope_before[k] : slope;
+        if (m->rated[k]) continue;
+        u0[PAIRS + k] = 0.5 * (before + slope);
+        m->used[PAIRS + k] = 1.5 * slope - 0.5 * before;
     }
+}
+
+/* The states at the end of the step. */
+static void refresh(Model *m) {
+    int n = (int)ceil(m->h / m->longest - 1e-9);
+    double u0[INPUTS], step;
+    if (m->known) return;
+    if (n < 1) n = 1;
+    step = m->h > 0.0 ? m->h / n : m->step;
+    memcpy(u0, m->input0, sizeof u0);
+    memcpy(m->used, m->input, sizeof u0);
+    if (m->h > 0.0) use_slopes(m, u0);
+    if (m->changed || fabs(step - m->step) > 1e-9 * step) {
+        prepare(&m->p, step, m->matrices);
+        if (m->h > 0.0) resume(m->matrices, u0, step / m->step, m->carry);
+        m->step = step;
+        m->changed = 0;
+    }
+    if (!m->started) start(&m->p, m->matrices, m->input, m->carry);
+    memcpy(m->end, m->carry, sizeof m->end);
+    if (m->h > 0.0) advance(&m->p, m->matrices, u0, m->used, m->h, n, m->end);
+    m->known = 1;
 }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -88,6 +119,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+    refresh((Model *)c);
     ((Model *)c)->started = 1;
     return fmi2OK;
 }
@@ -103,19 +135,19 @@ fmi2Status fmi2Reset(fmi2Component c) {
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
-    const Model *m = (const Model *)c;
-    double state[LAW_STATES + 1], rate[LAW_STATES + 1];
+    Model *m = (Model *)c;
+    double rate[STATES + 1], y[OUTPUTS];
     size_t i;
-    end_state(m, state);
-    law_state_rate(&m->p, m->motion[0], m->motion[1], state, rate);
+    refresh(m);
+    observe(&m->p, m->matrices, m->end, m->used, rate, y);
     for (i = 0; i < n; ++i) {
         const size_t k = vr[i];
-        if (k < FORCE) value[i] = m->guessed[k] ? m->motion0[k] : m->motion[k];
-        else if (k == FORCE) value[i] = law_force(&m->p, m->motion[0], m->motion[1], state);
+        if (k < FIRST_OUTPUT) value[i] = m->guessed[k] ? m->input0[k] : m->input[k];
+        else if (k < LONGEST_STEP) value[i] = y[k - FIRST_OUTPUT];
         else if (k == LONGEST_STEP) value[i] = m->longest;
         else if (k < FIRST_STATE) value[i] = ((const double *)&m->p)[k - FIRST_NUMBER];
-        else if (k < FIRST_RATE) value[i] = state[k - FIRST_STATE];
-        else if (k < FIRST_RATE + LAW_STATES) value[i] = rate[k - FIRST_RATE];
+        else if (k < FIRST_RATE) value[i] = m->end[k - FIRST_STATE];
+        else if (k < FIRST_RATE + STATES) value[i] = rate[k - FIRST_RATE];
         else return fmi2Error;
     }
     return fmi2OK;
@@ -126,18 +158,21 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     size_t i;
     for (i = 0; i < n; ++i) {
         const size_t k = vr[i];
-        if (k < FORCE) {
-            m->motion[k] = value[i];
+        if (k < FIRST_OUTPUT) {
+            m->input[k] = value[i];
             m->guessed[k] = m->given[k] = 0;
+            if (k >= PAIRS && value[i] != 0.0) m->rated[k - PAIRS] = 1;
         } else if (k == LONGEST_STEP && value[i] > 0.0) {
             m->longest = value[i];
         } else if (k >= FIRST_NUMBER && k < FIRST_STATE) {
-            ((double *)&m->p)[k - FIRST_NUMBER] = value[i];
-            if (!m->started) law_init(&m->p, m->state);
+            double *number = (double *)&m->p + (k - FIRST_NUMBER);
+            if (*number != value[i]) m->changed = 1;
+            *number = value[i];
         } else {
             return fmi2Error;
         }
     }
+    m->known = 0;
     return fmi2OK;
 }
 
@@ -196,31 +231,32 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     return fmi2OK;
 }
 
-/* Changes of the force and of the rates of the states, for model exchange: in co-simulation the states at the end of a
- * step depend on the inputs. */
+/* Changes of the outputs and of the rates of the states, for model exchange: in co-simulation the states at the end of
+ * a step depend on the inputs. */
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n,
                                         const fmi2ValueReference known[], size_t count, const fmi2Real change[],
                                         fmi2Real value[]) {
-    const Model *m = (const Model *)c;
-    const double x = m->motion[0], v = m->motion[1];
-    double d[2] = {0.0, 0.0}, dstate[LAW_STATES + 1], drate[LAW_STATES + 1];
-    law_parameters dp;
+    Model *m = (Model *)c;
+    double d[INPUTS], dx[STATES + 1], drate[STATES + 1], dy[OUTPUTS];
+    model_parameters dp;
     size_t i;
     if (m->h > 0.0) return fmi2Error;
     memset(&dp, 0, sizeof dp);
-    memset(dstate, 0, sizeof dstate);
+    memset(d, 0, sizeof d);
+    memset(dx, 0, sizeof dx);
     for (i = 0; i < count; ++i) {
         const size_t k = known[i];
-        if (k < FORCE) d[k] += change[i];
+        if (k < FIRST_OUTPUT) d[k] += change[i];
         else if (k >= FIRST_NUMBER && k < FIRST_STATE) ((double *)&dp)[k - FIRST_NUMBER] += change[i];
-        else if (k >= FIRST_STATE && k < FIRST_RATE) dstate[k - FIRST_STATE] += change[i];
+        else if (k >= FIRST_STATE && k < FIRST_RATE) dx[k - FIRST_STATE] += change[i];
         else return fmi2Error;
     }
-    law_state_rate_derivative(&m->p, &dp, x, d[0], v, d[1], m->state, dstate, drate);
+    refresh(m);
+    observe_derivative(&m->p, &dp, m->end, dx, m->used, d, drate, dy);
     for (i = 0; i < n; ++i) {
         const size_t k = unknown[i];
-        if (k == FORCE) value[i] = law_force_derivative(&m->p, &dp, x, d[0], v, d[1], m->state, dstate);
-        else if (k >= FIRST_RATE && k < FIRST_RATE + LAW_STATES) value[i] = drate[k - FIRST_RATE];
+        if (k >= FIRST_OUTPUT && k < LONGEST_STEP) value[i] = dy[k - FIRST_OUTPUT];
+        else if (k >= FIRST_RATE && k < FIRST_RATE + STATES) value[i] = drate[k - FIRST_RATE];
         else return fmi2Error;
     }
     return fmi2OK;
@@ -256,21 +292,27 @@ fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) {
-    if (n != LAW_STATES) return fmi2Error;
-    if (n) memcpy(((Model *)c)->state, x, n * sizeof *x);
+    if (n != STATES) return fmi2Error;
+    refresh((Model *)c);
+    if (n) memcpy(((Model *)c)->carry, x, n * sizeof *x);
+    ((Model *)c)->known = 0;
     return fmi2OK;
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) {
-    if (n != LAW_STATES) return fmi2Error;
-    if (n) memcpy(x, ((const Model *)c)->state, n * sizeof *x);
+    if (n != STATES) return fmi2Error;
+    refresh((Model *)c);
+    if (n) memcpy(x, ((const Model *)c)->end, n * sizeof *x);
     return fmi2OK;
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real rates[], size_t n) {
-    const Model *m = (const Model *)c;
-    if (n != LAW_STATES) return fmi2Error;
-    if (n) law_state_rate(&m->p, m->motion[0], m->motion[1], m->state, rates);
+    Model *m = (Model *)c;
+    double rate[STATES + 1], y[OUTPUTS];
+    if (n != STATES) return fmi2Error;
+    refresh(m);
+    observe(&m->p, m->matrices, m->end, m->used, rate, y);
+    if (n) memcpy(rates, rate, n * sizeof *rates);
     return fmi2OK;
 }
 
@@ -294,7 +336,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
     size_t i;
     for (i = 0; i < n; ++i) {
         if (order[i] != 1) return fmi2Error;
-        if (vr[i] >= FORCE) continue;
+        if (vr[i] >= FIRST_OUTPUT) continue;
         m->slope[vr[i]] = value[i];
         m->given[vr[i]] = 1;
     }
@@ -309,25 +351,33 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean final) {
     Model *m = (Model *)c;
-    double state[LAW_STATES + 1], now[2], slope;
     int k;
     UNUSED(time), UNUSED(final);
     if (!(h > 0.0)) return fmi2Error;
-    for (k = 0; k < 2; ++k) {
-        if (m->guessed[k]) m->motion[k] = m->motion0[k]; /* an input that was not set again keeps its value */
-        now[k] = m->motion[k];
+    for (k = 0; k < INPUTS; ++k) {
+        if (m->guessed[k]) m->input[k] = m->input0[k]; /* an input that was not set again keeps its value */
+        m->known = m->known && !m->guessed[k];
     }
-    end_state(m, state);
-    memcpy(m->state, state, sizeof state);
-    slope = m->given[1] ? m->slope[1] : m->h > 0.0 ? (now[1] - m->motion0[1]) / m->h : 0.0;
-    m->motion[1] = now[1] + h * slope;
-    m->motion[0] = now[0] + h * (m->given[0] ? m->slope[0] : 0.5 * (now[1] + m->motion[1]));
-    for (k = 0; k < 2; ++k) {
-        m->motion0[k] = now[k];
+    refresh(m);
+    memcpy(m->carry, m->end, sizeof m->carry);
+    for (k = 0; k < PAIRS; ++k) {
+        const int rate = PAIRS + k;
+        const double now = m->input[k], v = m->input[rate];
+        const double slope = m->h > 0.0 ? (now - m->input0[k]) / m->h : 0.0;
+        const double bend = m->given[rate] ? m->slope[rate] : m->h > 0.0 ? (v - m->input0[rate]) / m->h : 0.0;
+        m->input[rate] = v + h * bend;
+        m->input[k] = now + h * (m->given[k] ? m->slope[k] : m->rated[k] ? 0.5 * (v + m->input[rate]) : slope);
+        m->input0[k] = now;
+        m->input0[rate] = v;
+        m->slope_before[k] = slope;
+    }
+    for (k = 0; k < INPUTS; ++k) {
         m->guessed[k] = 1;
         m->given[k] = 0;
     }
     m->h = h;
+    m->steps = m->steps < 2 ? m->steps + 1 : 2;
+    m->known = 0;
     return fmi2OK;
 }
 

@@ -1,0 +1,111 @@
+"""A vehicle with a law, and its ride metrics, as functions of their numbers, which the explorer computes."""
+
+from functools import cached_property
+from typing import Any
+
+import equinox as eqx
+
+from jaxdamp import _checks
+from jaxdamp.codegen import Program, Symbols, symbols
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.export._law_program import LawProgram
+from jaxdamp.export._vehicle_program import FlatTree, VehicleProgram, road_input
+from jaxdamp.parameters import get, modules_inside, with_values
+from jaxdamp.simulation import MetricObserver
+from jaxdamp.vehicles import AbstractVehicle
+
+
+class RideProgram(VehicleProgram):
+    """A vehicle with a law at its dampers, whose rides can be printed: steps, and the observer of the metrics.
+
+    The numbers of the law and those of the vehicle are different objects, p and q. The observer has an array g.
+
+    Arguments:
+        law: the law, which the vehicle holds.
+        vehicle: the vehicle.
+        dt: interval of the instants [s].
+        count: number of the instants of a run.
+
+    Attributes:
+        numbers: parameters and settings of the vehicle but those of the law.
+        metrics: the ride metrics that a run gathers.
+    """
+
+    def __init__(self, law: LawProgram, vehicle: AbstractVehicle, dt: float, count: int) -> None:
+        super().__init__(vehicle, member=law.member)
+        inside = [(prefix, module) for prefix, module in modules_inside(self.vehicle) if prefix]
+        self._places = [prefix for prefix, module in inside if eqx.tree_equal(module, law.law)]
+        if not self._places:
+            remedy = "Build it with the law: `QuarterCar(..., damper=law)`."
+            _checks.refuse("vehicle", "hold the law as a damper", repr(type(vehicle).__name__), remedy)
+        self.law = law
+        self.numbers = [n for n in self.numbers if not any(n.path.startswith(prefix) for prefix in self._places)]
+        self.metrics = [m for m in vehicle.ride_metrics if not m.statistic.needs_record]
+        self.dt, self.count = dt, count
+        self._gathered = FlatTree()
+
+    @property
+    def needed(self) -> list[str]:
+        """Names of the channels that the metrics need; they are the first numbers of g."""
+        return list(dict.fromkeys(name for m in self.metrics for name in (m.channel, m.by) if name))
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Lengths of the arrays m, c and g."""
+        _ = self.begin
+        return super().sizes | {"g": self._gathered.count}
+
+    def with_law(self, law: AbstractDamper) -> AbstractVehicle:
+        """The vehicle with another law at its dampers."""
+        return self._placed(self.vehicle, law)
+
+    @cached_property
+    def begin(self) -> Program:
+        """`begin(m, c, h, r)`: the metrics with the first instant, g."""
+
+        def begin(held: list[Any], now: list[Any], height: Any, rate: Any) -> list[Any]:
+            return self._gathered.taken(self._observer(held).begin(self._carry.tree(now), road_input(height, rate)))
+
+        return self._lowered(begin, self._carried, *self._road("h", "r"))
+
+    @cached_property
+    def observe(self) -> Program:
+        """`observe(m, c, g, h, r)`: the metrics with this instant, g."""
+
+        def observe(held: list[Any], now: list[Any], gathered: list[Any], height: Any, rate: Any) -> list[Any]:
+            before, road = self._gathered.tree(gathered), road_input(height, rate)
+            return self._gathered.taken(self._observer(held).add(before, self._carry.tree(now), road))
+
+        return self._lowered(observe, self._carried, self._observed_so_far, *self._road("h", "r"))
+
+    @cached_property
+    def end(self) -> Program:
+        """`end(m, g)`: the metrics, in the order of `metrics`."""
+
+        def end(held: list[Any], gathered: list[Any]) -> list[Any]:
+            values = self._observer(held).end(self._gathered.tree(gathered), ())
+            return [values[m.name] for m in self.metrics]
+
+        return self._lowered(end, self._observed_so_far)
+
+    def vehicle_of(self, values: Any) -> AbstractVehicle:
+        """The vehicle with other numbers, those of the law and its own."""
+        of_law, own = values
+        car = with_values(self.vehicle, {n.path: value for n, value in zip(self.numbers, own, strict=True)})
+        return self._placed(car, self.law.law_of(of_law))
+
+    def values(self, owner: str = "p") -> Any:
+        """The numbers of the law, and those of the vehicle."""
+        return self.law.values(owner), [symbols(f"q{self.member}{n.name}", n.value.shape) for n in self.numbers]
+
+    @property
+    def _observed_so_far(self) -> list[Symbols]:
+        _ = self.begin
+        return self._gathered.symbols("g", self.dtype)
+
+    def _observer(self, held: list[Any]) -> MetricObserver:
+        return MetricObserver(self._equations(held), self.metrics, self.dt, self.count)
+
+    def _placed(self, vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
+        places = [prefix[:-1] for prefix in self._places]
+        return eqx.tree_at(lambda car: [get(car, place) for place in places], vehicle, [law] * len(places))

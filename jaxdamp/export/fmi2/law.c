@@ -1,0 +1,50 @@
+/* A damper law as the unit sees it: one input, the stroke, with its rate, the velocity. */
+#define PAIRS 1
+#define OUTPUTS 1
+#define STATES MODEL_STATES
+#define CARRY MODEL_STATES
+#define MATRICES 0
+#define RATES_GIVEN 1 /* the velocity is an input that counts even where it is zero */
+#define UNUSED(name) ((void)(name))
+
+static void prepare(const model_parameters *p, double h, double *m) { UNUSED(p), UNUSED(h), UNUSED(m); }
+
+static void start(const model_parameters *p, const double *m, const double *u, double *c) {
+    UNUSED(m), UNUSED(u);
+    model_init(p, c);
+}
+
+static void resume(const double *m, const double *u, double ratio, double *c) {
+    UNUSED(m), UNUSED(u), UNUSED(ratio), UNUSED(c);
+}
+
+/* n steps: the velocity is linear in time, the stroke the cubic with these velocities. */
+static void advance(const model_parameters *p, const double *m, const double *u0, const double *u1, double h, int n,
+                    double *c) {
+    const double x0 = u0[0], v0 = u0[1], x1 = u1[0], v1 = u1[1];
+    double x = x0, v = v0;
+    int i;
+    UNUSED(m);
+    for (i = 1; i <= n; ++i) {
+        const double s = (double)i / n, r = 1.0 - s;
+        const double rise = h * (v0 * s * r * r - v1 * s * s * r);
+        const double next = i == n ? x1 : x0 * (1.0 + 2.0 * s) * r * r + x1 * s * s * (3.0 - 2.0 * s) + rise;
+        const double faster = i == n ? v1 : v0 + s * (v1 - v0);
+        model_advance(p, x, v, next, faster, h / n, c);
+        x = next;
+        v = faster;
+    }
+}
+
+static void observe(const model_parameters *p, const double *m, const double *x, const double *u, double *rate,
+                    double *y) {
+    UNUSED(m);
+    model_state_rate(p, u[0], u[1], x, rate);
+    y[0] = model_force(p, u[0], u[1], x);
+}
+
+static void observe_derivative(const model_parameters *p, const model_parameters *dp, const double *x, const double *dx,
+                               const double *u, const double *du, double *drate, double *dy) {
+    model_state_rate_derivative(p, dp, u[0], du[0], u[1], du[1], x, dx, drate);
+    dy[0] = model_force_derivative(p, dp, u[0], du[0], u[1], du[1], x, dx);
+}
