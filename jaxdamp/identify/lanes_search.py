@@ -16,6 +16,8 @@ from jaxdamp.identify.lanes import Evaluation
 from jaxdamp.identify.search import (
     AT_EDGE,
     FIRST_DAMPING,
+    LARGEST_STEP_SIZE,
+    LEAST_DAMPING,
     MOST_GROWTH,
     MOST_OF_THE_WAY,
     NEAR,
@@ -25,8 +27,6 @@ from jaxdamp.identify.search import (
 )
 from jaxdamp.parameters import Bounds
 
-
-LEAST_DAMPING = 1e-13  # of the squared norms of the Jacobian's columns: keeps singular systems solvable
 
 Evaluate = Callable[[Float[np.ndarray, "problems free"], Int[np.ndarray, " some"]], Evaluation]
 
@@ -68,31 +68,46 @@ def search_lanes(
     gram = evaluate(y, np.arange(len(y))).gram
     scale = np.sqrt(np.maximum(_diagonal(gram), 0.0))
     step_size, steps = np.ones(len(y)), np.ones(len(y), int)
+    refused = np.zeros(len(y), bool)  # the last step
     ended: list[Status | None] = [None if np.all(np.isfinite(own)) else Status.NO_STEP for own in gram]
     rounding = 500 * precision
+
+    def steps_of(some: Int[np.ndarray, " some"], step_size: Float[np.ndarray, " some"]) -> _Steps:
+        step = _steps(gram[some], scale[some], step_size, lower - y[some], upper - y[some])
+        floor = np.maximum(rounding, STEP_TOLERANCE**2 / samples[some]) * 0.5 * gram[some, -1, -1] + rounding**2
+        short = np.all(np.abs(step) <= SHORT * (1e-3 + np.abs(y[some])), axis=1)
+        return _Steps(step, _decrease(gram[some], step), floor, short)
+
     while True:
         open_ = np.array([i for i, status in enumerate(ended) if status is None and steps[i] < max_steps], int)
         if not open_.size:
             break
-        step = _steps(gram[open_], scale[open_], step_size[open_], lower - y[open_], upper - y[open_])
+        chosen = steps_of(open_, step_size[open_])
+        is_whole = ~refused[open_] & chosen.small
+        if np.any(is_whole):
+            whole = steps_of(open_, np.full(open_.size, LARGEST_STEP_SIZE))
+            is_whole &= ~whole.small
+            chosen = chosen.replaced(is_whole, whole)
         trial = y.copy()
-        trial[open_] += step
+        trial[open_] += chosen.step
         found = evaluate(trial, open_)
         steps[open_] += 1
         old, new = 0.5 * gram[open_, -1, -1], 0.5 * found.gram[open_, -1, -1]
-        predicted = _decrease(gram[open_], step)
-        floor = np.maximum(rounding, STEP_TOLERANCE**2 / samples[open_]) * old + rounding**2
-        negligible = (predicted < floor) & (new - old < floor)
-        short = np.all(np.abs(step) <= SHORT * (1e-3 + np.abs(y[open_])), axis=1)
-        ratio = (old - new) / np.where(predicted > 0, predicted, 1.0)
+        negligible = (chosen.predicted < chosen.floor) & (new - old < chosen.floor)
+        ratio = (old - new) / np.where(chosen.predicted > 0, chosen.predicted, 1.0)
         accepted = found.keeps_conditions[open_] & (negligible | (ratio > WORTHWHILE))
         accepted &= np.all(np.isfinite(found.gram[open_]), axis=(1, 2))
+        refused[open_] = ~accepted
         growth = np.maximum(1.0 / MOST_GROWTH, 1.0 - (2.0 * np.clip(ratio, -1e6, 2.0) - 1.0) ** 3)
-        step_size[open_] /= np.where(accepted, growth, MOST_GROWTH)
+        step_size[open_] /= np.where(accepted, growth, np.where(is_whole, 1.0, MOST_GROWTH))
         moved = open_[accepted]
         y[moved], gram[moved] = trial[moved], found.gram[moved]
         scale[moved] = np.maximum(scale[moved], np.sqrt(np.maximum(_diagonal(gram[moved]), 0.0)))
-        for i, done in zip(open_, negligible | short, strict=True):
+        again = open_[is_whole & ~accepted]
+        while again.size:
+            again = again[(step_size[again] < LARGEST_STEP_SIZE) & steps_of(again, step_size[again]).small]
+            step_size[again] *= MOST_GROWTH
+        for i, done in zip(open_, negligible | chosen.short, strict=True):
             ended[i] = Status.CONVERGED if done else None
     at_edge = (np.abs(y - lower) < AT_EDGE) & (y != lower)
     if np.any(at_edge):
@@ -100,6 +115,25 @@ def search_lanes(
         edged = np.flatnonzero(np.any(at_edge, axis=1))
         gram[edged] = evaluate(y, edged).gram[edged]
     return LanesEnd(y, gram, [status or Status.STEP_LIMIT for status in ended], steps)
+
+
+class _Steps(NamedTuple):
+    """Steps of some problems, and what decides whether a search ends by them."""
+
+    step: Float[np.ndarray, "some free"]
+    predicted: Float[np.ndarray, " some"]  # decrease of half the sum of squares
+    floor: Float[np.ndarray, " some"]  # of a decrease that counts
+    short: Bool[np.ndarray, " some"]
+
+    @property
+    def small(self) -> Bool[np.ndarray, " some"]:
+        """Whether the search would end; true of steps that are not finite."""
+        return ~(self.predicted >= self.floor) | self.short
+
+    def replaced(self, where: Bool[np.ndarray, " some"], others: "_Steps") -> "_Steps":
+        """These, but some of the others."""
+        pairs = zip(self, others, strict=True)
+        return _Steps(*(np.where(where[:, None] if a.ndim > 1 else where, b, a) for a, b in pairs))
 
 
 def _diagonal(gram: np.ndarray) -> np.ndarray:

@@ -25,6 +25,8 @@ SHORT = 1e-6  # step, relative to the coordinates
 WORTHWHILE = 1e-3  # of the predicted decrease, for a step to be accepted
 MOST_GROWTH = 5.0  # of the step size, from one step to the next
 FIRST_DAMPING = 1e-2  # of the squared norms of the Jacobian's columns
+LEAST_DAMPING = 1e-13  # of the same: keeps singular systems solvable
+LARGEST_STEP_SIZE = FIRST_DAMPING / LEAST_DAMPING
 MOST_OF_THE_WAY = 0.9  # to an edge, in one step
 NEAR = 1e-3  # coordinates so near an edge may go all the way
 AT_EDGE = 1e-6  # coordinates so near their lower bound end on it; also the distance to conditions
@@ -66,7 +68,9 @@ def search(problem: Problem, max_steps: int, held: int | None = None, tolerance:
     decrease is less than `tolerance` standard errors, or below rounding errors, is accepted and ends the search; if
     refused, it would only become shorter and shorter. A step shorter than `SHORT` also ends the search: kinks of a law
     are kinks of the sum of squares, near which the predicted decrease is wrong. A step that violates a condition
-    between parameters is refused.
+    between parameters is refused. The damping holds back what the records hardly determine, so that a step is small
+    far from the minimum too: before the search ends by a small step, the whole step, without damping, is tried, and if
+    it is refused, the most damped one that is not small.
 
     Arguments:
         problem: the problem with its start.
@@ -82,31 +86,48 @@ def search(problem: Problem, max_steps: int, held: int | None = None, tolerance:
     bounds = Bounds(lower, upper)
     now = _point(problem, np.clip(start, lower, upper))
     model = _Model.at(now, bounds, np.zeros(start.size))
-    step_size, converged, steps = 1.0, False, 1
+    step_size, converged, steps, refused = 1.0, False, 1, False
     step = model.step(step_size)
     while not converged and steps < max_steps and np.all(np.isfinite(step)):
+        old, rounding = now.half_squares, 500 * now.precision
+        floor = max(rounding, tolerance**2 / now.residual.size) * old + rounding**2
+        is_whole = not refused and _is_small(model, now, step, floor)
+        if is_whole:
+            whole = model.step(LARGEST_STEP_SIZE)
+            is_whole = not _is_small(model, now, whole, floor)
+            step = whole if is_whole else step
         trial = _point(problem, now.y + step)
         steps += 1
-        old, new = now.half_squares, trial.half_squares
-        predicted = model.decrease(step)
-        rounding = 500 * now.precision
-        floor = max(rounding, tolerance**2 / now.residual.size) * old + rounding**2
+        new, predicted = trial.half_squares, model.decrease(step)
         negligible = predicted < floor and new - old < floor
-        converged = bool(negligible or np.all(np.abs(step) <= SHORT * (1e-3 + np.abs(now.y))))
+        converged = bool(negligible or _is_short(now, step))
         ratio = (old - new) / (predicted if predicted > 0 else 1.0)
-        if trial.keeps_conditions and (negligible or ratio > WORTHWHILE):
+        refused = not (trial.keeps_conditions and (negligible or ratio > WORTHWHILE))
+        if not refused:
             # Beyond 2 the growth is at its limit; the cube of a huge ratio would overflow.
             step_size /= max(1.0 / MOST_GROWTH, 1.0 - (2.0 * float(np.clip(ratio, -1e6, 2.0)) - 1.0) ** 3)
             now, model = trial, _Model.at(trial, bounds, model.scale)
-        else:
+        elif not is_whole:
             step_size /= MOST_GROWTH
         step = model.step(step_size)
+        while refused and is_whole and step_size < LARGEST_STEP_SIZE and _is_small(model, now, step, floor):
+            step_size *= MOST_GROWTH
+            step = model.step(step_size)
     status = Status.CONVERGED if converged else Status.STEP_LIMIT
     status = status if np.all(np.isfinite(step)) else Status.NO_STEP
     at_edge = np.abs(now.y - lower) < AT_EDGE
     if np.any(at_edge & (now.y != lower)):
         now = _point(problem, np.where(at_edge, lower, now.y))
     return SearchEnd(now.values, now.residual, now.jacobian, status, steps)
+
+
+def _is_small(model: "_Model", now: "_Point", step: Float[np.ndarray, " free"], floor: float) -> bool:
+    """Whether the search would end by a step; true of one that is not finite."""
+    return not model.decrease(step) >= floor or _is_short(now, step)
+
+
+def _is_short(now: "_Point", step: Float[np.ndarray, " free"]) -> bool:
+    return bool(np.all(np.abs(step) <= SHORT * (1e-3 + np.abs(now.y))))
 
 
 class _Point(NamedTuple):

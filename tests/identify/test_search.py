@@ -4,11 +4,12 @@ import jax
 import numpy as np
 import pytest
 
+from jaxdamp._status import Status
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import Besinger, CoulombFriction, Lag, Linear, PiecewiseLinear, PowerLaw
-from jaxdamp.identify import fit
+from jaxdamp.identify import fit, fit_many
 from jaxdamp.identify.search import _Model
-from jaxdamp.parameters import free_parameters
+from jaxdamp.parameters import free_parameters, replace
 
 
 BESINGER = Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05)
@@ -162,6 +163,29 @@ def test_a_lag_that_is_not_there_ends_at_zero(sines):
     assert result.converged
     assert result["lag_time"].value < 1e-4 and result["lag_time"].note == "not identifiable"
     assert abs(result["law.rate"].value - 1500.0) < 4 * result["law.rate"].standard_error
+
+
+@pytest.mark.parametrize("many", [False, True], ids=["fit", "fit_many"])
+def test_a_start_beside_the_minimum_reaches_it_where_the_records_hardly_tell(sines, many):
+    """Two powers side by side: damping makes the first step tiny although the minimum is three standard errors away."""
+    truth = PowerLaw(1500.0, 0.9, 1200.0, 0.9) + PowerLaw(500.0, 0.6, 400.0, 0.6)
+    how = {"freeze": ["*offset"], "starts": 1}
+    runs = sines(truth, noise=0.02, seed=4)
+    whole = fit(truth, runs, **how)
+    values, errors = (np.array([getattr(p, name) for p in whole.parameters]) for name in ("value", "standard_error"))
+    information = np.linalg.inv(whole.covariance / np.outer(errors, errors))
+    scale = np.sqrt(np.diag(information))
+    eigenvalues, directions = np.linalg.eigh(information / np.outer(scale, scale))
+    away = values + 3.0 * errors * directions[:, 0] / scale / np.sqrt(eigenvalues[0])
+    start = replace(truth, dict(zip((p.name for p in whole.parameters), away, strict=True)))
+    if many:
+        result = fit_many(start, {"damper": runs}, **how)
+        status, reached = result.status[0], result.values[0]
+    else:
+        result = fit(start, runs, **how)
+        status, reached = result.status, np.array([p.value for p in result.parameters])
+    assert status is Status.CONVERGED
+    np.testing.assert_allclose((reached - values) / errors, 0.0, atol=0.01)
 
 
 def test_a_singular_model_has_no_step():
