@@ -110,6 +110,7 @@ def test_the_kernel_compiled_as_ptx(monkeypatch):
     """All of a thread stays in registers, and the function that launches it compiles."""
     loops = []
     text = _lanes.Loop.text.fget
+    assert text is not None
     monkeypatch.setattr(_lanes.Loop, "text", property(lambda loop: (loops.append(loop), text(loop))[1]))
     jax.vmap(oscillator(printed_scan))(jnp.linspace(0.5, 3.0, 5))
     kernel = loops[-1].kernel
