@@ -63,7 +63,7 @@ def launcher(text: str, architecture: str) -> str:
     return template.replace("@ptx@", ",".join(map(str, ptx(text, architecture))))
 
 
-def registered_on_gpu(text: str) -> str:
-    """The name under which XLA calls a kernel on the GPUs of this process."""
+def register_on_gpu(text: str, name: str) -> None:
+    """Let XLA call a kernel on the GPUs of this process, under the name of the same loop on its processors."""
     capability = jax.devices()[0].compute_capability  # such as "9.0"
-    return registered(launcher(text, f"compute_{capability.replace('.', '')}"), "CUDA")
+    registered(launcher(text, f"compute_{capability.replace('.', '')}"), "CUDA", name)

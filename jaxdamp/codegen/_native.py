@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from importlib import resources
 from pathlib import Path
 
 import jax
@@ -53,25 +54,27 @@ def _folder() -> Path:
 
 
 @functools.cache
-def registered(text: str, platform: str = "cpu") -> str:
+def registered(text: str, platform: str = "cpu", name: str = "") -> str:
     """The name under which XLA calls the function `loop` of a C text, compiled once in a process.
 
     Arguments:
         text: C.
         platform: of XLA, "cpu" or "CUDA".
+        name: another one than that made from the text, under which another platform has the same function.
 
     Raises:
         NotImplementedError: no C compiler, or one that refuses the text; the message holds what it says.
     """
     tool = compiled_by()
-    name = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
-    source, target = _folder() / f"{name}.c", _folder() / f"{name}.so"
+    own = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
+    source, target = _folder() / f"{own}.c", _folder() / f"{own}.so"
     source.write_text(text, encoding="utf-8")
-    where = ["-I", jax.ffi.include_dir(), str(source), "-o", str(target)]
+    headers = ["-I", jax.ffi.include_dir(), "-I", str(resources.files("jaxdamp.codegen"))]
+    where = [*headers, str(source), "-o", str(target)]
     for flags, libraries in (([*_FLAGS, *_WIDE], ["-lmvec", "-lm", "-ldl"]), (_FLAGS, ["-lm"])):
         done = subprocess.run([tool, *flags, *where, *libraries], capture_output=True, text=True)
         if done.returncode == 0:
             function = ctypes.CDLL(str(target)).loop
-            jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(function), platform=platform)
-            return name
+            jax.ffi.register_ffi_target(name or own, jax.ffi.pycapsule(function), platform=platform)
+            return name or own
     raise NotImplementedError(f"{tool} does not compile the printed loop: {done.stderr.strip()[-2000:]}")

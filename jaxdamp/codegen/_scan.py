@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from jaxdamp import _checks
-from jaxdamp.codegen._cuda import registered_on_gpu
+from jaxdamp.codegen._cuda import register_on_gpu
 from jaxdamp.codegen._jaxprs import called, with_constants_as_inputs
 from jaxdamp.codegen._lanes import OF_POINT, OF_STEP, Loop, Operand, lanes_in_c
 from jaxdamp.codegen._lowering import printing
@@ -76,8 +76,9 @@ def printed_scan(step: Callable[[Any, Any], Any], carry: Any, rows: Any, *, arit
         now, state = _stacked(start, loop.laned, size)
         table = jnp.concatenate([jnp.reshape(x, (x.shape[0], -1)) for x in rows], axis=1)
         kinds = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in (now, state)]
-        on_gpu = jax.default_backend() == "gpu"
-        name = registered_on_gpu(loop.kernel) if on_gpu else registered(loop.text)
+        name = registered(loop.text)
+        if jax.default_backend() == "gpu":
+            register_on_gpu(loop.kernel, name)
         printed: Any = jax.ffi.ffi_call(name, kinds, vmap_method="sequential")
         now, state = printed(shared, own, now, state, table)
         return _unstacked(now, state, start, loop.laned), list(loop.laned)

@@ -14,9 +14,8 @@ typedef unsigned int uint32_t;
 #else
 #include <math.h>
 #include <stdbool.h>
-#include <stdint.h>
 
-#include "xla/ffi/api/c_api.h"
+#include "call.h"
 #define KERNEL static
 #define UNROLLED
 #define POINT thread
@@ -71,22 +70,12 @@ KERNEL void steps_of_points(const double *restrict shared, const double *restric
 }
 
 #ifndef __CUDACC__
-static double *numbers(void *buffer)
-{
-    return (double *)((XLA_FFI_Buffer *)buffer)->data;
-}
-
 XLA_FFI_Error *loop(XLA_FFI_CallFrame *frame)
 {
-    XLA_FFI_Metadata_Extension *asked = (XLA_FFI_Metadata_Extension *)frame->extension_start;
-    if (asked && asked->extension_base.type == XLA_FFI_Extension_Metadata) {
-        XLA_FFI_Metadata *about = asked->metadata;
-        about->api_version.major_version = XLA_FFI_API_MAJOR;
-        about->api_version.minor_version = XLA_FFI_API_MINOR;
+    if (asks_version(frame))
         return 0;
-    }
     void **in = frame->args.args, **out = frame->rets.rets;
-    const int64_t steps = ((XLA_FFI_Buffer *)in[4])->dims[0], points = ((XLA_FFI_Buffer *)in[3])->dims[1];
+    const int64_t steps = size(in[4], 0), points = size(in[3], 1);
     for (thread = 0; thread < points; thread++)
         steps_of_points(numbers(in[0]), numbers(in[1]), numbers(in[2]), numbers(in[3]), numbers(in[4]), steps, points,
                         numbers(out[0]), numbers(out[1]));

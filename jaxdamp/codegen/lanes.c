@@ -1,9 +1,8 @@
 /* A loop over steps for many points side by side, called by XLA. The lines between the marks are printed. */
 #include <math.h>
 #include <stdbool.h>
-#include <stdint.h>
 
-#include "xla/ffi/api/c_api.h"
+#include "call.h"
 
 #define LANES 32 /* points of a block, which the compiler turns into vectors */
 #define ROW(name, count) double name[(count) ? (count) : 1][LANES] __attribute__((aligned(64)))
@@ -72,25 +71,10 @@ static void run(const double *restrict shared, const double *restrict own_in, co
     }
 }
 
-static double *numbers(void *buffer)
-{
-    return (double *)((XLA_FFI_Buffer *)buffer)->data;
-}
-
-static int64_t size(void *buffer, int64_t axis)
-{
-    return ((XLA_FFI_Buffer *)buffer)->dims[axis];
-}
-
 XLA_FFI_Error *loop(XLA_FFI_CallFrame *frame)
 {
-    XLA_FFI_Metadata_Extension *asked = (XLA_FFI_Metadata_Extension *)frame->extension_start;
-    if (asked && asked->extension_base.type == XLA_FFI_Extension_Metadata) {
-        XLA_FFI_Metadata *about = asked->metadata;
-        about->api_version.major_version = XLA_FFI_API_MAJOR;
-        about->api_version.minor_version = XLA_FFI_API_MINOR;
+    if (asks_version(frame))
         return 0;
-    }
     void **in = frame->args.args, **out = frame->rets.rets;
     run(numbers(in[0]), numbers(in[1]), numbers(in[2]), numbers(in[3]), numbers(in[4]), size(in[4], 0), size(in[3], 1),
         numbers(out[0]), numbers(out[1]));

@@ -3,7 +3,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#include "xla/ffi/api/c_api.h"
+#include "call.h"
 
 #define THREADS 128 /* of a block */
 #define DEVICES 64
@@ -50,20 +50,10 @@ static int function_in(void *context, void *driver, void **function)
     return code;
 }
 
-static void *data(void *buffer)
-{
-    return ((XLA_FFI_Buffer *)buffer)->data;
-}
-
 XLA_FFI_Error *loop(XLA_FFI_CallFrame *frame)
 {
-    XLA_FFI_Metadata_Extension *asked = (XLA_FFI_Metadata_Extension *)frame->extension_start;
-    if (asked && asked->extension_base.type == XLA_FFI_Extension_Metadata) {
-        XLA_FFI_Metadata *about = asked->metadata;
-        about->api_version.major_version = XLA_FFI_API_MAJOR;
-        about->api_version.minor_version = XLA_FFI_API_MINOR;
+    if (asks_version(frame))
         return 0;
-    }
     void *driver = dlopen("libcuda.so.1", RTLD_NOW), *context, *function, *before;
     if (!driver)
         return failed(frame, "the loading of libcuda.so.1", 0);
@@ -72,8 +62,10 @@ XLA_FFI_Error *loop(XLA_FFI_CallFrame *frame)
     if (error)
         return error;
     void **in = frame->args.args, **out = frame->rets.rets;
-    int64_t steps = ((XLA_FFI_Buffer *)in[4])->dims[0], points = ((XLA_FFI_Buffer *)in[3])->dims[1];
-    void *a[] = {data(in[0]), data(in[1]), data(in[2]), data(in[3]), data(in[4]), data(out[0]), data(out[1])};
+    int64_t steps = size(in[4], 0), points = size(in[3], 1);
+    void *a[7];
+    for (int i = 0; i < 7; i++)
+        a[i] = numbers(i < 5 ? in[i] : out[i - 5]);
     void *arguments[] = {&a[0], &a[1], &a[2], &a[3], &a[4], &steps, &points, &a[5], &a[6]};
     int code = ((ContextOf)dlsym(driver, "cuStreamGetCtx"))(stream.stream, &context);
     if (code)

@@ -72,7 +72,7 @@ def to_fmu(law: AbstractDamper | AbstractVehicle, path: str | os.PathLike[str], 
         program, longest, own = VehicleProgram(law), _LONGEST_STEP / substeps_needed(law, _LONGEST_STEP), "vehicle.c"
         model, printed = program.vehicle, vehicle_source(program, "model", derivatives=True)
     known = variables(program, longest)
-    texts = [printed.static(), *((_TEXTS / file).read_text(encoding="utf-8") for file in (own, "unit.c"))]
+    texts = [printed.static(), *((_TEXTS / file).read_text(encoding="utf-8") for file in (own, "unit.c", "services.c"))]
     guid = hashlib.sha256(repr((texts, known)).encode()).hexdigest()[:32]
     source = "\n".join([f'#define GUID "{{{guid}}}"', f"#define DEFAULT_STEP {longest!r}\n", *texts])
     contents = {"modelDescription.xml": description(model, known, name, guid).encode()}

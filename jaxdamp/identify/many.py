@@ -74,8 +74,8 @@ def fit_many(
         weighting: of the records of a damper: `"samples"` or `"runs"`, as in `fit`.
         loss: as in `fit`; each damper has its own weights.
         priors: as in `fit`, the same for every damper; they count against the noise that the standard errors assume.
-        initial_state: of a law with states, as in `fit`; dampers whose states drift in a motion that is said to be
-            periodic have a remark.
+        initial_state: of a law with states, as in `fit`, but not "estimated"; dampers whose states drift in a motion
+            that is said to be periodic have a remark.
         samples_per_cycle: slow records are averaged in blocks down to this number.
         starts: largest number of starts of each damper, side by side: `law`, then those that it proposes.
         max_steps: largest number of steps of each search.
@@ -100,6 +100,9 @@ def fit_many(
     _checks.one_of("weighting", weighting, ["samples", "runs"])
     _checks.one_of("loss", loss, LOSSES)
     _checks.one_of("initial_state", initial_state, INITIAL_STATES)
+    if initial_state == "estimated":
+        remedy = 'Fit one damper: `fit(law, runs, initial_state="estimated")`.'
+        _checks.refuse("initial_state", "need no numbers of each record", "'estimated'", remedy)
     for name, count in (("max_steps", max_steps), ("starts", starts)):
         if count < 1:
             _checks.refuse(name, "be 1 or more", count)

@@ -13,6 +13,9 @@ from jaxdamp.identify.initial_states import Cycle, moving_samples, repeated_moti
 from jaxdamp.identify.model import Model, blind_end, law_of
 
 
+COARSEST = 0.48  # rad between samples, beyond which straight lines between them are the larger error
+
+
 class Row(NamedTuple):
     """A record made ready for a model with memory."""
 
@@ -88,7 +91,7 @@ def row_of(
     omega = dominant_rate(run)
     block = samples_in_block(run, samples_per_cycle)
     dt = block / run.sampling_rate
-    substeps = int(np.clip(np.ceil(omega * dt / law_of(model).traits().step_angle), 1, 8))
+    substeps = max(int(np.ceil(min(omega * dt, COARSEST) / law_of(model).traits().step_angle)), 1)
     start = start_of(run, initial_state)
     warm_up = 0 if start in ("rest", "estimated") else int(min(2 * np.pi / omega, run.duration) / dt)
     signals = [averaged(values, block) for values in _with_warm_up(run, warm_up * block, channels)]

@@ -21,8 +21,9 @@ FAMILIES = (  # of laws, by the number of their colour
     (dampers.Linear, dampers.Bilinear, dampers.PiecewiseLinear),  # straight pieces
     (dampers.Besinger, dampers.Degressive, dampers.DigressiveProgressive, dampers.Saturating),  # valves that open
     (dampers.PowerLaw, dampers.Polynomial, dampers.SegmentedPolynomial),  # powers of the velocity
-    (dampers.BoucWen, dampers.ModifiedBoucWen, dampers.Dahl, dampers.LuGre, dampers.ViscoPlastic, dampers.Play,
-     dampers.CoulombFriction, dampers.StribeckFriction, dampers.HyperbolicTangent, dampers.KaradayiMasada),  # friction
+    (dampers.BoucWen, dampers.ModifiedBoucWen, dampers.Dahl, dampers.LuGre, dampers.ViscoPlastic,
+     dampers.CreepingViscoPlastic, dampers.Play, dampers.CoulombFriction, dampers.StribeckFriction,
+     dampers.HyperbolicTangent, dampers.KaradayiMasada),  # friction
     (dampers.Table, dampers.SplineTable, dampers.ForceSurface, dampers.AccelerationSurface, dampers.NeuralHysteresis,
      dampers.Hybrid),  # numbers without a formula
     (dampers.MonoTube, dampers.PistonFlow, dampers.FrequencySelective),  # hydraulics

@@ -129,12 +129,12 @@ class Exponential(AbstractFixedStep):
         dt: spacing of the instants [s]; that of the run if left out.
         substeps: steps between two instants; as many as the steepest law needs (friction at standstill, a bristle, oil)
             if left out, so that every step is stable. The road stays straight between instants.
-        printed: print the loop over time as C and let the machine's C compiler (gcc, clang) make vector code of it: for
-            a `Ride` in a `sweep` or under `jax.vmap`, in double precision. The numbers are the same to rounding, and on
-            a CPU come 1.1 to 1.6 times as fast for laws of arithmetic and roots (`docs/speed.md`). On a GPU the loop is
-            one CUDA kernel: it was compiled, and compared through the same text in C, but not yet run. Derivatives do
-            not pass. What cannot be printed is refused with the reason (`NotImplementedError`), with "arithmetic" also
-            laws with exponentials, powers and the like. With None, a long `sweep` chooses.
+        printed: print the loop over time as C and let the machine's C compiler (gcc, clang) make vector code of it:
+            for a `Ride` in a `sweep` or under `jax.vmap`, in double precision. The numbers are the same to rounding,
+            and on a quiet CPU come 1.3 to 1.6 times as fast for laws of arithmetic and roots (`docs/speed.md`). On a
+            GPU the loop is one CUDA kernel: it was compiled, and compared through the same text in C, but not yet
+            run. Derivatives do not pass. What cannot be printed is refused with the reason (`NotImplementedError`),
+            with "arithmetic" also laws with exponentials, powers and the like. With None, a long `sweep` chooses.
 
     >>> from jaxdamp import roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)

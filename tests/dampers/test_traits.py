@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import respond
+from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import (
     BoucWen,
     Bushing,
@@ -22,6 +23,7 @@ from jaxdamp.dampers import (
     StrokeDependent,
     TemperatureScaled,
 )
+from jaxdamp.identify import prepare
 from jaxdamp.vehicles.ports import Ports
 
 from .test_contract import network
@@ -109,6 +111,14 @@ def test_laws_around_a_mono_tube_take_its_short_steps_and_write_out_no_iteration
     for law in outer:
         assert law.traits().solves_equation
         assert law.traits().step_angle == tube.traits().step_angle < Linear(20.0).traits().step_angle
+
+
+def test_a_fit_takes_steps_of_the_angle_also_in_a_coarse_record():
+    (run,) = VirtualDyno(Linear(1000.0), 100.0).run(SineTest(0.02, 1.0, cycles=2))
+    for law in (MonoTube.reference(), Lag(Linear(1000.0), 0.002)):
+        (batch,) = prepare(law, [run], samples_per_cycle=50).residuals
+        angle = 2.0 * np.pi * float(batch.dt[0]) / batch.substeps
+        assert 0.6 * law.traits().step_angle < angle <= law.traits().step_angle
 
 
 def test_stroke_limits_are_those_at_the_wheel():

@@ -130,6 +130,7 @@ def test_what_is_refused(clicks):
         ({"shared": ["rebound"]}, "No parameter is named 'rebound'"),
         ({"settings": CLICKS[:3]}, "one number for each of 6 dampers"),
         ({"starts": 0}, "`starts` must be 1 or more"),
+        ({"initial_state": "estimated"}, "`initial_state` must need no numbers of each record"),
         ({"starts": 2, "shared": ["rebound_rate"]}, "`starts` must be 1 with shared parameters"),
     )
     for options, message in refusals:
