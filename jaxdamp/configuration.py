@@ -3,7 +3,7 @@
 import functools
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import NamedTuple
@@ -93,8 +93,8 @@ class Target(NamedTuple):
     Attributes:
         fused_loops: XLA compiles loops over time as one function.
         reciprocal_roots: the device has an instruction for many 1/√x at a time (AVX-512); XLA then starts from it.
-        library_functions: exponentials and logarithms are those of the compiler's own library, one number at a time,
-            as in printed C (`jaxdamp.codegen`).
+        library_functions: exponentials, logarithms and powers are those of the compiler's own library, one number at a
+            time: fastest for one car, and in printed C (`jaxdamp.codegen`).
     """
 
     fused_loops: bool
@@ -113,6 +113,11 @@ def compiling_for(other: Target) -> Iterator[None]:
         yield
     finally:
         _OTHER_TARGET.reset(token)
+
+
+def one_at_a_time() -> AbstractContextManager[None]:
+    """Functions traced inside are for one car: they take the library's elementary functions."""
+    return compiling_for(target()._replace(library_functions=True))
 
 
 def target() -> Target:
