@@ -2,9 +2,7 @@
 
 import functools
 import os
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
-from contextvars import ContextVar
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -102,17 +100,13 @@ class Target(NamedTuple):
     library_functions: bool = False
 
 
-_OTHER_TARGET: ContextVar[Target | None] = ContextVar("other_target", default=None)
+# Part of the key of compiled functions: what was traced for one target is not taken for another.
+_OTHER_TARGET = jax.make_user_context(None)
 
 
-@contextmanager
-def compiling_for(other: Target) -> Iterator[None]:
+def compiling_for(other: Target) -> AbstractContextManager[None]:
     """Functions traced inside are for another target than XLA in this process."""
-    token = _OTHER_TARGET.set(other)
-    try:
-        yield
-    finally:
-        _OTHER_TARGET.reset(token)
+    return _OTHER_TARGET(other)
 
 
 def one_at_a_time() -> AbstractContextManager[None]:
@@ -122,7 +116,7 @@ def one_at_a_time() -> AbstractContextManager[None]:
 
 def target() -> Target:
     """What the function that is being traced is compiled for; by default this process, see `_this_process`."""
-    return _OTHER_TARGET.get() or _this_process()
+    return _OTHER_TARGET.value or _this_process()
 
 
 @functools.cache

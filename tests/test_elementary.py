@@ -7,7 +7,7 @@ import pytest
 
 from jaxdamp import _elementary
 from jaxdamp._elementary import exponential, logarithm, power, reciprocal_root
-from jaxdamp.configuration import Target
+from jaxdamp.configuration import Target, one_at_a_time
 
 
 def test_logarithm_is_that_of_numpy(rng):
@@ -78,3 +78,19 @@ def test_second_derivatives_over_a_loop(function):
         assert abs(expected) > 1e-3
         assert float(jax.hessian(looped)(at)) == pytest.approx(expected, rel=1e-13)
         assert float(jax.jacrev(jax.jacrev(looped))(at)) == pytest.approx(expected, rel=1e-13)
+
+
+def test_one_car_has_the_powers_of_the_library_with_the_same_derivatives():
+    inside = jax.jit(power)
+    with one_at_a_time():
+        assert "pow" in str(jax.make_jaxpr(inside)(0.3, 1.7))
+        assert float(inside(0.0, 0.5)) == pytest.approx(0.0, abs=1e-14)
+        for mode in (jax.jacfwd, jax.jacrev):
+            for order, place in ((1, 0), (1, 1), (2, 0), (2, 1)):
+                slope = inside
+                for _ in range(order):
+                    slope = mode(slope, place)
+                n, x = 1.7, 0.3
+                exact = {(1, 0): n / x, (2, 0): n * (n - 1) / x**2, (1, 1): np.log(x), (2, 1): np.log(x) ** 2}
+                assert float(slope(x, n)) == pytest.approx(exact[order, place] * x**n, rel=1e-13)
+    assert "bitcast" in str(jax.make_jaxpr(inside)(0.3, 1.7))

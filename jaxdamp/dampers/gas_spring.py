@@ -4,6 +4,7 @@ from typing import final
 
 import equinox as eqx
 
+from jaxdamp._elementary import power
 from jaxdamp._limits import at_least
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractStateless
@@ -22,7 +23,7 @@ def gas_pressure(x: ScalarLike, pressure: ScalarLike, volume: ScalarLike, area: 
     """
     share = 1.0 + area * x / volume
     limited = at_least(share, LEAST_SHARE)
-    return pressure * limited**-n * (1.0 - n * (share - limited) / limited)
+    return pressure * power(limited, -n) * (1.0 - n * (share - limited) / limited)
 
 
 @final

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple, final
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
@@ -18,10 +19,26 @@ def orifice_root(drop: ScalarLike, transition: ScalarLike) -> Scalar:
     return drop * reciprocal_root(jnp.sqrt(drop * drop + transition * transition))
 
 
-def orifice_drop(root: ScalarLike, transition: ScalarLike) -> Scalar:
+@jax.custom_jvp
+def orifice_drop(root: Scalar, transition: Scalar) -> Scalar:
     """Δp [Pa] of S [√Pa], the inverse of `orifice_root`."""
+    return root * jnp.sqrt(0.5 * (root * root + _quartic(root, transition)))
+
+
+def _quartic(root: Scalar, transition: Scalar) -> Scalar:
+    """q = √(S⁴ + 4 ε²) [Pa]."""
     square = root * root
-    return root * jnp.sqrt(0.5 * (square + jnp.sqrt(square * square + 4.0 * transition * transition)))
+    return jnp.sqrt(square * square + 4.0 * transition * transition)
+
+
+@orifice_drop.defjvp
+def _orifice_drop_slope(primals: tuple[Scalar, Scalar], tangents: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+    """∂Δp/∂S = r (1 + S²/q) and ∂Δp/∂ε = S ε/(q r), r = Δp/S: with fewer quotients than the rules of the roots."""
+    (root, transition), (change, shift) = primals, tangents
+    square, q = root * root, _quartic(root, transition)
+    mean, inverse = jnp.sqrt(0.5 * (square + q)), 1.0 / q
+    slope = mean * (1.0 + square * inverse)
+    return root * mean, slope * change + root * transition * inverse / mean * shift
 
 
 DENSITY, DISCHARGE = 850.0, 0.7  # kg/m³ of the oil, and C_d, where nothing else is stated
@@ -32,16 +49,22 @@ def flow_per_area(density: ScalarLike = DENSITY, discharge: ScalarLike = DISCHAR
     return discharge * jnp.sqrt(2.0 / density)
 
 
-class Valve(NamedTuple):
-    """A spring-loaded valve: opening pressure [Pa], pressure per area [Pa/m²] and largest area [m²]."""
+class Passages(NamedTuple):
+    """What the oil flows through in one direction, in terms that a search evaluates with few quotients.
+
+    Attributes:
+        opening: p_o of the valve [Pa].
+        per_pressure: 1/(k A_max) [1/Pa].
+        valve: C_d √(2/ρ) A_max/A [m/s/√Pa], of the valve fully open.
+        bleed: C_d √(2/ρ) A_b/A [m/s/√Pa].
+        leak: k_l/A [m/s/Pa].
+    """
 
     opening: Scalar
-    stiffness: Scalar
-    largest: Scalar
-
-    def open_area(self, drop: ScalarLike) -> Scalar:
-        """A_max tanh((Δp − p_o)/(k A_max)) [m²] at a pressure drop Δp [Pa]; closed below p_o."""
-        return self.largest * jnp.tanh(at_least(drop - self.opening, 0.0) / (self.stiffness * self.largest))
+    per_pressure: Scalar
+    valve: Scalar
+    bleed: Scalar
+    leak: Scalar
 
 
 @final
@@ -80,12 +103,14 @@ class PistonFlow(AbstractMemoryless):
     discharge: Number = setting("", "C_d, discharge coefficient", positive, default=DISCHARGE)
     transition_pressure: Number = setting("Pa", "ε, drop below which orifice flow is laminar", positive, default=1e3)
 
-    def valve(self, rebound: Bool[Array, ""]) -> Valve:
-        """The valve that opens in a direction."""
-        return Valve(
-            jnp.where(rebound, self.rebound_opening_pressure, self.compression_opening_pressure),
-            jnp.where(rebound, self.rebound_valve_stiffness, self.compression_valve_stiffness),
-            jnp.where(rebound, self.rebound_valve_area, self.compression_valve_area),
+    def passages(self, rebound: Bool[Array, ""]) -> Passages:
+        """Bleed, leak and the valve that opens in a direction."""
+        opening = jnp.where(rebound, self.rebound_opening_pressure, self.compression_opening_pressure)
+        stiffness = jnp.where(rebound, self.rebound_valve_stiffness, self.compression_valve_stiffness)
+        largest = jnp.where(rebound, self.rebound_valve_area, self.compression_valve_area)
+        per_area = flow_per_area(self.density, self.discharge) / self.area
+        return Passages(
+            opening, 1.0 / (stiffness * largest), per_area * largest, per_area * self.bleed_area, self.leak / self.area
         )
 
     def root(self, drop: ScalarLike) -> Scalar:
@@ -94,33 +119,29 @@ class PistonFlow(AbstractMemoryless):
 
     def drop(self, root: ScalarLike) -> Scalar:
         """Pressure drop [Pa] of S [√Pa]."""
-        return orifice_drop(root, self.transition_pressure)
+        return orifice_drop(jnp.asarray(root), jnp.asarray(self.transition_pressure))
 
-    def _per_root(self, open_area: ScalarLike) -> Scalar:
-        """Q/(A S) [m/s per √Pa] through an open area [m²]."""
-        return flow_per_area(self.density, self.discharge) * open_area / self.area
-
-    def flow_velocity(self, root: ScalarLike, valve: Valve) -> Scalar:
-        """Q/A [m/s] at S [√Pa]: the velocity of a piston that displaces this flow. `valve` is that of the direction."""
+    def flow_velocity(self, root: ScalarLike, passages: Passages) -> Scalar:
+        """Q/A [m/s] at S [√Pa]: the velocity of a piston that displaces this flow, through those of its direction."""
         drop = self.drop(root)
-        open_area = self.bleed_area + valve.open_area(jnp.abs(drop))
-        return self._per_root(open_area) * root + self.leak * drop / self.area
+        share = jnp.tanh(at_least(jnp.abs(drop) - passages.opening, 0.0) * passages.per_pressure)
+        return (passages.bleed + passages.valve * share) * root + passages.leak * drop
 
     def _root_at(self, v: ScalarLike) -> Scalar:
         """S [√Pa] at which Q/A is v."""
         v = jnp.asarray(v)
-        speed, valve = jnp.abs(v), self.valve(v >= 0)
-        most = speed / self._per_root(self.bleed_area)  # through the bleed alone
+        speed, passages = jnp.abs(v), self.passages(v >= 0)
+        most = speed / passages.bleed  # through the bleed alone
         # A first estimate, correct in the leading digit: all flow through the valve, partly or fully open, or the leak.
-        cube = speed * valve.stiffness / self._per_root(1.0)
-        guess = jnp.sqrt(valve.opening + at_most(cube / jnp.sqrt(valve.opening), jnp.cbrt(cube) ** 2))
-        guess = at_least(guess, speed / self._per_root(self.bleed_area + valve.largest))
-        leak_alone = jnp.sqrt(speed * self.area / at_least(self.leak, jnp.finfo(self.leak.dtype).tiny))
+        cube = speed / (passages.valve * passages.per_pressure)
+        guess = jnp.sqrt(passages.opening + at_most(cube / jnp.sqrt(passages.opening), jnp.cbrt(cube) ** 2))
+        guess = at_least(guess, speed / (passages.bleed + passages.valve))
+        leak_alone = jnp.sqrt(speed / at_least(passages.leak, jnp.finfo(passages.leak.dtype).tiny))
         guess = at_most(guess, at_most(leak_alone, most))
         zero = jnp.zeros_like(most)
         lower, upper = jnp.where(v >= 0, zero, -most), jnp.where(v >= 0, most, zero)
         guess = jnp.where(v >= 0, guess, -guess)
-        return increasing_root(lambda root: self.flow_velocity(root, valve) - v, guess, lower, upper)
+        return increasing_root(lambda root: self.flow_velocity(root, passages) - v, guess, lower, upper)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

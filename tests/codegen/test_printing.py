@@ -199,6 +199,14 @@ def test_text_is_the_same_whatever_was_compiled_before():
     assert "int64_t" not in printed("powers", C(), "void f(void)")  # pow by bits is for vectors only
 
 
+def test_a_function_inside_that_was_compiled_before_is_printed_for_its_own_target():
+    inner = jax.jit(lambda x: power(x, 1.5))
+    assert "bitcast" in str(jax.make_jaxpr(inner)(2.0))  # vectorised, for XLA
+    text = "\n".join(C().lines(lower(inner, symbols("x")).statements, 0))
+    assert "pow(" in text
+    assert "bitcast" in str(jax.make_jaxpr(inner)(2.0))
+
+
 def test_each_operation_is_computed_once_and_nothing_in_vain():
     program = lower(lambda x, y: (jnp.sin(x) * 2.0, jnp.sin(x) + 1.0, jnp.cos(y))[:2], symbols("x"), symbols("y"))
     assert len(program.statements) == 3

@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import root_scalar
 
 from jaxdamp.dampers import PistonFlow
+from jaxdamp.dampers.piston_flow import orifice_drop
 
 from .single_precision import single_precision_error
 
@@ -83,13 +84,28 @@ def test_it_settles_for_hard_cases():
     def back(law, v):
         force = law.force_velocity(v)
         drop = force / law.area
-        found = law.flow_velocity(law.root(drop), law.valve(drop >= 0))
+        found = law.flow_velocity(law.root(drop), law.passages(drop >= 0))
         slope = jax.grad(law.force_velocity)(v)
         return (found - v) * slope / force
 
     error = np.abs(jax.jit(jax.vmap(lambda law: jax.vmap(lambda v: back(law, v))(v)))(laws))
     assert np.max(error) < 3e-3
     assert np.mean(error > 1e-9) < 1e-4
+
+
+def test_the_slopes_of_the_pressure_drop_are_those_of_its_formula():
+    def plain(root, transition):
+        square = root * root
+        return root * jnp.sqrt(0.5 * (square + jnp.sqrt(square * square + 4.0 * transition * transition)))
+
+    transition = jnp.asarray(TRANSITION)
+    for root in jnp.array([-2e3, -30.0, 0.0, 1e-3, 31.0, 1500.0]):
+        for mode in (jax.jacfwd, jax.jacrev):
+            for place in (0, 1):
+                slope, exact = mode(orifice_drop, place), mode(plain, place)
+                np.testing.assert_allclose(slope(root, transition), exact(root, transition), rtol=1e-12, atol=1e-15)
+                second = mode(slope, place)(root, transition), mode(exact, place)(root, transition)
+                np.testing.assert_allclose(*second, rtol=1e-10, atol=1e-12)
 
 
 def test_single_precision():
