@@ -2,8 +2,8 @@
 
     python -m benchmarks.explorer [NAME...]    laws of the contract; all of them if left out
 
-A page holds a 10 s quarter car at 1 kHz and three loops. "opens" is from the address to the first picture, on the second
-opening; "follows" is what a moved slider starts: loops, ride, metrics, spectrum and drawing, the median of nine.
+A page holds a 10 s quarter car at 1 kHz and three loops. "opens" is from the address to the first picture, on the
+second opening; "follows" is what a moved slider starts: loops, ride, metrics, spectrum and drawing, the median of nine.
 """
 
 import sys
@@ -22,7 +22,9 @@ from tests.dampers.test_contract import LAWS  # noqa: E402
 from tests.export.browser import Browser, started  # noqa: E402
 
 
-MOVED = "(() => { const ms = []; for (let i = 0; i < 9; ++i) { refresh(); ms.push(state.milliseconds); } return ms; })()"
+MOVED = (
+    "(() => { const ms = []; for (let i = 0; i < 9; ++i) { refresh(); ms.push(state.milliseconds); } return ms; })()"
+)
 
 
 def measured(browser: Browser, name: str, folder: Path) -> list[Any]:

@@ -14,7 +14,7 @@ functions are those of the language's own library. A primitive that cannot be pr
 
 from jaxdamp.codegen._languages import AbstractLanguage, C, JavaScript, PrintedFunction
 from jaxdamp.codegen._lowering import Program, Symbols, lower, symbols
-from jaxdamp.codegen._native import compiler, compiles_for_x86
+from jaxdamp.codegen._native import compiler
 from jaxdamp.codegen._program import Constant
 from jaxdamp.codegen._scan import printed_scan
 
@@ -28,7 +28,6 @@ __all__ = [
     "Program",
     "Symbols",
     "compiler",
-    "compiles_for_x86",
     "lower",
     "printed_scan",
     "symbols",

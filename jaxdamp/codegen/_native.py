@@ -28,11 +28,6 @@ def compiler() -> str | None:
     return next(filter(None, map(shutil.which, [*own[:1], "gcc", "clang", "cc"])), None)
 
 
-def compiles_for_x86() -> bool:
-    """Whether gcc is the compiler, and the processor is an x86-64: where printed loops were measured."""
-    return "gcc" in Path(compiler() or "").name and hasattr(os, "uname") and os.uname().machine == "x86_64"
-
-
 def compiled_by() -> str:
     """The path of the C compiler.
 

@@ -26,14 +26,14 @@ def orifice_drop(root: Scalar, transition: Scalar) -> Scalar:
 
 
 def _quartic(root: Scalar, transition: Scalar) -> Scalar:
-    """q = √(S⁴ + 4 ε²) [Pa]."""
+    """√(S⁴ + 4 ε²) [Pa]."""
     square = root * root
     return jnp.sqrt(square * square + 4.0 * transition * transition)
 
 
 @orifice_drop.defjvp
 def _orifice_drop_slope(primals: tuple[Scalar, Scalar], tangents: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
-    """∂Δp/∂S = r (1 + S²/q) and ∂Δp/∂ε = S ε/(q r), r = Δp/S: with fewer quotients than the rules of the roots."""
+    """∂Δp/∂S = r (1 + S²/q) and ∂Δp/∂ε = S ε/(q r), r = Δp/S, q as above: fewer quotients than the rules of roots."""
     (root, transition), (change, shift) = primals, tangents
     square, q = root * root, _quartic(root, transition)
     mean, inverse = jnp.sqrt(0.5 * (square + q)), 1.0 / q

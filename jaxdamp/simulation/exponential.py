@@ -134,7 +134,9 @@ class Exponential(AbstractFixedStep):
             and on a quiet CPU come 1.3 to 1.6 times as fast for laws of arithmetic and roots (`docs/speed.md`). On a
             GPU the loop is one CUDA kernel: it was compiled, and compared through the same text in C, but not yet
             run. Derivatives do not pass. What cannot be printed is refused with the reason (`NotImplementedError`),
-            with "arithmetic" also laws with exponentials, powers and the like. With None, a long `sweep` chooses.
+            with "arithmetic" also laws with exponentials, powers and the like. If left out (None), a `sweep` of half a
+            minute and more tries the loop of XLA and a printed one, and goes on with the faster; with False all is left
+            to XLA.
 
     >>> from jaxdamp import roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)
@@ -144,7 +146,7 @@ class Exponential(AbstractFixedStep):
 
     dt: float | None = eqx.field(static=True, default=None)
     substeps: int | None = eqx.field(static=True, default=None)
-    printed: bool | Literal["arithmetic"] | None = eqx.field(static=True, default=False)
+    printed: bool | Literal["arithmetic"] | None = eqx.field(static=True, default=None)
 
     def __check_init__(self) -> None:
         if self.dt is not None:

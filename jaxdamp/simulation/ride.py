@@ -15,7 +15,7 @@ from jaxdamp._jacobian import Mode
 from jaxdamp._many_points import outside_domains
 from jaxdamp._types import Scalar
 from jaxdamp._vectors import MemoryLayout
-from jaxdamp.codegen import compiles_for_x86
+from jaxdamp.codegen import compiler
 from jaxdamp.configuration import target
 from jaxdamp.dampers import RangeUse, has_fitted_range
 from jaxdamp.metrics import Metric, MetricValues
@@ -32,9 +32,6 @@ from jaxdamp.simulation.stationary import stationary_metrics, stationary_range_u
 from jaxdamp.simulation.step_size import RunCheck
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
 from jaxdamp.vehicles import AbstractVehicle, is_stationary
-
-
-LONG_SWEEP = 1e9  # steps of cars, some seconds on a core: printing saves a tenth or more of them
 
 
 @final
@@ -167,16 +164,13 @@ class Ride(eqx.Module):
         layout = self.engine.layout(2 * len(self.vehicle.coordinates), side_by_side=True)
         return eqx.tree_at(lambda ride: ride.layout, self, layout)
 
-    def printed_side_by_side(self, points: int) -> "Ride | None":
-        """The same with its loop printed as C, for a sweep of so many points, if it may be faster.
+    def printed_side_by_side(self) -> "Ride | None":
+        """The same with its loop printed as C, if the engine allows it, numbers are double and a compiler is at hand.
 
-        That is where numbers are double, gcc is at hand on an x86-64 processor, for which it was measured, and the
-        sweep is long enough to pay for the compiler.
+        A `sweep` that takes long compiles this form too, and keeps the faster of both.
         """
         engine = self.engine.printed_if_faster()
-        if engine is None or self.heights is None or self.heights.dtype != jnp.float64:
-            return None
-        if points * self.heights.shape[0] * self.substeps < LONG_SWEEP or not compiles_for_x86():
+        if engine is None or self.heights is None or self.heights.dtype != jnp.float64 or compiler() is None:
             return None
         return eqx.tree_at(lambda ride: ride.engine, self, engine).side_by_side()
 

@@ -50,10 +50,10 @@ class HasSideBySide(Protocol):
 
 @runtime_checkable
 class HasPrinted(Protocol):
-    """A function whose loop can be printed as C where that is faster."""
+    """A function whose loop can be printed as C, which may be faster."""
 
-    def printed_side_by_side(self, points: int) -> Callable[[dict[str, Any]], Any] | None:
-        """The form for a sweep of so many points without derivatives, on processors; None if XLA is to compile it."""
+    def printed_side_by_side(self) -> Callable[[dict[str, Any]], Any] | None:
+        """That form, for long sweeps without derivatives on processors; None if XLA is to compile it in any case."""
         ...
 
 

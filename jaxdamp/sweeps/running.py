@@ -1,11 +1,9 @@
 """`sweep`: one function at many points."""
 
 import os
-import re
-import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, final
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from jaxtyping import Array
@@ -18,7 +16,8 @@ from jaxdamp.sweeps.axes import AbstractPoints, as_points
 from jaxdamp.sweeps.devices import choose_devices
 from jaxdamp.sweeps.file import SweepFile
 from jaxdamp.sweeps.function import HasDomain, HasLanes, HasPrinted, HasSideBySide, HasUnits
-from jaxdamp.sweeps.program import Program, forget_errors, prepare, quiet, with_chunk
+from jaxdamp.sweeps.program import Program, prepare, quiet
+from jaxdamp.sweeps.runner import Runner
 from jaxdamp.sweeps.table import Table, extent
 from jaxdamp.sweeps.tracing import Traced, trace
 
@@ -27,8 +26,8 @@ if TYPE_CHECKING:
     import xarray
 
 
-CALL = 0.3  # s that one call of the program should take
 BAR = 20  # characters
+COMPILED, PRINTED = "compiled by XLA", "printed as C"
 
 
 def sweep(
@@ -72,8 +71,8 @@ def sweep(
 
     Returns:
         The results by name with the axes as dimensions (for a list, along `point`). Of a `Ride`, `attrs["loop"]` says
-        by what its loop was compiled: XLA, or as printed C by gcc where its engine leaves that choice to a long sweep;
-        the numbers are the same to rounding.
+        by what its loop was compiled at the end: XLA, or the C compiler where a long sweep found that to be faster; the
+        numbers are the same to rounding.
 
     Raises:
         ValueError: axes that are no numbers, a function that does not know an axis or returns no named numbers, no
@@ -97,10 +96,10 @@ def sweep(
         kept.resume()
     _leave_out(function, table)
     left = np.flatnonzero(~table.done)
-    loop = "compiled by XLA"
+    loop = COMPILED
     if left.size:
-        program, loop = _prepared(function, traced, len(left), chunk, devices)
-        runner = _Runner(program, points)
+        program = prepare(traced, len(left), chunk, devices, _lanes(function))
+        runner = Runner(program, points, lambda: _printed(function, traced, len(left), chunk, devices))
         with Progress("Sweeping") as shown, quiet():
             try:
                 for indices, results in runner.results(left):
@@ -112,27 +111,24 @@ def sweep(
                 if kept is not None:
                     kept.save(now=True)
             runner.close()
+        loop = COMPILED if runner.program.traced is traced else PRINTED
     table.warn()
     data = table.label()
     return data.assign_attrs(loop=loop) if isinstance(function, HasPrinted) else data
 
 
-def _prepared(function: Any, traced: Traced, count: int, chunk: int | None, devices: Any) -> tuple[Program, str]:
-    """The compiled program, and by what its loop is compiled: printed as C where the function says that it is faster.
-
-    What cannot be printed or compiled after all is left to XLA.
-    """
+def _printed(function: Any, traced: Traced, count: int, chunk: int | None, devices: Any) -> Program | None:
+    """The program with its loop printed as C, if the function has one that this machine can compile."""
     on_cpu = choose_devices(devices)[0].platform == "cpu" and not processes.several()
-    if traced.mode is None and on_cpu and isinstance(function, HasPrinted):
-        printed = function.printed_side_by_side(count)
-        if printed is not None:
-            try:
-                with warnings.catch_warnings(action="ignore"):  # of axes, which were given before
-                    own = trace(printed, list(traced.axes), False)._replace(fingerprint=traced.fingerprint)
-                return prepare(own, count, chunk, devices, _lanes(printed)), "printed as C, compiled by gcc"
-            except NotImplementedError:
-                pass
-    return prepare(traced, count, chunk, devices, _lanes(function)), "compiled by XLA"
+    printed = function.printed_side_by_side() if isinstance(function, HasPrinted) else None
+    if printed is None or traced.mode is not None or not on_cpu:
+        return None
+    try:
+        with warnings.catch_warnings(action="ignore"):  # of axes, which were given before
+            own = trace(printed, list(traced.axes), False)._replace(fingerprint=traced.fingerprint)
+        return prepare(own, count, chunk, devices, _lanes(printed))
+    except NotImplementedError:
+        return None
 
 
 def _lanes(function: Any) -> int | None:
@@ -160,68 +156,3 @@ def _tell(progress: Callable[[int, int], None] | None, shown: Progress, done: in
         rest = (total - done) / rate
         time_left = f"{rest:.0f} s" if rest < 120 else f"{rest / 60:.0f} min" if rest < 7200 else f"{rest / 3600:.1f} h"
         shown(f"{'█' * full}{'·' * (BAR - full)} {100 * done // total} %, {done} of {total} points, {time_left} left")
-
-
-@final
-class _Runner:
-    """Takes points through a program, in calls of a useful length; points that raise are found by halving."""
-
-    def __init__(self, program: Program, points: AbstractPoints) -> None:
-        self._program, self._points = program, points
-        self._rounds = 1
-        self._raised = False
-        self.rate, self.error = 1.0, ""  # points a second; what the function raised last
-
-    def results(self, left: np.ndarray) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray] | None]]:
-        """The points in pieces with their results; None where the function raises."""
-        while left.size:
-            size = self._program.capacity(self._rounds)
-            pending, left = [left[:size]], left[size:]
-            while pending:
-                indices = pending.pop()
-                found, full = self._call(indices)
-                if found is None and full and self._program.layout.chunk > 1:  # out of memory
-                    pieces = max(-(-len(indices) // self._program.capacity(1)), 1)
-                    pending += np.array_split(indices, pieces)[::-1]
-                elif found is None and len(indices) > 1:
-                    pending += np.array_split(indices, 2)[::-1]
-                else:
-                    yield indices, found
-
-    def _call(self, indices: np.ndarray) -> tuple[dict[str, np.ndarray] | None, bool]:
-        """Results, or None and whether for want of memory, in which case the next calls take half the chunk."""
-        start, found, error = time.perf_counter(), {}, ""
-        try:
-            found = self._program.start(self._points.columns(indices))
-        except (RuntimeError, FloatingPointError) as raised:
-            error = str(raised) or repr(raised)
-        full = "RESOURCE_EXHAUSTED" in error
-        seconds, some_failed, some_full = processes.largest(time.perf_counter() - start, bool(error), full)
-        if not some_failed:
-            self._adapt(len(indices), float(seconds))
-            return self._program.collect(found, len(indices)), False
-        if some_full and self._program.layout.chunk > 1:
-            old = self._program
-            self._program = with_chunk(old.traced, old.layout.mesh, old.layout.chunk // 2)
-            self._rounds = 1
-        self._raised = True
-        self.error = _last_line(error)
-        return None, bool(some_full)
-
-    def close(self) -> None:
-        """Leave nothing behind that raises later."""
-        if self._raised:
-            forget_errors(self._program.layout.mesh)
-
-    def _adapt(self, size: int, seconds: float) -> None:
-        """Make the next call as long as it should be, but at most four times as long as this one."""
-        self.rate = size / seconds
-        rounds = -(-size // self._program.capacity(1))
-        self._rounds = min(max(int(rounds * min(CALL / seconds, 4.0)), 1), self._program.layout.rounds)
-
-
-def _last_line(error: str) -> str:
-    """What a user wrote into an error, out of the report of a callback that raised."""
-    lines = [line for line in error.splitlines() if re.match(r"\S*(Error|Exception)\S*: ", line)]
-    line = (lines or error.strip().splitlines() or [""])[-1]
-    return re.sub(r"^\S*Equinox\S*: ", "", line)

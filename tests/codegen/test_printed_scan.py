@@ -9,6 +9,7 @@ from jaxdamp import Ride, roads, sweep, vehicles
 from jaxdamp.codegen import _cuda, _lanes, _native, _scan, compiler, printed_scan
 from jaxdamp.dampers import Besinger, PowerLaw, SeriesSpring
 from jaxdamp.simulation import Exponential, simulate
+from jaxdamp.sweeps import runner
 
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -150,30 +151,32 @@ def test_a_sweep_of_all_ride_metrics():
         np.testing.assert_allclose(printed[name], plain[name], rtol=1e-11, atol=1e-14, err_msg=str(name))
 
 
-def test_a_long_sweep_prints_where_that_is_faster(monkeypatch):
-    """With the numbers of XLA, which takes over where derivatives, functions or a missing compiler stand in the way."""
-    choosing = Exponential(printed=None)
-    ride = Ride(CAR, ROAD, metrics=["rms_sprung_acceleration"], duration=0.4, engine=choosing)
+def test_a_long_sweep_tries_the_printed_loop_too(monkeypatch):
+    """With the numbers of XLA, which does all where derivatives, functions or a missing compiler stand in the way."""
+    ride = Ride(CAR, ROAD, metrics=["rms_sprung_acceleration"], duration=0.4)
+    tried, original = [], runner._Pace
+    monkeypatch.setattr(runner, "_Pace", lambda program: tried.append(program) or original(program))
 
     def swept(function=ride, **options):
-        return sweep(function, {RATE: np.linspace(2e3, 5e3, 4)}, **options)
+        tried.clear()
+        data = sweep(function, {RATE: np.linspace(2e3, 5e3, 20)}, chunk=1, **options)
+        return data, len(tried)
 
-    plain = swept()
-    monkeypatch.setattr("jaxdamp.simulation.ride.LONG_SWEEP", 0)
-    if _native.compiles_for_x86():
-        printed = swept()
-        assert printed.attrs["loop"].startswith("printed as C")
-        metric = "rms_sprung_acceleration"
-        np.testing.assert_allclose(printed[metric], plain[metric], rtol=1e-12)
-    powers = vehicles.presets.quarter_car_000(PowerLaw(1800.0, 0.55, 900.0, 0.55))
-    others = [
-        plain,
-        swept(gradients=True),
-        sweep(Ride(powers, ROAD, duration=0.4, engine=choosing), {"sprung_mass": [250.0, 300.0]}),
-    ]
-    monkeypatch.setattr(_native, "compiler", lambda: None)
-    others += [swept()]
-    assert [data.attrs["loop"] for data in others] == ["compiled by XLA"] * 4
+    plain, programs = swept()
+    assert (programs, plain.attrs["loop"]) == (1, "compiled by XLA")  # too short
+    monkeypatch.setattr(runner, "LONG", 0.0)
+    monkeypatch.setattr(runner, "TURNS", 1)
+    found, programs = swept()
+    assert programs == 2 and found.attrs["loop"] in ("compiled by XLA", "printed as C")
+    metric = "rms_sprung_acceleration"
+    np.testing.assert_allclose(found[metric], plain[metric], rtol=1e-12)
+    powers = vehicles.presets.quarter_car_000(CAR.damper + PowerLaw(1800.0, 0.55, 900.0, 0.55))
+    by_xla = Ride(CAR, ROAD, metrics=[metric], duration=0.4, engine=Exponential(printed=False))
+    assert swept(gradients=True)[1] == swept(by_xla)[1] == 1
+    ride_of_powers = Ride(powers, ROAD, metrics=[metric], duration=0.4)
+    assert len(sweep(ride_of_powers, {"sprung_mass": np.linspace(250.0, 300.0, 9)}, chunk=1)) and len(tried) == 2
+    monkeypatch.setattr("jaxdamp.simulation.ride.compiler", lambda: None)
+    assert swept()[1] == 1
 
 
 def test_runs_that_cannot_be_printed():

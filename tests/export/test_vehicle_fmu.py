@@ -3,6 +3,7 @@
 import ctypes
 import functools
 import subprocess
+import warnings
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from jaxdamp.dampers import Besinger, BoucWen, GasSpring, Lag, SeriesSpring
 from jaxdamp.export import to_c, to_fmu
 from jaxdamp.parameters import replace
 from jaxdamp.roads import from_profile
+from jaxdamp.simulation import CoarseStepWarning
 from jaxdamp.vehicles import RollCar, presets
 from tests.export.compiled import STRICT, compiler
 
@@ -25,9 +27,11 @@ CARS = {
     "roll": lambda: RollCar(420.0, 820.0, presets.full_car_jazar(SeriesSpring(VALVE, 4e5, 1e8)).front),
     "truck": lambda: presets.truck_001(),
     "tracked": lambda: presets.m113_003(VALVE),
+    "full": lambda: presets.full_car_jazar(SeriesSpring(VALVE, 4e5, 1e8)),
 }
-# The others run with the slow tests.
-NAMES = ["quarter", *(pytest.param(name, marks=pytest.mark.slow) for name in CARS if name != "quarter")]
+# The others run with the slow tests; the C compiler takes a minute for the full car, before a release.
+MARKS = {name: pytest.mark.slow for name in CARS} | {"full": pytest.mark.exhaustive, "quarter": ()}
+NAMES = [pytest.param(name, marks=marks) for name, marks in MARKS.items()]
 
 
 @functools.cache
@@ -50,7 +54,8 @@ def expected(name, step, vehicle=None):
     """The channels from `simulate`, by names, at the instants of a step."""
     time = instants(step)
     road = from_profile(time, heights(name, time)[0])
-    return simulate(vehicle or car(name), road, dt=step)
+    with warnings.catch_warnings(action="ignore", category=CoarseStepWarning):  # the longest one is meant to be
+        return simulate(vehicle or car(name), road, dt=step)
 
 
 def shown(name):
@@ -143,14 +148,8 @@ def test_fmu(files, tmp_path, name):
     assert len(shown(name)) > 3
 
 
-@pytest.mark.parametrize(
-    ("name", "rates"),
-    [
-        *(("quarter", True), ("quarter", False)),
-        *(pytest.param(*case, marks=pytest.mark.slow) for case in (("roll", True), ("roll", False), ("tracked", True))),
-        pytest.param("truck", False, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.parametrize("rates", [True, False])
+@pytest.mark.parametrize("name", NAMES)
 def test_co_simulation_in_the_master_of_fmpy(files, name, rates):
     """Right after a step inputs and outputs are extrapolated: the error falls with the square of the step."""
     errors = []
@@ -159,7 +158,7 @@ def test_co_simulation_in_the_master_of_fmpy(files, name, rates):
         response = expected(name, step)
         errors.append([worst(done[channel][3:], np.asarray(response[channel])[3:]) for channel in shown(name)])
     one, two, three = np.array(errors)
-    assert np.all(three < 0.05) and np.all(two < 0.4 * one + 1e-6) and np.all(three < 0.4 * two + 1e-6), errors
+    assert np.all(three < 0.05) and np.all(two < 0.65 * one + 1e-6) and np.all(three < 0.16 * one + 1e-6), errors
 
 
 def integrated(unit, name, channels):
@@ -191,7 +190,7 @@ def integrated(unit, name, channels):
     return dict(zip(channels, np.array(rows).T, strict=True))
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if getattr(name, "values", None) != ("half",)])
+@pytest.mark.parametrize("name", NAMES)
 def test_model_exchange(files, tmp_path, name):
     """`simulate` converges to the states that a solver integrates, with the order of its step.
 

@@ -1,0 +1,65 @@
+"""The choice between two programs, which run on a clock of their own."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from jaxdamp.sweeps import points, runner
+from jaxdamp.sweeps.program import Program, prepare
+from jaxdamp.sweeps.tracing import trace
+
+
+COUNT = 3000
+
+
+@pytest.fixture
+def program(monkeypatch):
+    """Makes a program that takes so many seconds a point, and counts the points that it takes."""
+    clock, of = SimpleNamespace(now=0.0), {}
+    monkeypatch.setattr(runner.time, "perf_counter", lambda: clock.now)
+    start = Program.start
+
+    def timed(program, columns):
+        seconds, taken = of[id(program)]
+        clock.now += seconds * len(columns["x"])
+        taken.append(len(columns["x"]))
+        return start(program, columns)
+
+    def program(seconds):
+        made = prepare(trace(lambda point: {"twice": 2.0 * point["x"]}, ["x"], False), COUNT, 4, 1, None)
+        of[id(made)] = seconds, []
+        return made, of[id(made)][1]
+
+    monkeypatch.setattr(Program, "start", timed)
+    return program
+
+
+def run(first, other):
+    runs = runner.Runner(first, points({"x": np.arange(float(COUNT))}), other)
+    parts = list(runs.results(np.arange(COUNT)))
+    np.testing.assert_array_equal(np.concatenate([indices for indices, _ in parts]), np.arange(COUNT))
+    np.testing.assert_array_equal(np.concatenate([found["twice"] for _, found in parts]), 2.0 * np.arange(COUNT))
+    return runs
+
+
+@pytest.mark.parametrize(("first", "second"), [(0.04, 0.02), (0.02, 0.04)])
+def test_the_faster_program_does_the_rest_of_a_long_sweep(program, first, second):
+    (one, by_one), (two, by_two) = program(first), program(second)
+    runs = run(one, lambda: two)
+    slow, fast = (by_one, by_two) if first > second else (by_two, by_one)
+    assert runs.program is (two if first > second else one)
+    assert 0 < sum(slow) < 0.05 * COUNT and sum(slow) + sum(fast) == COUNT
+    assert runs.rate == pytest.approx(50.0)
+
+
+def test_a_short_sweep_asks_for_no_other_program(program):
+    one, taken = program(0.009)
+    run(one, lambda: pytest.fail("asked for"))
+    assert sum(taken) == COUNT
+
+
+def test_without_another_program_the_first_does_all(program):
+    (one, taken), asked = program(0.04), []
+    run(one, lambda: asked.append(1))
+    assert (sum(taken), len(asked)) == (COUNT, 1)
