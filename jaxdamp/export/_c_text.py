@@ -19,6 +19,16 @@ INCLUDES = """\
 """
 
 
+# A compiler's time grows faster than the length of a function: a minute for the thousands of lines of a full car.
+_NOT_OPTIMISED = """\
+#if defined(__clang__)
+__attribute__((noinline, optnone))
+#elif defined(__GNUC__)
+__attribute__((optimize("O0")))
+#endif
+"""
+
+
 class CFunction(NamedTuple):
     """A function of the source.
 
@@ -27,12 +37,14 @@ class CFunction(NamedTuple):
         head: its declaration.
         program: its statements.
         targets: the arguments that take the parts of the result; the result is returned where there are none.
+        optimised: whether the compiler may optimise it; not if it is long and called rarely.
     """
 
     comment: str
     head: str
     program: Program
     targets: Sequence[str] = ()
+    optimised: bool = True
 
 
 class CSource(NamedTuple):
@@ -125,7 +137,8 @@ def _definition(function: CFunction) -> str:
     else:
         returned = results.item()
     printed = PrintedFunction(function.head, arguments, function.program.statements, outputs, returned)
-    return f"/* {function.comment} */\n{LANGUAGE.function(printed)}"
+    how = "" if function.optimised else _NOT_OPTIMISED
+    return f"/* {function.comment} */\n{how}{LANGUAGE.function(printed)}"
 
 
 def _entries(number: LawNumber) -> Iterable[tuple[str, float]]:

@@ -19,6 +19,7 @@ def vehicle_source(program: VehicleProgram, name: str, derivatives: bool = False
             f"void {name}_prepare({p}, {real} dt, {real} *m)",
             program.prepare,
             ["m"],
+            optimised=False,
         ),
         CFunction(
             "At rest in the static equilibrium on the road: c.",

@@ -29,8 +29,9 @@ CARS = {
     "tracked": lambda: presets.m113_003(VALVE),
     "full": lambda: presets.full_car_jazar(SeriesSpring(VALVE, 4e5, 1e8)),
 }
-# The others run with the slow tests; the C compiler takes a minute for the full car, before a release.
-MARKS = {name: pytest.mark.slow for name in CARS} | {"full": pytest.mark.exhaustive, "quarter": ()}
+# The others run with the slow tests, two of them before a release.
+MARKS = {name: pytest.mark.slow for name in CARS} | dict.fromkeys(("full", "roll"), pytest.mark.exhaustive)
+MARKS["quarter"] = ()
 NAMES = [pytest.param(name, marks=marks) for name, marks in MARKS.items()]
 
 
@@ -149,7 +150,7 @@ def test_fmu(files, tmp_path, name):
 
 
 @pytest.mark.parametrize("rates", [True, False])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [name for name in NAMES if name.values != ("tracked",)])
 def test_co_simulation_in_the_master_of_fmpy(files, name, rates):
     """Right after a step inputs and outputs are extrapolated: the error falls with the square of the step."""
     errors = []
@@ -159,6 +160,17 @@ def test_co_simulation_in_the_master_of_fmpy(files, name, rates):
         errors.append([worst(done[channel][3:], np.asarray(response[channel])[3:]) for channel in shown(name)])
     one, two, three = np.array(errors)
     assert np.all(three < 0.05) and np.all(two < 0.65 * one + 1e-6) and np.all(three < 0.16 * one + 1e-6), errors
+
+
+@pytest.mark.slow
+def test_laws_between_wheel_and_road_without_rates_converge_in_proportion_to_the_step(files):
+    errors = []
+    for step in STEPS:
+        done = in_master(files("tracked"), "tracked", step, "CoSimulation", input=signals("tracked", step, rates=False))
+        response = expected("tracked", step)
+        errors.append(max(worst(done[c][3:], np.asarray(response[c])[3:]) for c in shown("tracked")))
+    one, two, three = errors
+    assert 0.4 * two < three < 0.6 * two and two < 0.8 * one, errors  # the longest step is too coarse for more
 
 
 def integrated(unit, name, channels):
