@@ -6,6 +6,7 @@ A page holds a 10 s quarter car at 1 kHz and three loops. "opens" is from the ad
 second opening; "follows" is what a moved slider starts: loops, ride, metrics, spectrum and drawing, the median of nine.
 """
 
+import shutil
 import sys
 import tempfile
 from pathlib import Path
@@ -19,7 +20,7 @@ configure(cache=False)
 from benchmarks._timing import report  # noqa: E402
 from jaxdamp.export import to_explorer  # noqa: E402
 from tests.dampers.test_contract import LAWS  # noqa: E402
-from tests.export.browser import Browser, started  # noqa: E402
+from tests.export.browser import NAMES, Browser, started  # noqa: E402
 
 
 MOVED = (
@@ -38,6 +39,9 @@ def measured(browser: Browser, name: str, folder: Path) -> list[Any]:
 
 
 def main() -> None:
+    if not any(map(shutil.which, NAMES)):
+        print("No Chromium or Chrome is installed.")
+        return
     names = sys.argv[1:] or list(LAWS)
     with tempfile.TemporaryDirectory() as folder, started() as browser:
         rows = [measured(browser, name, Path(folder)) for name in names]
