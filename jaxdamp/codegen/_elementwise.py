@@ -11,7 +11,7 @@ from jaxdamp.codegen._program import Atom, Atoms, Writer, constant
 # Operations of the program have the names of the primitives.
 SAME_NAME = frozenset(
     "add sub mul div rem pow neg abs sign max min lt le gt ge eq ne and or xor not nextafter "
-    "exp exp2 expm1 log log1p sqrt cbrt sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh "
+    "exp exp2 expm1 log log1p log2 sqrt cbrt sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh "
     "erf erfc floor ceil is_finite".split()
 )
 OTHER_NAME = {"add_any": "add"}

@@ -42,7 +42,7 @@ _OF_FLOATS = {
     "min": "{0} < {1} || {0} != {0} ? {0} : {1}",
 }
 FUNCTIONS = frozenset(
-    "exp expm1 log log1p sqrt cbrt pow sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh "
+    "exp expm1 log log1p log2 sqrt cbrt pow sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh "
     "floor ceil".split()
 )
 

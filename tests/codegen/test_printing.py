@@ -105,8 +105,8 @@ def powers(x):
 
 
 def functions(x):
-    names = jnp.exp, jnp.expm1, jnp.log1p, jnp.tanh, jnp.arcsin, jnp.arctan, jnp.sinh, jax.nn.sigmoid
-    return [f(0.4 * x) for f in names]
+    names = jnp.exp, jnp.expm1, jnp.log1p, jnp.tanh, jnp.arcsin, jnp.arctan, jnp.sinh, jax.nn.sigmoid, jnp.exp2
+    return [*[f(0.4 * x) for f in names], jnp.log2(x * x)]
 
 
 def whole(x):
