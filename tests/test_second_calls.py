@@ -73,6 +73,7 @@ CALLS = {
 
 
 @pytest.mark.parametrize("name", CALLS)
+@pytest.mark.exhaustive_cases("Ride by a solver", "simulate by a solver", "simulate by an engine")
 def test_of_a_law_with_other_numbers(name):
     first, *others = in_calls(CALLS[name], [1500.0, 1700.0, 1900.0])
     assert first > 0 and others == [0, 0]

@@ -130,6 +130,7 @@ class Unit:
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.exhaustive_cases("truck", "half")
 def test_fmu(files, tmp_path, name):
     """Valid; with the inputs of an instant its channels are those of `simulate`."""
     from fmpy.validation import validate_fmu
@@ -151,6 +152,7 @@ def test_fmu(files, tmp_path, name):
         pytest.param("truck", False, marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.exhaustive_cases("truck-False", "tracked-True")
 def test_co_simulation_in_the_master_of_fmpy(files, name, rates):
     """Right after a step inputs and outputs are extrapolated: the error falls with the square of the step."""
     errors = []
@@ -284,7 +286,7 @@ def test_the_test_program_of_c(tmp_path, name):
         assert test.name == "car_test.c"
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_single_precision(tmp_path):
     source = to_c(car("quarter"), tmp_path / "car.c", precision="float32")[1]
     subprocess.run([compiler(), *STRICT, "car.c", "car_test.c", "-o", "car", "-lm"], cwd=tmp_path, check=True)

@@ -71,7 +71,7 @@ def test_a_part_of_a_run_has_windows_in_the_time_of_the_run(run):
         run.between(0.6, 1.1).metrics([window])
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_derivatives_and_blocks_of_a_run_that_saves_its_channel(monkeypatch):
     """Forward and reverse slopes of a record's statistic and of a window, of a run in one piece and in several."""
     chosen = [Metric("sprung_acceleration", JERK), Metric("stroke", "standard_deviation", window=(0.1, 0.25))]

@@ -67,6 +67,7 @@ def test_energy_error_falls_with_the_square_of_the_step(name, tyre_damping):
     assert errors[0] > 3.3 * errors[1] > 3.3 * 3.3 * errors[2]
 
 
+@pytest.mark.exhaustive_cases("linear", "besinger", "bilinear", "motion ratio", "series spring")
 def test_the_two_engines_agree(run):
     reference = simulate(run.vehicle, BUMP, duration=1.0, engine=Adaptive())
     for channel, share in (("sprung_acceleration", 6e-3), ("stroke", 1e-3), ("dynamic_tyre_load", 1e-3)):
@@ -136,6 +137,7 @@ def test_agrees_with_equations_written_by_hand():
 
 
 @pytest.mark.parametrize("frequency", [0.6, 1.0, 3.0, 7.5, 15.0])
+@pytest.mark.exhaustive_cases("0.6", "3.0", "15.0")
 def test_steady_sine_is_the_transfer_function(frequency):
     """H(s) = s² k_t (c s + k)/D(s), D = (m_s s² + c s + k)(m_u s² + c s + k + k_t) − (c s + k)²."""
     c, s = 2500.0, 2j * np.pi * frequency

@@ -129,7 +129,7 @@ def test_tolerances_cost_what_a_sample_says() -> None:
     assert effect.sentence("comfort").startswith("A 5 % scatter of damper.rate costs 0.08")
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_a_robust_tuning_meets_the_worst_case_better() -> None:
     """Two payloads want different rates; the tuning for the worst case has the smaller largest value."""
     loads = {"empty": tune.Condition(), "laden": tune.Condition({"sprung_mass": 1800.0})}
