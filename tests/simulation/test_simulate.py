@@ -257,6 +257,7 @@ def test_refuses_runs_that_make_no_sense(change, message):
 
 
 @pytest.mark.parametrize("engine", [Exponential(), Adaptive()], ids=["exponential", "adaptive"])
+@pytest.mark.exhaustive_cases("adaptive")
 def test_a_run_saved_with_stride_is_every_so_many_th_instant_of_the_run(engine):
     """Tyre damping included: what it hears of the road is the slope at the instant, not over the stride."""
     car = replace(quarter_car_000(LAWS["lag"]), {"tyre_damping": 300.0})
