@@ -237,7 +237,7 @@ def test_implicit_solver_on_the_rig():
     np.testing.assert_allclose(found[-800:], expected, atol=2e-5 * np.max(np.abs(expected)))
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_both_engines_in_a_quarter_car():
     """No cavities open here; with them (bumps of 5 cm) steps of 0.5 ms do as well."""
     car = QuarterCar(300.0, 40.0, 20e3, 200e3, LAW)

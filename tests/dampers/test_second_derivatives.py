@@ -126,7 +126,7 @@ def test_of_a_root_that_few_steps_find(rng):
     np.testing.assert_allclose(reverse, forward, rtol=0.0, atol=1e-11 * np.max(np.abs(forward)))
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_of_where_a_vehicle_comes_to_rest():
     """A gas spring's equilibrium k z = F(z): z″ by its pressure from differences of the first derivative."""
 

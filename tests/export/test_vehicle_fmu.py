@@ -152,7 +152,7 @@ def test_fmu(files, tmp_path, name):
         pytest.param("truck", False, marks=pytest.mark.slow),
     ],
 )
-@pytest.mark.exhaustive_cases("truck-False", "tracked-True")
+@pytest.mark.exhaustive_cases("roll-True", "truck-False", "tracked-True")
 def test_co_simulation_in_the_master_of_fmpy(files, name, rates):
     """Right after a step inputs and outputs are extrapolated: the error falls with the square of the step."""
     errors = []

@@ -38,7 +38,7 @@ def test_finds_the_parameters(lagged):
     assert plain["history"]["value"] == list(result.history) and plain["status"] == result.status.name.lower()
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_hybrid_learns_a_hysteresis_that_it_does_not_contain_the_same_each_time():
     law = BoucWen(300.0, 0.0, 500.0, 1e-3)
     runs = list(VirtualDyno(law, sampling_rate=400.0).run([SineTest(a, 2.0, cycles=3) for a in (0.02, 0.01, 0.005)]))

@@ -297,7 +297,7 @@ def test_the_adaptive_engine_gives_up_where_it_would_take_for_ever():
         simulate(car, BUMP, duration=0.3, engine=Adaptive())
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_an_implicit_solver_takes_a_law_with_kinks_in_series_with_a_spring():
     car = quarter_car_000(dampers.SeriesSpring(LAWS["bilinear"], 5e6))
     implicit = simulate(car, BUMP, duration=0.4, engine=Adaptive(diffrax.Kvaerno3(), 1e-6, 1e-8))
