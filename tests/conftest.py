@@ -29,13 +29,20 @@ gc.set_threshold(100_000, 20, 100)
 
 @pytest.hookimpl(tryfirst=True)  # before the choice by `-m`
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of the cases of a test marked `slow_one_in(n)`, one in n is slow; the others run before a release."""
+    """Of the cases of a test, one in n is slow (`slow_one_in`) or some run before a release (`exhaustive_cases`)."""
     cases: Counter[str] = Counter()
     for item in items:
         if mark := item.get_closest_marker("slow_one_in"):
             test = item.nodeid.partition("[")[0]
             item.add_marker("exhaustive" if cases[test] % mark.args[0] else "slow")
             cases[test] += 1
+        if (mark := item.get_closest_marker("exhaustive_cases")) and _case(item) in mark.args:
+            item.own_markers[:] = [m for m in item.own_markers if m.name != "slow"]
+            item.add_marker("exhaustive")
+
+
+def _case(item: pytest.Item) -> str:
+    return item.nodeid.partition("[")[2].removesuffix("]")
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -47,6 +47,7 @@ def swept(rate):
 
 BUMP = roads.cosine_bump(0.03, start=0.0, duration=0.03)
 ROAD = roads.delayed(BUMP, positions=[0.0, 0.2], speed=20.0)
+RIDE = Ride(quarter_car_000(Bilinear(1500.0, 900.0)), BUMP, duration=0.05, metrics=["rms_sprung_acceleration"])
 TIME = 1e-3 * np.arange(101)
 CALLS = {
     "simulate": lambda rate: simulate(half_car_002(Lag(Bilinear(rate, 900.0), 4e-3)), ROAD, duration=0.05).motion,
@@ -68,11 +69,13 @@ CALLS = {
     "respond by a solver": lambda rate: respond(
         Lag(Bilinear(rate, 900.0), 4e-3), TIME, 1e-5 * rate * np.sin(30 * TIME), engine=Adaptive()
     ),
+    "a ride called with numbers": lambda rate: RIDE({"rebound_rate": rate, "sprung_mass": int(rate) // 5}),
     "sweep": swept,
 }
 
 
 @pytest.mark.parametrize("name", CALLS)
+@pytest.mark.exhaustive_cases("Ride by a solver", "simulate by a solver", "simulate by an engine")
 def test_of_a_law_with_other_numbers(name):
     first, *others = in_calls(CALLS[name], [1500.0, 1700.0, 1900.0])
     assert first > 0 and others == [0, 0]

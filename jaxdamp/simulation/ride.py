@@ -203,6 +203,10 @@ class Ride(eqx.Module):
         for name, value in point.items():
             if np.shape(value) != ():
                 self._check_shape(name, np.shape(value))
+        numbers = {name: value for name, value in point.items() if isinstance(value, int | float | np.number)}
+        if numbers:  # checked here, and compiled for all values
+            replace(self.vehicle, numbers)
+            point |= {name: jnp.asarray(value, float) for name, value in numbers.items()}
         with self.engine.naming_derivatives():
             return MetricValues.with_units(_drive(self, point), self.units)
 

@@ -11,7 +11,7 @@ from benchmarks.peers import c, casadi_map, diffrax_vmapped, finite_differences,
 from jaxdamp.dampers import Besinger
 
 
-pytestmark = pytest.mark.slow_one_in(3)  # they are about benchmarks, not about what users call
+pytestmark = pytest.mark.exhaustive  # they are about benchmarks, not about what users call
 
 DT = 1e-3
 ALL = list(problem.CASES)

@@ -12,7 +12,7 @@ from jaxdamp.dampers import Besinger
 from jaxdamp.export import from_json
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_the_demo_goes_through_the_whole_chain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scenario = Scenario(
         law=Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05),

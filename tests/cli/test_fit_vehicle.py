@@ -106,7 +106,7 @@ def test_a_second_run_replaces_nothing_unasked(files: dict[str, Path], fitted: t
     assert "name another file with --report, or pass --replace" in refused(out.parent, *call, *page)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_bench_records_guides_and_two_records_in_one_fit(files: dict[str, Path], tmp_path: Path) -> None:
     rig = vehicles.Guided(CAR, (vehicles.Guide(CoulombFriction(40.0, 0.01)),))
     sweep = roads.sweep_sine(0.7, 12.0, duration=3.0, velocity_amplitude=0.15)

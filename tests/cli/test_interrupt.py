@@ -117,6 +117,7 @@ def test_nothing_stops_what_is_being_saved(tmp_path: Path) -> None:
         ("Pictures and report ...", ["besinger_lag", "linear"]),
     ],
 )
+@pytest.mark.exhaustive_cases("Pictures and report ...-kept3")
 def test_a_fit_can_be_stopped_at_any_stage(records: Path, tmp_path: Path, mark: str, kept: list[str] | None) -> None:
     out = tmp_path / "fit"
     program = "import runpy; runpy.run_module('jaxdamp', run_name='__main__')"

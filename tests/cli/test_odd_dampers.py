@@ -40,6 +40,7 @@ def _fit(law: AbstractDamper, folder: Path, laws: str) -> Path:
 
 @pytest.mark.slow_one_in(3)
 @pytest.mark.parametrize("name", DAMPERS)
+@pytest.mark.exhaustive_cases("bristles with a spring")
 def test_odd_dampers_give_laws_tables_and_pictures(tmp_path: Path, name: str) -> None:
     laws = ["besinger_series_spring", "bouc_wen", "linear", "lugre_spring"]
     out = _fit(DAMPERS[name], tmp_path, ",".join(laws))

@@ -105,5 +105,6 @@ def check(name, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CARS)
+@pytest.mark.exhaustive_cases("full car")
 def test_printed_steps_of_vehicles_are_those_of_jax(tmp_path, name):
     check(name, tmp_path)

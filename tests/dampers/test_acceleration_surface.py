@@ -118,6 +118,7 @@ def test_the_guess_is_near_the_fit(lagging, moving):
     assert errors[0] < 1.05 * errors[1] < 35.0
 
 
+@pytest.mark.exhaustive
 def test_drives_a_car_as_the_damper_does(moving):
     law = moving.law  # which would refuse if the ride left its data
     road = cosine_bump(0.015, start=0.05, duration=0.25)
@@ -127,6 +128,7 @@ def test_drives_a_car_as_the_damper_does(moving):
     np.testing.assert_allclose(found, expected, atol=0.1 * np.max(np.abs(expected)))
 
 
+@pytest.mark.exhaustive
 def test_quarter_car():
     def rate(x, v, s):
         return [(v - s) / 0.002]

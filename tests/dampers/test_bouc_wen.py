@@ -118,6 +118,7 @@ def test_derivatives_at_rest_are_those_of_the_elastic_branch():
 
 
 @pytest.mark.parametrize("n", [1.0, 1.5, 2.0, 4.0, 20.0])
+@pytest.mark.exhaustive_cases("2.0", "4.0")
 def test_derivatives_of_a_step_stay_right_up_to_the_yield_force(n, rng):
     """Where a quotient of rounding errors would be anything, up to 1e9, and differ between both modes."""
     size = 1.0 - np.concatenate([[0.0], 10.0 ** rng.uniform(-16.0, -3.0, 400)])

@@ -92,6 +92,7 @@ def test_stable_at_a_step_far_too_long():
     assert np.all(np.abs(force) < 2000.0)
 
 
+@pytest.mark.exhaustive
 def test_quarter_car():
     oil, rubber, damping = 4e5, 1.2e5, 700.0
 

@@ -181,8 +181,20 @@ LAWS = {
     "scaled sum with hysteresis": lambda: 0.5 * (BoucWen(800.0, 0.0, 300.0, 1e-3) + Spring(2000.0)),
 }
 
-# These run with the slow tests: further examples of a kind that is held to the contract anyway; what compiles for long.
+# Further examples of a kind that is held to the contract anyway run before a release; what compiles for long is slow.
 FURTHER = {
+    "bilinear, sharp",
+    "slopes, no knot",
+    "slopes, falling",
+    "power 0.65",
+    "power 1.8",
+    "table of two",
+    "saturating, arctan",
+    "saturating, algebraic",
+    "degressive, straight in compression",
+    "digressive-progressive, sharp",
+    "Stribeck friction, no breakaway",
+    "spline table of two",
     "Besinger, narrow",
     "series spring, stiff",
     "series spring, power",
@@ -204,6 +216,7 @@ FURTHER = {
     "scaled sum with hysteresis",
 }
 LONG = {
+    "visco-plastic",
     "segmented polynomial",
     "series spring, soft cubic",
     "Karadayi and Masada",
@@ -244,7 +257,11 @@ IN_PLACES = {"inside wrappers", "alike ports"}  # these run below, the second wi
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow_one_in(3)] if name in FURTHER | LONG else []) for name in LAWS]
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.exhaustive] * (name in FURTHER) + [pytest.mark.slow] * (name in LONG))
+        for name in LAWS
+    ],
 )
 def test_contract(name):
     law, broken = LAWS[name](), EXCEPTIONS.get(name, {})
@@ -259,6 +276,7 @@ def test_contract(name):
 
 @pytest.mark.slow_one_in(5)
 @pytest.mark.parametrize("name", [name for name in LAWS if name not in FURTHER])
+@pytest.mark.exhaustive_cases("mono-tube", "hybrid")
 def test_inside_every_wrapper(name):
     check_inside_wrappers(LAWS[name]())
 
@@ -266,7 +284,7 @@ def test_inside_every_wrapper(name):
 GROUPS = [list(LAWS)[i : i + len(SLOTS)] for i in range(0, len(LAWS), len(SLOTS))]
 
 
-@pytest.mark.slow_one_in(4)
+@pytest.mark.slow_one_in(8)
 @pytest.mark.parametrize("group", GROUPS, ids=lambda group: f"{group[0]} to {group[-1]}")
 def test_at_alike_ports(group):
     check_alike_ports(*(LAWS[name]() for name in group))

@@ -189,6 +189,7 @@ def test_guess_takes_the_rate_outside_from_the_data():
     assert float(ForceSurface.guess(v, -force, x).outside_rate) == 0.0
 
 
+@pytest.mark.exhaustive
 def test_quarter_car():
     law = ForceSurface([[0.0, 900.0], [0.0, 200.0]], (-0.06, 0.06), (-1.0, 1.0))
     found, expected = simulated_and_integrated(

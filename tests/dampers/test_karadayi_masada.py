@@ -70,5 +70,6 @@ def test_two_springs_in_series_are_refused():
         SeriesSpring(law, 1e6)
 
 
+@pytest.mark.exhaustive
 def test_single_precision():
     assert single_precision_error(lambda: KaradayiMasada(2600.0, 1200.0, 40.0, 0.01, 1e6, 3e-4)) < 1e-3

@@ -228,7 +228,7 @@ def test_single_precision():
 # ---- solvers, vehicles, fits
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_implicit_solver_on_the_rig():
     _, _, expected, _, _ = integrated(12.5, 0.02, cycles=2, samples=800)
     w, t = 2 * np.pi * 12.5, np.arange(1601) * 1e-4

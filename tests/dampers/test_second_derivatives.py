@@ -78,7 +78,7 @@ def assert_agree(quantity, names, rng, *, with_differences=True):
         np.testing.assert_allclose(forward / size, differences(function, way) / size, atol=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_powers_and_limits_on_the_bench(rng):
     assert_agree(bench, ["Bouc and Wen", "power 0.4, offsets", "bump stop"], rng)
 

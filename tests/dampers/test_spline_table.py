@@ -132,6 +132,7 @@ def test_fit_recovers_the_forces():
     assert np.all(np.abs(np.array([e.value for e in result.parameters]) - FORCE) < 4 * errors)
 
 
+@pytest.mark.exhaustive
 def test_quarter_car():
     pchip = PchipInterpolator(VELOCITY, FORCE)
     found, expected = simulated_and_integrated(

@@ -35,6 +35,7 @@ ALLOWED = 0.015  # RMS of the error over the RMS of the channel where nothing is
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.exhaustive_cases("linear", "bump stop")
 def test_right_or_warned_of_or_refused(name):
     car = quarter_car_000(LAWS[name]())
     fine = simulate(car, ROUGH, duration=2.0, dt=1e-4)

@@ -18,6 +18,10 @@ from jaxdamp.parameters import with_values
 INSTANTS, STEP = 120, 1e-3
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 CHANGES = (2e-4, 0.03, 1e-4, 0.05)  # of x0, v0, x1, v1
+# The numbers are compared, not the speed: XLA compiles the laws quickly whatever XLA_FLAGS says.
+QUICKLY: dict[str, int | bool] = {"xla_backend_optimization_level": 0}
+if jax.__version_info__ < (0, 11):
+    QUICKLY["xla_cpu_use_fusion_emitters"] = False
 PREAMBLE = "#include <math.h>\n#include <stdbool.h>\n#include <stdint.h>\n"
 
 
@@ -104,7 +108,8 @@ def in_jax(law, states):
     def both(x0, v0, x1, v1, state):
         return jax.jvp(step, (values, x0, v0, x1, v1, state), (values, *changes, 0.3 * state))
 
-    (after, force), (dafter, dforce) = jax.jit(jax.vmap(both))(x[:-1], v[:-1], x[1:], v[1:], jnp.asarray(states[:-1]))
+    step_of_all = jax.jit(jax.vmap(both), compiler_options=QUICKLY)
+    (after, force), (dafter, dforce) = step_of_all(x[:-1], v[:-1], x[1:], v[1:], jnp.asarray(states[:-1]))
     return [np.asarray(a) for a in (after, force, dafter, dforce)]
 
 

@@ -136,6 +136,7 @@ class Unit:
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.exhaustive_cases("truck", "half")
 def test_fmu(files, tmp_path, name):
     """Valid; with the inputs of an instant its channels are those of `simulate`."""
     from fmpy.validation import validate_fmu
@@ -149,6 +150,7 @@ def test_fmu(files, tmp_path, name):
     assert len(shown(name)) > 3
 
 
+@pytest.mark.exhaustive_cases("half-True", "half-False", "truck-True")
 @pytest.mark.parametrize("rates", [True, False])
 @pytest.mark.parametrize("name", [name for name in NAMES if name.values != ("tracked",)])
 def test_co_simulation_in_the_master_of_fmpy(files, name, rates):
@@ -295,7 +297,7 @@ def test_the_test_program_of_c(tmp_path, name):
         assert test.name == "car_test.c"
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_single_precision(tmp_path):
     source = to_c(car("quarter"), tmp_path / "car.c", precision="float32")[1]
     subprocess.run([compiler(), *STRICT, "car.c", "car_test.c", "-o", "car", "-lm"], cwd=tmp_path, check=True)

@@ -68,7 +68,7 @@ def test_priors_losses_and_the_machine_count_as_in_a_linear_fit(sines):
         assert row.standard_deviation == pytest.approx(estimate.standard_error, rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_noise_with_a_memory_widens_the_posterior_but_not_the_priors(sines):
     pytest.importorskip("numpyro")
     runs, rng = sines(Linear(2000.0), noise=0.0), np.random.default_rng(4)

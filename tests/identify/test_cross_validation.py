@@ -17,7 +17,7 @@ def runs():
     return list(dyno.run([SineTest(0.01, f, cycles=3) for f in (1.0, 3.0, 5.0)]))
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_an_infinite_weighting_leaves_a_record_out(runs):
     start = Lag(Bilinear(2000.0, 1000.0), 0.002)
     without = identify.fit(start, runs[:2], force_noise=10.0)

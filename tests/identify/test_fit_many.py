@@ -40,6 +40,7 @@ def clicks() -> dict[str, list[BenchRun]]:
     ],
     ids=["memoryless", "with a state"],
 )
+@pytest.mark.exhaustive_cases("memoryless")
 def test_the_optimum_is_that_of_single_fits(clicks, start, options):
     many = fit_many(start, clicks, **options)
     assert many.converged and many.names == tuple(clicks) and len(many) == 6
@@ -157,6 +158,7 @@ def spiked(runs: list[BenchRun], seed: int) -> list[BenchRun]:
     ],
     ids=["loss", "priors", "both"],
 )
+@pytest.mark.exhaustive_cases("loss", "priors")
 def test_losses_and_priors_are_those_of_single_fits(clicks, options):
     wild = {name: spiked(runs, i) for i, (name, runs) in enumerate(clicks.items())} if "loss" in options else clicks
     many = fit_many(Bilinear, wild, rig="gas", **options)

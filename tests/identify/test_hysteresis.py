@@ -26,7 +26,7 @@ def check_car(result, car):
     assert len(result.warnings) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_thirty_records_give_the_car_damper_back(car, car_runs):
     starts = {
         "data": default_ladder(car_runs, ["besinger_series_spring"])["besinger_series_spring"],

@@ -56,6 +56,7 @@ def test_a_record_cut_out_of_a_long_motion_is_fitted_without_bias(lag_runs):
     ],
     ids=["series spring", "Bouc-Wen"],
 )
+@pytest.mark.exhaustive_cases("Bouc-Wen")
 def test_laws_with_states_are_identified_from_few_cycles(law, tests, frozen):
     runs = cut_out(law, tests, noise=2.0, sampling_rate=400.0)
     free = free_parameters(law, freeze=frozen)

@@ -116,6 +116,7 @@ def test_what_is_no_smooth_minimum_of_squares_is_refused():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bounds", [None, {"rebound_rate": (500.0, 6000.0)}])
+@pytest.mark.exhaustive_cases("None")
 def test_besinger_also_at_a_bound(bounds):
     runs = records(dampers.Besinger(3000.0, 8000.0, 1200.0, 0.15, 0.3), (0.02, 2.0), (0.03, 4.0))
     start = dampers.Besinger(2500.0, 5500.0, 1500.0, 0.2, 0.3)

@@ -181,7 +181,7 @@ def test_what_a_fit_refuses():
         identify.fit(START, runs, rig=Rig(gas_force=-1.0), per_record=["rig.friction"])
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_a_law_with_states_and_everything_that_a_machine_adds():
     """Heat and lag too; the friction of the machine is told from the law by its velocity alone, so it stays out."""
     law = SeriesSpring(Bilinear(2600.0, 1200.0), 3e5)

@@ -34,6 +34,7 @@ def errors(result, truth):
 
 
 @pytest.mark.parametrize("name", LAWS)
+@pytest.mark.exhaustive_cases("power", "piecewise")
 def test_finds_the_truth_from_away_with_noise(sines, name):
     truth = LAWS[name]
     runs = sines(truth, noise=20.0, seed=4)
@@ -53,7 +54,7 @@ def test_without_noise_the_law_comes_back_exactly(sines, name):
     assert np.allclose([e.value for e in result.parameters], free_parameters(truth).values, rtol=1e-6, atol=1e-4)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_standard_errors_cover_the_scatter(sines):
     z = np.array([errors(fit(BESINGER, sines(BESINGER, noise=20.0, seed=seed)), BESINGER) for seed in range(20)])
     assert np.all(np.abs(z) < 4.5)

@@ -65,6 +65,7 @@ def test_a_bad_instance_ends_where_the_truth_does(first_records):
 
 
 @pytest.mark.parametrize("seed", [3, 30])
+@pytest.mark.exhaustive_cases("3")
 def test_the_published_set_is_found(seed):
     assert np.all(np.abs(errors(fit(Besinger, records(seed)), PUBLISHED)) < 3.0)
 

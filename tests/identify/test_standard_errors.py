@@ -56,6 +56,7 @@ def record(noise):
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.95])
+@pytest.mark.exhaustive_cases("0.0")
 def test_errors_cover_the_scatter_whether_noise_is_alike_or_not(memory):
     noises = [20.0 * coloured(np.random.default_rng(seed), 4000, memory) for seed in range(60)]
     results = [fit(Linear, record(noise)) for noise in noises]

@@ -17,6 +17,7 @@ TRUTHS = {
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] if n != "Dahl" else []) for n in TRUTHS])
+@pytest.mark.exhaustive_cases("Karadayi-Masada")
 def test_fit_from_the_start_finds_the_law(name):
     law, start = TRUTHS[name]
     tests = [SineTest(0.02, 1.0, cycles=2), SineTest(0.004, 6.0, cycles=2), SineTest(0.02, 4.0, cycles=2)]

@@ -90,7 +90,7 @@ def test_refusals(lagged):
         identify.train(start, lagged[:1], held_out=lagged[1], learning_rate=-0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_the_learnt_rung_is_trained_without_the_record_it_stops_by(lagged, monkeypatch):
     start = identify.ladder_starts(["neural_hysteresis_spring"])["neural_hysteresis_spring"]
     assert isinstance(start, identify.LearntStart) and "neural_hysteresis_spring" not in identify.LAWS

@@ -61,7 +61,7 @@ def test_a_result_shows_itself(motions, record):
     assert "vehicle.damper.rate" in repr(motions) and "Channels" in str(motions.scores_table())
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_a_result_is_drawn_and_predicts_its_records(motions, record):
     assert len(motions.plot().axes) == 4
     predicted = motions.predict()["sweep"]["stroke"]
@@ -89,7 +89,7 @@ def test_measured_wheel_forces_drive_the_vehicle_without_its_tyres():
     assert_recovered(result, CAR)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_bench_and_ride_records_together_beat_either_alone(record, motions):
     runs = bench.VirtualDyno(CAR.damper, force_noise=10.0, gas_force=-80.0, sampling_rate=200.0).run(
         [bench.SineTest(0.02, 1.0), bench.SineTest(0.01, 3.0)]

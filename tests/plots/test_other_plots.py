@@ -61,6 +61,7 @@ def test_the_baseline_is_a_dashed_black_line() -> None:
         plots.force_velocity({"old": Linear(1000.0)}, baseline="odl")
 
 
+@pytest.mark.exhaustive
 def test_a_law_has_the_colour_of_its_family_in_every_figure(responses: dict[str, Response]) -> None:
     besinger = Besinger(1600.0, 4200.0, 900.0, limit_velocity=0.13, transition_velocity=0.35)
     laws = {"linear": Linear(2e3), "lag": Lag(besinger, 0.01), "friction": Linear(1e3) + CoulombFriction(50.0, 0.01)}

@@ -19,7 +19,7 @@ def test_training_history(runs: BenchSet) -> None:
     assert axes.get_title(loc="left") == "after all 50 steps"
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_cross_validation(runs: BenchSet) -> None:
     laws = {"linear": Linear, "slopes": PiecewiseLinear}
     result = identify.cross_validate(laws, runs[:4], by=lambda run: "slow" if run.frequency < 2.5 else "fast")

@@ -71,6 +71,7 @@ def test_a_page_on_fits(comparison: Comparison, tmp_path: Path) -> None:
     assert places == sorted(places)
 
 
+@pytest.mark.exhaustive
 def test_a_page_on_fits_beside_a_baseline(comparison: Comparison) -> None:
     stiffer = Bilinear(2.0 * 2600.0, 2.0 * 1200.0)
     found = bench.preflight(comparison.best.result.runs)
@@ -98,7 +99,7 @@ def test_a_page_on_records_beside_a_law(comparison: Comparison) -> None:
     assert changes == pytest.approx([0.0, -50.0], abs=0.5)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_a_page_on_the_whole_chain(comparison: Comparison, rides: dict[str, Response], tuned: TuneResult) -> None:
     runs = comparison.best.result.runs
     evaluation, found = bench.evaluate(runs), bench.preflight(runs)
@@ -135,6 +136,7 @@ def test_rides_in_words(rides: dict[str, Response]) -> None:
     assert f"tyre load {soft:.3g} N. ISO 2631-1 calls such an acceleration" in alone
 
 
+@pytest.mark.exhaustive
 def test_a_page_on_a_tuning_beside_another_vehicle(tuned: TuneResult) -> None:
     other = vehicles.presets.quarter_car_000(Linear(900.0))
     html = tuning_report(tuned, baseline=other).to_html()

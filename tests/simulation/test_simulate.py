@@ -67,6 +67,7 @@ def test_energy_error_falls_with_the_square_of_the_step(name, tyre_damping):
     assert errors[0] > 3.3 * errors[1] > 3.3 * 3.3 * errors[2]
 
 
+@pytest.mark.exhaustive_cases("linear", "besinger", "bilinear", "motion ratio", "series spring")
 def test_the_two_engines_agree(run):
     reference = simulate(run.vehicle, BUMP, duration=1.0, engine=Adaptive())
     for channel, share in (("sprung_acceleration", 6e-3), ("stroke", 1e-3), ("dynamic_tyre_load", 1e-3)):
@@ -136,6 +137,7 @@ def test_agrees_with_equations_written_by_hand():
 
 
 @pytest.mark.parametrize("frequency", [0.6, 1.0, 3.0, 7.5, 15.0])
+@pytest.mark.exhaustive_cases("0.6", "3.0", "15.0")
 def test_steady_sine_is_the_transfer_function(frequency):
     """H(s) = s² k_t (c s + k)/D(s), D = (m_s s² + c s + k)(m_u s² + c s + k + k_t) − (c s + k)²."""
     c, s = 2500.0, 2j * np.pi * frequency
@@ -255,6 +257,7 @@ def test_refuses_runs_that_make_no_sense(change, message):
 
 
 @pytest.mark.parametrize("engine", [Exponential(), Adaptive()], ids=["exponential", "adaptive"])
+@pytest.mark.exhaustive_cases("adaptive")
 def test_a_run_saved_with_stride_is_every_so_many_th_instant_of_the_run(engine):
     """Tyre damping included: what it hears of the road is the slope at the instant, not over the stride."""
     car = replace(quarter_car_000(LAWS["lag"]), {"tyre_damping": 300.0})
@@ -294,7 +297,7 @@ def test_the_adaptive_engine_gives_up_where_it_would_take_for_ever():
         simulate(car, BUMP, duration=0.3, engine=Adaptive())
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_an_implicit_solver_takes_a_law_with_kinks_in_series_with_a_spring():
     car = quarter_car_000(dampers.SeriesSpring(LAWS["bilinear"], 5e6))
     implicit = simulate(car, BUMP, duration=0.4, engine=Adaptive(diffrax.Kvaerno3(), 1e-6, 1e-8))

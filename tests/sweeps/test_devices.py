@@ -76,6 +76,7 @@ def test_two_devices(tmp_path, expected, expected_failing):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("devices", [1, 2])
+@pytest.mark.exhaustive_cases("1")
 def test_two_processes(tmp_path, expected, expected_failing, devices):
     elsewhere(tmp_path, processes=2, devices=devices)
     compare(tmp_path, expected, expected_failing, 2)

@@ -44,6 +44,7 @@ def _closed_forms(car) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("preset", ["quarter_car_mathworks", "golden_car"])
+@pytest.mark.exhaustive_cases("quarter_car_mathworks")
 def test_finds_the_closed_form_optima_of_other_cars(preset):
     car = getattr(vehicles.presets, preset)()
     for metric, best in _closed_forms(car).items():
@@ -56,7 +57,7 @@ def test_closed_form_optima_are_those_of_paper_000():
     assert pytest.approx(5536.5, abs=0.05) == BEST_TYRE
 
 
-@pytest.mark.slow_one_in(3)
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("preset", ["quarter_car_000", "quarter_car_mathworks", "golden_car"])
 def test_simulated_roads_find_the_optimum_within_their_sampling_error(preset):
     """Roads that repeat after the run hold every wave whole times; their optima scatter little."""

@@ -113,6 +113,7 @@ def test_three_objectives_with_a_limit_and_a_function():
     assert len(front.plot().axes) == 4
 
 
+@pytest.mark.slow
 def test_scenarios_limits_shapes_ties_and_starts_are_those_of_a_tuning():
     """A front over two payloads: its ends are the results of `minimise` with the same arguments."""
     car = vehicles.presets.quarter_car_000(dampers.Bilinear(2500.0, 2500.0) + dampers.Linear(2500.0))
@@ -166,6 +167,7 @@ def test_a_limit_that_no_design_meets_is_named():
     assert front.designs[0, 0] == pytest.approx(7500.0, rel=1e-4)
 
 
+@pytest.mark.exhaustive
 def test_metrics_without_conflict_have_one_best_design():
     front = tune.pareto([TYRE, "dynamic_load_coefficient"], CAR, ROAD, points=3)
     assert len(front) == 1 and "do not conflict" in front.warnings[0]
@@ -200,7 +202,7 @@ def test_wrong_calls_are_refused(objectives, options, message):
         tune.pareto(objectives, CAR, ROAD, **options)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_simulated_front_is_better_than_a_grid():
     car = vehicles.presets.quarter_car_000(dampers.Bilinear(2600.0, 1400.0))
     road = roads.iso8608("C", speed=20.0, seed=1)

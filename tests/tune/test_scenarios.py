@@ -36,6 +36,7 @@ def test_each_scenario_is_the_ride_of_that_vehicle_on_that_road() -> None:
         assert float(joined[name]) == pytest.approx(float(np.sum(ride.weights * each[name])))
 
 
+@pytest.mark.slow
 def test_scenarios_are_swept_and_differentiated_as_a_ride() -> None:
     ride = tune.Scenarios(WHITE, [tune.Condition(), tune.Condition(factors={"rate": 0.9})]).ride(
         LINEAR, metrics=[ACCELERATION]

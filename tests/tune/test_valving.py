@@ -81,7 +81,7 @@ def test_targets_become_points_and_loops():
     assert len(_wanted([run], START, None, ()).all_forces) == 900
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_the_noisy_hysteresis_of_a_known_damper_is_reached():
     time = np.arange(4000) / 4000.0
     angle = 2 * np.pi * 6.0 * time

@@ -32,6 +32,7 @@ def test_descriptions_say_of_how_many_a_channel_is():
 @pytest.mark.parametrize(
     ("make", "damper"), [(presets.truck_001, "front_damper"), (presets.m113_003, "wheel_1_damper")]
 )
+@pytest.mark.exhaustive_cases("m113_003-wheel_1_damper")
 def test_force_and_power_are_of_one_damper(make, damper):
     car = make(damper=dampers.Linear(15e3))
     run = simulate(car, tracks(bumps(0.05 + 0.1 * np.arange(len(car.wheel_names)), 301)))

@@ -127,6 +127,7 @@ def test_energy_balance_closes(driven):
 
 
 @pytest.mark.parametrize("name", ["full car", "walking beam"])
+@pytest.mark.exhaustive_cases("full car")
 def test_settled_vehicle_follows_level_and_tilted_ground(name):
     """On any plane the suspension is not strained; the linear vehicle says the same."""
     vehicle = FLEET[name]

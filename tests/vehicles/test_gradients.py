@@ -12,8 +12,6 @@ from .by_hand import CASES
 from .fleet import bumps, full_quarter_car
 
 
-pytestmark = pytest.mark.slow_one_in(3)
-
 STEPS, DT = 500, 1e-3
 
 
@@ -59,6 +57,7 @@ def difference(function, direction, step=2e-5):
     return jax.tree.map(lambda a, b: (4.0 * a - b) / 3.0, near, far)
 
 
+@pytest.mark.slow
 def test_every_metric_in_every_parameter_of_a_quarter_car_with_everything():
     car = full_quarter_car(
         damper=dampers.MotionRatio(dampers.Lag(dampers.Bilinear(1900.0, 1100.0, knee_width=0.02), 4e-3), 0.9),
@@ -74,6 +73,7 @@ def test_every_metric_in_every_parameter_of_a_quarter_car_with_everything():
         assert_slopes(found, difference(value, jnp.eye(len(paths))[i]), level, path)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", ["full car", "walking beam", "tracked hull"])
 def test_every_metric_of_a_vehicle_along_a_direction_in_all_parameters(name, rng):
     paths, run = ridden(CASES[name].vehicle, CASES[name].behind, CASES[name].right)

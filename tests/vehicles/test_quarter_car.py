@@ -57,6 +57,7 @@ def test_figures_of_paper_000_on_class_c():
 @pytest.mark.parametrize(
     ("channel", "best"), [("sprung_acceleration", 4656.373930627), ("dynamic_tyre_load", 5536.51355)]
 )
+@pytest.mark.exhaustive_cases("dynamic_tyre_load-5536.51355")
 def test_gradient_vanishes_at_the_best_coefficient_and_agrees_with_differences(channel, best):
     car = quarter_car_000()
 

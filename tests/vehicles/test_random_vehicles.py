@@ -68,6 +68,7 @@ def under_wheels(case, road):
 
 
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.exhaustive_cases("half car")
 def test_motion_is_that_of_the_equations(name):
     case = CASES[name]
     errors = []

@@ -57,6 +57,7 @@ def stiffness_at_rest(vehicle):
     ],
     ids=["truck", "hull"],
 )
+@pytest.mark.exhaustive_cases("hull")
 def test_a_spring_beside_is_a_stiffer_spring_wherever_it_stands(with_laws, stiffer, places):
     names = {channel.name for channel in with_laws.layout.channels}
     assert {f"{place}_{law}_force" for place in places for law in LAWS} <= names
