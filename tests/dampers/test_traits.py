@@ -24,6 +24,7 @@ from jaxdamp.dampers import (
     TemperatureScaled,
 )
 from jaxdamp.identify import prepare
+from jaxdamp.identify.traces import Batch
 from jaxdamp.vehicles.ports import Ports
 
 from .test_contract import network
@@ -117,6 +118,7 @@ def test_a_fit_takes_steps_of_the_angle_also_in_a_coarse_record():
     (run,) = VirtualDyno(Linear(1000.0), 100.0).run(SineTest(0.02, 1.0, cycles=2))
     for law in (MonoTube.reference(), Lag(Linear(1000.0), 0.002)):
         (batch,) = prepare(law, [run], samples_per_cycle=50).residuals
+        assert isinstance(batch, Batch)
         angle = 2.0 * np.pi * float(batch.dt[0]) / batch.substeps
         assert 0.6 * law.traits().step_angle < angle <= law.traits().step_angle
 

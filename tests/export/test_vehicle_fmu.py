@@ -30,9 +30,8 @@ CARS = {
     "full": lambda: presets.full_car_jazar(SeriesSpring(VALVE, 4e5, 1e8)),
 }
 # The others run with the slow tests, two of them before a release.
-MARKS = {name: pytest.mark.slow for name in CARS} | dict.fromkeys(("full", "roll"), pytest.mark.exhaustive)
-MARKS["quarter"] = ()
-NAMES = [pytest.param(name, marks=marks) for name, marks in MARKS.items()]
+MARKS = {"quarter": [], "full": [pytest.mark.exhaustive], "roll": [pytest.mark.exhaustive]}
+NAMES = [pytest.param(name, marks=MARKS.get(name, [pytest.mark.slow])) for name in CARS]
 
 
 @functools.cache
