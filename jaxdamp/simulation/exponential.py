@@ -131,8 +131,8 @@ class Exponential(AbstractFixedStep):
             if left out, so that every step is stable. The road stays straight between instants.
         printed: print the loop over time as C and let the machine's C compiler (gcc, clang) make vector code of it:
             for a `Ride` in a `sweep` or under `jax.vmap`, in double precision. The numbers are the same to rounding,
-            and on a quiet CPU come 1.3 to 1.6 times as fast for laws of arithmetic and roots (`docs/speed.md`). On a
-            GPU the loop is one CUDA kernel: it was compiled, and compared through the same text in C, but not yet
+            and on one core of a quiet CPU come 1.3 to 1.6 times as fast for laws of arithmetic and roots
+            (`docs/speed.md`). On a GPU the loop is one CUDA kernel: compiled, and compared as C, but not yet
             run. Derivatives do not pass. What cannot be printed is refused with the reason (`NotImplementedError`),
             with "arithmetic" also laws with exponentials, powers and the like. If left out (None), a `sweep` of half a
             minute and more tries the loop of XLA and a printed one, and goes on with the faster; with False all is left
