@@ -65,7 +65,7 @@ Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an e
 Replace = Annotated[
     bool,
     typer.Option(
-        "--replace", "--force", help="Write into --out although it is not empty: results of jaxdamp are replaced."
+        "--replace", "--force", help="Write into --out although it is not empty; earlier results go to .previous in it."
     ),
 ]
 
