@@ -6,8 +6,6 @@ from difflib import get_close_matches
 from typing import Any, NoReturn
 
 import numpy as np
-from jax import Array
-from jax.core import Tracer
 
 
 MOST_SHOWN = 8  # largest number of array elements shown in a message
@@ -79,7 +77,7 @@ def summary(value: Any, wrong: Any = None) -> Any:
     >>> summary(np.array([1.0, -2.0] * 10), np.array([False, True] * 10))
     '20 numbers, 10 of them wrong, the first -2 at index 1'
     """
-    if not isinstance(value, np.ndarray | Array) or value.size <= MOST_SHOWN:
+    if not (isinstance(value, np.ndarray) or hasattr(value, "aval")) or value.size <= MOST_SHOWN:
         return value
     array = np.asarray(value)
     shape = "" if array.ndim == 1 else f" in shape {array.shape}"
@@ -94,6 +92,8 @@ def summary(value: Any, wrong: Any = None) -> Any:
 
 def concrete(value: Any) -> np.ndarray | None:
     """The value as a NumPy array, or `None` while JAX traces it (traced values cannot be checked)."""
+    from jax.core import Tracer  # here, since a command that only has to say what is wrong need not wait for JAX
+
     return None if isinstance(value, Tracer) else np.asarray(value)
 
 

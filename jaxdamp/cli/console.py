@@ -118,15 +118,15 @@ def prepare() -> None:
 
 @contextmanager
 def plain_errors(debug: bool) -> Iterator[None]:
-    """Show what the library refuses as one message without traceback, and end with exit code 2; after Ctrl-C 130."""
+    """Show what the library refuses as one message without traceback, and end with exit code 2."""
     screen = Console(stderr=True, highlight=False, soft_wrap=True)
     try:
         with interrupt.watched():
             yield
     except interrupt.Interrupted as stop:
         screen.print(Text(str(stop), style="yellow"))
-        raise typer.Exit(interrupt.EXIT_CODE) from stop
-    except (ValueError, OSError) as error:
+        raise typer.Exit(interrupt.exit_code()) from stop
+    except (ValueError, OSError, ImportError) as error:
         if debug:
             raise
         screen.print(Text.assemble(("Error: ", "bold red"), (message(error), "red")))

@@ -16,6 +16,7 @@ from typing import Any
 import typer
 from filelock import FileLock, Timeout
 
+from jaxdamp._writing import sync, write_whole
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.interrupt import Interrupted
 
@@ -65,7 +66,7 @@ class Results:
         with interrupt.undisturbed():
             fresh = written(self.draft)
             for name in fresh:
-                _sync(self.draft / name)
+                sync(self.draft / name)
             self._published |= {name: _sha256(self.draft / name) for name in fresh}
             if not self.target.exists():
                 self._tell(self.draft, missing)
@@ -75,7 +76,7 @@ class Results:
                 self.draft.rename(self.target)
             else:
                 self._move(fresh, missing)
-            _sync(self.target.parent)
+            sync(self.target.parent)
             self._begun = True
             shutil.rmtree(self.draft, ignore_errors=True)
             if missing:
@@ -114,7 +115,7 @@ class Results:
         """Write the manifest, and first the note on what is missing."""
         if missing:
             text = f"These results of jaxdamp {self._command} are not complete. Missing: {missing}.\n"
-            _write(folder / UNFINISHED, text)
+            write_whole(folder / UNFINISHED, text)
         files = [*sorted({*self.published, *(besides or [])}), *([UNFINISHED] if missing else []), MANIFEST]
         manifest = {
             "format": FORMAT,
@@ -123,7 +124,7 @@ class Results:
             "files": files,
             "sha256": self._published,
         }
-        _write(folder / MANIFEST, json.dumps(manifest, indent=1, ensure_ascii=False) + "\n")
+        write_whole(folder / MANIFEST, json.dumps(manifest, indent=1, ensure_ascii=False) + "\n")
 
     def discard(self) -> str:
         """Remove the draft, and say what is in place."""
@@ -189,6 +190,15 @@ def _written(results: Results) -> Iterator[Results]:
         raise _unwritable(place, error) from error
     finally:
         shutil.rmtree(results.draft, ignore_errors=True)
+
+
+def refuse_target(target: Path, command: str, *, replace: bool) -> None:
+    """Refuse a folder that the command may not write.
+
+    Raises:
+        ValueError: as `results_folder`.
+    """
+    _earlier_files(target.expanduser(), command, replace)
 
 
 @contextmanager
@@ -319,22 +329,3 @@ def _remove_empty(folder: Path, root: Path) -> None:
 def _sha256(file: Path) -> str:
     with file.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def _write(file: Path, text: str) -> None:
-    """Write a file so that it is there whole or as it was."""
-    draft = file.with_name(f".{file.name}{DRAFT}")
-    draft.write_text(text, encoding="utf-8")
-    _sync(draft)
-    os.replace(draft, file)
-
-
-def _sync(path: Path) -> None:
-    """Wait until a file, or the names in a folder, are on the disk; where folders cannot be opened, they are not."""
-    if path.is_dir() and os.name == "nt":
-        return
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

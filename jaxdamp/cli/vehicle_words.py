@@ -1,7 +1,6 @@
 """What a vehicle is called on the command line: a published one, or a file of one's own."""
 
 import inspect
-import json
 import tomllib
 from collections.abc import Callable, Mapping
 from fnmatch import fnmatchcase
@@ -11,6 +10,7 @@ from typing import Any
 import equinox as eqx
 
 from jaxdamp import _checks, export, vehicles
+from jaxdamp.cli.early import FROM_FIT, FROM_LIST, read_json, require_file
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import get, replace
 from jaxdamp.report import Column, Table
@@ -52,10 +52,9 @@ def parse_vehicle(word: str) -> MakeCar:
         _checks.one_of("vehicle", word, presets())
         return lambda law: presets()[word](damper=law)
     if path.suffix == ".json":
-        car = read_module("vehicle", path, AbstractVehicle, "a vehicle", 'Or give a name, see "jaxdamp vehicles".')
+        car = read_module("vehicle", path, AbstractVehicle, "a vehicle", FROM_LIST)
         return lambda law: car if law is None else with_law(car, law)
-    if not path.is_file():
-        _checks.refuse("vehicle", "be a file that is there", word, 'Or a name, see "jaxdamp vehicles".')
+    require_file("vehicle", path, FROM_LIST)
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except tomllib.TOMLDecodeError as error:
@@ -70,7 +69,7 @@ def read_law(argument: str, path: Path) -> AbstractDamper:
         argument: that gives the file, for messages.
         path: of the file.
     """
-    return read_module(argument, path, AbstractDamper, "a law", "`jaxdamp fit` writes best_law.json from records.")
+    return read_module(argument, path, AbstractDamper, "a law", FROM_FIT)
 
 
 def read_module(argument: str, path: Path, kinds: type | tuple[type, ...], words: str, remedy: str = "") -> Any:
@@ -86,12 +85,7 @@ def read_module(argument: str, path: Path, kinds: type | tuple[type, ...], words
     Raises:
         ValueError: no such file, one that is not JSON, or that holds something else.
     """
-    if not path.is_file():
-        _checks.refuse(argument, "be a file that is there", path, remedy)
-    try:
-        json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:  # also of bytes that are no text
-        _checks.refuse(argument, f"be {words} as JSON", f"{path}: {error}", remedy)
+    read_json(argument, path, words, remedy)
     module = export.from_json(path)
     _checks.instance(argument, module, kinds, f"be {words} as JSON", remedy)
     return module

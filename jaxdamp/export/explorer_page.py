@@ -13,12 +13,12 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._writing import write_whole
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, laws_inside
 from jaxdamp.export._javascript import bump_function, closed, law_functions, vehicle_functions
 from jaxdamp.export._law_program import LawNumber, LawProgram
 from jaxdamp.export._ride_program import RideProgram
-from jaxdamp.export._write import write_whole
 from jaxdamp.export.module_file import to_json
 from jaxdamp.parameters import weight
 from jaxdamp.roads import AbstractRoad, iso8608

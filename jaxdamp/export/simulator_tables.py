@@ -8,8 +8,8 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._types import VectorLike
+from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
-from jaxdamp.export._write import write_whole
 from jaxdamp.export.force_velocity import SettledTable, settled_table, warn_of_rows
 from jaxdamp.rig import respond
 

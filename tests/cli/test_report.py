@@ -36,4 +36,6 @@ def test_the_chain_is_on_one_page_with_its_files(tmp_path: Path) -> None:
 
 
 def test_a_white_road_is_refused(tmp_path: Path) -> None:
-    assert "Option --road must be one to ride on" in refused(tmp_path, "report", "a.csv", "--road", "white:C")
+    (tmp_path / "a.csv").write_text("")
+    words = ("report", tmp_path / "a.csv", "--road", "white:C")
+    assert "Option --road must be one to ride on" in refused(tmp_path, *words)

@@ -1,5 +1,7 @@
 """Loops over steps printed as C for many points side by side give the numbers of `jax.lax.scan`."""
 
+from pathlib import Path
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -135,6 +137,9 @@ def test_refused_by_name(monkeypatch):
         run(lambda c, row, x: c + 1, jnp.asarray(0))
     with pytest.raises(NotImplementedError, match="rows of a loop"):
         jax.vmap(lambda rows: printed_scan(lambda c, row: c + row[0], jnp.asarray(0.0), rows))(jnp.ones((3, 5, 1)))
+    with monkeypatch.context() as patched, pytest.raises(NotImplementedError, match=r"loaded here .* TMPDIR"):
+        patched.setattr(_native, "_folder", lambda: Path("/nowhere"))
+        run(lambda c, row, x: c + 0.321 * row[0] * x, jnp.asarray(0.0))
     monkeypatch.setattr(_native, "compiler", lambda: None)
     with pytest.raises(NotImplementedError, match="No C compiler"):
         run(lambda c, row, x: c + 0.123 * row[0] * x, jnp.asarray(0.0))

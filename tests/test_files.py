@@ -2,7 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from jaxdamp.bench.files import find_files, natural_key
+from jaxdamp._files import RECORD_SUFFIXES, find_files, natural_key
+from jaxdamp.bench import READERS
 
 
 def _touch(folder: Path, *names: str) -> None:
@@ -55,3 +56,7 @@ def test_the_same_file_twice(tmp_path):
     _touch(tmp_path, "a.csv")
     with pytest.raises(ValueError, match="there 2 times"):
         find_files([tmp_path / "a.csv", tmp_path])
+
+
+def test_every_reader_has_its_suffix():
+    assert set(READERS) == set(RECORD_SUFFIXES)

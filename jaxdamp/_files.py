@@ -12,6 +12,8 @@ from jaxdamp import _checks
 
 MAYBE_NOTES = (".txt", ".dat", ".asc")  # of a folder these are not read: they may be notes
 TEXT_SUFFIXES = (".csv", ".tsv", *MAYBE_NOTES)
+RECORD_SUFFIXES = (*TEXT_SUFFIXES, ".xlsx", ".xlsm", ".mat", ".tdms", ".mf4", ".mdf", ".parquet")
+FOLDER_SUFFIXES = frozenset(RECORD_SUFFIXES) - set(MAYBE_NOTES)  # of the files that a folder stands for
 
 
 def find_files(
