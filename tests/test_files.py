@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,12 @@ def test_the_same_file_twice(tmp_path):
     _touch(tmp_path, "a.csv")
     with pytest.raises(ValueError, match="there 2 times"):
         find_files([tmp_path / "a.csv", tmp_path])
+
+
+def test_a_pipe_is_no_record(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(ValueError, match="a pipe or a device"):
+        find_files(tmp_path / "pipe.csv")
 
 
 def test_every_reader_has_its_suffix():

@@ -138,7 +138,7 @@ def _assembled(data: dict[str, Any], programs: str) -> str:
     parts = {
         "style": text["style.css"],
         "version": importlib.metadata.version("jaxdamp"),
-        "data": json.dumps(data, allow_nan=False).replace("</", "<\\/"),
+        "data": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
         "programs": programs,
         "scripts": "\n".join(text[name] for name in _SCRIPTS),
     }

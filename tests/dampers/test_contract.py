@@ -56,6 +56,9 @@ from jaxdamp.testing import CHECKS, check_alike_ports, check_inside_wrappers, ch
 from jaxdamp.testing.places import SLOTS
 
 
+pytestmark = pytest.mark.users_flags
+
+
 def degressive(knee_width=1e-3, offset=0.0):
     return PowerLaw(1800.0, 0.4, 900.0, 0.5, offset, 0.7 * offset, knee_width=knee_width)
 
