@@ -77,6 +77,11 @@ class AbstractRoad(eqx.Module):
         """The first and the last time [s] at which the road has a height; infinite where it has no such end."""
         return -math.inf, math.inf
 
+    @property
+    def longest_run(self) -> float | None:
+        """The longest run [s] in which a random road does not repeat; `None` if there is no such limit."""
+        return None
+
     def reseeded(self, seed: int) -> "AbstractRoad | None":
         """The same kind of road with other random numbers; `None` if nothing in it is random or can be drawn again."""
         del seed

@@ -55,6 +55,16 @@ class Joined(AbstractRoad):
         return None if at is None or rest is None else float(at) + rest
 
     @property
+    def longest_run(self) -> float | None:
+        """Until the second road repeats, or the first one before it does [s]."""
+        at, own, rest = _checks.concrete(self.at), self.first.longest_run, self.second.longest_run
+        if at is None:
+            return None
+        if own is not None and own < float(at) * (1.0 - 1e-9):
+            return own
+        return None if rest is None else float(at) + rest
+
+    @property
     def span(self) -> tuple[Scalar | float, Scalar | float]:
         """From the beginning of the first road to the end of the second [s]."""
         return self.first.span[0], self.at + self.second.span[1]

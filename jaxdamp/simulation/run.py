@@ -153,6 +153,11 @@ def sampled(
         _checks.refuse("duration", "be given for a road without an end of its own", None, "Pass `duration=10.0`.")
     _checks.positive("duration", duration)
     _checks.positive("dt", dt)
+    longest = road.longest_run
+    if longest is not None and duration > longest * (1 + 1e-9):
+        must = f"not be longer than the random road, which repeats after {longest:g} s"
+        remedy = f"Make the road with `duration={duration:g}`, or with a greater `length`."
+        _checks.refuse("duration", must, f"{duration:g} s", remedy)
     if dt > duration:
         _checks.refuse("dt", f"be shorter than the run of {duration:g} s", dt)
     if road.grid is not None and dt > road.grid * (1 + 1e-9):

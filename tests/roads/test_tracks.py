@@ -15,15 +15,16 @@ def gamma(n, track=TRACK):
 
 
 def spectra(seed, length=1000.0, samples=6000):
-    """Line amplitudes of both tracks over one period, with the spatial frequencies well within the band."""
-    road = two_track(iso8608("C", SPEED, seed=2, length=length, ramp=0.0), track_width=TRACK, seed=seed)
+    """Lines of both tracks over one period, of fixed amplitudes, and the spatial frequencies well within the band."""
+    surface = iso8608("C", SPEED, seed=2, length=length, ramp=0.0, amplitudes="fixed")
+    road = two_track(surface, track_width=TRACK, seed=seed)
     z = np.asarray(road.height(length / SPEED * np.arange(samples) / samples))
     n = np.arange(samples // 2 + 1) / length
     inside = (n > 0.013) & (n < 2.8)
     return n[inside], np.fft.rfft(z, axis=0)[inside] / samples
 
 
-def test_tracks_heave_and_roll_have_exactly_their_spectra_in_every_realisation():
+def test_with_fixed_amplitudes_tracks_heave_and_roll_have_exactly_their_spectra():
     n, lines = spectra(seed=7)
     power = np.abs(lines) ** 2
     # the phases are in double precision and the sum is exact to 1e-12 of the largest line, 1e-3 m; the least is 3e-6 m
