@@ -1,7 +1,7 @@
 """Random roads of the ISO 8608 roughness classes."""
 
 import math
-from typing import Literal, final
+from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -45,10 +45,10 @@ class Iso8608(AbstractRoad):
     length: float = eqx.field(static=True)
     band: tuple[float, float] = eqx.field(static=True)
     ramp: float = eqx.field(static=True)
-    amplitudes: Literal["random", "fixed"] = eqx.field(static=True)
+    amplitudes: str = eqx.field(static=True)
 
     @eqx.filter_jit
-    def height(self, time: SignalLike) -> Float[Array, "time 1"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see `iso8608`."""
         time = jnp.asarray(time, self.phase.dtype)
         cycles = self.speed * time / self.length
@@ -110,7 +110,7 @@ def iso8608(
     maximum_spatial_frequency: float = HIGHEST_SPATIAL_FREQUENCY,
     length: float | int | None = None,
     ramp: float | int = 0.5,
-    amplitudes: Literal["random", "fixed"] = "random",
+    amplitudes: str = "random",
 ) -> Iso8608:
     """A random road of an ISO 8608 roughness class, driven at constant speed.
 
@@ -122,10 +122,10 @@ def iso8608(
     By default the factors r_i are random as well, with the Rayleigh distribution of mean square 1: the road is a
     Gaussian process. The spectrum is that of the class on average, and the RMS of a run scatters from seed to seed as
     on real roads of one class (that of the body acceleration of a car by 2 to 3 % in 50 s). With `amplitudes="fixed"`
-    all r_i are 1: every road has exactly the spectrum and the variance of the class, and the RMS scatters some ten times
-    less. Take this to reproduce a spectrum, not to judge how sure a difference between two dampers is. Heights are then
-    only close to Gaussian, with a kurtosis of 3 - 1.5 sum p_i^2, where p_i is the share of a cosine in the variance
-    (2.96 for the defaults). A seed gives the same phases with either.
+    all r_i are 1: every road has exactly the spectrum and the variance of the class, and the RMS scatters some ten
+    times less. Take this to reproduce a spectrum, not to judge how sure a difference between two dampers is. Heights
+    are then only close to Gaussian, with a kurtosis of 3 - 1.5 sum p_i^2, where p_i is the share of a cosine in the
+    variance (2.96 for the defaults). A seed gives the same phases with either.
 
     One road holds few long waves: judge body motion on several seeds.
 
@@ -153,10 +153,12 @@ def iso8608(
 
     Raises:
         ValueError: if the class or `amplitudes` is unknown, if `speed`, the roughness or a spatial frequency is not
-            positive, if `waviness` or `ramp` is negative, if the band is empty, if `length` is shorter than the longest wave or
-            than `speed` times `duration`, or if `duration` is given while `speed` is traced (give `length` instead).
+            positive, if `waviness` or `ramp` is negative, if the band is empty, if `length` is shorter than the
+            longest wave or than `speed` times `duration`, or if `duration` is given while `speed` is traced (give
+            `length` instead).
 
-    Source: ISO 8608; Rice (1944) for the Gaussian sum of cosines. Not to be confused with the table over rad/m, whose reference is 1 rad/m (1e-6 m^3 for class A).
+    Source: ISO 8608; Rice (1944) for the Gaussian sum of cosines. Not to be confused with the table over rad/m, whose
+    reference is 1 rad/m (1e-6 m^3 for class A).
 
     >>> import jax.numpy as jnp
     >>> road = iso8608("C", speed=20.0, seed=1, ramp=0.0, amplitudes="fixed")

@@ -21,7 +21,7 @@ class Joined(AbstractRoad):
     second: AbstractRoad
     at: Scalar
 
-    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] at each `time` [s]; see `joined`."""
         time = jnp.asarray(time, self.at.dtype)
         before = self.first.height(at_most(time, self.at))
@@ -63,6 +63,11 @@ class Joined(AbstractRoad):
         if own is not None and own < float(at) * (1.0 - 1e-9):
             return own
         return None if rest is None else float(at) + rest
+
+    @property
+    def shortest_event(self) -> float | None:
+        """The shorter of those of the two roads [s]."""
+        return least([self.first.shortest_event, self.second.shortest_event])
 
     @property
     def span(self) -> tuple[Scalar | float, Scalar | float]:

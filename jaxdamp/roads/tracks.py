@@ -27,7 +27,7 @@ class TwoTrack(AbstractOnSeveralRoads):
     roads: tuple[AbstractRoad, AbstractRoad]
     track_width: Scalar | None = None
 
-    def height(self, time: SignalLike) -> Float[Array, "time 2"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time 2"]:
         """The heights [m] at each `time` [s], left then right."""
         return jnp.concatenate([track.height(time) for track in self.roads], axis=1)
 
@@ -66,10 +66,10 @@ def two_track(
 
     Its cosines, as complex numbers, are gamma(n) times those of the left track and sqrt(1 - gamma(n)^2) times other
     ones with the same distribution, so that both tracks together are a Gaussian process. For a road with fixed
-    amplitudes each cosine has the same amplitude and a phase shifted by arccos(gamma(n)), with a random sign: every road,
-    not only their average, then has exactly the spectrum G_d of the class in both tracks, G_d (1 + gamma)/2 in their mean
-    (heave) and 2 G_d (1 - gamma) in their difference (roll). The coherence over bands of many cosines is gamma^2 in
-    either. Differentiable in `track_width` and in what the road is differentiable in.
+    amplitudes each cosine has the same amplitude and a phase shifted by arccos(gamma(n)), with a random sign: every
+    road, not only their average, then has exactly the spectrum G_d of the class in both tracks, G_d (1 + gamma)/2 in
+    their mean (heave) and 2 G_d (1 - gamma) in their difference (roll). The coherence over bands of many cosines is
+    gamma^2 in either. Differentiable in `track_width` and in what the road is differentiable in.
 
     Arguments:
         left: the road under the left wheels, with a single track.

@@ -33,6 +33,23 @@ def test_with_fixed_amplitudes_tracks_heave_and_roll_have_exactly_their_spectra(
     np.testing.assert_allclose(np.abs(lines[:, 0] - lines[:, 1]) ** 2, power[:, 0] * 2 * (1 - gamma(n)), rtol=1e-4)
 
 
+@pytest.mark.parametrize("seed", [3, 4])  # also the one of the left track
+def test_random_tracks_have_the_spectrum_and_coherency_on_average_also_drawn_anew(seed):
+    road = two_track(iso8608("C", SPEED, seed=3), track_width=TRACK, seed=seed)
+    drawn = road.reseeded(8)
+    n = np.asarray(road.roads[0].spatial_frequency)
+    for left, right in (road.roads, drawn.roads):
+        a, b = (np.asarray(r.relative_amplitude) * np.exp(1j * np.asarray(r.phase)) for r in (left, right))
+        for low, high in ((0.011, 0.2), (0.2, 0.6), (0.6, 2.9)):
+            some = (n > low) & (n < high)
+            cross, scatter = np.mean((a * np.conj(b))[some]), 4 / np.sqrt(some.sum())
+            assert abs(cross - np.mean(gamma(n[some]))) < scatter
+            assert abs(np.mean(np.abs(b[some]) ** 2) - 1) < scatter
+    assert abs(np.corrcoef(drawn.roads[0].relative_amplitude, road.roads[0].relative_amplitude)[0, 1]) < 0.08
+    same = two_track(road.roads[0], road.roads[0]).reseeded(8)
+    np.testing.assert_array_equal(same.roads[0].relative_amplitude, same.roads[1].relative_amplitude)
+
+
 def test_neither_track_leads():
     # the imaginary part of the cross spectrum, +-sqrt(1 - gamma^2) by line, averages out like a random walk
     n, lines = spectra(seed=7)
