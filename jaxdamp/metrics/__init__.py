@@ -3,8 +3,8 @@
 Every function takes plain arrays of uniformly sampled signals, simulated or measured, NumPy or JAX, in SI units. A
 signal has one axis, time; use `jax.vmap` for many. All are pure JAX functions and can be compiled, batched and
 differentiated; where a derivative is zero or undefined, the docstring says so and names a smooth alternative. NaN in a
-signal gives NaN. Only functions that return texts (`evaluation_method`, `comfort_reaction`) and `rainflow_cycles` cannot
-be compiled.
+signal gives NaN. Only `rainflow_cycles` and functions that return texts (`evaluation_method`, `comfort_reaction`)
+cannot be compiled.
 
 - Size of a signal: `rms`, `peak`, `smooth_peak`, `crest_factor`, `running_rms`.
 - Spectrum: `power_spectral_density`, `transmissibility`, `coherence`.

@@ -58,7 +58,7 @@ def rainflow_cycles(signal: VectorLike) -> RainflowCycles:
     >>> sorted(zip((2 * cycles.amplitude).tolist(), cycles.count.tolist()))
     [(3.0, 0.5), (4.0, 0.5), (4.0, 1.0), (6.0, 0.5), (8.0, 0.5), (8.0, 0.5), (9.0, 0.5)]
     >>> cycles.damage(1)
-    13.5
+    11.5
     """
     load = np.asarray(signal, float)
     if load.ndim != 1 or load.size < 2:

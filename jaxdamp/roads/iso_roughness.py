@@ -121,11 +121,12 @@ def iso8608(
 
     By default the factors r_i are random as well, with the Rayleigh distribution of mean square 1: the road is a
     Gaussian process. The spectrum is that of the class on average, and the RMS of a run scatters from seed to seed as
-    on real roads of one class (that of the body acceleration of a car by 2 to 3 % in 50 s). With `amplitudes="fixed"`
-    all r_i are 1: every road has exactly the spectrum and the variance of the class, and the RMS scatters some ten
-    times less. Take this to reproduce a spectrum, not to judge how sure a difference between two dampers is. Heights
-    are then only close to Gaussian, with a kurtosis of 3 - 1.5 sum p_i^2, where p_i is the share of a cosine in the
-    variance (2.96 for the defaults). A seed gives the same phases with either.
+    on real roads of one class: over the whole length by sqrt(sum p_i^2)/2, where p_i is the share of a cosine in the
+    mean square of the signal (2 to 8 % for the body acceleration of a car in 50 s). With `amplitudes="fixed"` all r_i
+    are 1: every road has exactly the spectrum and the variance of the class, and a run as long as the road hardly
+    scatters. Take this to reproduce a spectrum, not to judge how sure a difference between two dampers is. Heights are
+    then only close to Gaussian, with a kurtosis of 3 - 1.5 sum p_i^2 (2.96 for the defaults). A seed gives the same
+    phases with either.
 
     One road holds few long waves: judge body motion on several seeds.
 
