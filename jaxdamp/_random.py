@@ -49,6 +49,14 @@ def normal(seed: int | Array, shape: tuple[int, ...]) -> Float[Array, "..."]:
     return jnp.where(negative, -size, size)
 
 
+def rayleigh(above: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
+    """Sizes r of mean square 1 with the Rayleigh distribution, from the probability exp(-r^2) of a larger one.
+
+    With a phase phi of its own r (cos phi, sin phi) are two independent normal numbers of variance 1/2.
+    """
+    return jnp.sqrt(-jnp.log(jnp.clip(above, _FEWEST, 1.0)))
+
+
 def sign(seed: int | Array, shape: tuple[int, ...]) -> Float[Array, "..."]:
     """1 or −1 with equal probability; arguments as those of `uniform`."""
     return jnp.where(_bits(seed, shape)[0] >> 31 == 0, 1.0, -1.0).astype(float)

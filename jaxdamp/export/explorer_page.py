@@ -202,7 +202,7 @@ def _of_metric(metric: Any, vehicle: AbstractVehicle) -> dict[str, Any]:
 
 
 def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> dict[str, Any]:
-    """Amplitudes of class A and phases of random roads, of which those of all classes and speeds follow."""
+    """Amplitudes and phases of random roads of class A, of which those of all classes and speeds follow."""
     longest = max(speed, _FASTEST) * duration
     made = [iso8608("A", 1.0, seed=seed + k, length=max(1000.0, longest)) for k in range(_SEEDS)]
     lines = {
@@ -210,8 +210,7 @@ def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> dict
         "length": made[0].length,
         "ramp": made[0].ramp,
         "seed": seed,
-        "amplitude": _packed(made[0].amplitude),
-        "phases": [_packed(road.phase) for road in made],
+        "drawn": [{"amplitude": _packed(road.amplitude), "phase": _packed(road.phase)} for road in made],
     }
     return {"class": road_class, "speed": speed, "iso": lines, "profile": None}
 

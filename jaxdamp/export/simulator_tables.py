@@ -105,12 +105,15 @@ def to_matlab(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vec
         The path of the file.
 
     Raises:
-        ValueError: as `to_csv`.
+        ValueError: as `to_csv`; a path that does not end in `.mat`.
     """
     import io
 
     from scipy.io import savemat
 
+    if Path(path).suffix.lower() != ".mat":
+        remedy = "It holds binary data, not a script: write `front.mat`, and read it by `load front.mat`."
+        _checks.refuse("path", "be a file NAME.mat", str(path), remedy)
     table, content = _table(law, velocities, "to_matlab(law, path, velocities)"), io.BytesIO()
     about = "\n".join(table.comments)
     savemat(content, {"velocity": table.velocity[:, None], "force": table.force[:, None], "about": about})

@@ -3,7 +3,8 @@
 Every function takes plain arrays of uniformly sampled signals, simulated or measured, NumPy or JAX, in SI units. A
 signal has one axis, time; use `jax.vmap` for many. All are pure JAX functions and can be compiled, batched and
 differentiated; where a derivative is zero or undefined, the docstring says so and names a smooth alternative. NaN in a
-signal gives NaN. Only functions that return texts (`evaluation_method`, `comfort_reaction`) cannot be compiled.
+signal gives NaN. Only `rainflow_cycles` and functions that return texts (`evaluation_method`, `comfort_reaction`)
+cannot be compiled.
 
 - Size of a signal: `rms`, `peak`, `smooth_peak`, `crest_factor`, `running_rms`.
 - Spectrum: `power_spectral_density`, `transmissibility`, `coherence`.
@@ -18,7 +19,7 @@ signal gives NaN. Only functions that return texts (`evaluation_method`, `comfor
   `aggregate_force_percentile`.
 - Damper: `dissipated_energy`, `dissipated_power`, `equivalent_damping`, `velocity_histogram`,
   `dissipation_histogram`, `temperature_rise`, `damper_temperature`.
-- Fatigue: `spectral_moments`, `spectral_damage`.
+- Fatigue: `spectral_moments`, `spectral_damage`, `rainflow_cycles`.
 - Road: `international_roughness_index`, `international_roughness_by_segment`.
 - Metrics of a vehicle channel, also computed during a simulation: `Metric`, with one of `STATISTICS`, `percentile` or
   your own `Statistic`; values by name: `MetricValues`.
@@ -55,6 +56,7 @@ from jaxdamp.metrics.heat import damper_temperature, temperature_rise
 from jaxdamp.metrics.histogram import dissipation_histogram, velocity_histogram
 from jaxdamp.metrics.metric import Metric
 from jaxdamp.metrics.names import RENAMED, MetricValues, current_name, current_names
+from jaxdamp.metrics.rainflow import rainflow_cycles
 from jaxdamp.metrics.roughness_index import (
     RoughnessBySegment,
     international_roughness_by_segment,
@@ -117,6 +119,7 @@ __all__ = [
     "peak",
     "percentile",
     "power_spectral_density",
+    "rainflow_cycles",
     "rms",
     "road_stress_factor",
     "running_rms",

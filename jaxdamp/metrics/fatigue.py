@@ -47,7 +47,8 @@ def spectral_damage(
     """Expected sum of cycle amplitudes to the power k, per second, of a Gaussian load [unit^k/s].
 
     With a Woehler line N S^k = K (S the amplitude, not the range) the damage after T seconds is T/K times this, by
-    Palmgren and Miner. Cycles are those of rainflow counting; their means are not counted.
+    Palmgren and Miner. Cycles are those of rainflow counting (`rainflow_cycles` counts those of a record); their means
+    are not counted.
 
     - "dirlik": nu_p m_0^(k/2) (D1 Q^k Gamma(1 + k) + 2^(k/2) Gamma(1 + k/2) (D2 |R|^k + D3)), for any width of band; a
       fit to simulated records; for k of 3 and 4 within some 10 % of counting, for k of 6 and more it can lie 30 % low

@@ -37,6 +37,16 @@ class AbstractOnOneRoad(AbstractRoad):
         return self.road.duration
 
     @property
+    def longest_run(self) -> float | None:
+        """That of the road [s]."""
+        return self.road.longest_run
+
+    @property
+    def shortest_event(self) -> float | None:
+        """That of the road [s]."""
+        return self.road.shortest_event
+
+    @property
     def span(self) -> tuple[Scalar | float, Scalar | float]:
         """That of the road [s]."""
         return self.road.span
@@ -66,6 +76,16 @@ class AbstractOnSeveralRoads(AbstractRoad):
     def duration(self) -> float | None:
         """The shortest of the durations [s]."""
         return least([road.duration for road in self.roads])
+
+    @property
+    def longest_run(self) -> float | None:
+        """The shortest of those of the roads [s]."""
+        return least([road.longest_run for road in self.roads])
+
+    @property
+    def shortest_event(self) -> float | None:
+        """The shortest of those of the roads [s]."""
+        return least([road.shortest_event for road in self.roads])
 
     @property
     def span(self) -> tuple[Scalar, Scalar]:

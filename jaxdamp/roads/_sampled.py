@@ -44,7 +44,7 @@ class SampledRoad(AbstractRoad):
     periodic: bool = eqx.field(static=True)
     ramp: float = eqx.field(static=True)
 
-    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] at each `time` [s], by linear interpolation between the samples.
 
         Times outside the record of a road that is not periodic raise a `ValueError`, or give NaN where they are

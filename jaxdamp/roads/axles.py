@@ -27,7 +27,7 @@ class Delayed(AbstractOnOneRoad):
         """The speed [m/s] that the road was created for."""
         return self.driven_at
 
-    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] under each wheel at each `time` [s]: all wheels of the first axle, then of the second, ..."""
         time = jnp.asarray(time, self.delay.dtype)
         # a record is level before its first sample; the road itself refuses given times before it
@@ -55,7 +55,7 @@ class InPhase(AbstractOnOneRoad):
 
     road: AbstractRoad
 
-    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] of each track at each `time` [s]."""
         return self.road.height(time)
 

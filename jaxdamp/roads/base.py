@@ -2,10 +2,13 @@
 
 import math
 from abc import abstractmethod
-from typing import Literal, NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import equinox as eqx
-from jaxtyping import Array, Float
+import jax.numpy as jnp
+from jax.tree_util import Partial
+from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp._types import Scalar, SignalLike
 
@@ -33,19 +36,49 @@ class Columns(NamedTuple):
         return side_by_side if self.delays is None else f"{side_by_side} for each of {self.delays.size} axles"
 
 
+if TYPE_CHECKING:
+    from typing import TypeVar
+
+    _Method = TypeVar("_Method", bound=Callable[..., Any])
+
+    def _for_jit(method: _Method) -> _Method: ...
+else:
+
+    class _for_jit:
+        """A method that can be passed on as a function: to `jax.jit`, which refuses the methods of equinox."""
+
+        def __init__(self, method: Callable[..., Any]) -> None:
+            self.method = method
+
+        def __get__(self, road: Any, owner: type | None = None) -> Callable[..., Any]:
+            return self.method if road is None else Partial(self.method, road)
+
+
 class AbstractRoad(eqx.Module):
     """The height of the ground under each wheel as a function of time.
 
     Roads are created by the functions of `jaxdamp.roads`. They are pytrees: their array leaves (heights, speed,
-    roughness) can be traced, batched and differentiated.
+    roughness) can be traced, batched and differentiated. A road of your own defines `heights_at`; call `height`.
 
     The default properties are those of a formula of time: one track, no speed, no samples, no start and no end. Other
     roads override them.
     """
 
+    @_for_jit
+    def height(self, time: Float[ArrayLike, "*times"]) -> Float[Array, "*times wheels"]:
+        """The height [m], up positive, under each wheel at each `time` [s]; one column for a single track.
+
+        Of a single time it is one height for each wheel, for a vector field of your own. `jax.jit(road.height)` and
+        the like work.
+        """
+        times = jnp.asarray(time, float)
+        if times.ndim == 1:
+            return self.heights_at(times)
+        return self.heights_at(times.reshape(-1)).reshape(*times.shape, self.wheels)
+
     @abstractmethod
-    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
-        """The height [m], up positive, under each wheel at each `time` [s]; one column for a single track."""
+    def heights_at(self, time: SignalLike) -> Float[Array, "time wheels"]:
+        """The same for times in a row: what the kinds of roads define."""
 
     @property
     def wheels(self) -> int:
@@ -76,6 +109,16 @@ class AbstractRoad(eqx.Module):
     def span(self) -> tuple[Scalar | float, Scalar | float]:
         """The first and the last time [s] at which the road has a height; infinite where it has no such end."""
         return -math.inf, math.inf
+
+    @property
+    def longest_run(self) -> float | None:
+        """The longest run [s] in which a random road does not repeat; `None` if there is no such limit."""
+        return None
+
+    @property
+    def shortest_event(self) -> float | None:
+        """The time [s] that a wheel takes over the shortest bump or hole, which steps must not skip; `None` if none."""
+        return None
 
     def reseeded(self, seed: int) -> "AbstractRoad | None":
         """The same kind of road with other random numbers; `None` if nothing in it is random or can be drawn again."""

@@ -4,6 +4,7 @@ from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jax.tree_util import Partial
 from jaxtyping import Array, Float
 
@@ -38,8 +39,14 @@ class Bump(AbstractRoad):
         """The speed [m/s] that the road was created for."""
         return self.driven_at
 
+    @property
+    def shortest_event(self) -> float | None:
+        """Its own width T [s]; `None` where it is traced, or of height zero."""
+        width, peak = _checks.concrete(self.width), _checks.concrete(self.peak)
+        return None if width is None or peak is None or not np.any(peak) else float(np.min(width))
+
     @eqx.filter_jit
-    def height(self, time: SignalLike) -> Float[Array, "time 1"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see the function that made the road."""
         time = jnp.asarray(time, self.peak.dtype)
         return (self.peak * self.shape((time - self.start) / self.width))[:, None]

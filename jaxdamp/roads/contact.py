@@ -35,11 +35,17 @@ class ContactPatch(AbstractOnOneRoad):
     points: int = eqx.field(static=True)
 
     @property
+    def shortest_event(self) -> float | None:
+        """That of the road [s], longer by the time in which the patch passes."""
+        own, passing = self.road.shortest_event, _checks.concrete(self.passing_time)
+        return None if own is None or passing is None else own + float(np.min(passing))
+
+    @property
     def speed(self) -> Scalar:
         """The speed [m/s] that the road was created for."""
         return self.driven_at
 
-    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The mean height [m] under each wheel at each `time` [s]; see `contact_patch`."""
         nodes, weights = (jnp.asarray(array, float) for array in np.polynomial.legendre.leggauss(self.points))
         around = heights_around(self.road, time, 0.5 * self.passing_time * nodes)
@@ -60,7 +66,7 @@ class RollingDisc(AbstractOnOneRoad):
         """The speed [m/s] that the road was created for."""
         return self.driven_at
 
-    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] of each disc at each `time` [s]; see `rolling_disc`."""
         angle = jnp.linspace(-0.5 * jnp.pi, 0.5 * jnp.pi, self.points)
         around = heights_around(self.road, time, self.radius * jnp.sin(angle) / self.speed)

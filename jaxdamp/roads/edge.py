@@ -22,7 +22,7 @@ class Step(AbstractRoad):
     smooth: bool = eqx.field(static=True)
 
     @eqx.filter_jit
-    def height(self, time: SignalLike) -> Float[Array, "time 1"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see `step`."""
         time = jnp.asarray(time, self.rise.dtype)
         flank = quintic_step if self.smooth else raised_cosine

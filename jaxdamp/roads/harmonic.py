@@ -28,7 +28,7 @@ class Sine(AbstractRoad):
         return self.driven_at
 
     @eqx.filter_jit
-    def height(self, time: SignalLike) -> Float[Array, "time 1"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see `sine`."""
         time = jnp.asarray(time, self.amplitude.dtype)
         wave = self.amplitude * jnp.sin(2.0 * jnp.pi * self.frequency * time)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._random import uniform
+from jaxdamp._random import rayleigh, uniform
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.roads._cosine_sum import cosine_sum
 from jaxdamp.roads._fade import fade_in
@@ -23,18 +23,32 @@ from jaxdamp.roads.iso_classes import (
 
 @final
 class Iso8608(AbstractRoad):
-    """A sum of cosines with the spectrum of ISO 8608; created by `iso8608`."""
+    """A sum of cosines with the spectrum of ISO 8608; created by `iso8608`.
+
+    Attributes:
+        roughness_psd: G_d(n0) [m^3].
+        waviness: w.
+        driven_at: V [m/s].
+        phase: phi_i of each cosine [rad].
+        relative_amplitude: r_i of each cosine, of mean square 1 over all roads; 1 for fixed amplitudes.
+        length: the distance after which the road repeats [m].
+        band: the least and the greatest spatial frequency [cycle/m].
+        ramp: the time of the fade-in [s].
+        amplitudes: "random" or "fixed".
+    """
 
     roughness_psd: Scalar
     waviness: Scalar
     driven_at: Scalar
     phase: Float[Array, " lines"]
+    relative_amplitude: Float[Array, " lines"]
     length: float = eqx.field(static=True)
     band: tuple[float, float] = eqx.field(static=True)
     ramp: float = eqx.field(static=True)
+    amplitudes: str = eqx.field(static=True)
 
     @eqx.filter_jit
-    def height(self, time: SignalLike) -> Float[Array, "time 1"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see `iso8608`."""
         time = jnp.asarray(time, self.phase.dtype)
         cycles = self.speed * time / self.length
@@ -54,11 +68,11 @@ class Iso8608(AbstractRoad):
 
     @property
     def amplitude(self) -> Float[Array, " lines"]:
-        """The amplitudes of the cosines [m], sqrt(2 int G_d dn) over the band nearest to each (by Simpson's rule)."""
+        """The amplitudes of the cosines [m], r sqrt(2 int G_d dn) over the band nearest to each (by Simpson's rule)."""
         centre, half = self.spatial_frequency, 0.5 / self.length
         lower, upper = jnp.clip(centre - half, *self.band), jnp.clip(centre + half, *self.band)
         ends = [displacement_psd(n, self.roughness_psd, self.waviness) for n in (lower, 0.5 * (lower + upper), upper)]
-        return jnp.sqrt((upper - lower) / 3.0 * (ends[0] + 4.0 * ends[1] + ends[2]))
+        return self.relative_amplitude * jnp.sqrt((upper - lower) / 3.0 * (ends[0] + 4.0 * ends[1] + ends[2]))
 
     @property
     def duration(self) -> float | None:
@@ -66,10 +80,23 @@ class Iso8608(AbstractRoad):
         speed = _checks.concrete(self.speed)
         return None if speed is None else self.length / float(speed)
 
+    @property
+    def longest_run(self) -> float | None:
+        """The time [s] after which the road repeats."""
+        return self.duration
+
     def reseeded(self, seed: int) -> "Iso8608":
-        """Another realisation: each phase is shifted by a random angle, the same for each track of a surface."""
-        shift = uniform(seed, self.phase.shape, 2.0 * math.pi)
-        return eqx.tree_at(lambda road: road.phase, self, (self.phase + shift) % (2.0 * math.pi))
+        """Another realisation: the probabilities of phases and amplitudes are shifted, alike for equal roads.
+
+        Equal tracks stay equal, independent ones independent.
+        """
+        turn, shift = uniform(seed, (2, self.phase.size))
+        phase = (self.phase + 2.0 * math.pi * turn) % (2.0 * math.pi)
+        if self.amplitudes == "fixed":
+            return eqx.tree_at(lambda road: road.phase, self, phase)
+        above = jnp.exp(-(self.relative_amplitude**2))
+        drawn = (phase, rayleigh((above + shift) % 1.0))
+        return eqx.tree_at(lambda road: (road.phase, road.relative_amplitude), self, drawn)
 
 
 def iso8608(
@@ -83,19 +110,25 @@ def iso8608(
     maximum_spatial_frequency: float = HIGHEST_SPATIAL_FREQUENCY,
     length: float | int | None = None,
     ramp: float | int = 0.5,
+    amplitudes: str = "random",
 ) -> Iso8608:
     """A random road of an ISO 8608 roughness class, driven at constant speed.
 
     Its displacement PSD over spatial frequency is G_d(n) = G_d(n0) (n/n0)^-w; over frequency it is
-    G_d(f/speed)/speed. The road is z(t) = sum_i a_i cos(2 pi n_i V t + phi_i) with n_i = i/length and random phases
-    phi_i. The amplitudes are not random: a_i^2/2 is the integral of G_d over the band 1/length wide around n_i, so
-    each realisation has exactly the variance of the class. It has as many cosines as there are multiples of 1/length
-    in the band (2820 for 1 km), and repeats after `length`.
+    G_d(f/speed)/speed. The road is z(t) = sum_i r_i a_i cos(2 pi n_i V t + phi_i) with n_i = i/length and random phases
+    phi_i; a_i^2/2 is the integral of G_d over the band 1/length wide around n_i. It has as many cosines as there are
+    multiples of 1/length in the band (2820 for 1 km), and repeats after `length`: simulations refuse to run longer.
 
-    Heights are close to Gaussian, with a kurtosis of 3 - 1.5 sum p_i^2, where p_i is the share of a cosine in the
-    variance: 2.96 for the defaults, whose variance lies mostly in the dozens of longest waves. Slopes and vertical
-    velocities are Gaussian for every practical purpose. Because one realisation holds few long waves, judge body
-    motion on several seeds.
+    By default the factors r_i are random as well, with the Rayleigh distribution of mean square 1: the road is a
+    Gaussian process. The spectrum is that of the class on average, and the RMS of a run scatters from seed to seed as
+    on real roads of one class: over the whole length by sqrt(sum p_i^2)/2, where p_i is the share of a cosine in the
+    mean square of the signal (2 to 8 % for the body acceleration of a car in 50 s). With `amplitudes="fixed"` all r_i
+    are 1: every road has exactly the spectrum and the variance of the class, and a run as long as the road hardly
+    scatters. Take this to reproduce a spectrum, not to judge how sure a difference between two dampers is. Heights are
+    then only close to Gaussian, with a kurtosis of 3 - 1.5 sum p_i^2 (2.96 for the defaults). A seed gives the same
+    phases with either.
+
+    One road holds few long waves: judge body motion on several seeds.
 
     Differentiable in `speed`, `waviness` and a numeric `road_class`; the same ground is then driven faster or is
     rougher. `two_track` adds the right-hand track, `delayed` the rear axle; `iso8608_filtered` is the road made by a
@@ -106,26 +139,30 @@ def iso8608(
             the roughness G_d(n0) itself [m^3] at n0 = 0.1 cycle/m ("A" is 16e-6, each class four times the one
             before).
         speed: V, the speed of the vehicle [m/s].
-        duration: the time [s] the road must last before it repeats; lengthens the road where 1 km is not enough.
+        duration: the time [s] the road must last before it repeats; lengthens the road where 1 km is not enough. The
+            same seed with another length is another road.
         seed: a whole number, or a JAX random key.
         waviness: w; 2 in the standard.
         minimum_spatial_frequency: the lower end of the spectrum [cycle/m]; 0.011 in the standard.
         maximum_spatial_frequency: the upper end of the spectrum [cycle/m]; 2.83 in the standard. It reaches the
             frequency 2.83 V: sample the road at more than twice that.
         length: the distance [m] after which the road repeats; by default the longest of 1000 m, ten of the longest
-            waves, and `speed` times `duration`. The time to compute the road grows with it.
+            waves, and `speed` times `duration`.
         ramp: the time [s] over which the road fades in as a raised cosine at the start, so that a vehicle at rest on
             level ground meets no jump; 0 turns it off.
+        amplitudes: "random" for a Gaussian road, "fixed" for the exact spectrum in every road.
 
     Raises:
-        ValueError: if the class is unknown, if `speed`, the roughness or a spatial frequency is not positive, if
-            `waviness` or `ramp` is negative, if the band is empty, if `length` is shorter than the longest wave or
-            than `speed` times `duration`, or if `duration` is given while `speed` is traced (give `length` instead).
+        ValueError: if the class or `amplitudes` is unknown, if `speed`, the roughness or a spatial frequency is not
+            positive, if `waviness` or `ramp` is negative, if the band is empty, if `length` is shorter than the
+            longest wave or than `speed` times `duration`, or if `duration` is given while `speed` is traced (give
+            `length` instead).
 
-    Source: ISO 8608. Not to be confused with the table over rad/m, whose reference is 1 rad/m (1e-6 m^3 for class A).
+    Source: ISO 8608; Rice (1944) for the Gaussian sum of cosines. Not to be confused with the table over rad/m, whose
+    reference is 1 rad/m (1e-6 m^3 for class A).
 
     >>> import jax.numpy as jnp
-    >>> road = iso8608("C", speed=20.0, seed=1, ramp=0.0)
+    >>> road = iso8608("C", speed=20.0, seed=1, ramp=0.0, amplitudes="fixed")
     >>> z = road.height(jnp.linspace(0.0, 50.0, 10_000, endpoint=False))[:, 0]
     >>> round(float(jnp.sqrt(jnp.mean(z**2))), 6)  # sqrt(256e-6 * 0.1**2 * (1/0.011 - 1/2.83))
     0.015226
@@ -145,17 +182,21 @@ def iso8608(
     _checks.positive("speed", speed, "Roads are driven forwards; it is in m/s.")
     _checks.nonnegative("waviness", waviness, "The standard uses 2.")
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
+    _checks.one_of("amplitudes", amplitudes, ["random", "fixed"])
     density = roughness(road_class)
     length = _repeat_length(band, speed, duration, length)
     first, last = _first_and_last(band, length)
+    turn, above = uniform(seed, (2, last - first + 1))
     return Iso8608(
         roughness_psd=jnp.asarray(density, float),
         waviness=jnp.asarray(waviness, float),
         driven_at=jnp.asarray(speed, float),
-        phase=uniform(seed, (last - first + 1,), 2.0 * math.pi),
+        phase=2.0 * math.pi * turn,
+        relative_amplitude=jnp.ones_like(turn) if amplitudes == "fixed" else rayleigh(above),
         length=length,
         band=band,
         ramp=float(ramp),
+        amplitudes=amplitudes,
     )
 
 

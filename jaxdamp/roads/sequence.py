@@ -21,7 +21,7 @@ class Joined(AbstractRoad):
     second: AbstractRoad
     at: Scalar
 
-    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] at each `time` [s]; see `joined`."""
         time = jnp.asarray(time, self.at.dtype)
         before = self.first.height(at_most(time, self.at))
@@ -53,6 +53,21 @@ class Joined(AbstractRoad):
         """The time [s] at which the second road ends or repeats."""
         at, rest = _checks.concrete(self.at), self.second.duration
         return None if at is None or rest is None else float(at) + rest
+
+    @property
+    def longest_run(self) -> float | None:
+        """Until the second road repeats, or the first one before it does [s]."""
+        at, own, rest = _checks.concrete(self.at), self.first.longest_run, self.second.longest_run
+        if at is None:
+            return None
+        if own is not None and own < float(at) * (1.0 - 1e-9):
+            return own
+        return None if rest is None else float(at) + rest
+
+    @property
+    def shortest_event(self) -> float | None:
+        """The shorter of those of the two roads [s]."""
+        return least([self.first.shortest_event, self.second.shortest_event])
 
     @property
     def span(self) -> tuple[Scalar | float, Scalar | float]:

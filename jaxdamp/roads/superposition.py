@@ -16,7 +16,7 @@ class Superposed(AbstractOnSeveralRoads):
 
     roads: tuple[AbstractRoad, ...]
 
-    def height(self, time: SignalLike) -> Float[Array, "time wheels"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The sum of the heights [m] at each `time` [s]."""
         total = self.roads[0].height(time)
         for road in self.roads[1:]:

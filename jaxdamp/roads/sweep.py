@@ -41,7 +41,7 @@ class SweepSine(AbstractRoad):
     ramp: float = eqx.field(static=True)
 
     @eqx.filter_jit
-    def height(self, time: SignalLike) -> Float[Array, "time 1"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time 1"]:
         """The height [m] at each `time` [s]; see `sweep_sine`."""
         time = jnp.asarray(time, self.size.dtype)
         inside = within(time, 0.0, self.period)

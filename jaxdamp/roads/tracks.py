@@ -7,8 +7,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._random import sign
-from jaxdamp._types import ScalarLike, SignalLike
+from jaxdamp._random import rayleigh, sign, uniform
+from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.roads._composed import AbstractOnSeveralRoads, same_columns
 from jaxdamp.roads.base import AbstractRoad, Columns
 from jaxdamp.roads.coherency import coherency
@@ -17,11 +17,17 @@ from jaxdamp.roads.iso_roughness import Iso8608
 
 @final
 class TwoTrack(AbstractOnSeveralRoads):
-    """A left-hand and a right-hand track; created by `two_track`."""
+    """A left-hand and a right-hand track; created by `two_track`.
+
+    Attributes:
+        roads: left, right.
+        track_width: B [m], where the right-hand track was made from the left-hand one.
+    """
 
     roads: tuple[AbstractRoad, AbstractRoad]
+    track_width: Scalar | None = None
 
-    def height(self, time: SignalLike) -> Float[Array, "time 2"]:
+    def heights_at(self, time: SignalLike) -> Float[Array, "time 2"]:
         """The heights [m] at each `time` [s], left then right."""
         return jnp.concatenate([track.height(time) for track in self.roads], axis=1)
 
@@ -35,6 +41,13 @@ class TwoTrack(AbstractOnSeveralRoads):
         """Two tracks side by side, in phase if they are."""
         in_phase = self.roads[0].columns.kind == "in phase"
         return Columns("in phase" if in_phase else "road", 2)
+
+    def reseeded(self, seed: int) -> AbstractRoad | None:
+        """Other tracks, which are as coherent as these."""
+        left = self.roads[0]
+        if self.track_width is None or not isinstance(left, Iso8608) or left.amplitudes == "fixed":
+            return super().reseeded(seed)
+        return two_track(left.reseeded(seed), track_width=self.track_width, seed=seed)
 
 
 def two_track(
@@ -51,10 +64,12 @@ def two_track(
     road of the same spectrum, coherent at long wavelengths and independent at short ones, as on an isotropic surface
     (see `coherency`).
 
-    For the latter each cosine has the same amplitude and a phase shifted by arccos(gamma(n)), with a random sign. So
-    every realisation, not only their average, has exactly the spectrum G_d of the class in both tracks,
-    G_d (1 + gamma)/2 in their mean (heave) and 2 G_d (1 - gamma) in their difference (roll); the coherence over bands
-    of many cosines is gamma^2. Differentiable in `track_width` and in what the road is differentiable in.
+    Its cosines, as complex numbers, are gamma(n) times those of the left track and sqrt(1 - gamma(n)^2) times other
+    ones with the same distribution, so that both tracks together are a Gaussian process. For a road with fixed
+    amplitudes each cosine has the same amplitude and a phase shifted by arccos(gamma(n)), with a random sign: every
+    road, not only their average, then has exactly the spectrum G_d of the class in both tracks, G_d (1 + gamma)/2 in
+    their mean (heave) and 2 G_d (1 - gamma) in their difference (roll). The coherence over bands of many cosines is
+    gamma^2 in either. Differentiable in `track_width` and in what the road is differentiable in.
 
     Arguments:
         left: the road under the left wheels, with a single track.
@@ -98,8 +113,20 @@ def two_track(
     _checks.positive("track_width", track_width, "It is in m.")
     if seed is None:
         _checks.refuse("seed", "be given with `track_width`", seed, "Any whole number: another one, another road.")
+    return TwoTrack((left, _beside(left, track_width, seed)), jnp.asarray(track_width, float))
+
+
+def _beside(left: Iso8608, track_width: ScalarLike, seed: int | Array) -> Iso8608:
+    """The right-hand track of a random road."""
+    # at 1, which gamma reaches only for a vanishing track, arccos and the square root have no slope
     gamma = coherency(left.spatial_frequency, track_width, left.waviness)
-    # at 1, which gamma reaches only for a vanishing track, arccos has no slope
-    shift = jnp.arccos(jnp.minimum(gamma, 1.0 - 4.0 * float(jnp.finfo(gamma.dtype).eps)))
-    side = sign(seed, gamma.shape)
-    return TwoTrack((left, eqx.tree_at(lambda road: road.phase, left, left.phase + side * shift)))
+    gamma = jnp.minimum(gamma, 1.0 - 4.0 * float(jnp.finfo(gamma.dtype).eps))
+    if left.amplitudes == "fixed":
+        return eqx.tree_at(lambda road: road.phase, left, left.phase + sign(seed, gamma.shape) * jnp.arccos(gamma))
+    # numbers that `iso8608` does not use, so that the same seed may be given to both
+    turn, above = uniform(seed, (4, gamma.size))[2:]
+    shared, rest = gamma * left.relative_amplitude, jnp.sqrt((1.0 - gamma) * (1.0 + gamma)) * rayleigh(above)
+    real = shared * jnp.cos(left.phase) + rest * jnp.cos(2.0 * jnp.pi * turn)
+    imaginary = shared * jnp.sin(left.phase) + rest * jnp.sin(2.0 * jnp.pi * turn)
+    drawn = (jnp.arctan2(imaginary, real), jnp.sqrt(real**2 + imaginary**2))
+    return eqx.tree_at(lambda road: (road.phase, road.relative_amplitude), left, drawn)

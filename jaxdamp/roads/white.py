@@ -16,16 +16,25 @@ class WhiteRoad(eqx.Module):
     """A road given only by its spectrum, for the stationary response of linear vehicles; created by `white`.
 
     Attributes:
-        velocity_psd: two-sided power spectral density of the rate of height [(m/s)²/Hz].
+        velocity_psd: two-sided power spectral density S of the rate of height [(m/s)²/Hz], as `stationary_rms` takes
+            it: half of `one_sided_velocity_psd`.
         speed: speed of the vehicle, for the delays between axles [m/s].
     """
 
     velocity_psd: Scalar
     speed: Scalar
 
+    @property
+    def one_sided_velocity_psd(self) -> Scalar:
+        """Power spectral density over positive frequencies [(m/s)²/Hz], 2 S: that of all other spectra here."""
+        return 2.0 * self.velocity_psd
+
 
 def white(road_class: str | ScalarLike, speed: ScalarLike) -> WhiteRoad:
     """The road of an ISO 8608 class at a speed as white noise in the rate of height, S = 2π² G_d(n₀) n₀² V.
+
+    S is two-sided. The one-sided density, with which spectra of simulated and measured signals are compared, is 2 S =
+    (2π n₀)² G_d(n₀) V (`one_sided_velocity_psd`).
 
     It cannot be used in simulations over time, only for stationary responses, in which heights are relative.
 

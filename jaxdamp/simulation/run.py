@@ -20,6 +20,7 @@ from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.range_notes import range_sentences
 from jaxdamp.simulation.recorder import recorded
 from jaxdamp.simulation.response import Response
+from jaxdamp.simulation.stability import rounded_down
 from jaxdamp.simulation.step_size import RunCheck
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
 from jaxdamp.vehicles import AbstractVehicle, refuse_restless, static_equilibrium
@@ -153,11 +154,20 @@ def sampled(
         _checks.refuse("duration", "be given for a road without an end of its own", None, "Pass `duration=10.0`.")
     _checks.positive("duration", duration)
     _checks.positive("dt", dt)
+    longest = road.longest_run
+    if longest is not None and duration > longest * (1 + 1e-9):
+        must = f"not be longer than the random road, which repeats after {longest:g} s"
+        remedy = f"Make the road with `duration={duration:g}`, or with a greater `length`."
+        _checks.refuse("duration", must, f"{duration:g} s", remedy)
     if dt > duration:
         _checks.refuse("dt", f"be shorter than the run of {duration:g} s", dt)
     if road.grid is not None and dt > road.grid * (1 + 1e-9):
         remedy = f"Pass `dt={road.grid:g}` or less, or make the road with a coarser grid."
         _checks.refuse("dt", f"not be longer than the road's grid of {road.grid:g} s", dt, remedy)
+    event = road.shortest_event
+    if event is not None and event < 2 * dt * (1 - 1e-9):
+        must = f"be at most half the time over the shortest bump, {event:.3g} s, which steps would skip"
+        _checks.refuse("dt", must, f"{dt:g} s", f"Pass `dt={rounded_down(event / 8):g}`, or make the bump longer.")
     count = round(duration / dt)
     time = jnp.arange(count + 1, dtype=float) * dt
     return time, heights_under_wheels(vehicle, road, time)

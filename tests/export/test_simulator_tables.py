@@ -75,6 +75,11 @@ def test_matlab(tmp_path):
     assert known["velocity"].shape == (37, 1)
     np.testing.assert_array_equal(known["velocity"][:, 0], VELOCITIES)
     np.testing.assert_allclose(known["force"][:, 0], FORCE, rtol=1e-14)
+    with pytest.raises(
+        ValueError, match=r"`path` must be a file NAME.mat, but is .*front.m. It holds binary data, not a script"
+    ):
+        to_matlab(LAW, tmp_path / "front.m", VELOCITIES)
+    assert not (tmp_path / "front.m").exists()
 
 
 @pytest.mark.parametrize("ratio", [1.0, 0.7])

@@ -1,4 +1,4 @@
-import itertools
+import sys
 
 import jax
 import jax.numpy as jnp
@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import gamma
 
-from jaxdamp.metrics import power_spectral_density, spectral_damage, spectral_moments
+from jaxdamp.metrics import power_spectral_density, rainflow_cycles, spectral_damage, spectral_moments
 
 
 FREQUENCY = np.linspace(0.0, 250.0, 2501)
@@ -18,26 +18,6 @@ SPECTRA = {
 }
 
 
-def rainflow(signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Amplitudes and counts of the cycles of a record, by the three-point method of ASTM E1049."""
-    step = np.diff(signal)
-    turns = signal[np.concatenate([[True], step[1:] * step[:-1] < 0, [True]])]
-    cycles, stack = [], []
-    for value in turns.tolist():
-        stack.append(value)
-        while len(stack) >= 3 and abs(stack[-1] - stack[-2]) >= abs(stack[-2] - stack[-3]):
-            span = abs(stack[-2] - stack[-3])
-            if len(stack) == 3:
-                cycles.append((span / 2, 0.5))
-                del stack[0]
-            else:
-                cycles.append((span / 2, 1.0))
-                del stack[-3:-1]
-    cycles += [(abs(b - a) / 2, 0.5) for a, b in itertools.pairwise(stack)]
-    amplitude, count = np.array(cycles).T
-    return amplitude, count
-
-
 def gaussian_record(density: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """100 s at 4 kHz: sines of fixed amplitude and random phase, so the variance is exact."""
     size, dt = 400_000, 0.00025
@@ -46,19 +26,37 @@ def gaussian_record(density: np.ndarray, rng: np.random.Generator) -> np.ndarray
     return np.fft.irfft(np.sqrt(lines * size / dt / 2) * phase, size)
 
 
-def test_rainflow_of_the_test_itself():
-    # the example of ASTM E1049: ranges 3, 4, 4 (one whole), 6, 8, 8, 9
-    amplitude, count = rainflow(np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0]))
-    table = {span: float(np.sum(count[amplitude == span / 2])) for span in (3, 4, 6, 8, 9)}
-    assert table == {3: 0.5, 4: 1.5, 6: 0.5, 8: 1.0, 9: 0.5}
+def test_rainflow_counts_the_example_of_the_standard():
+    # ASTM E1049-85, table of figure 6: ranges 3, 4, 4 (one whole), 6, 8, 8, 9 with their means
+    cycles = rainflow_cycles([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])
+    table = {(3, -0.5): 0.5, (4, -1.0): 0.5, (4, 1.0): 1.0, (6, 1.0): 0.5, (8, 0.0): 0.5, (8, 1.0): 0.5, (9, 0.5): 0.5}
+    assert dict(zip(zip(2 * cycles.amplitude, cycles.mean, strict=True), cycles.count, strict=True)) == table
+    assert cycles.damage(3) == sum(count * (span / 2) ** 3 for (span, _), count in table.items())
+
+
+def test_a_sine_with_an_offset_is_cycles_of_its_amplitude(unchecked):
+    found = rainflow_cycles(100.0 + 7.0 * np.cos(np.pi * np.arange(0, 41) / 4))  # five periods
+    np.testing.assert_allclose(found.amplitude, 7.0)
+    np.testing.assert_allclose(found.mean, 100.0)
+    assert np.sum(found.count) == 5.0
+    assert rainflow_cycles([3.0, 3.0]).damage(4) == 0.0
+    for wrong, message in (([1.0], "hold two or more samples"), ([1.0, np.nan, 2.0], "must be finite.*Cut the gaps")):
+        with pytest.raises(ValueError, match=message):
+            rainflow_cycles(wrong)
+
+
+def test_without_the_package_the_line_to_install_is_said(monkeypatch):
+    monkeypatch.setitem(sys.modules, "rainflow", None)
+    with pytest.raises(ImportError, match=r"pip install 'jaxdamp\[fatigue\]'"):
+        rainflow_cycles([1.0, 2.0, 0.0])
 
 
 @pytest.mark.parametrize("name", SPECTRA)
 def test_dirlik_meets_rainflow_counting(name, rng):
     record = gaussian_record(SPECTRA[name], rng)
-    amplitude, count = rainflow(record)
+    cycles = rainflow_cycles(record)
     for exponent in (3, 4):
-        counted = np.sum(count * amplitude**exponent) / 100.0
+        counted = cycles.damage(exponent) / 100.0
         # the formula is good to 10 % or so; the record, some 10^3 independent envelopes, scatters by 5 %
         assert float(spectral_damage(FREQUENCY, SPECTRA[name], exponent)) == pytest.approx(counted, rel=0.12)
         narrow = float(spectral_damage(FREQUENCY, SPECTRA[name], exponent, method="narrow-band"))

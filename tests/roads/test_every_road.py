@@ -71,6 +71,14 @@ def test_numpy_times_are_accepted(make):
     np.testing.assert_array_equal(road.height(np.asarray(TIME)), road.height(TIME))
 
 
+def test_a_single_time_has_a_height_for_each_wheel_and_the_method_compiles(make):
+    road, whole = make(0.02), make(0.02).height(TIME)
+    for height in (road.height, jax.jit(road.height)):
+        np.testing.assert_allclose(height(0.5), whole[150], rtol=1e-11, atol=1e-13)
+    np.testing.assert_allclose(jax.vmap(road.height)(TIME[150:152]), whole[150:152], rtol=1e-11, atol=1e-13)
+    assert jax.eval_shape(road.height, TIME.reshape(7, 43)).shape == (7, 43, road.wheels)
+
+
 def test_whole_numbers_are_accepted():
     np.testing.assert_array_equal(roads.sine(1, frequency=2).height(TIME), roads.sine(1.0, frequency=2.0).height(TIME))
     iso = roads.iso8608("C", 20, 10, seed=0)

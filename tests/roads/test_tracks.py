@@ -15,21 +15,39 @@ def gamma(n, track=TRACK):
 
 
 def spectra(seed, length=1000.0, samples=6000):
-    """Line amplitudes of both tracks over one period, with the spatial frequencies well within the band."""
-    road = two_track(iso8608("C", SPEED, seed=2, length=length, ramp=0.0), track_width=TRACK, seed=seed)
+    """Lines of both tracks over one period, of fixed amplitudes, and the spatial frequencies well within the band."""
+    surface = iso8608("C", SPEED, seed=2, length=length, ramp=0.0, amplitudes="fixed")
+    road = two_track(surface, track_width=TRACK, seed=seed)
     z = np.asarray(road.height(length / SPEED * np.arange(samples) / samples))
     n = np.arange(samples // 2 + 1) / length
     inside = (n > 0.013) & (n < 2.8)
     return n[inside], np.fft.rfft(z, axis=0)[inside] / samples
 
 
-def test_tracks_heave_and_roll_have_exactly_their_spectra_in_every_realisation():
+def test_with_fixed_amplitudes_tracks_heave_and_roll_have_exactly_their_spectra():
     n, lines = spectra(seed=7)
     power = np.abs(lines) ** 2
     # the phases are in double precision and the sum is exact to 1e-12 of the largest line, 1e-3 m; the least is 3e-6 m
     np.testing.assert_allclose(power[:, 1], power[:, 0], rtol=1e-5)
     np.testing.assert_allclose(np.abs(lines.sum(axis=1) / 2) ** 2, power[:, 0] * (1 + gamma(n)) / 2, rtol=1e-5)
     np.testing.assert_allclose(np.abs(lines[:, 0] - lines[:, 1]) ** 2, power[:, 0] * 2 * (1 - gamma(n)), rtol=1e-4)
+
+
+@pytest.mark.parametrize("seed", [3, 4])  # also the one of the left track
+def test_random_tracks_have_the_spectrum_and_coherency_on_average_also_drawn_anew(seed):
+    road = two_track(iso8608("C", SPEED, seed=3), track_width=TRACK, seed=seed)
+    drawn = road.reseeded(8)
+    n = np.asarray(road.roads[0].spatial_frequency)
+    for left, right in (road.roads, drawn.roads):
+        a, b = (np.asarray(r.relative_amplitude) * np.exp(1j * np.asarray(r.phase)) for r in (left, right))
+        for low, high in ((0.011, 0.2), (0.2, 0.6), (0.6, 2.9)):
+            some = (n > low) & (n < high)
+            cross, scatter = np.mean((a * np.conj(b))[some]), 4 / np.sqrt(some.sum())
+            assert abs(cross - np.mean(gamma(n[some]))) < scatter
+            assert abs(np.mean(np.abs(b[some]) ** 2) - 1) < scatter
+    assert abs(np.corrcoef(drawn.roads[0].relative_amplitude, road.roads[0].relative_amplitude)[0, 1]) < 0.08
+    same = two_track(road.roads[0], road.roads[0]).reseeded(8)
+    np.testing.assert_array_equal(same.roads[0].relative_amplitude, same.roads[1].relative_amplitude)
 
 
 def test_neither_track_leads():

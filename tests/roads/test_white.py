@@ -10,6 +10,7 @@ def test_is_half_the_one_sided_velocity_spectrum_of_the_class():
     displacement = 256e-6 * (spatial_frequency / 0.1) ** -2
     one_sided = (2 * np.pi * spatial_frequency) ** 2 * displacement * 20.0
     assert float(roads.white("C", speed=20.0).velocity_psd) == pytest.approx(one_sided / 2, rel=1e-12)
+    assert float(roads.white("C", speed=20.0).one_sided_velocity_psd) == pytest.approx(one_sided, rel=1e-12)
     assert float(roads.white(256e-6, speed=20.0).velocity_psd) == pytest.approx(one_sided / 2, rel=1e-12)
 
 

@@ -247,6 +247,15 @@ def test_duration_of_the_road_is_used():
             {"road": roads.from_profile(np.arange(400) * 5e-3, np.zeros((400, 2)))},
             r"`road` must have a column for each of 1",
         ),
+        (
+            {"road": roads.iso8608("C", 400.0, seed=1), "duration": 10.0, "dt": 1e-3},
+            r"`duration` must not be longer than the random road, which repeats after 2.5 s, but is 10 s. "
+            r"Make the road with `duration=10`",
+        ),
+        (
+            {"road": roads.superposed(roads.cosine_bump(0.01, start=0.1023, duration=4e-4), roads.step(0.01))},
+            r"`dt` must be at most half the time over the shortest bump, 0.0004 s.*is 0.005 s. Pass `dt=5e-05`",
+        ),
     ],
 )
 def test_refuses_runs_that_make_no_sense(change, message):

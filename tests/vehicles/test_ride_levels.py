@@ -17,7 +17,10 @@ def test_simulated_stationary_and_closed_form_are_one():
     car, speed, length, dt = quarter_car_000(), 20.0, 500.0, 2e-3
     white = roads.white("C", speed)
     exact = stationary_rms(car, white.velocity_psd)
-    run = simulate(car, roads.iso8608("C", speed, seed=4, length=length), duration=2 * length / speed, dt=dt)
+    first, then = (
+        roads.iso8608("C", speed, seed=4, length=length, ramp=ramp, amplitudes="fixed") for ramp in (0.5, 0.0)
+    )
+    run = simulate(car, roads.joined(first, then), duration=2 * length / speed, dt=dt)
     lap = round(length / speed / dt)
     closed = np.sqrt(float(white.velocity_psd) * np.array(closed_forms(1200.0, 125.0, 60e3, 220e3, 2500.0)))
     names = ("sprung_acceleration", "stroke", "dynamic_tyre_load")

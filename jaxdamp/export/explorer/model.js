@@ -56,10 +56,10 @@ function firstCounted(record, states) {
 }
 
 // Heights [m] of a sum of cosines z = a cos(2 pi n s + phase), n = k/length, at the distances s = speed t, faded in.
-function isoHeights(road, scale, phase, speed, dt, count) {
+function isoHeights(road, { amplitude, phase }, scale, speed, dt, count) {
   const heights = new Float64Array(count), again = 256;
   for (let line = 0; line < phase.length; ++line) {
-    const cycles = (road.first + line) / road.length * speed * dt, size = scale * road.amplitude[line];
+    const cycles = (road.first + line) / road.length * speed * dt, size = scale * amplitude[line];
     const turnCos = Math.cos(2 * Math.PI * cycles), turnSin = Math.sin(2 * Math.PI * cycles);
     for (let begin = 0; begin < count; begin += again) {  // afresh, so that rounding does not add up
       const angle = 2 * Math.PI * ((cycles * begin) % 1) + phase[line], end = Math.min(begin + again, count);

@@ -9,8 +9,8 @@ const cached = new Map();  // loops of the baseline, which no slider moves
 const start = (numbers) => Object.fromEntries(numbers.map((number) => [number.name, [...number.start]]));
 const values = { law: start(DATA.law.numbers), vehicle: start(DATA.vehicle.numbers) };
 const records = DATA.records.map((record) => ({ ...record, x: unpacked(record.x), v: unpacked(record.v), force: unpacked(record.force) }));
-const iso = { ...DATA.road.iso, amplitude: unpacked(DATA.road.iso.amplitude) };
-const phases = iso.phases.map(unpacked);
+const iso = DATA.road.iso;
+const drawnRoads = iso.drawn.map(({ amplitude, phase }) => ({ amplitude: unpacked(amplitude), phase: unpacked(phase) }));
 const profile = DATA.road.profile && { ...DATA.road.profile, heights: unpacked(DATA.road.profile.heights) };
 const charts = Object.fromEntries(["loopVelocity", "loopStroke", "spectrum", "trace"].map((id) => [id, new Chart(get(id))]));
 const sides = {
@@ -40,7 +40,7 @@ function roadHeights() {
   }
   const most = iso.length / ((count - 1) * dt);
   if (speed > most) throw new Error(`At ${speed} m/s the road of ${iso.length} m repeats within the run: take at most ${readable(most)} m/s.`);
-  return isoHeights(iso, 2 ** (kind.charCodeAt(0) - 65), phases[Number(get("seed").value)], speed, dt, count);
+  return isoHeights(iso, drawnRoads[Number(get("seed").value)], 2 ** (kind.charCodeAt(0) - 65), speed, dt, count);
 }
 
 function positive(id) {
@@ -295,7 +295,7 @@ function begin() {
   if (profile) get("roadKind").append(element("option", { value: "profile" }, profile.title));
   get("roadKind").value = profile ? "profile" : DATA.road.class;
   get("speed").value = DATA.road.speed;
-  phases.forEach((_, k) => get("seed").append(element("option", { value: k }, String(iso.seed + k))));
+  drawnRoads.forEach((_, k) => get("seed").append(element("option", { value: k }, String(iso.seed + k))));
   DATA.channels.forEach((channel, k) => get("channel").append(element("option", { value: k }, channel.name.replaceAll("_", " "))));
   get("baselineHead").textContent = DATA.baseline.title;
   for (const id of ["motion", "amplitude", "frequencies"]) get(id).addEventListener("input", schedule);
