@@ -160,9 +160,9 @@ def search(
     return ended
 
 
-def active(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tolerance) -> list[Limit]:
-    """The active or violated limits."""
-    return [limit for limit in limits if limit.margin(values[limit.name]) < tolerance.limit]
+def reached(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tolerance) -> list[Limit]:
+    """The limits that are met, and hold the search."""
+    return [limit for limit in limits if abs(limit.margin(values[limit.name])) <= tolerance.limit]
 
 
 def missed(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tolerance) -> list[Limit]:
@@ -190,7 +190,7 @@ def _slope_left(
     metrics, slopes = evaluator.at(values)
     unbound = np.array([not side for side in space.side(values)])
     gradient = (slopes[metric] * space.unit)[unbound]
-    tight = active(limits, metrics, evaluator.tolerance)
+    tight = [limit for limit in limits if limit.margin(metrics[limit.name]) < evaluator.tolerance.limit]
     if tight and gradient.size:
         walls = np.stack([(slopes[limit.name] * space.unit)[unbound] for limit in tight], axis=1)
         gradient = gradient - walls @ np.linalg.lstsq(walls, gradient, rcond=None)[0]
