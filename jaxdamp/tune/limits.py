@@ -72,6 +72,10 @@ class Limit(NamedTuple):
         """Relative distance to the nearer end, negative beyond it."""
         return min(self.upper - value, value - self.lower) / self.scale
 
+    def tightened(self, by: float) -> "Limit":
+        """The same with ends moved inwards by a share of the scale."""
+        return self._replace(lower=self.lower + by * self.scale, upper=self.upper - by * self.scale)
+
     def nearer(self, value: float) -> str:
         """The nearer end in words, such as "<= 0.1 m"."""
         sign, end = ("<=", self.upper) if self.upper - value <= value - self.lower else (">=", self.lower)

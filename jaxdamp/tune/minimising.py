@@ -21,6 +21,7 @@ from jaxdamp.tune.searching import Ended, Evaluator, many_at_a_time, missed, one
 from jaxdamp.tune.shape import Shape
 from jaxdamp.tune.starts import Attempt, Desk, best_of, search_together, start_points
 from jaxdamp.tune.task import DesignTask, check_call
+from jaxdamp.tune.verdict import lost_limits
 from jaxdamp.tune.wording import (
     active_words,
     bound_notes,
@@ -29,10 +30,14 @@ from jaxdamp.tune.wording import (
     idle_notes,
     missed_notes,
     start_notes,
+    tightened_notes,
     true_value_notes,
     violations,
     workshop_notes,
 )
+
+
+TIGHTENED = 2  # times that a search is repeated with limits that did not hold on fresh roads
 
 
 def minimise(
@@ -96,7 +101,8 @@ def minimise(
         starts: number of searches, side by side; the first from the vehicle, the others from inside the bounds.
         seed: of the other starts.
         fresh_roads: largest number of other realisations of a random road, or of those of the scenarios, on which the
-            result is judged; fewer once the gain and the limits are decided. 0 for none.
+            result is judged; fewer once the gain and the limits are decided. 0 for none. Where a limit does not hold on
+            them on average, it is tightened for the search by what is missing, and the result judged on new roads.
         duration: length of the run [s], as in `simulate`.
         dt: step [s], as in `simulate`.
         max_steps: largest number of steps of the search.
@@ -144,7 +150,16 @@ def minimise(
             points = start_points(space, starts, seed)
             several = search_together(desk, alone, points, space, name, all_limits, max_steps, progress)
             ended, attempts = _chosen(several, alone, points, name, all_limits)
-    return _result(task, alone, ended, attempts, all_limits, idle, max_steps, fresh_roads)
+        result = _result(task, alone, ended, attempts, all_limits, all_limits, idle, max_steps, fresh_roads)
+        tighter = all_limits
+        for again in range(1, TIGHTENED + 1):
+            excess = {} if result.violated else lost_limits(result)
+            if not excess:
+                break
+            tighter = [limit.tightened(excess.get(limit.of, 0.0)) for limit in tighter]
+            ended = search(alone, space, name, tighter, max_steps, progress, ended.values)
+            result = _result(task, alone, ended, attempts, all_limits, tighter, idle, max_steps, fresh_roads, again)
+    return result
 
 
 def _chosen(
@@ -171,11 +186,16 @@ def _result(
     ended: Ended,
     attempts: tuple[Attempt, ...],
     limits: Sequence[Limit],
+    searched: Sequence[Limit],
     idle: Sequence[str],
     max_steps: int,
     fresh_roads: int,
+    again: int = 0,
 ) -> TuneResult[V]:
-    """The result of a tuning, judged: what holds it, what it misses, and what it is worth on fresh roads."""
+    """The result of a tuning, judged: what holds it, what it misses, and what it is worth on fresh roads.
+
+    Limits may have been tighter in the search than they are, after it was repeated so many times.
+    """
     vehicle, space, objective, road, units = task.vehicle, task.space, task.objective, task.road, task.units
     before, after = evaluator.at(space.start)[0], evaluator.at(ended.values)[0]
     short = missed(limits, after, evaluator.tolerance)
@@ -186,11 +206,10 @@ def _result(
         status = Status.CONVERGED
     else:
         status = Status.STEP_LIMIT if ended.out_of_steps else Status.NO_BETTER_STEP
-    held = reached(limits, after, evaluator.tolerance)
+    held = reached(searched, after, evaluator.tolerance)
     notes = missed_notes(short, after, changes) + true_value_notes(objective, after, before, task.allowed)
-    notes += (
-        workshop_notes(space) + idle_notes(idle) + bound_notes(space, changes) + start_notes(attempts, objective.name)
-    )
+    notes += tightened_notes(limits, searched) + workshop_notes(space) + idle_notes(idle)
+    notes += bound_notes(space, changes) + start_notes(attempts, objective.name)
     if status in (Status.STEP_LIMIT, Status.NO_BETTER_STEP):
         notes.append(early_end(ended, max_steps))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
@@ -199,7 +218,14 @@ def _result(
     reported = [{name: values[name] for name in units} for values in (before, after)]
     duration, dt = task.run
     fresh = on_fresh_roads(
-        (vehicle, tuned), road, fresh_roads, task.allowed, objective, units, duration=duration, dt=dt
+        (vehicle, tuned),
+        road,
+        range(again * fresh_roads, (again + 1) * fresh_roads),
+        task.allowed,
+        objective,
+        units,
+        duration=duration,
+        dt=dt,
     )
     each, measured = None, task.measured
     if isinstance(measured.ride, ScenarioRide):

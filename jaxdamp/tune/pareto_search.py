@@ -193,7 +193,7 @@ def _on_fresh_roads(
     Nothing of a road that has no other realisation.
     """
     task = evaluator.task
-    rides = [task.measured.on_road(road).side_by_side() for road in other_roads(task.road, count)]
+    rides = [task.measured.on_road(road).side_by_side() for road in other_roads(task.road, range(count))]
     runs = [evaluator.numbers_at(np.vstack([designs, task.space.start]), ride) for ride in rides]
     values = {name: np.stack([run[name] for run in runs]) for name in task.units if runs}
     return {name: rows[:, :-1] for name, rows in values.items()}, {name: rows[:, -1] for name, rows in values.items()}

@@ -190,7 +190,7 @@ def rescored(
 def on_fresh_roads(
     cars: tuple[AbstractVehicle, AbstractVehicle],
     road: Any,
-    most: int,
+    numbers: Sequence[int],
     allowed: Mapping[str, LimitRange],
     objective: Objective,
     units: dict[str, str],
@@ -203,7 +203,7 @@ def on_fresh_roads(
     Arguments:
         cars: before and after.
         road: of the tuning.
-        most: largest number of roads.
+        numbers: of the realisations, as many as there may be.
         allowed: the limits.
         objective: of the tuning.
         units: of its metrics.
@@ -213,8 +213,8 @@ def on_fresh_roads(
     Returns:
         None where there is no other realisation.
     """
-    others, driven = other_roads(road, most), None
-    for first, last in itertools.pairwise([0, *(FEWEST * 2**i for i in range(most))]):
+    others, driven = other_roads(road, numbers), None
+    for first, last in itertools.pairwise([0, *(FEWEST * 2**i for i in range(len(numbers)))]):
         part = others[first:last]
         if not part:
             break
@@ -225,12 +225,12 @@ def on_fresh_roads(
     return driven
 
 
-def other_roads(road: Any, count: int) -> list[Any]:
-    """So many other realisations of a random road, or of scenarios on random roads; none of others."""
+def other_roads(road: Any, numbers: Sequence[int]) -> list[Any]:
+    """Other realisations of a random road, or of scenarios on random roads; none of others."""
     if isinstance(road, Scenarios):
-        roads = [road.on_other_roads(FIRST_SEED + i) for i in range(count)]
+        roads = [road.on_other_roads(FIRST_SEED + i) for i in numbers]
     elif isinstance(road, AbstractRoad):
-        roads = [road.reseeded(FIRST_SEED + i) for i in range(count)]
+        roads = [road.reseeded(FIRST_SEED + i) for i in numbers]
     else:
         roads = []
     return [other for other in roads if other is not None]

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp.tune.limits import LimitRange
+from jaxdamp.vehicles import ChannelKind
 
 
 if TYPE_CHECKING:
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
 
 
 KEPT = 0.01  # relative excess over a limit on fresh roads up to which it counts as kept
+FELT = (  # kinds of channels that people, tyres or bump stops feel; not the speed and power of the damper
+    ChannelKind.HEIGHT, ChannelKind.ANGLE, ChannelKind.ACCELERATION, ChannelKind.ANGULAR_ACCELERATION,
+    ChannelKind.STROKE, ChannelKind.TYRE_LOAD, ChannelKind.RELATIVE_TYRE_LOAD,
+)  # fmt: skip
 NOTICED = 0.05  # percent: smaller changes are none
 
 
@@ -59,7 +64,7 @@ def verdict_of(result: "TuneResult[Any]") -> Verdict:
     cost = f"; price: {name} {price:+.1f} %" if name else "; nothing else gets worse"
     held = _limits_in_words(result)
     error = 0.0 if result.fresh is None else 100.0 * result.fresh.half_width(result.metric)
-    lost = _lost(result)
+    lost = [f"{name} is {100 * x:.1f} % beyond its limit" for name, x in lost_limits(result).items()]
     if lost:
         outcome, first, held = Outcome.LIMIT_LOST, f"Not better: {'; '.join(lost)}; {words}", ""
     elif gain - error > -NOTICED and (result.fresh is None or gain > 0.0):
@@ -92,32 +97,40 @@ def _change(result: "TuneResult[Any]") -> tuple[float, str]:
 
 
 def _price(result: "TuneResult[Any]") -> tuple[float, str]:
-    """The largest rise of a metric without limit of its own [%], and its name; none if nothing rises."""
-    spared = {result.metric, *result.limits}
+    """The largest rise of a metric of body, suspension travel or tyres [%], and its name; none if nothing rises.
+
+    What is limited has its own words, and so have the metrics of its channel and those that change as it does.
+    """
+    metrics = {m.name: m for m in result.objective.metrics} if result.objective else {}
+    named = {result.metric, *result.limits}
+    limited = {metrics[name].channel for name in result.limits if name in metrics}
+    known = {_mean_change(result, name) for name in named}
     worst = (NOTICED, "")
     for name in result.units:
-        if name in spared or (result.objective is not None and name in _signed(result)):
+        change, metric = _mean_change(result, name), metrics.get(name)
+        if change is None or name in named or any(x is not None and np.isclose(change, x, 1e-6) for x in known):
             continue
-        if result.fresh is not None and name in result.fresh.before:
-            change = 100.0 * float(np.mean(result.fresh.change(name)))
-        else:
-            change = percent_change(result.before[name], result.after[name]) or 0.0
-        worst = max(worst, (change, name)) if np.isfinite(change) else worst
+        if metric is not None:
+            kind = result.start.layout.by_name[metric.channel].kind
+            if metric.channel in limited or metric.statistic.signed or kind not in FELT:
+                continue
+        worst = max(worst, (change, name))
     return worst
 
 
-def _signed(result: "TuneResult[Any]") -> set[str]:
-    """The metrics whose change in percent says nothing, and the functions of the objective."""
-    assert result.objective is not None
-    return {m.name for m in result.objective.metrics if m.statistic.signed} | set(result.objective.functions)
+def _mean_change(result: "TuneResult[Any]", name: str) -> float | None:
+    """The change of a metric [%], the mean on fresh roads if there are any; none from zero."""
+    if result.fresh is None or name not in result.fresh.before:
+        return percent_change(result.before[name], result.after[name])
+    change = 100.0 * float(np.mean(result.fresh.change(name)))
+    return change if np.isfinite(change) else None
 
 
 def _limits_in_words(result: "TuneResult[Any]") -> str:
     """How much of each limit is used, and on how many fresh roads it is broken."""
     texts = []
     for name in result.limits:
-        after = result.after[name]
-        change = percent_change(result.before[name], after)
+        after, change = result.after[name], _mean_change(result, name)
         share = f"{after:.4g} {typeset_unit(result.units[name])}".rstrip() if change is None else f"{change:+.1f} %"
         text = f"{name} {share}{', at its limit' * (name in result.active_limits)}"
         if result.fresh is not None and name in result.allowed:
@@ -127,16 +140,12 @@ def _limits_in_words(result: "TuneResult[Any]") -> str:
     return f"; limits: {'; '.join(texts)}" if texts else ""
 
 
-def _lost(result: "TuneResult[Any]") -> list[str]:
-    """The limits that are broken on average over fresh roads, by more than the error of this average."""
+def lost_limits(result: "TuneResult[Any]") -> dict[str, float]:
+    """The mean excess over limits that are broken on average over fresh roads, by more than the error of this mean."""
     if result.fresh is None or result.fresh.roads < 2:
-        return []
-    lost = []
-    for name, allowed in result.allowed.items():
-        over = excess(result.fresh, name, allowed)
-        if np.mean(over) - half_interval(over) > KEPT:
-            lost.append(f"{name} is {100 * np.mean(over):.1f} % beyond its limit on {result.fresh.roads} fresh roads")
-    return lost
+        return {}
+    over = {name: excess(result.fresh, name, allowed) for name, allowed in result.allowed.items()}
+    return {name: float(np.mean(x)) for name, x in over.items() if np.mean(x) - half_interval(x) > KEPT}
 
 
 def excess(fresh: "Rescore", name: str, allowed: LimitRange) -> Float[np.ndarray, " roads"]:

@@ -137,6 +137,14 @@ def violations(short: Sequence[Limit], values: Mapping[str, float]) -> dict[str,
     }
 
 
+def tightened_notes(limits: Sequence[Limit], searched: Sequence[Limit]) -> list[str]:
+    """A sentence on the limits that were tighter in the search than they are."""
+    pairs = zip(limits, searched, strict=True)
+    tight = [one.name for one, other in pairs if (one.lower, one.upper) != (other.lower, other.upper)]
+    words = "Tightened on the road of the tuning, so that they hold on others: the limits of"
+    return [f"{words} {', '.join(tight)}."] if tight else []
+
+
 def workshop_notes(space: SearchRange) -> list[str]:
     """A sentence on the free parameters that no workshop can change."""
     fixed = [p.path for p in space.free.chosen if not p.adjustable]
