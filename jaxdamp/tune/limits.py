@@ -145,7 +145,7 @@ def _range(one: str | Metric, given: Any) -> LimitRange:
     comparable = relative[0] == relative[1]
     if math.isnan(lower) or math.isnan(upper) or (comparable and lower >= upper):
         _checks.refuse(label, f"{must}, in increasing order", repr(given), "Write (-0.08, 0.1).")
-    if any(end is not None and math.isinf(number) for end, number in zip(pair, (lower, upper), strict=True)):
+    if math.isinf(lower) and math.isinf(upper):
         _checks.refuse(label, "be finite", repr(given), "Leave the limit out, or write None for an end without one.")
     return LimitRange(lower, upper, relative)
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -120,6 +121,18 @@ def test_roads_are_added_until_the_interval_decides():
     tyre = limit_ranges({TYRE: "+10%"}, [TYRE])
     open_limit = dataclasses.replace(fresh, after=fresh.after | {TYRE: np.array([1.0, 1.1, 1.25])})
     assert decided(fresh, tyre) and not decided(open_limit, tyre)
+
+
+def test_an_optimum_at_a_kink_is_an_optimum():
+    def worse(m):
+        return jnp.maximum(m[COMFORT] / 1.15, m["working_space_rms"] / 0.0125)
+
+    car, bounds = presets.quarter_car_000(dampers.Linear(1500.0)), {"rate": None}
+    result = tune.minimise(worse, car, WHITE, bounds=bounds)
+    left, right = (result.after[name] / size for name, size in ((COMFORT, 1.15), ("working_space_rms", 0.0125)))
+    assert left == pytest.approx(right, rel=1e-6) and result.converged and not result.warnings
+    stopped = tune.minimise(worse, car, WHITE, bounds=bounds, max_steps=2)
+    assert stopped.status is Status.STEP_LIMIT
 
 
 @pytest.mark.slow
