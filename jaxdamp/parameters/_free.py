@@ -1,5 +1,6 @@
 """The free parameters of a fit or a tuning as one vector."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -130,7 +131,7 @@ def free_parameters(
     limits = _limits_by_path(known, free, leaders, bounds or {})
     linear = free - {leader for path, leader in leaders.items() if not all_parameters[known.index(path)].linear}
     chosen = [
-        Parameter(p.path, p.value, p.unit, p.meaning, _limited(p, limits.get(p.path)), p.linear and p.path in linear)
+        dataclasses.replace(p, domain=_limited(p, limits.get(p.path)), linear=p.linear and p.path in linear)
         for p in all_parameters
         if p.path in free
     ]

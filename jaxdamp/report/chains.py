@@ -75,7 +75,7 @@ def chain_report(
         report.points(notes_of(ride))
         add_rides(report, ride, road, f"ride_{number}_")
     if tuned is not None:
-        report.heading("A better damper")
+        report.heading(tuned.verdict.outcome.value)
         add_tuning(report, tuned)
     add_other_fits(report, comparison)
     return report
