@@ -64,7 +64,7 @@ def test_a_result_shows_itself(motions, record):
 @pytest.mark.exhaustive
 def test_a_result_is_drawn_and_predicts_its_records(motions, record):
     assert len(motions.plot().axes) == 4
-    predicted = motions.predict()["sweep"]["stroke"]
+    predicted = motions.respond(record)["stroke"]
     assert np.std(predicted - record["stroke"]) == pytest.approx(2e-4, rel=0.05)
 
 
