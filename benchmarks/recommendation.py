@@ -96,7 +96,7 @@ def measured(rng: np.random.Generator) -> tuple[str, list[BenchRun], list[BenchR
     law, count = laws[name](draw), int(rng.integers(1, 9))
     tests = sines(count, 0.8)
     fastest = max(2 * np.pi * test.frequency * test.amplitude for test in tests)
-    size = float(np.sqrt(np.mean(quasi_static(law, np.linspace(-fastest, fastest, 21)) ** 2)))
+    size = float(np.sqrt(np.mean(quasi_static(law, np.linspace(-fastest, fastest, 21)).force ** 2)))
     noise, rig = float(rng.uniform(0.01, 0.05)) * size, Rig(force_offset=float(rng.normal(0.0, 0.02)) * size)
     dynos = [
         VirtualDyno(law, rig=rig, sampling_rate=SAMPLING_RATE, force_noise=noise, seed=int(rng.integers(2**31)))

@@ -8,6 +8,7 @@ import pytest
 from jaxdamp import bench, identify
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.cli.fitting import write_fits
+from jaxdamp.cli.wording import in_command_line
 from jaxdamp.dampers import Bilinear, Lag, Linear, PiecewiseLinear
 from jaxdamp.export import from_json
 from jaxdamp.report import Attempts, fit_report
@@ -46,3 +47,23 @@ def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: P
     assert len(marked) == 1 and marked[0].startswith(best.name)
     near = [rung for rung in comparison.rungs if not rung.doubt and rung.error <= best.error]
     assert not best.doubt or not near  # never one with doubt where one without predicts as well
+
+
+@pytest.mark.parametrize(
+    ("said", "option"),
+    [
+        ('80 % look like a delay: add "delay" to the machine (`rig`), or take a law with hysteresis.', "--rig delay"),
+        ('Add "gas" or "offset": add "gas" or "offset" to the machine (`rig`).', "--rig gas or --rig offset"),
+        ("If a channel is late, `process(delay=0.002)`; hysteresis needs a law with a lag.", "--rig delay"),
+        ("Mend the earthing, or filter: `process(low_pass=25)` if the motion allows it.", "--filter 25 "),
+        (
+            "Laws of velocity have none: subtract it, `process(without=bench.separate_gas_and_friction(run))`.",
+            "--rig gas",
+        ),
+        ("Laws with memory and means suffer: `process(moving=True)` cuts it off.", "--keep-rest"),
+    ],
+)
+def test_the_command_line_names_options_instead_of_calls(said: str, option: str) -> None:
+    assert (
+        option in in_command_line(said) and "`" not in in_command_line(said) and "process(" not in in_command_line(said)
+    )
