@@ -12,7 +12,7 @@ from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.demo_rides import TRUE, add_rides, ride_table, ride_verdict, show_rides
 from jaxdamp.cli.demo_tuning import COMFORT, GRIP, outcome, purpose
-from jaxdamp.cli.fitting import Fitted, fit_laws, write_fits, write_table
+from jaxdamp.cli.fitting import Fitted, fit_laws, show, write_fits, write_table
 from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.results import Results, results_folder
 from jaxdamp.cli.run_warnings import without_range_warnings
@@ -202,13 +202,10 @@ def _fit_of_truth(fits: Fitted, scenario: Scenario) -> FitResult | None:
 
 def show_fits(screen: Screen, fits: Fitted, truth: FitResult | None, scenario: Scenario) -> None:
     """The ladder and the recovered parameters."""
-    screen.table(fits.comparison.table(), mark=fits.comparison.best.name)
-    screen.points(fits.failures, style="red")
-    screen.say(" ".join(fits.comparison.verdict))
+    show(screen, fits)
     if truth is not None:
         screen.table(truth_table(scenario, truth))
         screen.say(truth_verdict(scenario, truth))
-        screen.points(truth.warnings, style="yellow")
 
 
 def truth_table(scenario: Scenario, result: FitResult) -> Table:

@@ -3,6 +3,7 @@
 from jaxdamp import bench
 from jaxdamp.bench import BenchSet, Preflight
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.wording import in_command_line
 
 
 _COLOURS = {"error": "red", "warning": "yellow", "note": ""}
@@ -25,7 +26,7 @@ def checked(screen: Screen, runs: BenchSet, *, notes: bool = True) -> tuple[Benc
     for sentence in found.sentences():
         severity = sentence.split(",")[0]
         if notes or severity != "note":
-            screen.points([sentence], style=_COLOURS[severity])
+            screen.points([in_command_line(sentence)], style=_COLOURS[severity])
     wrong = {name for finding in found.of("error") for name in finding.records}
     sound = BenchSet((run for run in runs if run.name not in wrong), runs.left_out)
     if not len(sound):

@@ -16,7 +16,7 @@ from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
 from jaxdamp.identify.front_door import also_of_vehicles
 from jaxdamp.identify.input_noise import input_noise_bias, on_bias
-from jaxdamp.identify.judging import judge
+from jaxdamp.identify.judging import MOST_WARNINGS, judge
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import rig_of
 from jaxdamp.identify.preparing import prepare, records_in_words
@@ -152,8 +152,14 @@ def fit(
         return dataclasses.replace(result, criterion=criterion)
     biases = map(float, input_noise_bias(problem, solution.best, input_noise))
     estimates = tuple(e._replace(bias=bias) for e, bias in zip(result.parameters, biases, strict=True))
-    warnings = (*result.warnings, *on_bias(estimates))
-    return dataclasses.replace(result, criterion=criterion, parameters=estimates, warnings=warnings)
+    biased = on_bias(estimates)
+    return dataclasses.replace(
+        result,
+        criterion=criterion,
+        parameters=estimates,
+        warnings=(*result.warnings, *biased),
+        main_warnings=(*result.main_warnings, *biased)[:MOST_WARNINGS],
+    )
 
 
 @one_thread()

@@ -22,6 +22,7 @@ from jaxdamp.identify.several import Solution
 from jaxdamp.parameters import get, with_values
 
 
+MOST_WARNINGS = 5  # that are shown at a terminal
 _REMEDY = "Try another start, bounds, or fewer free parameters."
 
 
@@ -45,12 +46,14 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         )
     noise = noise_of(problem, best, force_noise)
     estimates = estimate(problem, solution, noise)
-    models, model = _fitted(problem, best.values)
+    models, model = fitted_models(problem, best.values)
     law, rig = law_of(model), rig_of(model)
     fitted = np.isfinite(problem.sigma)
     percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
     notes = [f"The search did not converge: {best.status.sentence} {_REMEDY}"] * (not best.converged)
-    notes += [*notes_on(law, problem.fitted_to), *estimates.notes, *on_misfit(noise), *left_out(problem, best)]
+    on_records, on_rest, effects = notes_on(law, problem.fitted_to), on_misfit(noise), left_out(problem, best)
+    main = (*notes, *on_records, *effects, *estimates.summary, *on_rest)
+    notes += [*on_records, *estimates.notes, *on_rest, *effects]
     return FitResult(
         law=law,
         runs=problem.runs,
@@ -60,6 +63,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         rmse=rmse,
         scores=scores,
         warnings=tuple(notes),
+        main_warnings=main[:MOST_WARNINGS],
         status=best.status,
         steps=best.steps,
         starts=solution.starts,
@@ -74,7 +78,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     )
 
 
-def _fitted(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:
+def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:
     """The fitted model of each record, where they differ, and the one with the mean of what differs."""
     built = with_range(problem.free.started_at(values).tree, covered_range(problem.fitted_to))
     if starts := starts_in(built):

@@ -26,7 +26,7 @@ from jaxdamp.identify.model import (
 )
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
-from jaxdamp.identify.traces import batches, owners
+from jaxdamp.identify.traces import batches, owners, places
 from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
 
 
@@ -99,10 +99,12 @@ def prepare(
     noise = FIRST_NOISE * level / np.sqrt(max(np.count_nonzero(owner >= 0), 1))
     known = (*priors_on(free, priors or {}, noise), *(replace(prior, noise=jnp.asarray(noise)) for prior in expected))
     owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in known)])
-    residuals = (*residuals, *known)
     steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
     each, sigma = weighting == "runs", tuple(sigma)
-    return Problem(free, residuals, level, runs, sigma, owner, reach, begin, own, each, steps, initial_state)
+    where = places(residuals, ranges)
+    return Problem(
+        free, (*residuals, *known), level, runs, sigma, owner, reach, begin, own, each, steps, where, initial_state
+    )
 
 
 def _with_estimated_states(

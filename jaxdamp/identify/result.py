@@ -2,8 +2,9 @@
 
 import dataclasses
 import functools
+import warnings
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 from jaxtyping import Float
@@ -77,6 +78,13 @@ def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray])
     return 100.0 * (1.0 - missed / spread) if spread > 0.0 else -np.inf
 
 
+def score_of(name: str, measured: np.ndarray, predicted: np.ndarray) -> Score:
+    """Errors of a predicted force [N] from a measured one."""
+    error = predicted - measured
+    rmse, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
+    return Score(name, rmse, fit_percent([measured], [predicted]), largest)
+
+
 def score(
     model: Model | Sequence[Model],
     runs: Sequence[BenchRun],
@@ -92,12 +100,7 @@ def score(
     used = [used_samples(own, run, memoryless[id(own)], initial_state) for own, run in pairs]
     measured = [run.force[k] for run, k in zip(runs, used, strict=True)]
     predicted = [force[k] for force, k in zip(forces, used, strict=True)]
-    rows = []
-    for run, y, p in zip(runs, measured, predicted, strict=True):
-        error = p - y
-        rows.append(
-            Score(run.name, float(np.sqrt(np.mean(error**2))), fit_percent([y], [p]), float(np.abs(error).max()))
-        )
+    rows = [score_of(run.name, y, p) for run, y, p in zip(runs, measured, predicted, strict=True)]
     chosen = [i for i in range(len(runs)) if counted is None or counted[i]]
     y, p = [measured[i] for i in chosen], [predicted[i] for i in chosen]
     errors = np.concatenate(p) - np.concatenate(y)
@@ -156,13 +159,32 @@ class AbstractFitted:
         known = {id(run): start for run, start in zip(self.runs, self.record_starts, strict=False)}
         return on_rig(self.law, self.rig, [known.get(id(run)) for run in runs] if known else ())
 
-    def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
-        """Force [N] that the fit expects at every sample of records, old or new, of the same machine."""
-        runs = as_runs(runs)
-        return predict_runs(self.model_of(runs), runs, self.initial_state)
+    @overload
+    def respond(self, runs: BenchRun) -> np.ndarray: ...
+    @overload
+    def respond(self, runs: Iterable[BenchRun]) -> list[np.ndarray]: ...
+    def respond(self, runs: BenchRun | Iterable[BenchRun]) -> np.ndarray | list[np.ndarray]:
+        """Force [N] that the fit expects at every sample of a record, old or new, of the same machine.
 
-    def score(self, runs: Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
-        """Fit percent, RMSE [N] and the scores by record, on other records."""
+        It is the force of the law with what the fit found beside it: gas force and zero error of the load cell
+        (`rig`), and the states at the beginning (`initial_state`). `jaxdamp.respond(result.law, ...)` is the damper
+        alone, started at rest.
+
+        Arguments:
+            runs: one record, or several for a list of forces.
+        """
+        records = as_runs(runs)
+        forces = predict_runs(self.model_of(records), records, self.initial_state)
+        return forces[0] if isinstance(runs, BenchRun) else forces
+
+    def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
+        """Deprecated: `respond` gives the same, without a list for one record."""
+        text = "`predict` is deprecated: `respond(run)` gives the force of one record, `respond(runs)` a list."
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return self.respond(as_runs(runs))
+
+    def score(self, runs: BenchRun | Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
+        """Fit percent, RMSE [N] and the scores by record, on records old or new, as `respond` predicts them."""
         runs = as_runs(runs)
         return score(self.model_of(runs), runs, initial_state=self.initial_state)
 
@@ -198,6 +220,8 @@ class FitResult(AbstractFitted):
         record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
         record_rigs: the test machine of each record, as `record_laws`.
         criterion: loss, priors and what is special about the records in words; empty for plain least squares.
+        main_warnings: the gist of `warnings`: at most five, the one with the gravest consequence first, groups of
+            numbers named once.
         evidence: the minimum and the noise, for `band`, `propagate`, `profile` and `posterior`.
     """
 
@@ -210,6 +234,7 @@ class FitResult(AbstractFitted):
     record_laws: tuple[AbstractDamper, ...] = ()
     record_rigs: tuple[Rig, ...] = ()
     criterion: str = ""
+    main_warnings: tuple[str, ...] = ()
     evidence: Evidence | None = None
 
     @property

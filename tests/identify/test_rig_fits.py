@@ -64,7 +64,7 @@ def test_a_fit_without_the_machine_is_wrong_and_says_so(result):
 
 def test_predictions_are_those_of_the_machine(result):
     new = VirtualDyno(LAW, rig=RIG, sampling_rate=500.0).run(SineTest(0.015, 3.0))[0]
-    (force,) = result.predict(new)
+    force = result.respond(new)
     used = slice(len(new) // 6, -3)
     np.testing.assert_allclose(force[used], new.force[used], atol=4.0)  # of 730 N
     np.testing.assert_allclose(result.score([new])[1], np.std(force[used] - new.force[used]), rtol=0.5)

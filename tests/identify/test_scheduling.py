@@ -8,7 +8,8 @@ import pytest
 from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import Bilinear, ModifiedBoucWen, Scheduled, with_command
-from jaxdamp.identify.verdict import cannot_choose, not_worse
+from jaxdamp.identify.recommending import not_worse
+from jaxdamp.identify.verdict import cannot_choose
 from jaxdamp.parameters import get
 
 
@@ -71,6 +72,5 @@ def test_laws_that_the_records_cannot_tell_apart_are_named():
 def test_a_comparison_says_that_its_records_cannot_choose(sines):
     runs = sines(Bilinear(2000.0, 1000.0), noise=20.0)
     laws = identify.default_ladder(runs, ["linear", "bilinear", "piecewise_linear"])
-    said = identify.compare(laws, runs).verdict[-1]
-    assert "cannot choose between" in said and "The simplest of them is bilinear, with 3 numbers" in said
-    assert "between linear" not in said and ", linear" not in said
+    said = identify.compare(laws, runs).verdict[1]
+    assert said.startswith("With 3 numbers it is the simplest of bilinear and piecewise_linear, which predict alike")
