@@ -187,7 +187,7 @@ def improve(
             COMFORT,
             _car(truth.law),
             _roads(scenario)[ISO],
-            over=["damper.*rate"],
+            over=["damper.**rate"],
             limits=limits(before, scenario.tyre_load),
             fresh_roads=0,  # the demo takes more of them itself
             duration=scenario.duration,

@@ -64,8 +64,8 @@ def tune_command(
     minimise: Annotated[str, typer.Option(help="comfort, travel, grip, or the name of a ride metric.")] = "comfort",
     limit: Limit = [],  # noqa: B006
     over: Annotated[
-        list[str], typer.Option(help='Parameters to tune, by path or pattern, such as "damper.*_rate".')
-    ] = ["*damper*"],  # noqa: B006
+        list[str], typer.Option(help='Parameters to tune, by path or pattern, such as "damper.**_rate".')
+    ] = ["**damper.**"],  # noqa: B006
     freeze: Annotated[list[str], typer.Option(help="Parameters among these to hold.")] = [],  # noqa: B006
     bound: Annotated[
         list[str], typer.Option(help="Bounds: rate=1000:4000; a third to three times the start if left out.")
@@ -125,7 +125,7 @@ def report(
     ] = ["all"],  # noqa: B006
     minimise: Annotated[str, typer.Option(help="comfort, travel, grip, or the name of a ride metric.")] = "comfort",
     limit: Limit = [],  # noqa: B006
-    over: Annotated[list[str], typer.Option(help="Parameters to tune, by path or pattern.")] = ["*damper*"],  # noqa: B006
+    over: Annotated[list[str], typer.Option(help="Parameters to tune, by path or pattern.")] = ["**damper.**"],  # noqa: B006
     reading: ReadOptions,
     processing: ProcessOptions,
     speed: Speed = 20.0,

@@ -60,7 +60,7 @@ class TuneOptions:
 
     minimise: str = "comfort"
     limit: tuple[str, ...] = ()
-    over: tuple[str, ...] = ("*damper*",)
+    over: tuple[str, ...] = ("**damper.**",)
     freeze: tuple[str, ...] = ()
     bound: tuple[str, ...] = ()
     tie: tuple[str, ...] = ()

@@ -25,7 +25,7 @@ from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
-from jaxdamp.parameters import FreeParameters
+from jaxdamp.parameters import FreeParameters, matched_in_words, parameters
 
 
 # Errors due to a law that does not suit the records, as opposed to a wrong call (`TypeError` and so on).
@@ -83,7 +83,7 @@ def fit(
             the same.
         freeze: parameters to hold at their start, by path, last part of a path, or pattern.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
-        tie: parameters that take the values of others, such as `{"terms.1.*": "terms.0.*"}`: one free value for each
+        tie: parameters that take the values of others, such as `{"terms.1.**": "terms.0.**"}`: one free value for each
             group (see `jaxdamp.parameters.free_parameters`).
         per_record: parameters with one value for each record, such as a friction that depends on the temperature; names
             as in `freeze`. All other parameters are common to the records.
@@ -145,7 +145,9 @@ def fit(
         return solve(problem, starts=starts, max_steps=max_steps)
 
     problem, solution = solve_by(problem, by_squares, loss=loss, force_noise=force_noise, starts=starts)
-    result = judge(problem, solution, force_noise=force_noise)
+    known = [p.path for p in parameters(problem.free.tree)]
+    named = matched_in_words(known, freeze=freeze, bounds=bounds or {}, per_record=per_record)
+    result = dataclasses.replace(judge(problem, solution, force_noise=force_noise), patterns=named)
     words = (criterion_in_words(problem, loss, priors or {}), records_in_words(problem))
     criterion = "; ".join(filter(None, words))
     if input_noise is None:

@@ -32,7 +32,7 @@ def pareto(
     vehicle: V,
     road: Road | Scenarios,
     *,
-    over: Sequence[str] | Mapping[str, Any] = ("damper*",),
+    over: Sequence[str] | Mapping[str, Any] = ("damper.**",),
     freeze: Sequence[str] = (),
     bounds: Mapping[str, Any] | None = None,
     tie: Mapping[str, str] | None = None,
