@@ -1,6 +1,7 @@
 """Any law with parameters or a force that depends on a command: coil current, valve current, clicks."""
 
-from typing import Literal, final
+from collections.abc import Sequence
+from typing import final
 
 import equinox as eqx
 import jax
@@ -20,8 +21,7 @@ from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import increasing, setting
 
 
-Blend = Literal["parameters", "force"]
-BLENDS: tuple[Blend, ...] = ("parameters", "force")
+BLENDS = ("parameters", "force")
 
 
 @final
@@ -76,13 +76,22 @@ class Scheduled(AbstractWrapper):
         if len(self.laws) < 2 or self.levels.shape != (len(self.laws),):
             must = "contain two or more laws, with a level for each"
             _checks.refuse("laws", must, f"{len(self.laws)} laws and levels of shape {self.levels.shape}")
-        if self.blend == "parameters" and not of_equal_structure(self.laws):
+        if self.blend == "parameters" and not self.of_equal_structure(self.laws):
             remedy = 'Blend their forces, `blend="force"`, or use one law class with vectors of equal length.'
             _checks.refuse("laws", "be of equal structure", ", ".join(map(repr, self.laws)), remedy)
         command, levels = _checks.concrete(self.command), _checks.concrete(self.levels)
         if command is not None and levels is not None and not levels[0] <= command <= levels[-1]:
             must = f"be between the levels {levels[0]:g} and {levels[-1]:g}"
             _checks.refuse("command", must, f"{command:g}", "Add a law at a level further out.")
+
+    @staticmethod
+    def of_equal_structure(laws: Sequence[AbstractDamper]) -> bool:
+        """Whether all laws have the same parameters in the same shapes, so that these can be interpolated."""
+        structures = {
+            (jax.tree.structure(law), tuple(jnp.shape(leaf) for leaf in jax.tree.leaves(law)))
+            for law in without_fitted_ranges(tuple(laws))
+        }
+        return len(structures) == 1
 
     def shares(self) -> Float[Array, " laws"]:
         """Weight of each law in the interpolation; the sum is one."""
@@ -108,12 +117,3 @@ class Scheduled(AbstractWrapper):
     def side_by_side(self) -> tuple[AbstractDamper, ...]:
         """The terms of the law at the command."""
         return self.inner_law().side_by_side()
-
-
-def of_equal_structure(laws: tuple[AbstractDamper, ...]) -> bool:
-    """Whether all laws have the same parameters in the same shapes, so that these can be interpolated."""
-    structures = {
-        (jax.tree.structure(law), tuple(jnp.shape(leaf) for leaf in jax.tree.leaves(law)))
-        for law in without_fitted_ranges(laws)
-    }
-    return len(structures) == 1
