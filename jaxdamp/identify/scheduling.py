@@ -17,7 +17,7 @@ from jaxdamp.dampers import AbstractDamper, Scheduled, takes_command
 from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
 from jaxdamp.identify.estimating import undetermined
 from jaxdamp.identify.fitting import fit, solve
-from jaxdamp.identify.machine import OFFSET, Machine
+from jaxdamp.identify.machine import OFFSET, Machine, constant_forces
 from jaxdamp.identify.model import law_of, rig_of
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.result import FitResult, score
@@ -282,7 +282,9 @@ class Chain:
         blended = tuple(with_values(law, means) for law in laws)
         scheduled = Scheduled(blended, list(alone), min(alone), "parameters" if alike else "force")
         members = [run for setting in alone for run in self.at(setting)]
-        options: dict[str, Any] = self.options | {"starts": 1, "tie": tie}
+        constants = constant_forces(scheduled) or [] if rigs else []
+        held = [path for path in constants if float(get(scheduled, path)) == 0.0]  # the machine has the static force
+        options: dict[str, Any] = self.options | {"starts": 1, "tie": tie, "freeze": [*self.options["freeze"], *held]}
         result = fit(scheduled, members, rig=machine, **options)
         return with_blended_forces(result) if alike and blend == "force" else result
 
