@@ -184,7 +184,7 @@ def improve(screen: Screen, truth: FitResult, scenario: Scenario) -> TuneResult:
             COMFORT,
             _car(truth.law),
             _roads(scenario)[ISO],
-            over=["damper.*rate"],
+            over=["damper.**rate"],
             limits={GRIP: f"{100 * (scenario.tyre_load - 1):+.0f}%"},
             fresh_roads=scenario.fresh_roads,
             duration=scenario.duration,

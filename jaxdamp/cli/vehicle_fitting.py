@@ -62,6 +62,7 @@ def run_fit_vehicle(
             result = identify.fit_vehicle(**call)
         for table in (result.scores_table(), result.table()):
             screen.table(table)
+        screen.points([result.patterns] * bool(result.patterns))
         screen.points(result.warnings, style="yellow")
         interrupt.keep()
         with interrupt.saving(), screen.stage("Vehicle and tables"):

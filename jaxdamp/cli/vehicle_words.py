@@ -3,7 +3,6 @@
 import inspect
 import tomllib
 from collections.abc import Callable, Mapping
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import equinox as eqx
 from jaxdamp import _checks, export, vehicles
 from jaxdamp.cli.early import FROM_FIT, FROM_LIST, read_json, require_file
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import get, replace
+from jaxdamp.parameters import get, matching, replace
 from jaxdamp.report import Column, Table
 from jaxdamp.tune import damper_paths
 from jaxdamp.vehicles import AbstractVehicle
@@ -122,7 +121,7 @@ def with_law(vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
 
 def write_laws(folder: Path, vehicle: AbstractVehicle) -> None:
     """The dampers of a vehicle as JSON: law.json if all are alike, otherwise a file named after each path."""
-    laws = {path: get(vehicle, path) for path in damper_paths(vehicle) if fnmatchcase(path, "*damper")}
+    laws = {path: get(vehicle, path) for path in matching(damper_paths(vehicle), "*damper")}
     first = next(iter(laws.values()), None)
     if first is not None and all(bool(eqx.tree_equal(first, law)) for law in laws.values()):
         laws = {"law": first}
@@ -133,7 +132,7 @@ def write_laws(folder: Path, vehicle: AbstractVehicle) -> None:
 def damper_places(vehicle: AbstractVehicle) -> list[str]:
     """The paths of the dampers of a vehicle."""
     known = damper_paths(vehicle)
-    places = [path for path in known if fnmatchcase(path, "*damper")]
+    places = matching(known, "*damper")
     if not places:
         remedy = "Leave the law out, to take those of the vehicle."
         _checks.refuse("vehicle", "have a law whose path ends with 'damper'", ", ".join(known) or "none", remedy)

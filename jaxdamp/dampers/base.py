@@ -135,6 +135,14 @@ class AbstractDamper(Module):
         """
         return ()
 
+    def constant_forces(self) -> tuple[str, ...]:
+        """Own parameters whose only part, or a common part of whose numbers, is a force that never changes [N].
+
+        A zero error of the load cell has the same effect, so that a fit with one gives these no part of it. A law whose
+        static force has a meaning of its own, such as a gas charge, names none.
+        """
+        return ()
+
     @classmethod
     def has_conditions(cls) -> bool:
         """Whether the class has any conditions."""

@@ -113,6 +113,10 @@ class BoucWen(AbstractDamper):
         """The static force is an offset."""
         return super().traits()._replace(contains_offset=True)
 
+    def constant_forces(self) -> tuple[str, ...]:
+        """The static force."""
+        return ("static_force",)
+
     def initial_state(self) -> State:
         """No hysteretic force."""
         return jnp.zeros(1)

@@ -49,6 +49,10 @@ class HyperbolicTangent(AbstractStateless):
         """The static force is an offset."""
         return super().traits()._replace(contains_offset=True)
 
+    def constant_forces(self) -> tuple[str, ...]:
+        """The static force."""
+        return ("static_force",)
+
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m] and velocity v [m/s]."""
         branches = two_branches(x, v, self.steepness, self.branch_offset, self.stroke_width)

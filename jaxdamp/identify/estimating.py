@@ -12,7 +12,7 @@ from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.ends import at_ends
 from jaxdamp.identify.identifiability import on_identifiability
 from jaxdamp.identify.model import START_PATH
-from jaxdamp.identify.noise import Noise
+from jaxdamp.identify.noise import Noise, noise_of
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.profile import Profile, profile
 from jaxdamp.identify.result import Estimate, Minimum
@@ -80,6 +80,24 @@ def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     further = on_minima(minima, estimates) + on_reach(estimates, spans)
     summary = (*in_groups(estimates), *further)
     return Estimates(estimates, uncertain.covariance, minima, (*notes, *further), summary)
+
+
+def undetermined(problem: Problem, found: SearchEnd) -> tuple[str, ...]:
+    """The free numbers of the law that the records do not determine: all of them after a search without an end.
+
+    As `estimate` judges it, but by the derivatives alone, without following a number to where the error rises.
+
+    Arguments:
+        problem: the problem that was minimised.
+        found: the minimum.
+    """
+    free, of_law = problem.free, [not name.startswith(("rig.", "records.")) for name in problem.free.names]
+    if not found.finite:
+        return tuple(np.array(free.names)[of_law])
+    covariance = uncertainty(found.jacobian, found.residual, noise_of(problem, found, None)).covariance
+    large = large_changes(free, found.values, np.linalg.norm(found.jacobian, axis=0) / problem.level)
+    weak = ~(np.sqrt(np.diag(covariance)) <= WEAK * large)
+    return tuple(name for name, open_end in zip(free.names, weak & of_law, strict=True) if open_end)
 
 
 def _weakly_known(problem: Problem) -> tuple[Bool[np.ndarray, " free"], Float[np.ndarray, " free"]]:

@@ -25,9 +25,11 @@ from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
-from jaxdamp.parameters import FreeParameters
+from jaxdamp.identify.static_force import holds_static_force, static_force_in_words, with_static_force_on_machine
+from jaxdamp.parameters import FreeParameters, matched_in_words, parameters
 
 
+UNSEEN = 1e-12  # of the largest derivative, up to which one is a rounding error
 # Errors due to a law that does not suit the records, as opposed to a wrong call (`TypeError` and so on).
 NUMERICAL = (ValueError, ArithmeticError, eqx.EquinoxRuntimeError, jax.errors.JaxRuntimeError)
 
@@ -83,7 +85,7 @@ def fit(
             the same.
         freeze: parameters to hold at their start, by path, last part of a path, or pattern.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
-        tie: parameters that take the values of others, such as `{"terms.1.*": "terms.0.*"}`: one free value for each
+        tie: parameters that take the values of others, such as `{"terms.1.**": "terms.0.**"}`: one free value for each
             group (see `jaxdamp.parameters.free_parameters`).
         per_record: parameters with one value for each record, such as a friction that depends on the temperature; names
             as in `freeze`. All other parameters are common to the records.
@@ -145,7 +147,15 @@ def fit(
         return solve(problem, starts=starts, max_steps=max_steps)
 
     problem, solution = solve_by(problem, by_squares, loss=loss, force_noise=force_noise, starts=starts)
-    result = judge(problem, solution, force_noise=force_noise)
+    on_machine = holds_static_force(rig)
+    if on_machine:
+        problem, solution = with_static_force_on_machine(problem, solution)
+    known = [p.path for p in parameters(problem.free.tree)]
+    named = matched_in_words(known, freeze=freeze, bounds=bounds or {}, per_record=per_record)
+    result = dataclasses.replace(judge(problem, solution, force_noise=force_noise), patterns=named)
+    if on_machine:
+        said = static_force_in_words(result, problem.runs)
+        result = dataclasses.replace(result, warnings=(*result.warnings, *said))
     words = (criterion_in_words(problem, loss, priors or {}), records_in_words(problem))
     criterion = "; ".join(filter(None, words))
     if input_noise is None:
@@ -194,18 +204,19 @@ def _solve_linear(problem: Problem) -> Solution:
     begin = np.asarray(free.values)
     residual, jacobian = (np.asarray(a) for a in linearised(free, free.values, problem.residuals))
     norms = np.linalg.norm(jacobian, axis=0)
-    scale = np.where(norms > 0, norms, 1.0)
+    unseen = norms <= UNSEEN * norms.max()  # no sample shows these numbers: they keep their start
+    scale, jacobian = np.where(unseen, 1.0, norms), np.where(unseen, 0.0, jacobian)
     lower, upper = (coordinates.to_physical(np.asarray(y)) for y in coordinates.bounds())
     target = jacobian @ begin - residual
     whole = triangle(np.concatenate([jacobian / scale, target[:, None]], axis=1))
     r, target = whole[: begin.size, : begin.size], whole[: begin.size, begin.size]
-    values = np.linalg.lstsq(r, target, rcond=None)[0] / scale
+    values = np.where(unseen, begin, np.linalg.lstsq(r, target, rcond=None)[0] / scale)
     status = Status.CONVERGED
     if np.any((values < lower) | (values > upper)):
         from scipy.optimize import lsq_linear  # few fits need it
 
         answer = lsq_linear(r, target, (lower * scale, upper * scale), method="bvls")
-        values = np.clip(answer.x / scale, lower, upper)
+        values = np.where(unseen, begin, np.clip(answer.x / scale, lower, upper))
         status = Status.CONVERGED if answer.success else Status.STEP_LIMIT
     end = SearchEnd(values, residual + jacobian @ (values - begin), jacobian, status, 0)
     return Solution(end, (end,), 1, closed_form=True)

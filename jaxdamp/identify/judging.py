@@ -9,6 +9,7 @@ from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
 from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, takes_command
 from jaxdamp.identify._blas import one_thread
+from jaxdamp.identify.blending import off_span
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.estimating import estimate, on_misfit
 from jaxdamp.identify.left_out import left_out
@@ -51,7 +52,8 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     fitted = np.isfinite(problem.sigma)
     percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
     notes = [f"The search did not converge: {best.status.sentence} {_REMEDY}"] * (not best.converged)
-    on_records, on_rest, effects = notes_on(law, problem.fitted_to), on_misfit(noise), left_out(problem, best)
+    on_records = (*notes_on(law, problem.fitted_to), *off_span(model, problem.fitted_to, problem.initial_state))
+    on_rest, effects = on_misfit(noise), left_out(problem, best)
     main = (*notes, *on_records, *effects, *estimates.summary, *on_rest)
     notes += [*on_records, *estimates.notes, *on_rest, *effects]
     return FitResult(

@@ -111,8 +111,8 @@ def fit_many(
             "settings", f"give one number for each of {len(names)} dampers", f"{len(list(settings))} numbers"
         )
     some = [run for runs in records[:: -(-len(records) // STARTED_FROM)] for run in runs]
-    begun, machine = started_on(law, some, rig)
-    model, absent = on_rig(begun, machine), absent_paths(machine)
+    begun, machine, held = started_on(law, some, rig, [*(bounds or ()), *(priors or ()), *(tie or ()), *shared])
+    model, absent = on_rig(begun, machine), [*absent_paths(machine), *held]
     free = free_parameters(model, freeze=[*freeze, *absent], bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
     coordinates = Coordinates(free, smooth="ordered")

@@ -80,8 +80,9 @@ def prepare(
         _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
     sigma = weights(weighting, runs)
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
-    begin, machine = started_on(law, fitted_to, rig)
-    model, absent = on_rig(begin, machine), absent_paths(machine)
+    named = [*name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
+    begin, machine, held = started_on(law, fitted_to, rig, named)
+    model, absent = on_rig(begin, machine), [*absent_paths(machine), *held]
     initial_state = initial_state_for(model, initial_state)
     expected: tuple[Priors, ...] = ()
     if initial_state == "estimated":

@@ -222,6 +222,7 @@ class FitResult(AbstractFitted):
         criterion: loss, priors and what is special about the records in words; empty for plain least squares.
         main_warnings: the gist of `warnings`: at most five, the one with the gravest consequence first, groups of
             numbers named once.
+        patterns: what each pattern with `*` in the call stood for, in words.
         evidence: the minimum and the noise, for `band`, `propagate`, `profile` and `posterior`.
     """
 
@@ -235,6 +236,7 @@ class FitResult(AbstractFitted):
     record_rigs: tuple[Rig, ...] = ()
     criterion: str = ""
     main_warnings: tuple[str, ...] = ()
+    patterns: str = ""
     evidence: Evidence | None = None
 
     @property
@@ -266,9 +268,8 @@ class FitResult(AbstractFitted):
             true_rig: the true test machine, if one was fitted.
             title: of the table.
         """
-        title = (
-            f"{title or f'Parameters of {type(self.law).__name__}'}{f' ({self.criterion})' if self.criterion else ''}"
-        )
+        title = title or f"Parameters of {type(self.law).__name__}"
+        title += f" ({self.criterion})" if self.criterion else ""
         true = None if truth is None else on_rig(truth, None if self.rig is None else true_rig or Rig())
         return parameter_table(title, self.parameters, true)
 
@@ -346,7 +347,7 @@ class FitResult(AbstractFitted):
     def to_dict(self) -> dict[str, Any]:
         """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         return super().to_dict() | {
-            **({"criterion": self.criterion} if self.criterion else {}),
+            **{name: words for name in ("criterion", "patterns") if (words := getattr(self, name))},
             "error_shares": plain(self.error_shares._asdict()),
             "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
             "covariance": plain(self.covariance),
@@ -367,7 +368,7 @@ class FitResult(AbstractFitted):
         for e, (value, error) in zip(self.parameters, texts, strict=True):
             note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
             lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
-        lines += [f"  {self.criterion}"] * bool(self.criterion)
+        lines += [f"  {words}" for words in (self.criterion, self.patterns) if words]
         if len(self.minima) > 1:
             lines.append(f"  {describe(self.minima, self.starts)}")
         return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])

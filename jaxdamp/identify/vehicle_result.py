@@ -68,6 +68,7 @@ class VehicleFit:
         scale_free: the parameters that may all be larger by one factor, which the records do not show.
         rig: the fitted test machine of the bench records, if one was fitted.
         problem: the least squares at the result.
+        patterns: what each pattern with `*` in the call stood for, in words.
     """
 
     vehicle: AbstractVehicle
@@ -85,6 +86,7 @@ class VehicleFit:
     scale_free: tuple[str, ...]
     rig: Rig | None
     problem: Problem
+    patterns: str = ""
 
     @property
     def converged(self) -> bool:
@@ -192,6 +194,7 @@ class VehicleFit:
             "warnings": list(self.warnings),
             "held": list(self.held),
             "scale_free": list(self.scale_free),
+            **({"patterns": self.patterns} if self.patterns else {}),
             "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
             "covariance": plain(self.covariance),
             "scores": [
@@ -219,6 +222,7 @@ class VehicleFit:
         for e, (value, error) in zip(self.parameters, texts, strict=True):
             note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
             lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
+        lines += [f"  {self.patterns}"] * bool(self.patterns)
         return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])
 
 

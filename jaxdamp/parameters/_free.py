@@ -101,10 +101,10 @@ def free_parameters(
 
     Arguments:
         tree: a law, a vehicle or any module.
-        over: paths, last parts of paths or patterns with `*`; all parameters if not given.
+        over: paths, last parts of paths or patterns with `*` and `**` (`match_paths`); all parameters if not given.
         freeze: names of parameters to hold at their values.
         bounds: extra limits `{path: (lower, upper)}` in the parameter's unit.
-        tie: parameters that take the values of others, as `{"front.damper.*": "rear.damper.*"}`; a `*` stands
+        tie: parameters that take the values of others, as `{"front.damper.**": "rear.damper.**"}`; `*` and `**` stand
             for the same text on both sides. A group of tied parameters is one free value: it is free if `over` names
             one of them, frozen if `freeze` names one of them, and the bounds of one apply to all.
 

@@ -197,9 +197,17 @@ def _add_curves(report: Report, comparison: Comparison, baseline: AbstractDamper
     if baseline is not None:
         drawn |= _with_curves(report, {BASELINE: baseline}, points)
         dashed = BASELINE if BASELINE in drawn else dashed
+    machine, runs = best.result.rig, best.result.runs
+    static = 0.0 if machine is None else float(machine.force_offset) + float(machine.gas_force)
+    rest = None if machine is None else dataclasses.replace(machine, force_offset=0.0, gas_force=0.0)
     report.picture(
         lambda: plots.force_velocity(
-            drawn, runs=without_machine(best.result.rig, best.result.runs), baseline=dashed, note=note, bands=bands
+            drawn,
+            runs=without_machine(rest, runs),
+            baseline=dashed,
+            note=note,
+            bands=bands,
+            static_force=static,
         ),
         "Force over velocity",
         "force_velocity.png",

@@ -91,7 +91,7 @@ def minimise(
         bounds: bounds `{parameter: (lower, upper)}` in the unit of the parameter, instead of the default ones; the
             start must be between them. None removes one bound or both: with `bounds={"*": None}` only the domains
             remain. If two names match a parameter, the later one counts.
-        tie: parameters that take the values of others, such as `{"front.damper.*": "rear.damper.*"}`: one free value
+        tie: parameters that take the values of others, such as `{"front.damper.**": "rear.damper.**"}`: one free value
             for each group (see `jaxdamp.parameters.free_parameters`).
         limits: hard limits `{metric: largest value}` or `{metric: (smallest, largest)}` in the metric's unit, such as
             `{"working_space_peak_to_peak": 0.1}`, with a name or a `metrics.Metric`; in every scenario. `"+10%"` is

@@ -2,7 +2,6 @@
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from fnmatch import fnmatchcase
 from typing import Any
 
 import equinox as eqx
@@ -13,7 +12,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp.metrics import Metric
-from jaxdamp.parameters import FreeParameters, free_parameters, get, match_paths, name_patterns, parameters
+from jaxdamp.parameters import FreeParameters, free_parameters, get, match_paths, matching, name_patterns, parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.hats import is_hat, with_hats
@@ -153,7 +152,7 @@ def _check(wanted: Sequence[Any], vehicle: Any, road: Any, quantities: Mapping[s
 def _curves(vehicle: AbstractVehicle, pattern: str) -> list[str]:
     """The laws whose curves are looked at."""
     known = damper_paths(vehicle)
-    chosen = [path for path in known if fnmatchcase(path, pattern)]
+    chosen = matching(known, pattern)
     if not chosen:
         _checks.refuse("dampers", f"name a law of the vehicle ({', '.join(known)})", repr(pattern), "None for none.")
     return chosen

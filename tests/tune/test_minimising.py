@@ -155,7 +155,7 @@ def test_default_bounds_follow_the_domain_of_each_number():
     law = dampers.PiecewiseLinear(jnp.array([-0.2, 0.0, 0.3]), jnp.array([900.0, 2500.0, 2600.0, 1500.0]))
     spring = dampers.Spring(1500.0, -90.0)
     car = vehicles.presets.quarter_car_000(law + dampers.BoucWen(1000.0, 500.0, 2e5, 300.0) + spring)
-    space = search_range(car, ["damper.*"], [], None)
+    space = search_range(car, ["damper.**"], [], None)
     found = dict(zip(space.free.names, zip(space.lower, space.upper, strict=True), strict=True))
     assert found["damper.terms.0.slopes[1]"] == pytest.approx((2500 / 3, 7500.0))
     assert found["damper.terms.0.knots[0]"] == pytest.approx((-0.6, -0.2 / 3))
@@ -163,7 +163,7 @@ def test_default_bounds_follow_the_domain_of_each_number():
     assert found["damper.terms.1.exponent"] == pytest.approx((1.0, 6.0), abs=1e-5)
     preload = next(p.path for p in parameters.parameters(car) if p.unit == "N" and float(np.max(p.value)) < 0)
     assert found[preload] == pytest.approx((-270.0, 90.0))
-    free = search_range(car, ["damper.*"], [], {"*": None})
+    free = search_range(car, ["damper.**"], [], {"*": None})
     assert np.isinf(free.upper[:7]).all() and (free.lower[3:7] > 0.0).all()
 
 

@@ -123,7 +123,7 @@ def test_scenarios_limits_shapes_ties_and_starts_are_those_of_a_tuning():
     options: dict[str, Any] = {
         "limits": {TRAVEL: (least, highest)},
         "shape": [tune.ratio(1.5, 3.0, velocity=0.5)],
-        "over": {"damper.*rate": (500.0, 9000.0)},
+        "over": {"damper.**rate": (500.0, 9000.0)},
         "tie": {"damper.terms.1.rate": "damper.terms.0.compression_rate"},
     }
     front = tune.pareto([COMFORT, TYRE], car, scenarios, points=3, starts=2, **options)
