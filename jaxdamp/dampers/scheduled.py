@@ -52,8 +52,7 @@ class Scheduled(AbstractWrapper):
             must = "contain two or more laws, with a level for each"
             _checks.refuse("laws", must, f"{len(self.laws)} laws and levels of shape {self.levels.shape}")
         structures = {
-            (jax.tree.structure(law), tuple(jnp.shape(leaf) for leaf in jax.tree.leaves(law)))
-            for law in without_fitted_ranges(self.laws)
+            (jax.tree.structure(law), tuple(jnp.shape(leaf) for leaf in jax.tree.leaves(law))) for law in self.laws
         }
         if len(structures) > 1:
             remedy = "Use one law class with vectors of equal length, such as tables over the same velocities."

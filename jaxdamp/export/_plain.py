@@ -47,8 +47,8 @@ def declared(field: Any) -> dict[str, Any] | None:
 
 
 def own_fields(module: eqx.Module | type[eqx.Module]) -> list[dataclasses.Field]:
-    """All fields except the fitted range, which all laws have."""
-    return [field for field in dataclasses.fields(module) if field.name != FITTED_TO]
+    """All fields except the note of the fitted range, which all laws have."""
+    return [field for field in dataclasses.fields(module) if field.name != "range_note"]
 
 
 def plain_module(module: Any) -> dict[str, Any]:
@@ -64,7 +64,6 @@ def plain_module(module: Any) -> dict[str, Any]:
         result[field.name] = _plain(value, where) if number is None else _quantity(value, number["unit"], where)
     covered = module.fitted_to if isinstance(module, AbstractDamper) else None
     if covered is not None:
-        _known_number(covered.limits, f"{name}.{FITTED_TO}")
         result[FITTED_TO] = {q.name: {"value": list(q.limits), "unit": q.unit} for q in covered.known()}
     return result
 

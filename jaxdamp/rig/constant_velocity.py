@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp.dampers import AbstractDamper, coverage, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper, coverage
 from jaxdamp.parameters import as_float
 
 
@@ -62,7 +62,6 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     if velocities.ndim != 1 or velocities.size == 0:
         _checks.refuse("velocities", "be one or more in one dimension", f"of shape {velocities.shape}")
     _checks.finite("velocities", velocities)
-    law = without_fitted_ranges(law)
     states = jnp.broadcast_to(law.initial_state(), (velocities.size, law.initial_state().size))
     states, force = _hold(law, velocities, states, jnp.asarray(0))
     if law.initial_state().size == 0:

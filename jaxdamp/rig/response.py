@@ -22,7 +22,6 @@ from jaxdamp.dampers import (
     require_finite_force,
     sentence,
     warn_outside,
-    without_fitted_ranges,
 )
 from jaxdamp.parameters import as_float
 
@@ -115,7 +114,6 @@ def respond(
     dt = (time[-1] - time[0]) / (time.size - 1)
     rate = jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else as_float(velocity)
     _refuse_strokes(law, stroke)
-    fitted, law = law, without_fitted_ranges(law)
     if method is not None:
         _refuse_method(method, engine)
     solver = None if isinstance(method, str) else method
@@ -134,7 +132,7 @@ def respond(
     else:
         force = march(law, dt, stroke, rate, substeps, temperature)
     require_finite_force(law, force, "over the whole motion")
-    _warn_of_range(fitted, stroke, rate, force)
+    _warn_of_range(law, stroke, rate, force)
     return force
 
 
