@@ -54,6 +54,13 @@ def own_fields(module: eqx.Module | type[eqx.Module]) -> list[dataclasses.Field]
 def plain_module(module: Any) -> dict[str, Any]:
     """A module with all modules inside."""
     name = type(module).__name__
+    if type(module).__module__.split(".")[0] in BORROWED:
+        remedy = (
+            "Save its numbers by `equinox.tree_serialise_leaves(path, law)`, and read them into a law made by the same "
+            "constructor; `NeuralHysteresis` is a network that can be written."
+        )
+        must = "be of this package or your own: a module of another package holds functions, which no file does"
+        _checks.refuse("module", must, f"a {type(module).__module__.split('.')[0]} {name}", remedy)
     if known_classes().get(name) is not type(module):
         remedy = "Give your class a unique name; after redefining it, create its objects again."
         wrong = f"a {name} that differs from another {name}"

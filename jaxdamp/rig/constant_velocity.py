@@ -22,12 +22,14 @@ class QuasiStatic(NamedTuple):
         force: settled force [N], NaN where the law does not settle or has no finite force, shape (points,).
         settled: which points have a force, shape (points,).
         note: how many points have none, where and why, in words; empty if all have one.
+        states: states of the law at the end, shape (points, states): a start for `respond` of a record in motion.
     """
 
     velocity: Float[Array, " points"]
     force: Float[Array, " points"]
     settled: Bool[np.ndarray, " points"]
     note: str
+    states: Float[Array, "points states"]
 
 
 LONGEST_HOLD = 64  # s at constant velocity
@@ -66,7 +68,8 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     states, force = _hold(law, velocities, states, jnp.asarray(0))
     if law.initial_state().size == 0:
         settled = np.isfinite(force)
-        return QuasiStatic(velocities, force, settled, _gaps(law, np.asarray(velocities), np.asarray(force), settled))
+        note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
+        return QuasiStatic(velocities, force, settled, note, states)
     seconds, change = 0, np.full(velocities.shape, np.inf)
     while seconds < LONGEST_HOLD:
         longer = max(2 * seconds, 1)
@@ -79,7 +82,7 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     alone = change <= limit * size
     settled = np.isfinite(size) & (alone | (change <= limit * np.max(size, where=alone, initial=0.0)))
     note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
-    return QuasiStatic(velocities, jnp.where(settled, force, jnp.nan), settled, note)
+    return QuasiStatic(velocities, jnp.where(settled, force, jnp.nan), settled, note, states)
 
 
 def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled: np.ndarray) -> str:
