@@ -1,13 +1,15 @@
 """`judge`: from the minimum of a problem to a result with errors, scores and warnings."""
 
+import dataclasses
 from collections.abc import Sequence
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
-from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, takes_command
+from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, laws_inside, takes_command
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.blending import off_span
 from jaxdamp.identify.covered import covered_range
@@ -20,7 +22,7 @@ from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.result import FitResult, score
 from jaxdamp.identify.several import Solution
-from jaxdamp.parameters import get, with_values
+from jaxdamp.parameters import get, modules_inside, with_values
 
 
 MOST_WARNINGS = 5  # that are shown at a terminal
@@ -96,8 +98,28 @@ def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Mo
 
 
 def notes_on(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
-    """Sentences on records that contradict each other, strokes without a place, and a curve that adds energy."""
-    return _contradicting(law, runs) + _without_place(law, runs) + _driving(law, runs)
+    """Sentences on numbers left as they were, records that contradict, strokes without place, a curve adding energy."""
+    return _undeclared(law) + _contradicting(law, runs) + _without_place(law, runs) + _driving(law, runs)
+
+
+def _undeclared(law: AbstractDamper) -> list[str]:
+    """A sentence on numbers of a law that are neither parameters nor settings, such as a network of equinox."""
+    owners = [prefix for prefix, _ in laws_inside(law)]
+    counts: dict[str, int] = {}
+    for prefix, module in modules_inside(law):
+        owner = max((own for own in owners if prefix.startswith(own)), key=len)
+        for field in dataclasses.fields(module):
+            value = getattr(module, field.name)
+            if eqx.is_inexact_array(value) and not {"parameter", "setting"} & set(field.metadata):
+                name = owner + f"{prefix}{field.name}"[len(owner) :].split(".")[0]
+                counts[name] = counts.get(name, 0) + value.size
+    held = ", ".join(f"`{name}` ({count} numbers)" for name, count in counts.items())
+    if not held:
+        return []
+    return [
+        f"The fit left {held} as it was: only numbers that are declared by `parameter` are fitted. Train a network by "
+        "optax before the fit, or use `NeuralHysteresis`."
+    ]
 
 
 def _contradicting(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:

@@ -135,6 +135,9 @@ def free_parameters(
         for p in all_parameters
         if p.path in free
     ]
+    if not known:
+        remedy = "Declare its numbers by `parameter(unit, meaning)`; the weights of a network are trained by optax."
+        _checks.refuse("law", "have parameters", f"a {type(tree).__name__} without", remedy)
     if not chosen:
         raise ValueError(f"All parameters are frozen, nothing is left to change: {', '.join(known)}.")
     return FreeParameters(tree, tuple(chosen), tuple(pair for pair in leaders.items() if pair[1] in free))
