@@ -9,6 +9,8 @@ import numpy as np
 from jax import Array
 from jax.core import Tracer
 
+from jaxdamp._traced import behind, is_traced
+
 
 MOST_SHOWN = 8  # largest number of array elements shown in a message
 
@@ -93,15 +95,18 @@ def summary(value: Any, wrong: Any = None) -> Any:
 
 
 def concrete(value: Any) -> np.ndarray | None:
-    """The value as a NumPy array, or `None` while JAX traces it (traced values cannot be checked)."""
+    """The value as a NumPy array, or `None` while JAX traces it.
+
+    Under `jax.grad` too, so that what is computed with it keeps its derivatives; checks take `_traced.behind`.
+    """
     return None if isinstance(value, Tracer) else np.asarray(value)
 
 
 def _numbers(argument: str, value: Any) -> np.ndarray | None:
-    """`concrete`, but refusing values that are not numbers."""
-    array = concrete(value)
-    if array is not None and array.dtype.kind not in "biufc":
-        refuse(argument, "be a number", described(value))
+    """The value, also behind derivatives and batches; None inside `jax.jit`. What is no real number is refused."""
+    array = behind(value)
+    if array is not None and array.dtype.kind not in "biuf":
+        refuse(argument, "be a real number" if array.dtype.kind == "c" else "be a number", described(value))
     return array
 
 
@@ -117,6 +122,21 @@ def positive(argument: str, value: Any, remedy: str = "") -> None:
     array = _numbers(argument, value)
     if array is not None and not (np.all(np.isfinite(array)) and np.all(array > 0)):
         refuse(argument, "be positive and finite", summary(array, ~(np.isfinite(array) & (array > 0))), remedy)
+
+
+def untraced(argument: str, tree: Any, remedy: str = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`.") -> None:
+    """Refuse a tree with numbers that JAX traces, where numbers must be known and derivatives do not pass."""
+    if is_traced(tree):
+        refuse(argument, "have numbers that are known", "traced", remedy)
+
+
+def plain_number(argument: str, value: Any, remedy: str = "Close over a plain number.") -> float:
+    """A number that must be known before a program is compiled, and takes no part in derivatives."""
+    array = None if isinstance(value, Tracer) else _numbers(argument, value)
+    if array is None or array.ndim:
+        must = "be one plain number" if array is not None else "be a plain number, on which the length of a run depends"
+        refuse(argument, must, "traced" if array is None else f"of shape {array.shape}", remedy)
+    return float(array)
 
 
 def nonnegative(argument: str, value: Any, remedy: str = "") -> None:

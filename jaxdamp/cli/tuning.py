@@ -199,7 +199,7 @@ def run_sweep(
             results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
             drawn = {"folder": results.draft, "attempts": attempts}
-            marks = {"limits": limits, "baseline": None if beside is None else dict(ride.on_axles_of(beside)())}
+            marks = {"limits": limits, "baseline": None if beside is None else dict(ride.of_vehicle(beside)())}
             page = sweep_report(data, remarks=remarks, **marks, **drawn)
             page.write(results.draft / "report.html", command_line())
     screen.files(out, results.published)
