@@ -1,4 +1,7 @@
-"""Checks of arguments. Every message contains the argument, its value and the remedy."""
+"""Checks of arguments. Every message contains the argument, its value and the remedy.
+
+JAX is imported where numbers are checked, so that a command which refuses a path need not wait for it.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -91,17 +94,22 @@ def summary(value: Any, wrong: Any = None) -> Any:
 
 
 def concrete(value: Any) -> np.ndarray | None:
-    """The value as a NumPy array, or `None` while JAX traces it (traced values cannot be checked)."""
-    from jax.core import Tracer  # here, since a command that only has to say what is wrong need not wait for JAX
+    """The value as a NumPy array, or `None` while JAX traces it.
+
+    Under `jax.grad` too, so that what is computed with it keeps its derivatives; checks take `_traced.behind`.
+    """
+    from jax.core import Tracer
 
     return None if isinstance(value, Tracer) else np.asarray(value)
 
 
 def _numbers(argument: str, value: Any) -> np.ndarray | None:
-    """`concrete`, but refusing values that are not numbers."""
-    array = concrete(value)
-    if array is not None and array.dtype.kind not in "biufc":
-        refuse(argument, "be a number", described(value))
+    """The value, also behind derivatives and batches; None inside `jax.jit`. What is no real number is refused."""
+    from jaxdamp._traced import behind
+
+    array = behind(value)
+    if array is not None and array.dtype.kind not in "biuf":
+        refuse(argument, "be a real number" if array.dtype.kind == "c" else "be a number", described(value))
     return array
 
 
@@ -117,6 +125,23 @@ def positive(argument: str, value: Any, remedy: str = "") -> None:
     array = _numbers(argument, value)
     if array is not None and not (np.all(np.isfinite(array)) and np.all(array > 0)):
         refuse(argument, "be positive and finite", summary(array, ~(np.isfinite(array) & (array > 0))), remedy)
+
+
+def untraced(argument: str, tree: Any, remedy: str = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`.") -> None:
+    """Refuse a tree with numbers that JAX traces, where numbers must be known and derivatives do not pass."""
+    from jaxdamp._traced import is_traced
+
+    if is_traced(tree):
+        refuse(argument, "have numbers that are known", "traced", remedy)
+
+
+def plain_number(argument: str, value: Any, remedy: str = "Close over a plain number.") -> float:
+    """A number that must be known before a program is compiled, and takes no part in derivatives."""
+    array = None if concrete(value) is None else _numbers(argument, value)
+    if array is None or array.ndim:
+        must = "be one plain number" if array is not None else "be a plain number, on which the length of a run depends"
+        refuse(argument, must, "traced" if array is None else f"of shape {array.shape}", remedy)
+    return float(array)
 
 
 def nonnegative(argument: str, value: Any, remedy: str = "") -> None:

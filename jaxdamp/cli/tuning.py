@@ -204,7 +204,7 @@ def run_sweep(
             drawn = {"folder": results.draft, "attempts": attempts}
             if limits:
                 limits = limit_spans(limits, names, {name: float(value) for name, value in ride().items()})
-            marks = {"limits": limits, "baseline": None if beside is None else dict(ride.on_axles_of(beside)())}
+            marks = {"limits": limits, "baseline": None if beside is None else dict(ride.of_vehicle(beside)())}
             page = sweep_report(data, remarks=remarks, **marks, **drawn)
             page.write(results.draft / "report.html", command_line())
     screen.files(out, results.published)

@@ -43,6 +43,9 @@ class AbstractDamper(Module):
         check_parameters(self)
         check_conditions(self)
 
+    # By identity, whatever is equal, as JAX asks of a function: `jax.jit(law.force)`.
+    __hash__ = object.__hash__
+
     def __repr__(self) -> str:
         return readable(self)
 

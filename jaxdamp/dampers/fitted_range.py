@@ -99,6 +99,7 @@ def shown_unit(name: str) -> str:
 def _checked(name: str, limits: Limits | None) -> tuple[float, float] | None:
     if limits is None:
         return None
+    _checks.untraced(name, limits, "A range is what records covered: give plain numbers.")
     numbers = np.asarray(limits, dtype=float)
     if numbers.shape != (2,) or not np.all(np.isfinite(numbers)) or numbers[0] > numbers[1]:
         unit = f" [{UNITS[name]}]" if UNITS[name] else ""

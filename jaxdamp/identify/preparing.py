@@ -30,6 +30,9 @@ from jaxdamp.identify.traces import batches, owners, places
 from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
 
 
+FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residuals of a `Problem` can be traced."
+
+
 def prepare(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],
@@ -73,6 +76,7 @@ def prepare(
     1500.0
     """
     _checks.one_of("initial_state", initial_state, INITIAL_STATES)
+    _checks.untraced("law", law, FIT_OUTSIDE)
     runs = as_runs(runs, call="fit(law, runs)")
     if not runs:
         _checks.refuse("runs", "hold at least one record", "empty", "Read some with `bench.read`.")

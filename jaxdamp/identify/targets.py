@@ -129,7 +129,7 @@ class TargetResiduals(AbstractResiduals):
 
     def __call__(self, model: Any) -> Float[Array, " samples"]:
         """The deviations."""
-        reached = self.numbers.on_axles_of(model)({}) if isinstance(self.numbers, Ride) else self.numbers(model)
+        reached = self.numbers.of_vehicle(model)({}) if isinstance(self.numbers, Ride) else self.numbers(model)
         values = jnp.stack([jnp.asarray(reached[name], self.wanted.dtype) for name in self.names])
         return jnp.concatenate([(values - self.wanted) / self.tolerance, jnp.zeros(self.padding, values.dtype)])
 

@@ -28,6 +28,8 @@ def as_float(value: Any, name: str = "value") -> Array:
         return value
     if value is None or isinstance(value, str | bytes | type | eqx.Module):
         _checks.refuse(name, "be a number", _checks.described(value))
+    if jnp.iscomplexobj(value):
+        _checks.refuse(name, "be a real number", _checks.described(value))
     try:
         if isinstance(value, int | float | np.ndarray):
             value = np.asarray(value)  # arrays of NumPy are copied; numbers would be converted by a compiled program

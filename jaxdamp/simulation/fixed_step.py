@@ -6,7 +6,6 @@ small arrays and carries no more than it must.
 """
 
 from abc import abstractmethod
-from contextlib import nullcontext
 from typing import Any, TypeAlias
 
 import equinox as eqx
@@ -16,9 +15,8 @@ from jaxtyping import Array, Float
 
 from jaxdamp._jacobian import Mode
 from jaxdamp._types import Scalar, ScalarLike
-from jaxdamp._vectors import MemoryLayout, between, laid_out
+from jaxdamp._vectors import between, laid_out
 from jaxdamp.codegen import printed_scan
-from jaxdamp.configuration import one_at_a_time
 from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome
 from jaxdamp.simulation.equations import FOR_REVERSE, Equations, RoadInput, StepState
 
@@ -77,17 +75,6 @@ class AbstractFixedStep(AbstractEngine):
         observer: AbstractObserver,
     ) -> Outcome:
         """Step after step; of a long run reverse derivatives keep the beginnings of blocks only."""
-        with one_at_a_time() if equations.layout is MemoryLayout.SCALARS else nullcontext():
-            return self._run(equations, heights, dt, start, observer)
-
-    def _run(
-        self,
-        equations: Equations,
-        heights: Float[Array, "time wheels"],
-        dt: ScalarLike,
-        start: Float[Array, " n"],
-        observer: AbstractObserver,
-    ) -> Outcome:
         stepper = self.stepper(equations, jnp.asarray(dt / self.step_count, dtype=float))
         half_rate, layout = jnp.asarray(0.5 / dt, dtype=heights.dtype), equations.layout
         rated = equations.road_deflection is not None or not observer.saves_motion

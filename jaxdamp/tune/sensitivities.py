@@ -197,7 +197,7 @@ def _on_made_roads(
     def measured(x: Any) -> Mapping[str, Any]:
         road = make(**{name: x[count + i] for i, name in enumerate(names)})
         ride = Ride(vehicle, road, metrics=objective.metrics, **run)
-        return objective.of(ride.on_axles_of(free.build(x[:count]))())
+        return objective.of(ride.of_vehicle(free.build(x[:count]))())
 
     return measured
 

@@ -173,6 +173,7 @@ def check_call(call: str, vehicle: Any, road: Any, counts: Mapping[str, tuple[in
         counts: value and least value by argument.
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
+    _checks.untraced("vehicle", vehicle, "Call it outside `jax.jit` and `jax.grad`; a `Ride` can be traced.")
     if not isinstance(road, Scenarios):
         check_module("road", road, (AbstractRoad, WhiteRoad), call)
     for name, (count, least) in counts.items():
