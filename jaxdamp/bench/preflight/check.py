@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, final
 from jaxdamp import _checks
 from jaxdamp._tables import Cell, Column, Table, plain
 from jaxdamp.bench.analysis import as_records
-from jaxdamp.bench.preflight import bench_checks, channel_checks, consistency, motion_checks
+from jaxdamp.bench.preflight import bench_checks, changes, channel_checks, consistency, motion_checks, sample_checks
 from jaxdamp.bench.preflight.finding import SEVERITIES, Examined, Finding
 from jaxdamp.bench.runs import BenchRun
 
@@ -19,10 +19,20 @@ if TYPE_CHECKING:
 # In this order; where one family finds an error in a record, the later ones are left out for it.
 FAMILIES = (
     (motion_checks.magnitudes, motion_checks.few_samples, motion_checks.few_cycles, motion_checks.integrated),
-    (channel_checks.stuck, channel_checks.clipping, motion_checks.rest, motion_checks.run_up),
-    (channel_checks.spikes, channel_checks.quantisation, channel_checks.ripple, consistency.velocity, consistency.sign),
-    (motion_checks.jitter, consistency.gas_force, consistency.delay, consistency.breakaway, consistency.drift),
+    (sample_checks.repeated, sample_checks.edges, channel_checks.clipping, motion_checks.rest, motion_checks.run_up),
+    (channel_checks.quantisation, channel_checks.ripple, consistency.velocity, consistency.sign),
+    (
+        motion_checks.jitter,
+        changes.changes,
+        consistency.gas_force,
+        consistency.delay,
+        consistency.breakaway,
+        consistency.drift,
+    ),
 )
+# The checks that find errors, which are quick.
+ERRORS = (sample_checks.repeated, sample_checks.edges, channel_checks.clipping, consistency.velocity, consistency.sign)
+BAD_RECORDS = ("refuse", "leave_out", "keep")
 BENCH = ((bench_checks.turned_by_the_reader, bench_checks.turned_motion), (bench_checks.mixed_settings,))
 
 
@@ -137,3 +147,47 @@ def _of_record(run: BenchRun) -> list[Finding]:
         if any(finding.severity == "error" for finding in findings):
             break
     return findings
+
+
+def usable(
+    runs: Iterable[BenchRun], bad_records: str = "refuse", *, robust: bool = False, argument: str = "runs"
+) -> tuple[BenchRun, ...]:
+    """The records that something may be computed from: checks for errors only, in milliseconds a record.
+
+    Arguments:
+        runs: the records.
+        bad_records: what is done with records that have an error: "refuse" all, "leave_out" these, or "keep" them.
+        robust: whether what follows gives spikes little weight, so that they are no error.
+        argument: what the caller calls the records.
+
+    Raises:
+        ValueError: a record with an error, or, where these are left out, none without one.
+
+    >>> from jaxdamp import bench
+    >>> from jaxdamp.dampers import Linear
+    >>> test = bench.SineTest(0.02, 2.0, cycles=6)
+    >>> good, bad = (bench.VirtualDyno(Linear(1500.0), force_limit=limit).run(test)[0] for limit in (None, 300.0))
+    >>> len(bench.usable([good, bad], "leave_out"))
+    1
+    """
+    _checks.one_of("bad_records", bad_records, BAD_RECORDS)
+    runs = tuple(runs)
+    if bad_records == "keep":
+        return runs
+    errors = [_first_error(run, robust) for run in runs]
+    sound = tuple(run for run, error in zip(runs, errors, strict=True) if error is None)
+    found = [error for error in errors if error is not None]
+    if found and (bad_records == "refuse" or not sound):
+        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+        error = found[0]
+        ways = '`bad_records="leave_out"` fits the others, `bad_records="keep"` fits them as they are.'
+        is_ = f"{error.record}{more}: {error.message}"
+        _checks.refuse(argument, "be records without errors", is_, f"{error.remedy} {ways}")
+    return sound
+
+
+def _first_error(run: BenchRun, robust: bool) -> Finding | None:
+    """The first finding of a record that is an error."""
+    examined = Examined(run)
+    findings = (finding for check in ERRORS for finding in check(examined) if finding.severity == "error")
+    return next((finding for finding in findings if not (robust and finding.name.endswith("spikes"))), None)
