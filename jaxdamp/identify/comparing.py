@@ -154,7 +154,8 @@ def compare(
         options: passed on to `fit`.
 
     Raises:
-        ValueError: no laws, or none that could be fitted; a record with an error; with `scheduled`, records of one command only.
+        ValueError: no laws, or none that could be fitted; a record with an error; with `scheduled`, records of one
+            command only.
 
     >>> from jaxdamp import bench, dampers
     >>> runs = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=5.0).run(

@@ -87,7 +87,8 @@ def fit_many(
         by their error or their parameters are named in `remarks`.
 
     Raises:
-        ValueError: no dampers; a record with an error; names that fit no parameter; settings or degrees that do not suit the dampers.
+        ValueError: no dampers; a record with an error; names that fit no parameter; settings or degrees that do not
+            suit the dampers.
 
     >>> from jaxdamp import bench
     >>> from jaxdamp.dampers import Bilinear

@@ -32,6 +32,8 @@ FAMILIES = (
 )
 # The checks that find errors, which are quick.
 ERRORS = (sample_checks.repeated, sample_checks.edges, channel_checks.clipping, consistency.velocity, consistency.sign)
+# What is in the names of warnings, by what it does to results; all others come behind.
+CONSEQUENCE = ("unusual", "changes", "jump", "dropout", "held", "spikes", "velocity", "contradiction", "sign", "delay")
 BAD_RECORDS = ("refuse", "leave_out", "keep")
 BENCH = ((bench_checks.turned_by_the_reader, bench_checks.turned_motion), (bench_checks.mixed_settings,))
 
@@ -81,19 +83,22 @@ class Preflight:
         return f"Preflight of {records}: {words or 'nothing odd'}"
 
     def sentences(self) -> list[str]:
-        """Each kind of finding once, with the records that it is about and the largest of its sizes."""
+        """Each kind of finding once, worst first: in how many records, and that with the largest size in words."""
         kinds: dict[tuple[str, str], list[Finding]] = {}
         for finding in self.findings:
             kinds.setdefault((finding.severity, finding.name), []).append(finding)
         said = []
         for (severity, name), members in kinds.items():
             worst = max(members, key=lambda finding: abs(finding.size or 0.0))
-            others = [f.record for f in members if f is not worst]
-            more = f" Also {', '.join(others[:3])}" + (f" and {len(others) - 3} more" if len(others) > 3 else "") + "."
-            said.append(
-                f"{severity}, {name}: {worst.record}: {worst.message}.{more * bool(others)} {worst.remedy}".rstrip()
-            )
+            count = len({record for finding in members for record in finding.records})
+            where = f"{name} in {count} records, most in" if len(members) > 1 else f"{name}:"
+            said.append(f"{severity}, {where} {worst.record}: {worst.message}. {worst.remedy}".rstrip())
         return said
+
+    def without(self, names: Iterable[str]) -> "Preflight":
+        """The same without the findings of these names."""
+        left_out = tuple(names)
+        return Preflight(tuple(f for f in self.findings if f.name not in left_out), self.records)
 
     def to_dict(self) -> dict[str, Any]:
         """All findings as plain data."""
@@ -134,8 +139,8 @@ def preflight(runs: BenchRun | Iterable[BenchRun]) -> Preflight:
         wrong = {name for finding in findings if finding.severity == "error" for name in finding.records}
         sound = [run for run in chosen if run.name not in wrong]
         findings += [finding for check in family for finding in check(sound)]
-    findings = bench_checks.hysteresis_or_delay(findings)
-    findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
+    findings = bench_checks.gas_of_the_slowest(bench_checks.hysteresis_or_delay(findings), chosen)
+    findings.sort(key=_consequence)
     return Preflight(tuple(findings), tuple(run.name for run in chosen))
 
 
@@ -147,6 +152,12 @@ def _of_record(run: BenchRun) -> list[Finding]:
         if any(finding.severity == "error" for finding in findings):
             break
     return findings
+
+
+def _consequence(finding: Finding) -> tuple[int, int]:
+    """The rank of a finding: by severity, then by what it does to results."""
+    kinds = (number for number, kind in enumerate(CONSEQUENCE) if kind in finding.name)
+    return SEVERITIES.index(finding.severity), next(kinds, len(CONSEQUENCE))
 
 
 def usable(

@@ -58,7 +58,7 @@ def velocity(e: Examined) -> list[Finding]:
         float(np.sum(a * b)) for a, b in ((measured, derived), (measured, measured), (derived, derived))
     )
     likeness, scale = both / np.sqrt(own * squares) if own * squares > 0 else 0.0, both / squares
-    if likeness > 0.99 and 0.97 < scale < 1.03:
+    if likeness > 0.99 and 0.93 < scale < 1.07:
         return []
     severity = "error" if likeness < 0.8 or not 0.8 < scale < 1.25 else "warning"
     message = f"the velocity is {scale:.4g} times the derivative of the stroke, correlation {likeness:.3f}"

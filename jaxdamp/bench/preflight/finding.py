@@ -111,7 +111,7 @@ class Examined:
         if len(stroke) < 200 or step(stroke) > 0:
             return 0.0
         squares = np.diff(stroke, 5) ** 2 / 252.0
-        speed = np.abs(np.gradient(stroke)[2:-3]) * self.run.sampling_rate
+        speed = np.abs(self.run.velocity[self.moving])[2:-3]
         low, high = np.quantile(speed, (0.3, 0.7))
         fast, slow = (
             np.minimum(part, 10.0 * np.median(part)) for part in (squares[speed > high], squares[speed < low])

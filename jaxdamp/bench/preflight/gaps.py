@@ -30,12 +30,14 @@ def gaps(values: Samples, velocity: Samples, moving: slice, cycles: int) -> Int[
         return at
     x, v = values[moving], velocity[moving]
     first, last = at[:, 0], at[:, 1] + 1
-    resolution, noise, length = _resolution(x), white_noise(x), last - first
+    resolution, noise, length = _resolution(x, int(np.sum(last - first)), len(at)), white_noise(x), last - first
     outside, into, out = x[last + 1] - x[first - 1], x[first] - x[first - 1], x[last + 1] - x[last]
     chance = resolution / np.maximum(2 * np.sqrt(np.pi) * noise + np.abs(outside) / (length + 2), resolution)
     lost = (len(x) * chance**length < _BY_CHANCE) & (np.abs(outside) > resolution) & (noise > 2.0 * resolution)
     edge = np.maximum(_CLEAR * np.sqrt(2.0) * noise, 4.0 * resolution)
-    clipped = ((x[first] == x.max()) | (x[first] == x.min())) & (np.maximum(np.abs(into), np.abs(out)) < 2.0 * edge)
+    extreme = (x[first] == x.max()) | (x[first] == x.min())
+    smooth = np.maximum(np.abs(into), np.abs(out)) < 2.0 * edge
+    clipped = extreme & (smooth | (np.count_nonzero(extreme) > 2)) & (x[first] != 0.0)
     usual = np.abs(x[np.minimum(last + 2, len(x) - 1)] - x[last + 1])
     jumps = (length > 2) & (np.abs(out) > np.maximum(edge, 3.0 * usual))
     fastest = float(np.max(np.abs(v)))
@@ -45,16 +47,22 @@ def gaps(values: Samples, velocity: Samples, moving: slice, cycles: int) -> Int[
     return at[(lost | jumps) & ~clipped] + moving.start + np.array([0, 1])
 
 
-def _resolution(values: Samples) -> float:
-    """The step of the numbers as they were written: of their decimals, or of a converter; rounding of floats else."""
+def _resolution(values: Samples, still: int, stretches: int) -> float:
+    """The step of the numbers as they were written: of their decimals, or of a converter; rounding of floats else.
+
+    A converter shows by values that recur: of n values on m levels, about n² / 2m do. Those of the stretches of equal
+    neighbours do not count.
+    """
     some = values[:: max(len(values) // 2000, 1)]
-    largest = float(np.max(np.abs(some)))
+    largest, decimals = float(np.max(np.abs(some))), 1e-15
     for digits in range(12):
         unit = 10.0 ** (np.ceil(np.log10(max(largest, 1e-300))) - digits)
         if np.all(np.abs(some / unit - np.round(some / unit)) < 1e-3):
-            return float(unit)
-    levels = np.diff(np.unique(values))
-    levels = levels[levels > 1e-9 * largest]
-    steps = levels / levels.min(initial=np.inf)
-    regular = len(steps) and np.mean(np.abs(steps - np.round(steps)) < 0.05) > 0.9
-    return float(levels.min()) if regular else 1e-15 * largest
+            decimals = unit / largest
+            break
+    count, distinct = len(values), len(np.unique(values))
+    recurring = max(count - distinct - still - stretches, 0)
+    span = float(np.ptp(np.quantile(values, (0.01, 0.99))))
+    levels = distinct if distinct < 0.7 * count else count**2 / (2.0 * max(recurring, 1e-3))
+    coarse = span / levels if recurring > 3 else 0.0
+    return max(float(decimals) * largest, coarse)
