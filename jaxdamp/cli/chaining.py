@@ -55,7 +55,7 @@ def run_report(
     with results_folder(out, "report", replace=replace) as results:
         with screen.stage("Reading the records"):
             raw = reading.read(files)
-        sound, preflight = checked(screen, raw, notes=False)
+        sound, preflight = checked(screen, raw, reading, processing, refuse=True)
         runs = processing.apply(sound)
         remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.table(records_table(tuple(runs)))

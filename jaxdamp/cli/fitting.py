@@ -79,7 +79,7 @@ def run_fit(
     with another_page(report, out, replace=replace), results_folder(out, "fit", replace=replace) as results:
         with screen.stage("Reading the records"):
             raw = options.read(files)
-        sound, found = checked(screen, raw, notes=False)
+        sound, found = checked(screen, raw, options, processing or ProcessOptions(), refuse=True)
         runs = (processing or ProcessOptions()).apply(sound)
         _, held = split(runs, held_out)
         groups = grouped(runs, group_by)
@@ -206,6 +206,7 @@ def fit_laws(
                 weighting=weighting,
                 rig=rig,
                 scheduled=scheduled,
+                bad_records="keep",  # they were checked
             ):
                 outcomes.append(outcome)
                 if isinstance(outcome, Rung):

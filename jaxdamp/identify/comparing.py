@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 from jaxdamp._progress import Progress
 from jaxdamp._tables import Table, with_unit
-from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
 from jaxdamp.identify.machine import OFFSET, Machine
@@ -155,6 +155,7 @@ def compare(
     rig: Machine = OFFSET,
     scheduled: bool = False,
     progress: Callable[[str], None] | None = None,
+    bad_records: str = "refuse",
     **options: Any,
 ) -> Comparison:
     """Fit several laws to the same records, judge them on motion held out, and recommend one (`.best`).
@@ -175,10 +176,12 @@ def compare(
         scheduled: whether the parameters of each law are functions of the records' command, as in `fit_scheduled`;
             starts are carried over from neighbouring settings, and the best law is also scored between settings.
         progress: called with each name before its fit; a line in the terminal if it is left out.
+        bad_records: "refuse", "leave_out" or "keep" records with an error, as in `fit`; those held out are checked too.
         options: passed on to `fit`.
 
     Raises:
-        ValueError: no laws, or none that could be fitted; with `scheduled`, records of one command only.
+        ValueError: no laws, or none that could be fitted; a record with an error; with `scheduled`, records of one
+            command only.
 
     >>> from jaxdamp import bench, dampers
     >>> runs = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=5.0).run(
@@ -189,7 +192,9 @@ def compare(
     """
     call = "compare(laws, runs)"
     check_starts(laws, call)
-    runs, held_out = as_runs(runs, call=call), as_runs(held_out, "held_out")
+    robust = options.get("loss", "squares") != "squares"
+    runs = usable(as_runs(runs, call=call), bad_records, robust=robust)
+    held_out = usable(as_runs(held_out, "held_out"), bad_records, robust=robust, argument="held_out")
     with Progress("Fitting") as shown:
         number = 0
 
@@ -198,7 +203,7 @@ def compare(
             number += 1
             shown(f"{name}, {number} of {len(laws)}")
 
-        how = {"rig": rig, "scheduled": scheduled, "progress": progress or counted}
+        how = {"rig": rig, "scheduled": scheduled, "progress": progress or counted, "bad_records": "keep"}
         comparison = Comparison.of(fit_each(laws, runs, held_out, **how, **options), held_out)
     _ = comparison.verdict  # which leaves out settings if there are any: that is part of this work
     return comparison

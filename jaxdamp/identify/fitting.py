@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._status import Status
-from jaxdamp.bench import BenchRun
+from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify._tall import triangle
@@ -53,6 +53,7 @@ def fit(
     samples_per_cycle: int | None = 400,
     starts: int | None = None,
     max_steps: int = 200,
+    bad_records: str = "refuse",
 ) -> FitResult:
     """Fit a damper law to bench records by least squares on the force; a vehicle to its records, as `fit_vehicle` says.
 
@@ -110,14 +111,16 @@ def fit(
         starts: largest number of starts: `law` first, then those that its laws propose (`other_starts`); all of them if
             left out. With 1, the search starts from `law` only.
         max_steps: largest number of steps of each search.
+        bad_records: what is done with records in which the preflight finds an error, such as a clipped or lost force:
+            "refuse" the fit, "leave_out" these records, or "keep" them. Spikes are no error for a robust `loss`.
 
     Returns:
         The law with the range of the fitted records (`law.fitted_to`), its parameters with standard errors, scores and
         warnings; `status` and `warnings` report a search that failed.
 
     Raises:
-        ValueError: no records; names that fit no parameter; a start outside its bounds or without finite forces; a
-            constant force.
+        ValueError: no records; a record with an error; names that fit no parameter; a start outside its bounds or
+            without finite forces; a constant force.
 
     >>> from jaxdamp import bench, dampers
     >>> dyno = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=5.0, seed=1)
@@ -129,6 +132,7 @@ def fit(
     _checks.one_of("loss", loss, LOSSES)
     if force_noise is not None:
         _checks.positive("force_noise", force_noise)
+    runs = usable(as_runs(runs, call="fit(law, runs)"), bad_records, robust=loss != "squares")
     problem = prepare(
         law,
         runs,
