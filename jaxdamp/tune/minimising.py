@@ -24,10 +24,12 @@ from jaxdamp.tune.wording import (
     bound_notes,
     changes_of,
     early_end,
+    effect_notes,
     fresh_notes,
     missed_notes,
     start_notes,
     true_value_notes,
+    without_effect,
 )
 
 
@@ -73,8 +75,8 @@ def minimise(
             channel; or a differentiable function of the metrics by name, such as
             `lambda m: m["rms_sprung_acceleration"] / 1.5 + m["dynamic_load_coefficient"] / 0.2`, or `Targets(...)`.
         vehicle: the vehicle to start from.
-        road: a road for the simulation, the same in every step; `roads.white(...)` for the stationary response of the
-            linearised vehicle, which has no peaks; or `Scenarios(...)`, whose metrics are joined by their risk.
+        road: a road for the simulation, the same in every step; `roads.white(...)` for the stationary response with
+            equivalent linear laws, which has no peaks; or `Scenarios(...)`, whose metrics are joined by their risk.
         over: the parameters to change, by path, last part or pattern; all of the damper by default. A mapping
             `{parameter: (lower, upper)}` gives their bounds too, as `bounds` does.
         freeze: parameters among these to hold at their start.
@@ -168,7 +170,9 @@ def _result(
 ) -> TuneResult[V]:
     """The result of a tuning, judged: what holds it, what it misses, and what it is worth on fresh roads."""
     vehicle, space, objective, road, units = task.vehicle, task.space, task.objective, task.road, task.units
-    before, after = evaluator.at(space.start)[0], evaluator.at(ended.values)[0]
+    sides = evaluator.at(space.start), evaluator.at(ended.values)
+    before, after = (numbers for numbers, _ in sides)
+    idle = without_effect(space.free.names, (space.start, ended.values), objective.name, sides)
     short = missed(limits, after, evaluator.tolerance)
     changes = changes_of(space, ended.values)
     if short:
@@ -179,7 +183,7 @@ def _result(
         status = Status.STEP_LIMIT if ended.out_of_steps else Status.NO_BETTER_STEP
     held = active(limits, after, evaluator.tolerance)
     notes = missed_notes(short, after, changes) + true_value_notes(objective, after, task.allowed)
-    notes += bound_notes(space, changes) + start_notes(attempts, objective.name)
+    notes += effect_notes(idle, objective.name) + bound_notes(space, changes) + start_notes(attempts, objective.name)
     if status in (Status.STEP_LIMIT, Status.NO_BETTER_STEP):
         notes.append(early_end(ended, max_steps))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
@@ -214,5 +218,6 @@ def _result(
         fresh=fresh,
         starts=attempts,
         scenarios=each,
+        without_effect=idle,
         drive=Drive(road.scenarios[0].road if isinstance(road, Scenarios) else road, *task.run),
     )

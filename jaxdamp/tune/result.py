@@ -102,6 +102,7 @@ class TuneResult(Generic[V]):
         starts: the searches from several starts.
         scenarios: all metrics in every scenario; None for a tuning on one road.
         drive: what was driven over.
+        without_effect: names of the parameters by which the derivative of the minimised metric is zero.
     """
 
     vehicle: V
@@ -122,6 +123,7 @@ class TuneResult(Generic[V]):
     starts: tuple[Attempt, ...] = ()
     scenarios: ScenarioValues | None = None
     drive: Drive | None = None
+    without_effect: tuple[str, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -143,6 +145,9 @@ class TuneResult(Generic[V]):
         stops += [f"{change.name} {change.note}" for change in self.parameters if change.note]
         inside = "all parameters inside their bounds" if not any(c.note for c in self.parameters) else ""
         state = "an optimum" if self.converged else "not an optimum"
+        if len(self.without_effect) == len(self.parameters):
+            return f"{self.metric} {before:.4g} {unit}: no free parameter has an effect on it."
+        stops += [f"no effect of {name}" for name in self.without_effect]
         parts = [f"{state} after {len(self.history)} steps", *stops, *[inside] * bool(inside)]
         return f"{self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
 
@@ -231,6 +236,7 @@ class TuneResult(Generic[V]):
             "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
             "active_limits": list(self.active_limits),
             "active": list(self.active),
+            "without_effect": list(self.without_effect),
             "fresh": None if self.fresh is None else self.fresh.to_dict(),
             "scenarios": None if self.scenarios is None else plain(self.scenarios._asdict()),
             "starts": [plain(attempt._asdict()) for attempt in self.starts],

@@ -10,7 +10,7 @@ from jaxdamp._field_types import check_module
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import Ride
+from jaxdamp.simulation import Ride, stationary_notes
 from jaxdamp.tune.limits import Limit, limit_spans, scaled
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.objective import Function, objective_of
@@ -123,8 +123,10 @@ class DesignTask(Generic[V]):
 
     def notes_on_runs(self, design: AbstractVehicle) -> list[str]:
         """Notes on the step and on the fitted ranges for a design, on every road."""
-        notes = []
-        for ride_of in self.measured.rides_of():
+        rides = list(self.measured.rides_of())
+        road = rides[0](design).road if self.measured.white else None
+        notes = stationary_notes(design, road) if isinstance(road, WhiteRoad) else []
+        for ride_of in rides:
             coarse = [] if self.measured.white else step_notes(self.vehicle, design, ride_of)
             notes += coarse
             if not any("does not bear" in note for note in coarse):

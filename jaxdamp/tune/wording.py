@@ -17,6 +17,7 @@ from jaxdamp.tune.starts import Attempt
 
 
 LOST = 0.5  # share of an improvement: if less is left on fresh roads, a warning states it
+_ROUNDING = 1e-12  # of a metric, by which its derivative times the parameter counts as zero
 ALIKE = 1e-3  # relative difference of metrics at ends that count as one optimum
 
 
@@ -146,3 +147,33 @@ def fresh_notes(fresh: Rescore, sides: Sequence[Mapping[str, float]], allowed: M
             furthest = float(values.max() if np.any(values > upper) else values.min())
             notes.append(f"On {beyond} of {fresh.roads} fresh roads {name} is beyond its limit, up to {furthest:.4g}.")
     return notes
+
+
+def without_effect(
+    names: Sequence[str],
+    values: Sequence[np.ndarray],
+    metric: str,
+    sides: Sequence[tuple[Mapping[str, float], Mapping[str, np.ndarray]]],
+) -> tuple[str, ...]:
+    """The parameters by which the derivative of the metric is zero at the start and at the end, but for rounding.
+
+    Arguments:
+        names: of the parameters.
+        values: of the parameters on both sides.
+        metric: what is minimised.
+        sides: metrics and their derivatives at the start and at the end.
+    """
+    idle = np.ones(len(names), bool)
+    for at, (numbers, slopes) in zip(values, sides, strict=True):
+        rounded = np.abs(slopes[metric] * at) <= _ROUNDING * abs(numbers[metric])
+        idle &= (slopes[metric] == 0.0) | (rounded & (at != 0.0))
+    return tuple(name for name, none in zip(names, idle, strict=True) if none)
+
+
+def effect_notes(idle: Sequence[str], metric: str) -> list[str]:
+    """A sentence on the parameters without effect."""
+    if not idle:
+        return []
+    theirs = "their tuned values say" if len(idle) > 1 else "its tuned value says"
+    remedy = "Free others, or choose another metric or road."
+    return [f"No effect on {metric}: {', '.join(idle)}; {theirs} nothing. {remedy}"]
