@@ -10,6 +10,7 @@ error of the mean over the roads is printed beside it.
 import argparse
 import time
 import warnings
+from collections.abc import Callable
 
 import equinox as eqx
 import jax
@@ -54,8 +55,8 @@ def heights(count: int, duration: float) -> np.ndarray:
     return np.concatenate([np.zeros((count, 1)), np.cumsum(rises, axis=1)], axis=1)[:, :, None]
 
 
-def simulated(law: AbstractDamper, roads_of_class: np.ndarray, rates: np.ndarray | None = None) -> np.ndarray:
-    """RMS of each channel in each run, shape (channels, classes, roads); `rates` of a linear damper by class."""
+def runs(law: AbstractDamper, roads_of_class: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """RMS of each channel in each run, shape (channels, classes, roads), by the rates of a linear law in each class."""
     car = vehicles.presets.quarter_car_000(law)
     duration = (roads_of_class.shape[-2] - 1) * DT
     metrics = [Metric(channel, "standard_deviation", window=(BEGIN, duration)) for channel in CHANNELS]
@@ -65,12 +66,11 @@ def simulated(law: AbstractDamper, roads_of_class: np.ndarray, rates: np.ndarray
         ride = Ride(car, roughest, metrics=metrics, duration=duration, dt=DT).side_by_side()
 
     def run(road: jax.Array, rate: jax.Array) -> list[jax.Array]:
-        point = {} if rates is None else {"damper.rate": rate}
+        point = {"damper.rate": rate} if isinstance(law, dampers.Linear) else {}
         return list(eqx.tree_at(lambda ride: ride.heights, ride, road)(point).values())
 
-    of_class = jnp.zeros(len(CLASSES)) if rates is None else jnp.asarray(rates)
-    each = jax.jit(jax.vmap(jax.vmap(run, in_axes=(0, None))))(jnp.asarray(roads_of_class), of_class)
-    return np.asarray(jnp.stack(each))
+    each = jax.jit(jax.vmap(jax.vmap(run, in_axes=(0, None))))
+    return lambda rates: np.asarray(jnp.stack(each(jnp.asarray(roads_of_class), jnp.asarray(rates))))
 
 
 def main() -> None:
@@ -84,6 +84,7 @@ def main() -> None:
     begun = time.perf_counter()
     roughness = 2.0 ** np.arange(len(CLASSES))[:, None, None, None]
     driven = roughness * heights(options.roads, options.duration)[None]
+    linear = runs(dampers.Linear(1500.0), driven)
     misses, worst = [], {channel: 0.0 for channel in CHANNELS}
     print(f"error of the stationary RMS [%] (standard error), {options.roads} roads of {options.duration:g} s each")
     print(f"{'law':24} class  {'equivalent damper':52}" + "".join(f"{name:>24}" for name in CHANNELS))
@@ -93,7 +94,7 @@ def main() -> None:
         car, white = vehicles.presets.quarter_car_000(law), [roads.white(c, SPEED) for c in CLASSES]
         equivalent = [vehicles.equivalent_dampers(car, road.velocity_psd)["damper"] for road in white]
         rates = np.array([float(one.slope) for one in equivalent])
-        ratio = simulated(law, driven) / simulated(dampers.Linear(1500.0), driven, rates)
+        ratio = runs(law, driven)(rates) / linear(rates)
         for i, road in enumerate(white):
             found = vehicles.stationary_rms(car, road.velocity_psd)
             known = vehicles.stationary_rms(

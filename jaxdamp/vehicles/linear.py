@@ -13,6 +13,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._matrices import solve
 from jaxdamp._types import Scalar, ScalarLike
+from jaxdamp.dampers import coverage
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position
 from jaxdamp.vehicles.equivalent import equivalent_slopes
@@ -153,10 +154,11 @@ def _on_random_road(vehicle: AbstractVehicle, velocity_psd: Any, speed: Any, in_
         _checks.refuse("vehicle", must, f"one with a {law}", INSTEAD)
     success = _checks.concrete(found)
     if success is not None and not success:
-        own = {name: type(vehicle.frame().element(name).law).__name__ for name in vehicle.frame().element_names}
-        laws = ", ".join(f"{name} ({law})" for name, law in own.items())
+        names = vehicle.layout.ports[: len(vehicle.layout.ports) - sum(vehicle.layout.lifts)]
+        laws = ", ".join(f"{name} ({type(vehicle.frame().element(name).law).__name__})" for name in names)
         must = "have a stationary motion with linear laws equivalent to its own"
-        _checks.refuse("vehicle", must, f"one for which none was found: {laws}", INSTEAD)
+        remedy = " ".join([*filter(None, map(coverage, vehicle.elements())), INSTEAD])
+        _checks.refuse("vehicle", must, f"one for which none was found: {laws}", remedy)
     return linear
 
 
