@@ -19,6 +19,8 @@ from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.report import Attempts, sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
+from jaxdamp.simulation import stationary_notes
+from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import Status, TuneResult, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -195,6 +197,8 @@ def run_sweep(
             data = sweep(ride, axes, progress=lambda done, total: advance(f"{done} of {total} points", done))
         remarks = [str(warning.message) for warning in caught]
         screen.table(data.jaxdamp.table())
+        remarks += stationary_notes(ride.vehicle, road) if isinstance(road, WhiteRoad) else []
+        remarks += [f"No effect on {name}: {', '.join(flat)}." for name, flat in without_effect(data).items()]
         screen.points(remarks, style="yellow")
         with interrupt.saving(), screen.stage("Tables"):
             (results.draft / "sweep.csv").write_text(data.jaxdamp.table().to_csv(), encoding="utf-8")

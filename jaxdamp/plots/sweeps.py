@@ -8,6 +8,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
 from jaxdamp.plots import _style
+from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import limit_spans
 
 
@@ -70,7 +71,9 @@ def sweep(
     figure = _style.new_figure(7.0, 4.6)
     plot = figure.add_subplot()
     over_axes = " and ".join(_words(data, name) for name in axes)
-    plot.set_title(f"{_words(data, metric)} over {over_axes}", loc="left", fontsize="medium")
+    idle = without_effect(data).get(metric, [])
+    flat = f" (no effect of {' and '.join(_words(data, name) for name in idle)})" if idle else ""
+    plot.set_title(f"{_words(data, metric)} over {over_axes}{flat}", loc="left", fontsize="medium")
     (_curves if curves else _map)(figure, plot, data, metric, chosen, rest, _ends(data, spans))
     return figure
 

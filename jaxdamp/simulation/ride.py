@@ -31,9 +31,9 @@ from jaxdamp.simulation.observer import MetricObserver
 from jaxdamp.simulation.range_notes import range_uses
 from jaxdamp.simulation.recorder import recorded
 from jaxdamp.simulation.run import refuse_stacked, run_check, sampled
-from jaxdamp.simulation.stationary import stationary_metrics, stationary_range_use
+from jaxdamp.simulation.stationary import in_motion, stationary_dampers, stationary_metrics, stationary_range_use
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
-from jaxdamp.vehicles import AbstractVehicle, is_stationary
+from jaxdamp.vehicles import AbstractVehicle, EquivalentDamper, is_stationary
 
 
 @final
@@ -48,8 +48,10 @@ class Ride(eqx.Module):
     Where the road reaches the rear axles by the vehicle's own axle positions, parameters that move an axle take part:
     its road is then computed anew.
 
-    On a white road (`roads.white`) the same call gives the stationary ride of the linearised vehicle: the metrics that
-    follow from an RMS, without a run. `duration`, `dt`, `substeps` and `engine` then mean nothing.
+    On a white road (`roads.white`) the same call gives the stationary ride: metrics that follow from an RMS, without a
+    run. Each law is replaced by the linear one that is equivalent in the motion that results, taken as normally
+    distributed (`vehicles.linearise` says how accurate that is); `equivalent_dampers` names it. `duration`, `dt`,
+    `substeps` and `engine` then mean nothing.
 
     Metrics are gathered, but for those that need the whole record (`percentile`, "max_transient_value", a function of
     your own): their channels are saved, so that memory grows with the run.
@@ -206,6 +208,15 @@ class Ride(eqx.Module):
         saved, _ = recorded(self.engine, system, heights, step)
         return range_uses(vehicle, system.form, saved.motion, saved.road, saved.road_rate, saved.port_force)
 
+    def equivalent_dampers(self, point: Mapping[str, Any] | None = None) -> dict[str, EquivalentDamper]:
+        """On a white road, the linear damper that stands for each law at a point; empty on other roads.
+
+        `EquivalentDamper.words` says it as in "Gaussian, equivalent slope 2006 N s/m at 0.21 m/s RMS".
+        """
+        if not isinstance(self.road, WhiteRoad):
+            return {}
+        return stationary_dampers(replace(self.vehicle, dict(point or {})), self.road)
+
     def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
         return outside_domains(self.vehicle, columns)
@@ -222,7 +233,10 @@ class Ride(eqx.Module):
         point = {name: as_float(value, name) for name, value in point.items()}
         ride = self.side_by_side() if is_batched((self, point)) else self
         with self.engine.naming_derivatives():
-            return MetricValues.with_units(_drive(ride, point), self.units)
+            values = _drive(ride, point)
+        if isinstance(self.road, WhiteRoad) and any(_infinite(value) for value in values.values()):
+            in_motion(replace(self.vehicle, point), self.road)  # which refuses laws that have no stationary motion
+        return MetricValues.with_units(values, self.units)
 
     def _check_shape(self, name: str, shape: tuple[int, ...]) -> None:
         """Refuse several numbers for one, which would be several cars."""
@@ -232,6 +246,11 @@ class Ride(eqx.Module):
                 must = "be one number for one car" if known[path] == () else f"be of shape {known[path]}"
                 remedy = "For several cars use `jaxdamp.sweep(ride, {...})`, or `jax.vmap(ride)`."
                 _checks.refuse(f"point[{name!r}]", must, f"of shape {shape}", remedy)
+
+
+def _infinite(value: Scalar) -> bool:
+    known = _checks.concrete(value)
+    return known is not None and not np.all(np.isfinite(known))
 
 
 @eqx.filter_jit

@@ -27,12 +27,13 @@ from jaxdamp.tune.wording import (
     bound_notes,
     changes_of,
     early_end,
-    idle_notes,
+    effect_notes,
     missed_notes,
     start_notes,
     tightened_notes,
     true_value_notes,
     violations,
+    without_effect,
     workshop_notes,
 )
 
@@ -82,8 +83,8 @@ def minimise(
             channel; or a differentiable function of the metrics by name, such as
             `lambda m: m["rms_sprung_acceleration"] / 1.5 + m["dynamic_load_coefficient"] / 0.2`, or `Targets(...)`.
         vehicle: the vehicle to start from.
-        road: a road for the simulation, the same in every step; `roads.white(...)` for the stationary response of the
-            linearised vehicle, which has no peaks; or `Scenarios(...)`, whose metrics are joined by their risk.
+        road: a road for the simulation, the same in every step; `roads.white(...)` for the stationary response with
+            equivalent linear laws, which has no peaks; or `Scenarios(...)`, whose metrics are joined by their risk.
         over: the parameters to change, by path, last part or pattern; all of the dampers that a workshop can change
             (`Parameter.adjustable`) if left out. A mapping `{parameter: (lower, upper)}` gives their bounds too, as
             `bounds` does.
@@ -141,7 +142,7 @@ def minimise(
     evaluate = one_at_a_time(numbers, space.free, names) if desk is None else desk.alone
     alone = Evaluator(evaluate, names, task.tolerance)
     all_limits = task.limits(alone.at(space.start)[0])
-    idle = task.without_effect(*alone.at(space.start))
+    task.refuse_constant(*alone.at(space.start))
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
         if desk is None:
@@ -150,7 +151,7 @@ def minimise(
             points = start_points(space, starts, seed)
             several = search_together(desk, alone, points, space, name, all_limits, max_steps, progress)
             ended, attempts = _chosen(several, alone, points, name, all_limits)
-        result = _result(task, alone, ended, attempts, all_limits, all_limits, idle, max_steps, fresh_roads)
+        result = _result(task, alone, ended, attempts, all_limits, all_limits, max_steps, fresh_roads)
         tighter = all_limits
         for again in range(1, TIGHTENED + 1):
             excess = {} if result.violated else lost_limits(result)
@@ -158,7 +159,7 @@ def minimise(
                 break
             tighter = [limit.tightened(excess.get(limit.of, 0.0)) for limit in tighter]
             ended = search(alone, space, name, tighter, max_steps, progress, ended.values)
-            result = _result(task, alone, ended, attempts, all_limits, tighter, idle, max_steps, fresh_roads, again)
+            result = _result(task, alone, ended, attempts, all_limits, tighter, max_steps, fresh_roads, again)
     return result
 
 
@@ -187,7 +188,6 @@ def _result(
     attempts: tuple[Attempt, ...],
     limits: Sequence[Limit],
     searched: Sequence[Limit],
-    idle: Sequence[str],
     max_steps: int,
     fresh_roads: int,
     again: int = 0,
@@ -197,7 +197,9 @@ def _result(
     Limits may have been tighter in the search than they are, after it was repeated so many times.
     """
     vehicle, space, objective, road, units = task.vehicle, task.space, task.objective, task.road, task.units
-    before, after = evaluator.at(space.start)[0], evaluator.at(ended.values)[0]
+    sides = evaluator.at(space.start), evaluator.at(ended.values)
+    before, after = (numbers for numbers, _ in sides)
+    idle = without_effect(space.free.names, (space.start, ended.values), objective.name, sides)
     short = missed(limits, after, evaluator.tolerance)
     changes = changes_of(space, ended.values)
     if short:
@@ -208,7 +210,7 @@ def _result(
         status = Status.STEP_LIMIT if ended.out_of_steps else Status.NO_BETTER_STEP
     held = reached(searched, after, evaluator.tolerance)
     notes = missed_notes(short, after, changes) + true_value_notes(objective, after, before, task.allowed)
-    notes += tightened_notes(limits, searched) + workshop_notes(space) + idle_notes(idle)
+    notes += tightened_notes(limits, searched) + workshop_notes(space) + effect_notes(idle, objective.name)
     notes += bound_notes(space, changes) + start_notes(attempts, objective.name)
     if status in (Status.STEP_LIMIT, Status.NO_BETTER_STEP):
         notes.append(early_end(ended, max_steps))
@@ -251,6 +253,7 @@ def _result(
         fresh=fresh,
         starts=attempts,
         scenarios=each,
+        without_effect=idle,
         drive=Drive(road.scenarios[0].road if isinstance(road, Scenarios) else road, *task.run),
         violated=violations(short, after),
         extrapolated=tuple(extrapolated),

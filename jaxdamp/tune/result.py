@@ -103,6 +103,7 @@ class TuneResult(Generic[V]):
         starts: the searches from several starts.
         scenarios: all metrics in every scenario; None for a tuning on one road.
         drive: what was driven over.
+        without_effect: names of the parameters by which the derivative of the minimised metric is zero.
         violated: each metric or shape beyond its limit, in words with its number.
         extrapolated: each damper that the tuned vehicle takes out of its fitted range for 1 % of the time or more.
         allowed: the limits as they are written, which may be relative to the start on each road.
@@ -127,6 +128,7 @@ class TuneResult(Generic[V]):
     starts: tuple[Attempt, ...] = ()
     scenarios: ScenarioValues | None = None
     drive: Drive | None = None
+    without_effect: tuple[str, ...] = ()
     violated: dict[str, str] = dataclasses.field(default_factory=dict)
     extrapolated: tuple[str, ...] = ()
     allowed: dict[str, LimitRange] = dataclasses.field(default_factory=dict)
@@ -158,6 +160,7 @@ class TuneResult(Generic[V]):
         inside = "all parameters inside their bounds" if not any(c.note for c in self.parameters) else ""
         stops = [*(f"{name} beyond its limit" for name in self.violated), *stops]
         state = "an optimum" if self.converged else "not an optimum"
+        stops += [f"no effect of {name}" for name in self.without_effect]
         parts = [f"{state} after {len(self.history)} steps", *stops, *[inside] * bool(inside)]
         return f"{self.verdict.sentence} {self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
 
@@ -249,6 +252,7 @@ class TuneResult(Generic[V]):
             "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
             "active_limits": list(self.active_limits),
             "active": list(self.active),
+            "without_effect": list(self.without_effect),
             "fresh": None if self.fresh is None else self.fresh.to_dict(),
             "scenarios": None if self.scenarios is None else plain(self.scenarios._asdict()),
             "starts": [plain(attempt._asdict()) for attempt in self.starts],

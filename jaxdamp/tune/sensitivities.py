@@ -60,7 +60,7 @@ def sensitivity(
         freeze: parameters among these to leave out.
         quantities: of the road by name, such as `{"speed": 20.0}`.
         dampers: the laws whose curves are looked at, by path or pattern; None for none. On a white road there are none,
-            since the linearised vehicle has no curves.
+            where no run over time is made.
         reach: largest velocity of the curves [m/s]; three times the largest RMS of a damper velocity if left out.
         hats: number of velocities on each side.
         second_order: also the second derivatives by the parameters: how flat an optimum is.

@@ -10,7 +10,7 @@ from jaxdamp._field_types import check_module
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import Ride
+from jaxdamp.simulation import Ride, stationary_notes
 from jaxdamp.tune.limits import Limit, LimitRange, limit_ranges, scaled
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.objective import Function, objective_of
@@ -123,25 +123,19 @@ class DesignTask(Generic[V]):
         spans = {name: allowed.at(before[name]) for name, allowed in self.allowed.items()}
         return {name: span[1] if np.isinf(span[0]) else span for name, span in spans.items()}
 
-    def without_effect(self, before: Mapping[str, float], slopes: Mapping[str, np.ndarray]) -> list[str]:
-        """The free numbers that move neither the objectives nor what is limited, to first order.
-
-        Raises:
-            ValueError: all of them are so, as for a constant objective.
-        """
-        moved = [slopes[name] for name in (*self.objective.names, *self.limited_names)]
-        idle = [name for name, moves in zip(self.space.free.names, np.any(moved, axis=0), strict=True) if not moves]
-        of_objectives = [slopes[name] for name in self.objective.names]
-        if not np.any(of_objectives):
+    def refuse_constant(self, before: Mapping[str, float], slopes: Mapping[str, np.ndarray]) -> None:
+        """Refuse objectives that do not depend on what is free."""
+        if not any(np.any(slopes[name]) for name in self.objective.names):
             values = ", ".join(f"{name} = {before[name]:.4g}" for name in self.objective.names)
             remedy = "Free a parameter that it depends on, or take a road on which it does."
             _checks.refuse(self._argument, "depend on what is free", f"{values} whatever they are", remedy)
-        return idle
 
     def notes_on_runs(self, design: AbstractVehicle) -> tuple[list[str], list[str]]:
         """Notes on the step and on the fitted ranges for a design, on every road; and the dampers far outside."""
-        notes, far = [], []
-        for ride_of in self.measured.rides_of():
+        rides, far = list(self.measured.rides_of()), []
+        road = rides[0](design).road if self.measured.white else None
+        notes = stationary_notes(design, road) if isinstance(road, WhiteRoad) else []
+        for ride_of in rides:
             coarse = [] if self.measured.white else step_notes(self.vehicle, design, ride_of)
             notes += coarse
             if not any("does not bear" in note for note in coarse):

@@ -14,6 +14,7 @@ from jaxdamp.tune.smooth import exact_counterpart
 from jaxdamp.tune.starts import Attempt
 
 
+_ROUNDING = 1e-12  # of a metric, by which its derivative times the parameter counts as zero
 ALIKE = 1e-3  # relative difference of metrics at ends that count as one optimum
 
 
@@ -151,6 +152,31 @@ def workshop_notes(space: SearchRange) -> list[str]:
     return [f"No workshop can change {', '.join(fixed)}: what was tuned cannot be built as it is."] if fixed else []
 
 
-def idle_notes(idle: Sequence[str]) -> list[str]:
-    """A sentence on the free numbers that move nothing."""
-    return [f"Without any effect at the start: {', '.join(idle)}."] if idle else []
+def without_effect(
+    names: Sequence[str],
+    values: Sequence[np.ndarray],
+    metric: str,
+    sides: Sequence[tuple[Mapping[str, float], Mapping[str, np.ndarray]]],
+) -> tuple[str, ...]:
+    """The parameters by which the derivative of the metric is zero at the start and at the end, but for rounding.
+
+    Arguments:
+        names: of the parameters.
+        values: of the parameters on both sides.
+        metric: what is minimised.
+        sides: metrics and their derivatives at the start and at the end.
+    """
+    idle = np.ones(len(names), bool)
+    for at, (numbers, slopes) in zip(values, sides, strict=True):
+        rounded = np.abs(slopes[metric] * at) <= _ROUNDING * abs(numbers[metric])
+        idle &= (slopes[metric] == 0.0) | (rounded & (at != 0.0))
+    return tuple(name for name, none in zip(names, idle, strict=True) if none)
+
+
+def effect_notes(idle: Sequence[str], metric: str) -> list[str]:
+    """A sentence on the parameters without effect."""
+    if not idle:
+        return []
+    theirs = "their tuned values say" if len(idle) > 1 else "its tuned value says"
+    remedy = "Free others, or choose another metric or road."
+    return [f"No effect on {metric}: {', '.join(idle)}; {theirs} nothing. {remedy}"]

@@ -312,3 +312,16 @@ def test_a_tuned_vehicle_that_the_step_does_not_suit_is_noted():
     assert "does not bear the step" in notes[2][0]
     (coarse,) = step_notes(start, start, lambda car: ride_of(car, 0.02))
     assert "coarse" in coarse
+
+
+def test_a_parameter_without_effect_is_named_and_not_called_optimal():
+    car = vehicles.presets.quarter_car_000(dampers.Linear(1500.0) + dampers.Spring(1e3, 50.0))
+    both = ["damper.terms.0.rate", "damper.terms.1.preload"]
+    result = tune.minimise("rms_sprung_acceleration", car, roads.white("C", 20.0), over=both)
+    assert result.without_effect == ("damper.terms.1.preload",) and result.converged
+    assert "no effect of damper.terms.1.preload" in result.summary
+    assert any(
+        note.startswith("No effect on rms_sprung_acceleration: damper.terms.1.preload") for note in result.warnings
+    )
+    alone = tune.minimise("rms_sprung_acceleration", car, roads.white("C", 20.0), over=both[1:])
+    assert alone.summary.endswith("no free parameter has an effect on it.") and "optimum" not in alone.summary
