@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxdamp.tune.kinks import descend, has_kinks
 from jaxdamp.tune.limits import Limit, limit_ends
 from jaxdamp.tune.ranges import SearchRange
 from jaxdamp.tune.side_by_side import LANES, RADIUS, BatchEvaluator, Computed, Lane, Scaling, solve_together
@@ -95,6 +96,10 @@ def trace_front(
         if not improved:
             break
         solve(improved, scaling)
+    if has_kinks(evaluator.task):
+        descend(lanes, evaluator, scaling)
+        _restarted(lanes, scaling, 10.0 * evaluator.improvement)
+        descend(lanes, evaluator, scaling)
     return lanes
 
 
