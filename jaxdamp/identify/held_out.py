@@ -18,7 +18,8 @@ from jaxdamp.identify.judging import fitted_models
 from jaxdamp.identify.model import Model, is_memoryless
 from jaxdamp.identify.predicting import predict_by_record, used_samples
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.result import FitResult, Score, score_of
+from jaxdamp.identify.result import FitResult
+from jaxdamp.identify.scoring import Score, score_of
 
 
 PARTS = 4  # into which records, or the time of each record, are divided

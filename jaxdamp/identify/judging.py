@@ -20,7 +20,8 @@ from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.predicting import predict_runs
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
-from jaxdamp.identify.result import FitResult, score
+from jaxdamp.identify.result import FitResult
+from jaxdamp.identify.scoring import score
 from jaxdamp.identify.several import Solution
 from jaxdamp.parameters import get, modules_inside, with_values
 

@@ -8,8 +8,9 @@ import numpy as np
 from jaxdamp._tables import Cell, Column, Table
 from jaxdamp.dampers import AbstractDamper, with_command
 from jaxdamp.identify.residual import ErrorShares
-from jaxdamp.identify.result import FitResult, Score
+from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.scheduling import ScheduledFit
+from jaxdamp.identify.scoring import Score
 from jaxdamp.parameters import parameters
 
 
@@ -58,6 +59,12 @@ class Rung(NamedTuple):
         parts = ["not converged"] * (not self.result.converged)
         parts += [f"{weak} not identifiable"] * bool(weak) + [f"{bound} at a bound"] * bool(bound)
         return ", ".join(parts)
+
+    def scores_table(self) -> Table:
+        """The error on each record or part of a record that was held out."""
+        columns = (Column("held out"), Column("fit", "%", ".1f"), Column("RMSE", "N", ".1f"))
+        rows = tuple((score.name, score.fit_percent, score.rmse) for score in self.scores)
+        return Table(f"Errors of {self.name}: {self.judged_on}", columns, rows)
 
     def laws(self) -> dict[str, AbstractDamper]:
         """The law by its name; one that depends on the command at each, by a name of its own."""

@@ -14,7 +14,7 @@ from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.result import fit_percent
+from jaxdamp.identify.scoring import fit_percent
 from jaxdamp.identify.vehicle_model import VehicleTest
 from jaxdamp.identify.vehicle_preparing import checked_records, drives_of
 from jaxdamp.identify.vehicle_residuals import DamperOnBench, RideBatch, ride_batches

@@ -113,6 +113,8 @@ def add_fits(
         report.picture(lambda: plots.ladder(comparison), "Errors of the laws", "ladder.png")
     report.heading(f"The recommended law: {best.name}" if several else best.name)
     report.table(parameters_of(best))
+    if best.judged_on:
+        report.table(best.scores_table())
     add_findings(report, best.result)
     report.picture(lambda: plots.fit_loops(best.result), f"{best.name} over the fitted records", "best_law_loops.png")
     if comparison.held_out:
