@@ -91,16 +91,16 @@ def _by_score(alone: Mapping[float, AtSetting], initial_state: str) -> Choice:
     for low, own, high in zip(alone, list(alone)[1:], list(alone)[2:], strict=False):
         below, at, above = alone[low], alone[own], alone[high]
         share, runs = (own - low) / (high - low), at.runs
-        ends = [predict_runs(model, runs, initial_state) for model in (below.model, above.model)]
-        ways = {
-            "parameters": predict_runs(_between(below, above, share), runs, initial_state),
-            "force": [(1.0 - share) * f + share * g for f, g in zip(*ends, strict=True)],
-        }
+        models = (below.model, _between(below, above, share), above.model)
+        low_force, middle, high_force = (_force(model, runs, initial_state) for model in models)
+        ways = {"parameters": middle, "force": (1.0 - share) * low_force + share * high_force}
+        lengths = np.cumsum([len(run) for run in runs])[:-1]
         used = [used_samples(at.model, run, is_memoryless(at.model), initial_state) for run in runs]
         level = sum(float(np.sum(run.force[k] ** 2)) for run, k in zip(runs, used, strict=True))
         for name, forces in ways.items():
-            pairs = zip(runs, forces, used, strict=True)
-            errors[name] += sum(float(np.sum((run.force[k] - force[k]) ** 2)) for run, force, k in pairs) / level
+            pairs = zip(runs, np.split(forces, lengths), used, strict=True)
+            squares = sum(float(np.sum((run.force[k] - force[k]) ** 2)) for run, force, k in pairs)
+            errors[name] += squares / level if np.isfinite(squares) else np.inf
     by_force = np.sqrt(errors["force"]) < BETTER * np.sqrt(errors["parameters"])
     count = len(alone) - 2
     by = "Forces are blended" if by_force else "Parameters are interpolated"
@@ -120,19 +120,24 @@ def _between(below: AtSetting, above: AtSetting, share: float) -> Model:
 
 
 def _force(model: Model, runs: Sequence[BenchRun], initial_state: str) -> Float[np.ndarray, " samples"]:
-    return np.concatenate(predict_runs(model, runs, initial_state))
+    """The force [N] at all samples; not a number where the model has none on this motion."""
+    try:
+        return np.concatenate(predict_runs(model, runs, initial_state))
+    except ValueError:  # no finite force, or states that drift: possible between two laws that have neither
+        return np.full(sum(map(len, runs)), np.nan)
 
 
 def _leaving(low: float, high: float, below: np.ndarray, middle: np.ndarray, above: np.ndarray) -> str:
     """A sentence on a force halfway that is farther from the mean of its neighbours than they are; empty otherwise."""
     mean = 0.5 * (below + above)
     away, half = (float(np.sqrt(np.mean(a**2))) for a in (middle - mean, 0.5 * (above - below)))
-    if away <= half + MARGIN * float(np.std(mean)):
+    if not np.isfinite(half) or away <= half + MARGIN * float(np.std(mean)):
         return ""
+    where = f"its force is {away:.3g} N RMS from their mean, and they are {half:.3g} N"
+    where = where if np.isfinite(away) else "it has no force on the motion of the records"
     return (
         f"Between {low:g} and {high:g} the law with interpolated parameters leaves the span of its neighbours' forces:"
-        f" halfway its force is {away:.3g} N RMS from their mean, and they are {half:.3g} N. The numbers at the two do"
-        " not belong together."
+        f" halfway {where}. The numbers at the two do not belong together."
     )
 
 

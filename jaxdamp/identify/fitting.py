@@ -81,9 +81,10 @@ def fit(
             free, with these values as start, beside those of the law: `rig=Rig(gas_force=-100.0, force_delay=1e-3)`
             estimates a gas force and a delay. `freeze` the known ones (`"rig.moving_mass"`). Names of effects get their
             starts from the records: `rig=["gas", "friction", "delay"]`, out of offset, gas, gas_stiffness, friction,
-            mass, delay, lag, stroke_offset, heat; an offset or gas force named so is left out beside a law that
-            contains an offset itself. All paths of parameters then begin with `law.` or `rig.`; their last parts stay
-            the same.
+            mass, delay, lag, stroke_offset, heat. An offset or gas force named so is the whole static force: a
+            constant force of the law is held at zero, or zero at rest in a table, unless the call gives it a value; it
+            is left out beside a law with a static force of its own meaning, such as a gas charge. All paths of
+            parameters then begin with `law.` or `rig.`; their last parts stay the same.
         freeze: parameters to hold at their start, by path, last part of a path, or pattern.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
         tie: parameters that take the values of others, such as `{"terms.1.**": "terms.0.**"}`: one free value for each
