@@ -1,6 +1,7 @@
 """Cycles of a recorded load."""
 
-from typing import NamedTuple
+import dataclasses
+from typing import final
 
 import numpy as np
 from jaxtyping import Float
@@ -9,7 +10,9 @@ from jaxdamp import _checks
 from jaxdamp._types import VectorLike
 
 
-class RainflowCycles(NamedTuple):
+@final
+@dataclasses.dataclass(frozen=True)
+class RainflowCycles:
     """The cycles of a load, as found by `rainflow_cycles`: closed ones, and half ones with a count of 1/2.
 
     Attributes:

@@ -94,7 +94,8 @@ _interpolated = jax.custom_jvp(_from_grid, nondiff_argnums=(3,))
 @_interpolated.defjvp
 def _derivative(first: int, primals: Any, tangents: Any) -> tuple[Signal, Signal]:
     """The slope is the sum of the lines times 2 pi i n, as exact as the value; that of the window is not."""
-    (cycles, real, imaginary), (faster, *lines) = primals, tangents
+    (cycles, real, imaginary), (faster, more_real, more_imaginary) = primals, tangents
     turning = 2.0 * jnp.pi * jnp.arange(first, first + real.size, dtype=real.dtype)
     slope = _interpolated(cycles, -turning * imaginary, turning * real, first)
-    return _interpolated(cycles, real, imaginary, first), slope * faster + _from_grid(cycles, *lines, first)
+    more = _from_grid(cycles, more_real, more_imaginary, first)
+    return _interpolated(cycles, real, imaginary, first), slope * faster + more

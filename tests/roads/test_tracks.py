@@ -1,3 +1,5 @@
+from typing import Any
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -35,8 +37,8 @@ def test_with_fixed_amplitudes_tracks_heave_and_roll_have_exactly_their_spectra(
 
 @pytest.mark.parametrize("seed", [3, 4])  # also the one of the left track
 def test_random_tracks_have_the_spectrum_and_coherency_on_average_also_drawn_anew(seed):
-    road = two_track(iso8608("C", SPEED, seed=3), track_width=TRACK, seed=seed)
-    drawn = road.reseeded(8)
+    road: Any = two_track(iso8608("C", SPEED, seed=3), track_width=TRACK, seed=seed)
+    drawn: Any = road.reseeded(8)
     n = np.asarray(road.roads[0].spatial_frequency)
     for left, right in (road.roads, drawn.roads):
         a, b = (np.asarray(r.relative_amplitude) * np.exp(1j * np.asarray(r.phase)) for r in (left, right))
@@ -46,7 +48,7 @@ def test_random_tracks_have_the_spectrum_and_coherency_on_average_also_drawn_ane
             assert abs(cross - np.mean(gamma(n[some]))) < scatter
             assert abs(np.mean(np.abs(b[some]) ** 2) - 1) < scatter
     assert abs(np.corrcoef(drawn.roads[0].relative_amplitude, road.roads[0].relative_amplitude)[0, 1]) < 0.08
-    same = two_track(road.roads[0], road.roads[0]).reseeded(8)
+    same: Any = two_track(road.roads[0], road.roads[0]).reseeded(8)
     np.testing.assert_array_equal(same.roads[0].relative_amplitude, same.roads[1].relative_amplitude)
 
 
