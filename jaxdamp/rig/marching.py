@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode
+from jaxdamp._sharded import varying_as
 from jaxdamp._types import Signal, State
 from jaxdamp.dampers import AbstractDamper
 
@@ -127,6 +128,7 @@ def march_states(
 
     grid = (grouped(fine_x[:-1]), grouped(fine_v[:-1]), grouped(fine_x[1:]), grouped(fine_v[1:]))
     between = None if warm is None else 0.5 * (warm[:-1] + warm[1:])
+    state = varying_as(state, grid, eqx.filter(law, eqx.is_array), h)
     last, states = jax.lax.scan(sample, state, (grid, between))
     states = jnp.concatenate([states, last[None]])
     return jax.vmap(force)(stroke, velocity, states, warm), last
