@@ -91,7 +91,7 @@ class Preflight:
         for (severity, name), members in kinds.items():
             worst = max(members, key=lambda finding: abs(finding.size or 0.0))
             count = len({record for finding in members for record in finding.records})
-            where = f"{name} in {count} records, most in" if len(members) > 1 else f"{name}:"
+            where = f"{name} in {count} records, most in" if count > 1 else f"{name}:"
             said.append(f"{severity}, {where} {worst.record}: {worst.message}. {worst.remedy}".rstrip())
         return said
 
