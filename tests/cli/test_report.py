@@ -13,6 +13,7 @@ from jaxdamp.cli.chaining import not_identified
 from jaxdamp.dampers import Bilinear
 from jaxdamp.export import from_json
 from jaxdamp.identify import Estimate
+from jaxdamp.tune import Outcome
 
 from .invoking import jaxdamp, refused
 
@@ -33,8 +34,11 @@ def test_the_chain_is_on_one_page_with_its_files(tmp_path: Path) -> None:
     assert float(fitted.rebound_rate) == pytest.approx(2600.0, rel=0.01)
     assert float(tuned.rebound_rate) != pytest.approx(float(fitted.rebound_rate), rel=0.05)
     page = (out / "report.html").read_text()
-    assert all(text in page for text in ("tuned law against vehicle as it is", "fitted law against", "A better damper"))
-    assert json.loads((out / "tuning.json").read_text())["summary"].replace(">", "&gt;") in page
+    tuning = json.loads((out / "tuning.json").read_text())
+    heading = Outcome[tuning["verdict"]].value  # the records are slower than the damper on this bump
+    assert heading == "Not known to be better: outside the records" and "A better damper" not in page
+    assert all(text in page for text in ("tuned law against vehicle as it is", "fitted law against", heading))
+    assert tuning["summary"].replace(">", "&gt;") in page
     names = {file.name for file in out.iterdir()}
     assert names >= {"vehicle.json", "ride_metrics.csv", "ride_1_ride.png", "tuning.png", "laws", "tables"}
 

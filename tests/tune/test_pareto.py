@@ -223,7 +223,8 @@ def test_simulated_front_is_better_than_a_grid():
 @pytest.mark.slow
 def test_a_front_of_a_peak_has_no_design_that_another_valley_beats():
     """Rebound rates near 2500 and 7000 N s/m are valleys of their own; a search stays in the one it begins in."""
-    peak, run = "peak_sprung_acceleration", {"duration": 2.5, "dt": 4e-3}
+    peak = "peak_sprung_acceleration"
+    run: dict[str, Any] = {"duration": 2.5, "dt": 4e-3}
     car = vehicles.presets.quarter_car_000(dampers.Bilinear(2600.0, 1400.0))
     road = roads.iso8608("D", speed=20.0, seed=3, duration=3.0)
     span = (300.0, 9000.0)
