@@ -193,6 +193,7 @@ def _solve_linear(problem: Problem) -> Solution:
     free, coordinates = problem.free, problem.coordinates
     begin = np.asarray(free.values)
     residual, jacobian = (np.asarray(a) for a in linearised(free, free.values, problem.residuals))
+    residual, jacobian = problem.anchored(begin, residual, jacobian)
     norms = np.linalg.norm(jacobian, axis=0)
     scale = np.where(norms > 0, norms, 1.0)
     lower, upper = (coordinates.to_physical(np.asarray(y)) for y in coordinates.bounds())
