@@ -208,6 +208,7 @@ def _solve_linear(problem: Problem) -> Solution:
     free, coordinates = problem.free, problem.coordinates
     begin = np.asarray(free.values)
     residual, jacobian = (np.asarray(a) for a in linearised(free, free.values, problem.residuals))
+    residual, jacobian = problem.anchored(begin, residual, jacobian)
     norms = np.linalg.norm(jacobian, axis=0)
     unseen = norms <= UNSEEN * norms.max()  # no sample shows these numbers: they keep their start
     scale, jacobian = np.where(unseen, 1.0, norms), np.where(unseen, 0.0, jacobian)

@@ -18,6 +18,7 @@ from jaxdamp.identify.judging import fitted_models
 from jaxdamp.identify.model import Model, is_memoryless
 from jaxdamp.identify.predicting import predict_by_record, used_samples
 from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.scoring import Score, score_of
 
@@ -25,6 +26,7 @@ from jaxdamp.identify.scoring import Score, score_of
 PARTS = 4  # into which records, or the time of each record, are divided
 FEWEST_MOTIONS = 3  # that differ, for whole records to be left out
 ALIKE = 0.02  # relative difference of frequency and largest velocity of records of the same motion
+LEAST_CHANGE = 0.1  # of what changes the force by its RMS: numbers are never held more firmly
 SLICES = 5  # in which a part of a record of few cycles is spread over it
 REFIT_STEPS = 12  # of each refit at most, from the minimum of all records
 
@@ -53,6 +55,9 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     Records of three motions or more are left out in up to four groups, records of the same motion together. Otherwise
     the quarters of the records in time are left out; of records shorter than four cycles, every fourth of 20 slices.
 
+    Only velocities that the other parts reach are compared: no law knows its curve beyond. A number that the other
+    parts do not determine keeps its value of the fit of all records.
+
     Arguments:
         result: of `fit`.
         in_time: never leave whole records out, since the fit has numbers that only one record determines.
@@ -62,7 +67,7 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     """
     evidence = result.evidence
     assert evidence is not None
-    problem, start = evidence.problem, evidence.problem.started_at(evidence.minimum.values)
+    problem, start = evidence.problem, _anchored_at(evidence)
     fitted = np.flatnonzero(np.isfinite(problem.sigma))
     runs = [problem.runs[i] for i in fitted]
     groups = motions(runs)
@@ -73,7 +78,9 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
         if np.all(factor) or not np.any(problem.used & (factor > 0)):
             continue
         models, forces = _refitted(start, factor)
+        known = np.concatenate([run.velocity[~left] for run, left in zip(runs, part, strict=True)])
         for i, run, left in zip(fitted, runs, part, strict=True):
+            left &= (run.velocity >= known.min()) & (run.velocity <= known.max())
             name = run.name if whole else f"{run.name}, part {number} of {PARTS}"
             errors.add(name, models[i], run, forces[i], left, problem.initial_state)
     records = f"each of {len(runs)} records" if whole else f"each quarter of the record{'s' * (len(runs) > 1)}"
@@ -186,6 +193,19 @@ def _kept(problem: Problem, fitted: Sequence[int] | np.ndarray, part: Part) -> F
         count = place.stop - place.start
         factor[place] = ~np.any(left[: count * block].reshape(count, block), axis=1)
     return factor
+
+
+def _anchored_at(evidence: Evidence) -> Problem:
+    """The problem at its minimum, where numbers are weakly held: a large change counts as one standard deviation.
+
+    It is a change by the value itself, if that is between a tenth and all of what changes the force by its RMS.
+    """
+    problem, minimum = evidence.problem, evidence.minimum
+    sensitivity = np.linalg.norm(minimum.jacobian, axis=0) / problem.level
+    by_force = np.divide(1.0, sensitivity, out=np.ones(sensitivity.shape), where=sensitivity > 0)
+    large = np.clip(np.abs(minimum.values), LEAST_CHANGE * by_force, by_force)
+    weight = float(np.mean(evidence.noise.sigma[problem.used])) / large
+    return problem.started_at(minimum.values)._replace(anchor=(minimum.values, weight))
 
 
 @one_thread()

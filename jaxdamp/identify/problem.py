@@ -58,6 +58,8 @@ class Problem(NamedTuple):
         initial_state: how the records start, of `INITIAL_STATES`.
         noise_factor: factor on the noise that weighted residuals show, because of a robust loss.
         share_left_out: share of the samples that a robust loss gives less than half weight.
+        anchor: values that free numbers keep where the records say nothing of them, and the weight of one unit of each
+            beside the residuals; None for a fit without.
     """
 
     free: FreeParameters
@@ -75,6 +77,7 @@ class Problem(NamedTuple):
     initial_state: str = "warm_up"
     noise_factor: float = 1.0
     share_left_out: float = 0.0
+    anchor: tuple[Float[np.ndarray, " free"], Float[np.ndarray, " free"]] | None = None
 
     @property
     def coordinates(self) -> Coordinates:
@@ -101,6 +104,18 @@ class Problem(NamedTuple):
         factors = np.split(factor, np.cumsum(sizes)[:-1])
         parts = (part.reweighted(own) for part, own in zip(self.residuals, factors, strict=True))
         return self._replace(residuals=tuple(parts))
+
+    def anchored(
+        self,
+        values: Float[np.ndarray, " free"],
+        residual: Float[np.ndarray, " samples"],
+        jacobian: Float[np.ndarray, "samples free"],
+    ) -> tuple[Float[np.ndarray, " rows"], Float[np.ndarray, "rows free"]]:
+        """Residual and Jacobian at these values, with a row for each number that has an anchor."""
+        if self.anchor is None:
+            return residual, jacobian
+        at, weight = self.anchor
+        return np.concatenate([residual, weight * (values - at)]), np.concatenate([jacobian, np.diag(weight)])
 
     def is_rounding(self, squares: float) -> bool:
         """Whether a sum of squares is so small that it consists of rounding errors, not of noise."""

@@ -158,6 +158,7 @@ def _point(problem: Problem, y: Float[np.ndarray, " free"]) -> _Point:
     point = jnp.asarray(y, problem.free.values.dtype)
     arrays = [np.asarray(a, np.float64) for a in _evaluated(problem.coordinates, point, problem.residuals)]
     values, residual, jacobian, units, of_law, slopes = arrays
+    residual, jacobian = problem.anchored(values, residual, jacobian)
     precision = float(jnp.finfo(point.dtype).eps)
     return _Point(y, values, residual, jacobian, units, of_law, slopes, problem.level, precision)
 

@@ -10,6 +10,8 @@ from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import Bilinear, Lag, Linear, PiecewiseLinear, Polynomial
 from jaxdamp.identify import compare, cross_validate
 from jaxdamp.identify.held_out import motions
+from jaxdamp.identify.model import is_memoryless
+from jaxdamp.identify.predicting import used_samples
 from jaxdamp.identify.recommending import recommendation
 
 
@@ -33,9 +35,16 @@ def test_the_simplest_law_within_the_noise_is_recommended(comparison):
 def test_refits_from_the_common_optimum_are_those_from_the_start(law):
     dyno = VirtualDyno(Lag(TRUTH, 0.004), sampling_rate=400.0, force_noise=10.0)
     runs = list(dyno.run([SineTest(0.01, f, cycles=3) for f in (1.0, 3.0, 5.0)]))
-    folds = {fold.held_out: fold.rmse for fold in cross_validate({"law": law}, runs).folds}
+    expected = {}
+    for fold, run in zip(cross_validate({"law": law}, runs).folds, runs, strict=True):
+        model, reached = fold.result.model, max(other.peak_velocity for other in runs if other is not run)
+        compared = np.zeros(len(run), bool)
+        compared[used_samples(model, run, is_memoryless(model))] = True
+        compared &= np.abs(run.velocity) < reached
+        error = fold.result.respond(run)[compared] - run.force[compared]
+        expected[fold.held_out] = float(np.sqrt(np.mean(error**2)))
     (rung,) = compare({"law": law}, runs).rungs
-    assert {score.name: score.rmse for score in rung.scores} == pytest.approx(folds, rel=1e-3)
+    assert {score.name: score.rmse for score in rung.scores} == pytest.approx(expected, rel=5e-3)
 
 
 def test_a_single_record_is_judged_quarter_by_quarter(sines):
@@ -46,7 +55,7 @@ def test_a_single_record_is_judged_quarter_by_quarter(sines):
     for number, score in enumerate(rung.scores):
         out = slices == number
         rate = run.velocity[~out] @ run.force[~out] / (run.velocity[~out] @ run.velocity[~out])
-        assert score.rmse == pytest.approx(np.sqrt(np.mean((rate * run.velocity[out] - run.force[out]) ** 2)), rel=1e-6)
+        assert score.rmse == pytest.approx(np.sqrt(np.mean((rate * run.velocity[out] - run.force[out]) ** 2)), rel=1e-4)
         assert score.name == f"{run.name}, part {number + 1} of 4"
 
 
