@@ -18,6 +18,7 @@ QUESTIONS = (
     ["printed"],
     ["identification"],
     ["pareto"],
+    ["white_road"],
     ["explorer"],
 )
 

@@ -112,7 +112,7 @@ def scaled_inverse(matrix: np.ndarray) -> np.ndarray:
 
 def print_score(name: str, result: FitResult, clean: Sequence[BenchRun], measured: Sequence[BenchRun]) -> None:
     """Fit [%] on records that were not fitted, by the force without and with noise, after the run-up."""
-    predicted = result.predict(measured)
+    predicted = result.respond(measured)
     rows = [slice(SAMPLES * 5 // 4, None)] * len(clean)
     scores = [
         [fit_percent([run.force[k]], [f[k]]) for run, f, k in zip(runs, predicted, rows, strict=True)]

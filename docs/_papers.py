@@ -9,7 +9,7 @@ import _paper_000
 import _paper_001
 import _paper_002
 import _paper_003
-from _statement import CORRECTED, OPEN, REPRODUCED
+from _statement import VERDICTS
 
 
 PAPERS = {
@@ -24,15 +24,17 @@ def write_table(path: Path) -> None:
     """The page with one table for each paper."""
     lines = ["# The papers and jaxdamp", ""]
     lines += [
-        "Every equation, table, figure and claim of the four papers that jaxdamp builds on: reproduced, corrected, or"
-    ]
-    lines += [
-        "not reproducible because the paper does not say enough. The numbers were computed when this page was built.",
+        "Every equation, table, figure and claim of the four papers that jaxdamp builds on. *Reproduced*: the numbers",
+        "follow. *Corrected*: a slip of the paper. *Contradicted*: a conclusion that does not hold where it can be",
+        "computed. *Consistent on a twin*: the records are unpublished, and a virtual damper that was made to show it",
+        "shows it, which proves nothing of the real one. *Not treated*: the paper does not say enough. The numbers in",
+        "the third column were computed when this page was built, the others in the notebooks that are named.",
         "",
     ]
     for title, statements in PAPERS.items():
-        counts = {verdict: sum(s.verdict == verdict for s in statements) for verdict in (REPRODUCED, CORRECTED, OPEN)}
-        lines += [f"## {title}", "", ", ".join(f"{count} {verdict}" for verdict, count in counts.items()) + ".", ""]
+        counts = {verdict: sum(s.verdict == verdict for s in statements) for verdict in VERDICTS}
+        summary = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
+        lines += [f"## {title}", "", f"{summary}.", ""]
         lines += ["| place | statement | computed | verdict | comment |", "|---|---|---|---|---|"]
         lines += [statement.row() for statement in statements] + [""]
     text = "\n".join(lines)

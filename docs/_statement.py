@@ -4,7 +4,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 
-REPRODUCED, CORRECTED, OPEN = "reproduced", "corrected", "not reproducible"
+REPRODUCED = "reproduced"
+CORRECTED = "corrected"  # a slip of the paper
+CONTRADICTED = "contradicted"  # a conclusion that does not follow, or does not hold where it can be computed
+CONSISTENT = "consistent on a twin"  # seen on records that were made to show it: no evidence of its own
+NOT_TREATED = "not treated"  # the paper does not say enough
+VERDICTS = (REPRODUCED, CORRECTED, CONTRADICTED, CONSISTENT, NOT_TREATED)
 
 
 class Statement(NamedTuple):
@@ -13,8 +18,8 @@ class Statement(NamedTuple):
     Arguments:
         place: equation, table, figure or section.
         statement: what the paper says.
-        verdict: `REPRODUCED`, `CORRECTED` or `OPEN`.
-        comment: how it is reproduced, why it is corrected, or what is missing.
+        verdict: one of `VERDICTS`.
+        comment: how it is reproduced, why it is corrected, or what is missing; the notebook that computes it.
         printed: the number in the paper, if it is one.
         computed: the number of jaxdamp.
         tolerance: largest relative difference of a reproduced number.

@@ -1,4 +1,7 @@
-"""Checks of arguments. Every message contains the argument, its value and the remedy."""
+"""Checks of arguments. Every message contains the argument, its value and the remedy.
+
+JAX is imported where numbers are checked, so that a command which refuses a path need not wait for it.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -6,8 +9,6 @@ from difflib import get_close_matches
 from typing import Any, NoReturn
 
 import numpy as np
-from jax import Array
-from jax.core import Tracer
 
 
 MOST_SHOWN = 8  # largest number of array elements shown in a message
@@ -79,7 +80,7 @@ def summary(value: Any, wrong: Any = None) -> Any:
     >>> summary(np.array([1.0, -2.0] * 10), np.array([False, True] * 10))
     '20 numbers, 10 of them wrong, the first -2 at index 1'
     """
-    if not isinstance(value, np.ndarray | Array) or value.size <= MOST_SHOWN:
+    if not (isinstance(value, np.ndarray) or hasattr(value, "aval")) or value.size <= MOST_SHOWN:
         return value
     array = np.asarray(value)
     shape = "" if array.ndim == 1 else f" in shape {array.shape}"
@@ -93,15 +94,22 @@ def summary(value: Any, wrong: Any = None) -> Any:
 
 
 def concrete(value: Any) -> np.ndarray | None:
-    """The value as a NumPy array, or `None` while JAX traces it (traced values cannot be checked)."""
+    """The value as a NumPy array, or `None` while JAX traces it.
+
+    Under `jax.grad` too, so that what is computed with it keeps its derivatives; checks take `_traced.behind`.
+    """
+    from jax.core import Tracer
+
     return None if isinstance(value, Tracer) else np.asarray(value)
 
 
 def _numbers(argument: str, value: Any) -> np.ndarray | None:
-    """`concrete`, but refusing values that are not numbers."""
-    array = concrete(value)
-    if array is not None and array.dtype.kind not in "biufc":
-        refuse(argument, "be a number", described(value))
+    """The value, also behind derivatives and batches; None inside `jax.jit`. What is no real number is refused."""
+    from jaxdamp._traced import behind
+
+    array = behind(value)
+    if array is not None and array.dtype.kind not in "biuf":
+        refuse(argument, "be a real number" if array.dtype.kind == "c" else "be a number", described(value))
     return array
 
 
@@ -117,6 +125,23 @@ def positive(argument: str, value: Any, remedy: str = "") -> None:
     array = _numbers(argument, value)
     if array is not None and not (np.all(np.isfinite(array)) and np.all(array > 0)):
         refuse(argument, "be positive and finite", summary(array, ~(np.isfinite(array) & (array > 0))), remedy)
+
+
+def untraced(argument: str, tree: Any, remedy: str = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`.") -> None:
+    """Refuse a tree with numbers that JAX traces, where numbers must be known and derivatives do not pass."""
+    from jaxdamp._traced import is_traced
+
+    if is_traced(tree):
+        refuse(argument, "have numbers that are known", "traced", remedy)
+
+
+def plain_number(argument: str, value: Any, remedy: str = "Close over a plain number.") -> float:
+    """A number that must be known before a program is compiled, and takes no part in derivatives."""
+    array = None if concrete(value) is None else _numbers(argument, value)
+    if array is None or array.ndim:
+        must = "be one plain number" if array is not None else "be a plain number, on which the length of a run depends"
+        refuse(argument, must, "traced" if array is None else f"of shape {array.shape}", remedy)
+    return float(array)
 
 
 def nonnegative(argument: str, value: Any, remedy: str = "") -> None:

@@ -35,7 +35,7 @@ def check_field_types(module: eqx.Module) -> None:
         argument, value = f"{type(module).__name__}.{name}", getattr(module, name)
         if annotation is Number:
             if jnp.ndim(value):
-                remedy = "One object has one value; `jax.vmap` over the constructor makes a batch, `sweep` runs many."
+                remedy = "One object has one value: `jax.vmap` a function that makes and drives one, or `sweep`."
                 _checks.refuse(argument, "be one number", f"an array of shape {jnp.shape(value)}", remedy)
         elif annotation is Vector:
             if jnp.ndim(value) != 1:

@@ -8,6 +8,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Inexact
 
+from jaxdamp._sharded import varying_as
+
 
 _HALVINGS = 20
 _TERMS = 13  # of the Taylor series at a norm of one half or less: its rest is below 1e-16
@@ -16,6 +18,7 @@ _TERMS = 13  # of the Taylor series at a norm of one half or less: its rest is b
 @jax.jit
 def solve(matrix: Inexact[Array, "n n"], right: Inexact[Array, "n *columns"]) -> Inexact[Array, "n *columns"]:
     """X of A X = B for a small regular matrix, by elimination with row exchange; differentiable in both."""
+    matrix, right = varying_as((matrix, right))
 
     def times(x: Array) -> Array:
         return matrix @ x
@@ -47,7 +50,7 @@ def phi_functions(z: Inexact[Array, "n n"]) -> tuple[Inexact[Array, "n n"], ...]
     number s of doublings is chosen from the norm of z; the loops have a fixed length, so that batches and derivatives
     pass through. Valid up to a norm of 2¹⁹.
     """
-    one = jnp.eye(z.shape[0], dtype=z.dtype)
+    one = varying_as(jnp.eye(z.shape[0], dtype=z.dtype), z)
     norm = jax.lax.stop_gradient(jnp.max(jnp.sum(jnp.abs(z), axis=0)))
     count = jnp.clip(jnp.ceil(jnp.log2(jnp.maximum(norm, 1e-3))) + 1.0, 0.0, _HALVINGS)
     small = z * 2.0**-count

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
+from jaxdamp._sharded import varying_as
 from jaxdamp._types import Scalar
 from jaxdamp.configuration import target
 
@@ -86,6 +87,7 @@ def increasing_root(
         for _ in range(likely if target().fused_loops else 0):  # written out they are fast, but take longer to compile
             before, w = w, jnp.clip(newton(w)[2], low, high)
             start = moved(before, w)
-        return jax.lax.while_loop(going, again, (0, start, (w, low, high, never, never)))[2][0]
+        begin = varying_as((0, start, (w, low, high, never, never)))
+        return jax.lax.while_loop(going, again, begin)[2][0]
 
     return jax.lax.custom_root(function, jax.lax.stop_gradient(guess), solve, tangent_solve)

@@ -116,7 +116,7 @@ class Table:
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow(column.heading for column in self.columns)
-        writer.writerows(["" if cell is None else cell for cell in row] for row in self.rows)
+        writer.writerows([_plain_cell(cell) for cell in row] for row in self.rows)
         return out.getvalue()
 
     def to_html(self) -> str:
@@ -202,3 +202,10 @@ def with_unit(value: Any, unit: str) -> dict[str, Any]:
 def with_tied(note: str, tied: Sequence[str]) -> str:
     """The remark on a number: its note, and the names of the numbers that are tied to it."""
     return "; ".join([note] * bool(note) + [f"= {', '.join(tied)}"] * bool(tied))
+
+
+def _plain_cell(cell: Any) -> Any:
+    """A cell of a CSV file; texts that a spreadsheet would compute as a formula begin with an apostrophe."""
+    if cell is None:
+        return ""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t", "\r")) else cell

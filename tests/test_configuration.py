@@ -10,6 +10,8 @@ import pytest
 from jaxdamp.configuration import _with_option
 
 
+pytestmark = pytest.mark.users_flags
+
 FUSED = "xla_cpu_small_while_loop_byte_threshold=16777216"
 
 IMPORTING = """

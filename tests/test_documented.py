@@ -37,7 +37,7 @@ def arguments(value: Any) -> list[str]:
         return []
     fields = getattr(value, "__dataclass_fields__", {})
     declared = {name for name, field in fields.items() if {"parameter", "setting"} & set(field.metadata)}
-    given = {"fitted_to"} if isinstance(value, type) and issubclass(value, AbstractDamper) else set()
+    given = {"range_note"} if isinstance(value, type) and issubclass(value, AbstractDamper) else set()
     given |= {"args", "kwargs"} if getattr(value, "_is_protocol", False) else set()
     return [name for name in inspect.signature(value).parameters if name not in declared | given]
 

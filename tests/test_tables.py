@@ -43,3 +43,8 @@ def test_comparisons_have_a_change_only_of_several() -> None:
     assert alone.rows == (("lift off", "–", 0.1),)
     assert percent_change(0.0, 1.0) is None and percent_change(4.0, 3.0) == pytest.approx(-25.0)
     assert typeset_unit("m/s^2") == "m/s²" and typeset_unit("", "–") == "–" and typeset_unit("m/s^1.75") == "m/s^1.75"
+
+
+def test_a_text_is_no_formula_in_a_csv_file():
+    table = Table("t", (Column("name"), Column("x")), (("=HYPERLINK(1)", -1.5), ("@a", None), ("-b", 2.0), ("c", 3.0)))
+    assert table.to_csv() == "name,x\n'=HYPERLINK(1),-1.5\n'@a,\n'-b,2.0\nc,3.0\n"

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 
+pytestmark = pytest.mark.users_flags
+
 ENTRIES = Path(__file__).with_name("every_entry_point.py")
 
 # Relative to the largest number of each entry, some five times what was measured; 1e-4 if it is not named.

@@ -98,7 +98,7 @@ ANSWERS = {  # call: words that its refusal holds
     "identify.compare({'a': 'linear'}, runs)": ("`laws['a']` must be a law", "Write `dampers.Linear`"),
     "identify.compare(runs, {'a': law})": ("`laws` must be laws by name", "is a BenchSet", "`compare(laws, runs)`"),
     "identify.compare({'a': law}, runs, held_out='b')": ("`held_out` must be a record or records",),
-    "identify.fit(law, runs, tie=['rate'])": ("`tie` must be a mapping of names to names", "tie={'front.damper.*'"),
+    "identify.fit(law, runs, tie=['rate'])": ("`tie` must be a mapping of names to names", "tie={'front.damper.**'"),
     "identify.fit(law, runs, tie={'rate': ['rate']})": ("`tie` must be a mapping of names to names",),
     "identify.cross_validate([law], runs)": ("`laws` must be laws by name", "`cross_validate(laws, runs)`"),
     "identify.train(runs, law, held_out=runs)": ("`runs` must be a record or records", "is a Linear"),

@@ -27,7 +27,7 @@ from jaxdamp.bench.evaluation import (
     read_limits,
     separate_gas_and_friction,
 )
-from jaxdamp.bench.preflight import Finding, Preflight, preflight
+from jaxdamp.bench.preflight import Finding, Preflight, preflight, usable
 from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import Excitation, RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable
@@ -88,4 +88,5 @@ __all__ = [
     "read_rides",
     "separate_gas_and_friction",
     "steady_cycles",
+    "usable",
 ]

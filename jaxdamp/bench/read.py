@@ -9,9 +9,9 @@ from typing import Any
 
 from jaxdamp import _checks
 from jaxdamp._checks import Setting
+from jaxdamp._files import find_files
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice, is_record
-from jaxdamp.bench.files import find_files
 from jaxdamp.bench.manifest import find_manifest, merged, read_manifest
 from jaxdamp.bench.problems import Problems
 from jaxdamp.bench.raw import RawTable

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._files import find_files
 from jaxdamp.bench import sampling, stamps
 from jaxdamp.bench.columns import split_header
-from jaxdamp.bench.files import find_files
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.problems import Problems
 from jaxdamp.bench.raw import RawTable

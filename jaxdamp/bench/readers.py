@@ -5,7 +5,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from jaxdamp import _checks
-from jaxdamp.bench.files import MAYBE_NOTES, TEXT_SUFFIXES
+from jaxdamp._files import FOLDER_SUFFIXES, TEXT_SUFFIXES
 from jaxdamp.bench.formats import read_mat, read_mdf, read_parquet, read_tdms, read_xlsx
 from jaxdamp.bench.raw import RawTable
 from jaxdamp.bench.text import read_text
@@ -31,7 +31,7 @@ def with_own(readers: Mapping[str, Reader] | None) -> dict[str, Reader]:
 
 def folder_suffixes(own: Mapping[str, Reader] | None) -> set[str]:
     """The suffixes of the files that a folder stands for: all but those of text files that may be notes."""
-    return set(READERS) - set(MAYBE_NOTES) | set(own or {})
+    return FOLDER_SUFFIXES | set(own or {})
 
 
 def read_tables(file: Path, readers: Mapping[str, Reader], delimiter: str | None = None) -> list[RawTable]:

@@ -150,7 +150,7 @@ class BenchRun:
         """Half the range of the stroke [m], zero to peak, smoothed over a twentieth of a period."""
         return motion_amplitude(self.time, self.stroke)
 
-    @property
+    @cached_property
     def cycles(self) -> int:
         """Number of full cycles, from one passage of mid-stroke to the next in the same direction."""
         return max(len(cycle_instants(self.time, self.stroke)) - 1, 0)

@@ -1,14 +1,18 @@
-"""What was set on the damper for each record, from a table or from the names of the files."""
+"""What was set on the damper for each record, from a table, from the names of the files, or from the records."""
 
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 
 from jaxdamp import _checks
+from jaxdamp.bench.contradictions import contradictions, same_motion
+from jaxdamp.bench.runs import BenchRun
 
 
 Settings = Mapping[str, float | int | str]
 _FIELD = re.compile(r"\{(\w*)\}")
 _NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
+_RECUR = 0.3  # share of the pairs of one motion that contradict, from which several settings were recorded
 
 
 def settings_by_name(names: Sequence[str], given: str | Mapping[str, Settings] | None) -> dict[str, dict]:
@@ -68,3 +72,47 @@ def _add(settings: dict, more: Settings, name: str) -> None:
         if settings.setdefault(key, value) != value:
             must = f"give each setting one value, as {key} of {name!r}"
             _checks.refuse("settings", must, f"{settings[key]!r} and {value!r}")
+
+
+def settings_apart(runs: Sequence[BenchRun]) -> tuple[dict[str, str], str]:
+    """The setting of each record where records of the same motion contradict one another again and again.
+
+    Settings are what separates all such pairs: something that the records state, or a word of their names; of several
+    the one with the fewest values. Where nothing does, each record stands for itself.
+
+    Arguments:
+        runs: records without a command.
+
+    Returns:
+        The setting by name of the record, empty where the records agree; and a sentence on it.
+    """
+    alike = sum(same_motion(a, b) for a, b in itertools.combinations(runs, 2))
+    apart = [(pair.first, pair.second) for pair in contradictions(runs)]
+    if not apart or len(apart) < _RECUR * alike:
+        return {}, ""
+    begin = f"{len(apart)} of {alike} pairs of records of the same motion differ in force: "
+    remedy = "State what was set as `command`."
+    stated = [
+        (f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs})
+        for key in runs[0].settings
+        if all(key in run.settings for run in runs)
+    ]
+    words = {run.name: re.split(r"[_\s,;()]+|-(?=\D)", run.name) for run in runs}
+    fewest = min(map(len, words.values()))
+    named = [("a word of their names", {n: w[i] for n, w in words.items()}) for i in range(-1, -fewest - 1, -1)]
+    splitting = [
+        (what, found) for what, found in stated + named if all(found[first] != found[second] for first, second in apart)
+    ]
+    splitting = [(what, found) for what, found in splitting if len(set(found.values())) < len(runs) or len(runs) == 2]
+    if not splitting:
+        said = "they are not pooled but stand one by one, since neither names nor settings tell them apart. "
+        return {run.name: run.name for run in runs}, begin + said + remedy
+    what, found = min(splitting, key=lambda each: len(set(each[1].values())))
+    values = sorted(set(found.values()), key=by_number)
+    return found, f"{begin}they are taken as settings {', '.join(values)}, by {what}. {remedy}"
+
+
+def by_number(text: str) -> tuple[float, str]:
+    """What names of settings are sorted by: their first number."""
+    number = _NUMBER.search(text)
+    return (float(number.group().replace(",", ".")) if number else float("inf"), text)

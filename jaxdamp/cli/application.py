@@ -1,12 +1,14 @@
 """The application, its help and its version."""
 
-from typing import Annotated
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import typer
 
-from jaxdamp.cli.option_types import (
-    Commands,
-)
+from jaxdamp.cli.option_types import Commands, Debug
+from jaxdamp.cli.record_options import spread
 
 
 app = typer.Typer(
@@ -41,3 +43,32 @@ def common(
     ] = False,
 ) -> None:
     """Options before a command. The help of the application stands above."""
+
+
+def command(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a function a command: its words are checked before JAX is loaded, and errors are said in one sentence.
+
+    Parameters whose types are dataclasses of options become options of their own; `--debug` is added.
+    """
+
+    def register(function: Callable[..., None]) -> Callable[..., None]:
+        options = spread(function)
+
+        signature = inspect.signature(options)
+        switch = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Debug)
+
+        @functools.wraps(options)
+        def run(**given: Any) -> None:
+            from jaxdamp.cli import console, early
+
+            with console.plain_errors(given.pop("debug")):
+                early.check(name, given)
+                console.prepare()
+                options(**given)
+
+        run.__signature__ = signature.replace(parameters=[*signature.parameters.values(), switch])  # pyright: ignore[reportAttributeAccessIssue]
+        run.__annotations__ = {**options.__annotations__, "debug": Debug}
+        app.command(name)(run)
+        return function
+
+    return register

@@ -47,7 +47,7 @@ def run_bench(
         with screen.stage("Reading the records"):
             raw = options.read(files)
         screen.table(records_table(tuple(raw)))
-        sound, found = checked(screen, raw)
+        sound, found = checked(screen, raw, options, processing)
         runs = processing.apply(sound)
         remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.heading("What was done to the records")
@@ -57,9 +57,9 @@ def run_bench(
             evaluation = bench.evaluate(runs, velocities=wanted, by=by)
             beneath = None if baseline is None else _baseline(baseline, evaluation, options, processing)
         check = None if chosen is None else evaluation.check(chosen)
+        screen.points(evaluation.notes, style="yellow")
         for name in ("velocities", "settings", "peak_forces", "loops"):
             screen.table(evaluation.tables()[name])
-        screen.points(evaluation.notes, style="yellow")
         if check is not None:
             screen.table(check.table())
         if beneath is not None:

@@ -1,5 +1,6 @@
 """`jaxdamp report`: bench records, a vehicle and a road in; laws, rides, a tuned damper and one page out."""
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from jaxdamp.cli.tuning import RoadOptions, TuneOptions, tuned, tuning_arguments
 from jaxdamp.cli.unusual import unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle
 from jaxdamp.cli.wording import message
+from jaxdamp.identify import FitResult
+from jaxdamp.parameters import parameters
 from jaxdamp.report import Attempts, chain_report, records_table, ride_tables
 from jaxdamp.simulation import Response
 from jaxdamp.tune import TuneResult
@@ -35,10 +38,11 @@ def run_report(
     laws: Sequence[str],
     out: Path,
     replace: bool = False,
-) -> TuneResult:
+) -> TuneResult | None:
     """Fit laws to records, ride on the best one, tune it, and write all of it with one page.
 
-    The vehicle rides with its own dampers, with the fitted law at all of them, and with the tuned laws.
+    The vehicle rides with its own dampers, with the fitted law at all of them, and with the tuned laws. Nothing is
+    tuned if the law has no parameter that a workshop can change and that the records determine.
 
     Raises:
         ValueError: what the library refuses; a white road, on which nothing rides.
@@ -51,7 +55,7 @@ def run_report(
     with results_folder(out, "report", replace=replace) as results:
         with screen.stage("Reading the records"):
             raw = reading.read(files)
-        sound, preflight = checked(screen, raw, notes=False)
+        sound, preflight = checked(screen, raw, reading, processing, refuse=True)
         runs = processing.apply(sound)
         remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
         screen.table(records_table(tuple(runs)))
@@ -63,14 +67,18 @@ def run_report(
             write_fits(results.draft, fits.comparison, runs, attempts)
             write_table(results.draft, "preflight", preflight.table())
             results.publish("the rides, the tuning and the report")
-        fitted = make(fits.comparison.best.result.law)
-        result = tuned(screen, tuning_arguments(fitted, on, options))
-        rides = _rides(screen, {"vehicle as it is": car, "fitted law": fitted, "tuned law": result.vehicle}, on)
+        best = fits.comparison.best.result
+        fitted = make(best.law)
+        result, sentences = _tuned(screen, fitted, best, on, options)
+        remarks += sentences
+        cars = {"vehicle as it is": car, "fitted law": fitted}
+        rides = _rides(screen, cars if result is None else cars | {"tuned law": result.vehicle}, on)
         title = f"{on.vehicle} on {on.road} at {on.speed:g} m/s"
         for table in ride_tables(rides).values():
             screen.table(table)
         with interrupt.saving(), screen.stage("Tuned law, vehicle and tables"):
-            write_tuning(results.draft, result)
+            if result is not None:
+                write_tuning(results.draft, result)
             for name, table in ride_tables(rides).items():
                 (results.draft / f"ride_{name}.csv").write_text(table.to_csv(), encoding="utf-8")
             results.publish("the pictures and the report")
@@ -84,6 +92,38 @@ def run_report(
     screen.files(out, results.published)
     screen.points(attempts.troubles, style="yellow")
     return result
+
+
+def _tuned(
+    screen: Screen, car: AbstractVehicle, fit: FitResult, on: RoadOptions, options: TuneOptions
+) -> tuple[TuneResult | None, list[str]]:
+    """The tuning of what can be built and was identified, unless the options name other parameters; and remarks."""
+    unknown, sentences = not_identified(fit), []
+    adjustable = [p.path for p in parameters(fit.law) if p.adjustable]
+    if not options.over and not set(adjustable) - set(unknown):
+        sentence = (
+            "Nothing is tuned: the law has no parameter that a workshop can change and that the records determine."
+        )
+        screen.say(sentence)
+        return None, [sentence]
+    left_alone = [path for path in adjustable if path in unknown and not options.over]
+    if left_alone:
+        options = dataclasses.replace(options, freeze=(*options.freeze, *(f"*damper.{path}" for path in left_alone)))
+        sentences.append(f"Not tuned, since the records do not determine it: {', '.join(left_alone)}.")
+    call, more = tuning_arguments(car, on, options)
+    screen.points([*more, *sentences])
+    return tuned(screen, call), [*more, *sentences]
+
+
+def not_identified(fit: FitResult) -> list[str]:
+    """The parameters of the law of which the records determine no number."""
+    inside = "law." if fit.rig is not None or fit.record_starts else ""
+    notes: dict[str, list[bool]] = {}
+    for estimate in fit.parameters:
+        if estimate.name.startswith(inside):
+            path = estimate.name.removeprefix(inside).partition("[")[0]
+            notes.setdefault(path, []).append(estimate.note == "not identifiable")
+    return [path for path, unknown in notes.items() if all(unknown)]
 
 
 def _rides(screen: Screen, cars: dict[str, AbstractVehicle], on: RoadOptions) -> dict[str, Response]:

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from unicodedata import category
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -33,17 +34,17 @@ class Screen:
 
     def say(self, text: str = "", style: str = "") -> None:
         """A paragraph, taken literally."""
-        self.console.print(Text(text, style=style), soft_wrap=False)
+        self.console.print(literal(text, style), soft_wrap=False)
 
     def heading(self, text: str) -> None:
         """A section begins."""
         self.console.print()
-        self.console.print(Text(text, style="bold"))
+        self.console.print(literal(text, "bold"))
 
     def points(self, items: Sequence[str], style: str = "") -> None:
         """A list of remarks."""
         for item in items:
-            self.console.print(Text.assemble(("  - ", style), (item, style)))
+            self.console.print(literal(f"  - {item}", style))
 
     def table(self, table: Table, mark: str | None = None) -> None:
         """A table without its meanings, which are for the files; rows whose first cell is `mark` in bold."""
@@ -51,9 +52,9 @@ class Screen:
         visible = [index for index, column in enumerate(table.columns) if column.name != "meaning"]
         for index in visible:
             side = "right" if table.is_number(index) else "left"
-            shown.add_column(Text(table.columns[index].heading), justify=side, overflow="fold", no_wrap=index == 0)
+            shown.add_column(literal(table.columns[index].heading), justify=side, overflow="fold", no_wrap=index == 0)
         for row in table.texts():
-            shown.add_row(*(Text(row[index]) for index in visible), style="bold" if row[0] == mark else "")
+            shown.add_row(*(literal(row[index]) for index in visible), style="bold" if row[0] == mark else "")
         self.heading(table.title)
         self.console.print(Padding(shown, (0, 0, 0, 2), expand=False))
 
@@ -101,6 +102,16 @@ class Screen:
         self.say(f"{title}: done in {seconds:.1f} s", "green")
 
 
+def literal(text: str, style: str = "") -> Text:
+    """A text as it is, with control characters made visible: names out of files must not command the terminal."""
+    shown = "".join(_escaped(c) if category(c) == "Cc" and c not in "\n\t" else c for c in text)
+    return Text(shown, style=style)
+
+
+def _escaped(character: str) -> str:
+    return character.encode("unicode_escape").decode()
+
+
 def prepare() -> None:
     """Double precision, all cores, fast loops, as a command may decide for its own process.
 
@@ -118,16 +129,16 @@ def prepare() -> None:
 
 @contextmanager
 def plain_errors(debug: bool) -> Iterator[None]:
-    """Show what the library refuses as one message without traceback, and end with exit code 2; after Ctrl-C 130."""
+    """Show what the library refuses as one message without traceback, and end with exit code 2."""
     screen = Console(stderr=True, highlight=False, soft_wrap=True)
     try:
         with interrupt.watched():
             yield
     except interrupt.Interrupted as stop:
-        screen.print(Text(str(stop), style="yellow"))
-        raise typer.Exit(interrupt.EXIT_CODE) from stop
-    except (ValueError, OSError) as error:
+        screen.print(literal(str(stop), "yellow"))
+        raise typer.Exit(interrupt.exit_code()) from stop
+    except (ValueError, OSError, ImportError) as error:
         if debug:
             raise
-        screen.print(Text.assemble(("Error: ", "bold red"), (message(error), "red")))
+        screen.print(literal("Error: ", "bold red").append(literal(message(error), "red")))
         raise typer.Exit(2) from error

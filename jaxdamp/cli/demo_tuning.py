@@ -1,8 +1,6 @@
-"""The tuning of `jaxdamp demo`: comfort against the grip of the tyre, and what it is worth on fresh roads."""
+"""The tuning of `jaxdamp demo`: comfort against the grip of the tyre."""
 
-import numpy as np
-
-from jaxdamp.tune import Rescore, TuneResult
+from jaxdamp.tune import TuneResult
 
 
 COMFORT = "weighted_rms_sprung_acceleration"
@@ -11,11 +9,6 @@ WORDS = {
     COMFORT: "body acceleration as people feel it (ISO 2631-1, Wk)",
     GRIP: "tyre load variation",
 }
-
-
-def limits(before: dict[str, float], tyre_load: float) -> dict[str, float]:
-    """The limit of the tuning: the tyre load may vary by so much more than before."""
-    return {GRIP: tyre_load * before[GRIP]}
 
 
 def purpose(tyre_load: float) -> str:
@@ -39,14 +32,3 @@ def outcome(tuned: TuneResult) -> str:
     cost = f"The price: {worse}." if worse else "Nothing else gets worse."
     stop = "; ".join(stops)
     return f"The body shakes {gain:.0f} % less. What ends the search: {stop}. {cost}"
-
-
-def fresh_verdict(fresh: Rescore) -> str:
-    """Whether the gain holds on roads that the tuning has not seen."""
-    gain, cost = 100 * fresh.change(COMFORT), 100 * fresh.change(GRIP)
-    held = int(np.sum(gain < 0))
-    return (
-        f"On {held} of {fresh.roads} fresh roads the body shakes less, by {-gain.mean():.0f} % on average "
-        f"({-gain.max():.0f} to {-gain.min():.0f} %); the {WORDS[GRIP]} changes by "
-        f"{cost.mean():+.0f} % ({cost.min():+.0f} to {cost.max():+.0f} %)."
-    )

@@ -17,14 +17,13 @@ from jaxdamp.cli.preflighting import checked
 from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 from jaxdamp.cli.results import Results, another_page, results_folder
 from jaxdamp.cli.vehicle_words import read_law
-from jaxdamp.cli.wording import message
+from jaxdamp.cli.wording import in_command_line, message
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison, CrossValidation, Failure, Rung
 from jaxdamp.report import (
     Attempts,
     failure_sentences,
     fit_report,
-    fitted_range_table,
     fitted_velocities,
     parameters_of,
     records_table,
@@ -80,7 +79,7 @@ def run_fit(
     with another_page(report, out, replace=replace), results_folder(out, "fit", replace=replace) as results:
         with screen.stage("Reading the records"):
             raw = options.read(files)
-        sound, found = checked(screen, raw, notes=False)
+        sound, found = checked(screen, raw, options, processing or ProcessOptions(), refuse=True)
         runs = (processing or ProcessOptions()).apply(sound)
         _, held = split(runs, held_out)
         groups = grouped(runs, group_by)
@@ -207,6 +206,7 @@ def fit_laws(
                 weighting=weighting,
                 rig=rig,
                 scheduled=scheduled,
+                bad_records="keep",  # they were checked
             ):
                 outcomes.append(outcome)
                 if isinstance(outcome, Rung):
@@ -223,17 +223,19 @@ def fit_laws(
 
 
 def show(screen: Screen, fits: Fitted) -> None:
-    """The fits at the terminal: the ladder, the parameters of the best law, and what to think of them."""
-    best = fits.comparison.best
-    screen.table(fits.comparison.table(), mark=best.name)
+    """The fits at the terminal: the answer, one table, the gist of the warnings; all else is in tables and page."""
+    comparison, best = fits.comparison, fits.comparison.best
+    several = len(comparison.rungs) > 1
+    lines = 1 + several  # of the verdict: which law, and why
+    screen.say()
+    screen.say(" ".join(comparison.verdict[:lines]), style="bold")
+    screen.table(comparison.table() if several else parameters_of(best), mark=best.name)
     screen.points(fits.failures, style="red")
-    screen.table(parameters_of(best))
-    if best.result.law.fitted_to is not None:
-        screen.table(fitted_range_table(best.result.law.fitted_to))
-    if best.by_setting:
-        screen.table(best.by_setting.table())
-    screen.say(" ".join(fits.comparison.verdict))
-    screen.points(best.result.warnings, style="yellow")
+    screen.say(" ".join(comparison.verdict[lines:]))
+    result = best.result
+    screen.points([in_command_line(warning) for warning in result.main_warnings], style="yellow")
+    if len(result.warnings) > len(result.main_warnings):
+        screen.points([f"all {len(result.warnings)} warnings of {best.name} are in report.html"])
 
 
 def write_fits(folder: Path, comparison: Comparison, runs: BenchSet, attempts: Attempts) -> None:

@@ -1,4 +1,4 @@
-"""Ctrl-C: a command stops between two computations and keeps what is finished, or at once if it is pressed again.
+"""Ctrl-C or SIGTERM: a command stops between two computations and keeps what is finished, a second time at once.
 
 Python's own `KeyboardInterrupt` may be raised inside a callback of XLA or while a module is loading, and has crashed
 the process from there. So while a command runs, Ctrl-C only wakes a thread. That thread ends the process at once as
@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from typing import Any
 
 
-EXIT_CODE = 130  # 128 + SIGINT, as shells have it
+SIGNALS = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}  # and what Python does with them
 SHOW_CURSOR = "\x1b[?25h"
 
 
@@ -32,24 +32,32 @@ class _Watch:
 
     def __init__(self) -> None:
         self.asked = False  # to stop at the next place
+        self.number = int(signal.SIGINT)  # of the signal that asked
         self.worth_keeping = False
         self.saving = False  # what is finished is being written
         self.closing: list[Callable[[], str]] = []  # tidy up, and say what is there
         self.busy = threading.RLock()  # held while files are moved into place
 
-    def pressed(self) -> None:
-        """Ctrl-C was pressed. Called by the watching thread."""
+    def pressed(self, number: int) -> None:
+        """Ctrl-C was pressed, or the process is to end. Called by the watching thread."""
+        self.number = number
         if self.worth_keeping and not self.asked:
             self.asked = True
-            _say("\nStopping as soon as this computation is done, to keep what is finished. Ctrl-C again: at once.")
+            again = " Ctrl-C again: at once." if number == signal.SIGINT else ""
+            _say(f"\nStopping as soon as this computation is done, to keep what is finished.{again}")
             return
         with self.busy:
             remaining = " ".join(text for text in (tidy() for tidy in reversed(self.closing)) if text)
             _say(f"\nStopped. {remaining or 'Nothing was written.'}")
-            os._exit(EXIT_CODE)
+            os._exit(exit_code())
 
 
 _watch = _Watch()
+
+
+def exit_code() -> int:
+    """Of a command that was stopped, as shells have it: 130 after Ctrl-C, 143 after SIGTERM."""
+    return 128 + _watch.number
 
 
 def check() -> None:
@@ -96,10 +104,10 @@ def undisturbed() -> Iterator[None]:
 
 @contextmanager
 def watched(then: Any = signal.default_int_handler) -> Iterator[None]:
-    """Take over Ctrl-C while this lasts.
+    """Take over Ctrl-C and SIGTERM while this lasts.
 
     Nothing changes where a command is called from a program that handles Ctrl-C itself or ignores it, from another
-    thread than the first, or from a command.
+    thread than the first, or from a command; and with SIGTERM, where the program handles or ignores that.
 
     Arguments:
         then: what answers Ctrl-C afterwards.
@@ -111,7 +119,9 @@ def watched(then: Any = signal.default_int_handler) -> Iterator[None]:
     _watch.asked = _watch.worth_keeping = _watch.saving = False
     ears, mouth = socket.socketpair()
     mouth.setblocking(False)
-    signal.signal(signal.SIGINT, lambda number, frame: None)  # the thread answers, at once and not between bytecodes
+    ours = [number for number, default in SIGNALS.items() if signal.getsignal(number) is default]
+    for number in ours:
+        signal.signal(number, lambda number, frame: None)  # the thread answers, at once and not between bytecodes
     before = signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)
     thread = threading.Thread(target=_listen, args=(ears,), name="Ctrl-C", daemon=True)
     thread.start()
@@ -119,7 +129,8 @@ def watched(then: Any = signal.default_int_handler) -> Iterator[None]:
         yield
     finally:
         signal.set_wakeup_fd(before)
-        signal.signal(signal.SIGINT, then)
+        for number in ours:
+            signal.signal(number, then if number == signal.SIGINT else SIGNALS[number])
         mouth.close()
         thread.join()
         ears.close()
@@ -129,8 +140,8 @@ def _listen(ears: socket.socket) -> None:
     """Wait for signals until the other end is closed."""
     while numbers := ears.recv(64):
         for number in numbers:
-            if number == signal.SIGINT:
-                _watch.pressed()
+            if number in SIGNALS:
+                _watch.pressed(number)
 
 
 def _say(text: str) -> None:

@@ -5,18 +5,17 @@ from typing import Annotated
 
 import typer
 
-from jaxdamp.cli.application import app
+from jaxdamp.cli.application import app, command
 from jaxdamp.cli.option_types import (
-    Debug,
     Duration,
     Replace,
     Seed,
     Speed,
 )
-from jaxdamp.cli.record_options import ProcessOptions, ReadOptions, spread
+from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 
 
-@app.command()
+@command("export")
 def export(
     law: Annotated[
         Path, typer.Argument(help="A law as JSON, such as best_law.json of jaxdamp fit; or a vehicle, for c and fmu.")
@@ -27,18 +26,14 @@ def export(
         str | None, typer.Option(help="Of a table, FROM:TO:POINTS [m/s]; those the law was fitted to, or -1:1:41.")
     ] = None,
     replace: Replace = False,
-    debug: Debug = False,
 ) -> None:
     """Write a law as C, as FMU or as the table of a simulator; or a whole vehicle as C or FMU."""
     from jaxdamp.cli import console, exporting
 
-    with console.plain_errors(debug):
-        console.prepare()
-        exporting.run_export(console.Screen(), law, to, out=out, velocities=velocities, replace=replace)
+    exporting.run_export(console.Screen(), law, to, out=out, velocities=velocities, replace=replace)
 
 
-@app.command()
-@spread
+@command("explore")
 def explore(
     law: Annotated[Path, typer.Argument(help="A law as JSON, such as best_law.json of jaxdamp fit.")],
     files: Annotated[
@@ -59,23 +54,20 @@ def explore(
     seed: Seed = 0,
     out: Annotated[Path | None, typer.Option(help="File to write; the name of the law with .html.")] = None,
     replace: Replace = False,
-    debug: Debug = False,
 ) -> None:
     """Write a law as one page for the browser: sliders, loops, records and a ride, live and without a network."""
     from jaxdamp.cli import console, exploring
 
-    with console.plain_errors(debug):
-        console.prepare()
-        exploring.run_explore(
-            console.Screen(),
-            law,
-            files or [],
-            reading,
-            processing,
-            exploring.RideOptions(vehicle, road, speed, duration, seed, baseline),
-            out=out,
-            replace=replace,
-        )
+    exploring.run_explore(
+        console.Screen(),
+        law,
+        files or [],
+        reading,
+        processing,
+        exploring.RideOptions(vehicle, road, speed, duration, seed, baseline),
+        out=out,
+        replace=replace,
+    )
 
 
 @app.command(name="vehicles")

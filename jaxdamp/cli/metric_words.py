@@ -10,6 +10,9 @@ from jaxdamp.report import GOALS, goal_metrics
 from jaxdamp.vehicles import AbstractVehicle
 
 
+GRIP = "+10%"  # how much more a tyre load may vary after a tuning, by default
+
+
 def metric_names(option: str, word: str, vehicle: AbstractVehicle, *, white: bool) -> list[str]:
     """The ride metrics that a word means: comfort, travel, grip, or the name of one.
 
@@ -40,13 +43,32 @@ def objective_word(word: str, vehicle: AbstractVehicle, *, white: bool) -> str |
 
 
 def limit_words(texts: Sequence[str], vehicle: AbstractVehicle, *, white: bool) -> dict[str, Any]:
-    """The limits of "travel=0.1" or "maximum_x=-0.1:0.2"; a word that means several metrics limits each."""
+    """The limits of "travel=0.1", "maximum_x=-0.1:0.2" or "grip=+10%"; a word that means several metrics limits each.
+
+    "grip=none" is no limit.
+    """
     found = {}
     for word, value in pairs("limit", texts):
         for name in metric_names("limit", word, vehicle, white=white):
-            lower, upper = span("limit", value)
-            found[name] = upper if lower is None else (lower, upper)
+            if value != "none":
+                lower, upper = limit_span(value)
+                found[name] = upper if lower is None else (lower, upper)
     return found
+
+
+def default_limits(
+    texts: Sequence[str], goal: str, vehicle: AbstractVehicle, *, white: bool
+) -> tuple[dict[str, str], str]:
+    """The limit of grip that a tuning has by default, and a sentence that says so.
+
+    There is none where grip is minimised, or where the limits name grip or one of its metrics.
+    """
+    grip = metric_names("limit", "grip", vehicle, white=white)
+    named = {word for word, _ in pairs("limit", texts)} | {goal}
+    if named & {"grip", *grip}:
+        return {}, ""
+    words = f"Limited by default: grip (RMS variation of each tyre load) to {GRIP} of the start"
+    return dict.fromkeys(grip, GRIP), f"{words}; --limit grip=none removes it."
 
 
 def pairs(option: str, texts: Sequence[str]) -> list[tuple[str, str]]:
@@ -64,6 +86,19 @@ def pairs(option: str, texts: Sequence[str]) -> list[tuple[str, str]]:
             _checks.refuse(option, "name each thing once", f"twice {name!r}")
         found.append((name, value))
     return found
+
+
+def limit_span(text: str) -> tuple[float | str | None, float | str | None]:
+    """The ends of a limit, each a number or relative to the start.
+
+    >>> limit_span("+10%"), limit_span("0.05:+20%")
+    ((None, '+10%'), (0.05, '+20%'))
+    """
+    parts = [part.strip() for part in text.split(":")]
+    if not any(part.endswith("%") for part in parts) or len(parts) > 2:
+        return span("limit", text)
+    ends = [part if part.endswith("%") else span("limit", part)[1] if part else None for part in parts]
+    return (None, ends[0]) if len(ends) == 1 else (ends[0], ends[1])
 
 
 def span(option: str, text: str) -> tuple[float | None, float | None]:

@@ -65,7 +65,7 @@ Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an e
 Replace = Annotated[
     bool,
     typer.Option(
-        "--replace", "--force", help="Write into --out although it is not empty: results of jaxdamp are replaced."
+        "--replace", "--force", help="Write into --out although it is not empty; earlier results go to .previous in it."
     ),
 ]
 
@@ -97,7 +97,10 @@ Baseline = Annotated[Path | None, typer.Option(help="Another law to compare with
 BaselineVehicle = Annotated[
     Path | None, typer.Option(help="To compare with: another law, or another tuning's vehicle.json, as JSON.")
 ]
-Limit = Annotated[list[str], typer.Option(help="Hard limits [SI]: travel=0.1,grip=900, or NAME=LOWER:UPPER.")]
+Limit = Annotated[
+    list[str],
+    typer.Option(help="Hard limits [SI]: travel=0.1,comfort=+5%, NAME=LOWER:UPPER; a tuning has grip=+10% by itself."),
+]
 Start = Annotated[Path | None, typer.Option(help="A law as JSON for all dampers, instead of the vehicle's own.")]
 Speed = Annotated[float, typer.Option(help="Of the vehicle [m/s].")]
 Duration = Annotated[float | None, typer.Option(help="Of each ride [s]; the road's own, or 10.")]

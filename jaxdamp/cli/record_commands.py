@@ -5,11 +5,10 @@ from typing import Annotated
 
 import typer
 
-from jaxdamp.cli.application import app
+from jaxdamp.cli.application import command
 from jaxdamp.cli.option_types import (
     Baseline,
     CrossValidate,
-    Debug,
     Files,
     GroupBy,
     Page,
@@ -17,12 +16,11 @@ from jaxdamp.cli.option_types import (
     Start,
     Vehicle,
 )
-from jaxdamp.cli.record_options import ProcessOptions, ReadOptions, spread
+from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 from jaxdamp.cli.vehicle_fit_options import RideReadOptions, VehicleFitOptions
 
 
-@app.command()
-@spread
+@command("fit")
 def fit(
     files: Files,
     *,
@@ -51,7 +49,6 @@ def fit(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-fit"),
     report: Page = None,
     replace: Replace = False,
-    debug: Debug = False,
 ) -> None:
     """Fit damper laws to bench records, and say how good they are.
 
@@ -60,28 +57,25 @@ def fit(
     """
     from jaxdamp.cli import console, fitting
 
-    with console.plain_errors(debug):
-        console.prepare()
-        fitting.run_fit(
-            console.Screen(),
-            files,
-            reading,
-            laws=law,
-            held_out=held_out,
-            weighting=weighting,
-            rig=rig,
-            processing=processing,
-            group_by=group_by,
-            cross_validate=cross_validate,
-            baseline=baseline,
-            out=out,
-            report=report,
-            replace=replace,
-        )
+    fitting.run_fit(
+        console.Screen(),
+        files,
+        reading,
+        laws=law,
+        held_out=held_out,
+        weighting=weighting,
+        rig=rig,
+        processing=processing,
+        group_by=group_by,
+        cross_validate=cross_validate,
+        baseline=baseline,
+        out=out,
+        report=report,
+        replace=replace,
+    )
 
 
-@app.command(name="fit-vehicle")
-@spread
+@command("fit-vehicle")
 def fit_vehicle(
     vehicle: Vehicle,
     files: Annotated[list[Path], typer.Argument(help="Files with records of its motion, patterns, or folders.")],
@@ -92,7 +86,6 @@ def fit_vehicle(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-fit-vehicle"),
     report: Page = None,
     replace: Replace = False,
-    debug: Debug = False,
 ) -> None:
     """Fit masses, rates, friction and dampers of a vehicle to records of its motion on a rig or a road.
 
@@ -101,15 +94,12 @@ def fit_vehicle(
     """
     from jaxdamp.cli import console, vehicle_fitting
 
-    with console.plain_errors(debug):
-        console.prepare()
-        vehicle_fitting.run_fit_vehicle(
-            console.Screen(), vehicle, files, reading, options, start=start, out=out, report=report, replace=replace
-        )
+    vehicle_fitting.run_fit_vehicle(
+        console.Screen(), vehicle, files, reading, options, start=start, out=out, report=report, replace=replace
+    )
 
 
-@app.command()
-@spread
+@command("bench")
 def bench(
     files: Files,
     *,
@@ -127,7 +117,6 @@ def bench(
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-bench"),
     replace: Replace = False,
-    debug: Debug = False,
 ) -> None:
     """Look over bench records and evaluate them: what is odd, forces, rates, gas force, friction, limits.
 
@@ -136,30 +125,27 @@ def bench(
     """
     from jaxdamp.cli import benching, console
 
-    with console.plain_errors(debug):
-        console.prepare()
-        passed = benching.run_bench(
-            console.Screen(),
-            files,
-            reading,
-            processing=processing,
-            velocities=velocities,
-            group_by=group_by,
-            limits=limits,
-            baseline=baseline,
-            out=out,
-            replace=replace,
-        )
+    passed = benching.run_bench(
+        console.Screen(),
+        files,
+        reading,
+        processing=processing,
+        velocities=velocities,
+        group_by=group_by,
+        limits=limits,
+        baseline=baseline,
+        out=out,
+        replace=replace,
+    )
     if not passed:
         raise typer.Exit(1)
 
 
-@app.command()
+@command("demo")
 def demo(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-demo"),
     seed: Annotated[int, typer.Option(help="Of the noise of the virtual bench and of the roads.")] = 0,
     replace: Replace = False,
-    debug: Debug = False,
 ) -> None:
     """Run the whole chain on a damper whose truth is known. Needs no input.
 
@@ -169,6 +155,4 @@ def demo(
     from jaxdamp.cli import console
     from jaxdamp.cli import demo as demonstration
 
-    with console.plain_errors(debug):
-        console.prepare()
-        demonstration.run_demo(console.Screen(), demonstration.Scenario(seed=seed), out=out, replace=replace)
+    demonstration.run_demo(console.Screen(), demonstration.Scenario(seed=seed), out=out, replace=replace)

@@ -52,7 +52,10 @@ class ReadOptions:
         Path | None,
         typer.Option(help="TOML file that says how to read the files; jaxdamp.toml in a folder is taken by itself."),
     ] = None
-    skip_bad: Annotated[bool, typer.Option("--skip-bad", help="Leave out files that cannot be read.")] = False
+    skip_bad: Annotated[
+        bool, typer.Option("--skip-bad", help="Leave out files that cannot be read, and records with an error.")
+    ] = False
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print all findings on the records.")] = False
     command: Annotated[
         list[str], typer.Option(help="What was set on the damper, by name or pattern: '*_0.5A=0.5,*_1A=1'.")
     ] = field(default_factory=list)

@@ -1,21 +1,31 @@
 """The folder that a command writes: never over what is there, and never half-written without saying so."""
 
 import errno
+import getpass
+import glob
+import hashlib
 import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+import typer
+from filelock import FileLock, Timeout
+
+from jaxdamp._writing import sync, write_whole
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.interrupt import Interrupted
 
 
 MANIFEST = "manifest.json"
 UNFINISHED = "UNFINISHED.txt"
+PREVIOUS = ".previous"
 FORMAT = "jaxdamp results"
+DRAFT = ".draft"
 
 
 class Results:
@@ -29,58 +39,92 @@ class Results:
 
     def __init__(self, target: Path, command: str, earlier: list[str]) -> None:
         self.target, self._command, self._earlier = target, command, earlier
-        self._published: set[str] = set()
+        self._published: dict[str, str] = {}  # hashes by file
+        self._begun = False
         self.missing = "everything"
         self.draft = self._new_draft()
 
     def _new_draft(self) -> Path:
-        return Path(tempfile.mkdtemp(prefix=f".{self.target.name}.", suffix=".draft", dir=self.target.parent))
+        return Path(tempfile.mkdtemp(prefix=f".{self.target.name}.", suffix=DRAFT, dir=self.target.parent))
 
     @property
     def published(self) -> list[str]:
         """The files that are in place so far, without those that tell of them."""
-        return sorted(self._published - {MANIFEST, UNFINISHED})
+        return sorted(self._published)
 
     def publish(self, missing: str = "") -> None:
         """Move what is written so far into place.
+
+        A folder that does not exist yet appears with all of it at once. In one that exists, `UNFINISHED.txt` is there
+        before the first file is touched, and what an earlier run wrote goes to `.previous` before the first new file
+        comes: whenever the process ends, no old file stands beside a new one without this note.
 
         Arguments:
             missing: what is still to come, in words, for a file that stays in the folder until all is there.
         """
         self.missing = missing
         with interrupt.undisturbed():
-            results = {*self.published, *written(self.draft)}
-            files = [*sorted(results), *([UNFINISHED] if missing else []), MANIFEST]
-            if missing:
-                text = f"These results of jaxdamp {self._command} are not complete. Missing: {missing}.\n"
-                (self.draft / UNFINISHED).write_text(text, encoding="utf-8")
-            manifest = {"format": FORMAT, "command": self._command, "complete": not missing, "files": files}
-            text = json.dumps(manifest, indent=1, ensure_ascii=False) + "\n"
-            (self.draft / MANIFEST).write_text(text, encoding="utf-8")
-            self._move(files)
+            fresh = written(self.draft)
+            for name in fresh:
+                sync(self.draft / name)
+            self._published |= {name: _sha256(self.draft / name) for name in fresh}
+            if not self.target.exists():
+                self._tell(self.draft, missing)
+                mask = os.umask(0)
+                os.umask(mask)
+                self.draft.chmod(0o777 & ~mask)
+                self.draft.rename(self.target)
+            else:
+                self._move(fresh, missing)
+            sync(self.target.parent)
+            self._begun = True
             shutil.rmtree(self.draft, ignore_errors=True)
             if missing:
                 self.draft = self._new_draft()
 
-    def _move(self, files: list[str]) -> None:
-        """Move the draft into place and take away what only an earlier run or stage wrote."""
-        fresh = written(self.draft)
-        if not self.target.exists():
-            mask = os.umask(0)
-            os.umask(mask)
-            self.draft.chmod(0o777 & ~mask)
-            self.draft.rename(self.target)
-        for name in fresh if self.draft.exists() else ():
+    def _move(self, fresh: list[str], missing: str) -> None:
+        """Move the draft into a folder that exists."""
+        if not self._begun:
+            self._keep_previous(fresh)
+        self._tell(self.target, missing or "what was being moved here when the run ended")
+        for name in fresh:
             place = self.target / name
             place.parent.mkdir(parents=True, exist_ok=True)
             os.replace(self.draft / name, place)
-        for name in {*self._earlier, *self._published} - set(files):
-            (self.target / name).unlink(missing_ok=True)
-            for folder in (self.target / name).parents:
-                if folder == self.target or not folder.is_dir() or any(folder.iterdir()):
-                    break
-                folder.rmdir()
-        self._published, self._earlier = set(files), []
+        self._tell(self.target, missing)
+        if not missing:
+            (self.target / UNFINISHED).unlink(missing_ok=True)
+
+    def _keep_previous(self, fresh: list[str]) -> None:
+        """Move what an earlier run wrote, and files of the names to come, to `.previous`; the one before is dropped."""
+        there = [name for name in dict.fromkeys([*self._earlier, *fresh]) if (self.target / name).is_file()]
+        if not there:
+            return
+        previous, old = self.target / PREVIOUS, self.target / MANIFEST
+        _forget(previous)
+        previous.mkdir(exist_ok=True)
+        if old.is_file():
+            shutil.copyfile(old, previous / MANIFEST)
+        self._tell(self.target, f"everything; the results of the run before are in {PREVIOUS}", [*there])
+        for name in there:
+            (previous / name).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(self.target / name, previous / name)
+            _remove_empty((self.target / name).parent, self.target)
+
+    def _tell(self, folder: Path, missing: str, besides: list[str] | None = None) -> None:
+        """Write the manifest, and first the note on what is missing."""
+        if missing:
+            text = f"These results of jaxdamp {self._command} are not complete. Missing: {missing}.\n"
+            write_whole(folder / UNFINISHED, text)
+        files = [*sorted({*self.published, *(besides or [])}), *([UNFINISHED] if missing else []), MANIFEST]
+        manifest = {
+            "format": FORMAT,
+            "command": self._command,
+            "complete": not missing,
+            "files": files,
+            "sha256": self._published,
+        }
+        write_whole(folder / MANIFEST, json.dumps(manifest, indent=1, ensure_ascii=False) + "\n")
 
     def discard(self) -> str:
         """Remove the draft, and say what is in place."""
@@ -94,8 +138,9 @@ class Results:
 def results_folder(target: Path, command: str, *, replace: bool = False) -> Iterator[Results]:
     """Results to write; they are in place when all is done, or from the first `publish` on.
 
-    The target must not exist, or be empty. With `replace`, what a command wrote there before is replaced as soon as
-    there is something new, file by file: files that others put there stay, unless they have the name of a new one.
+    The target must not exist, or be empty. With `replace`, what the same command wrote there before, and any file that
+    has the name of a new one, is moved to `.previous` inside as soon as there is something new; all other files stay.
+    Nothing outside the folder is touched, wherever links lead, and no second command writes at the same time.
 
     Arguments:
         target: the folder to write.
@@ -103,11 +148,35 @@ def results_folder(target: Path, command: str, *, replace: bool = False) -> Iter
         replace: write into a folder that is not empty.
 
     Raises:
-        ValueError: the target is a file, is not empty, or cannot be written.
+        ValueError: the target is a file, is not empty, holds the results of another command, is being written by
+            another process, or cannot be written.
         Interrupted: Ctrl-C, with words on what was written. What is finished is in place then.
     """
     target = target.expanduser()
-    results = _opened(target, command, replace)
+    with _only_writer(target):
+        yield from _written(_opened(target, command, replace))
+
+
+@contextmanager
+def _only_writer(target: Path) -> Iterator[None]:
+    """Refuse a second process that writes the same folder; the lock ends with the process, however that ends."""
+    name = hashlib.sha256(str(target.resolve()).encode()).hexdigest()[:24]
+    lock = FileLock(Path(tempfile.gettempdir()) / f"jaxdamp-{getpass.getuser()}-{name}.lock")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        raise ValueError(
+            f"Another command is writing {str(target)!r}: wait for it, or name another folder with --out."
+        ) from None
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def _written(results: Results) -> Iterator[Results]:
+    """Give the results to be filled, and end them well or badly."""
+    target = results.target
     try:
         with interrupt.closing(results.discard):
             yield results
@@ -121,6 +190,15 @@ def results_folder(target: Path, command: str, *, replace: bool = False) -> Iter
         raise _unwritable(place, error) from error
     finally:
         shutil.rmtree(results.draft, ignore_errors=True)
+
+
+def refuse_target(target: Path, command: str, *, replace: bool) -> None:
+    """Refuse a folder that the command may not write.
+
+    Raises:
+        ValueError: as `results_folder`.
+    """
+    _earlier_files(target.expanduser(), command, replace)
 
 
 @contextmanager
@@ -146,7 +224,10 @@ def another_page(page: Path | None, target: Path, *, replace: bool = False) -> I
 
 def _opened(target: Path, command: str, replace: bool) -> Results:
     """The results of a folder that may be written."""
-    earlier = _earlier_files(target, replace)
+    earlier = _earlier_files(target, command, replace)
+    for draft in sorted(target.parent.glob(f".{glob.escape(target.name)}.*{DRAFT}")):
+        text = f"{str(draft)!r} was left by a run that was killed: look into it for results, or delete it."
+        typer.echo(text, err=True)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.exists() and not os.access(target, os.W_OK | os.X_OK):
@@ -176,32 +257,75 @@ def _kept(results: Results) -> str:
 
 def written(folder: Path) -> list[str]:
     """All files below a folder, in order, as paths relative to it."""
-    return sorted(file.relative_to(folder).as_posix() for file in folder.rglob("*") if file.is_file())
+    files = (file.relative_to(folder) for file in folder.rglob("*") if file.is_file())
+    return sorted(file.as_posix() for file in files if file.parts[0] != PREVIOUS)
 
 
-def _earlier_files(target: Path, replace: bool) -> list[str]:
-    """The files that a command wrote into the target before; a refusal where nothing may be replaced."""
+def _earlier_files(target: Path, command: str, replace: bool) -> list[str]:
+    """The files that the same command wrote into the target before; a refusal where nothing may be replaced."""
     if not target.exists():
         return []
     if not target.is_dir():
         raise ValueError(f"{str(target)!r} is a file: name a folder with --out.")
     if not any(target.iterdir()):
         return []
-    by = ""
-    try:
-        manifest = json.loads((target / MANIFEST).read_text(encoding="utf-8"))
-        ours, by = manifest["format"] == FORMAT, manifest.get("command", "")
-        files = [name for name in manifest["files"] if ".." not in Path(name).parts and not Path(name).is_absolute()]
-    except (OSError, ValueError, KeyError, TypeError):
-        ours, files = False, []
+    manifest = _manifest(target)
+    by = manifest.get("command", "")
+    if manifest and by != command:
+        raise ValueError(
+            f"The folder {str(target)!r} holds the results of jaxdamp {by}, which jaxdamp {command} does not replace: "
+            "name another one with --out."
+        )
     if replace:
-        return files if ours else []
-    if ours:
+        return _unchanged(target, manifest)
+    if manifest:
         raise ValueError(
             f"The folder {str(target)!r} holds the results of an earlier run of jaxdamp {by}: "
-            "name another one with --out, or pass --replace to replace them."
+            f"name another one with --out, or pass --replace to replace them (they are kept in {PREVIOUS} inside)."
         )
     raise ValueError(
         f"The folder {str(target)!r} is not empty and was not written by jaxdamp: name another one with --out, or "
-        "pass --replace to write into it (files of the same names are replaced, all others stay)."
+        f"pass --replace to write into it (files of the same names are kept in {PREVIOUS} inside, all others stay)."
     )
+
+
+def _manifest(folder: Path) -> dict[str, Any]:
+    """What the manifest of a folder says; empty if no command wrote one there."""
+    try:
+        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        return manifest if manifest["format"] == FORMAT and isinstance(manifest["files"], list) else {}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return {}
+
+
+def _unchanged(folder: Path, manifest: Mapping[str, Any]) -> list[str]:
+    """The files of a manifest that are inside the folder, wherever links lead, and as they were written."""
+    hashes = manifest.get("sha256", {})
+    files = []
+    for name in manifest.get("files", []):
+        path = folder / str(name)
+        inside = path.resolve().is_relative_to(folder.resolve()) and not path.is_symlink()
+        if name == MANIFEST or not inside or not path.is_file():
+            continue
+        if name == UNFINISHED or not manifest.get("complete") or hashes.get(name) == _sha256(path):
+            files.append(name)
+    return files
+
+
+def _forget(previous: Path) -> None:
+    """Delete the results before the last ones, but for files that somebody changed since or put there."""
+    for name in _unchanged(previous, _manifest(previous)):
+        (previous / name).unlink()
+        _remove_empty((previous / name).parent, previous)
+
+
+def _remove_empty(folder: Path, root: Path) -> None:
+    """Remove a folder and those above it, up to the root, as long as they are empty."""
+    while folder != root and folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
+        folder = folder.parent
+
+
+def _sha256(file: Path) -> str:
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

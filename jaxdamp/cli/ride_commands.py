@@ -5,11 +5,10 @@ from typing import Annotated
 
 import typer
 
-from jaxdamp.cli.application import app
+from jaxdamp.cli.application import command
 from jaxdamp.cli.option_types import (
     Baseline,
     BaselineVehicle,
-    Debug,
     Duration,
     Files,
     Limit,
@@ -21,10 +20,10 @@ from jaxdamp.cli.option_types import (
     Step,
     Vehicle,
 )
-from jaxdamp.cli.record_options import ProcessOptions, ReadOptions, spread
+from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
 
 
-@app.command()
+@command("ride")
 def ride(
     law: Annotated[Path, typer.Argument(help="A law as JSON, such as best_law.json of jaxdamp fit.")],
     vehicle: Annotated[
@@ -42,7 +41,6 @@ def ride(
     seed: Annotated[int, typer.Option(help="Of a random road.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-ride"),
     replace: Replace = False,
-    debug: Debug = False,
 ) -> None:
     """Ride on a law: metrics, comfort by ISO 2631-1 and pictures, beside a baseline.
 
@@ -50,13 +48,11 @@ def ride(
     """
     from jaxdamp.cli import console, riding
 
-    with console.plain_errors(debug):
-        console.prepare()
-        options = {"vehicle": vehicle, "road": road, "speed": speed, "duration": duration, "dt": dt, "seed": seed}
-        riding.run_ride(console.Screen(), law, baseline=baseline, out=out, replace=replace, **options)
+    options = {"vehicle": vehicle, "road": road, "speed": speed, "duration": duration, "dt": dt, "seed": seed}
+    riding.run_ride(console.Screen(), law, baseline=baseline, out=out, replace=replace, **options)
 
 
-@app.command(name="tune")
+@command("tune")
 def tune_command(
     vehicle: Vehicle,
     road: Road,
@@ -64,8 +60,8 @@ def tune_command(
     minimise: Annotated[str, typer.Option(help="comfort, travel, grip, or the name of a ride metric.")] = "comfort",
     limit: Limit = [],  # noqa: B006
     over: Annotated[
-        list[str], typer.Option(help='Parameters to tune, by path or pattern, such as "damper.*_rate".')
-    ] = ["*damper*"],  # noqa: B006
+        list[str], typer.Option(help="Parameters to tune, by path or pattern; what a workshop can change if left out.")
+    ] = [],  # noqa: B006
     freeze: Annotated[list[str], typer.Option(help="Parameters among these to hold.")] = [],  # noqa: B006
     bound: Annotated[
         list[str], typer.Option(help="Bounds: rate=1000:4000; a third to three times the start if left out.")
@@ -85,7 +81,6 @@ def tune_command(
     seed: Seed = 0,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-tune"),
     replace: Replace = False,
-    debug: Debug = False,
 ) -> None:
     """Tune the dampers of a vehicle for a ride metric within limits.
 
@@ -93,24 +88,21 @@ def tune_command(
     """
     from jaxdamp.cli import console, tuning
 
-    with console.plain_errors(debug):
-        console.prepare()
-        result = tuning.run_tune(
-            console.Screen(),
-            tuning.RoadOptions(vehicle, road, start, speed, duration, dt, seed),
-            tuning.TuneOptions(
-                minimise, tuple(limit), tuple(over), tuple(freeze), tuple(bound), tuple(tie), roads, starts, max_steps
-            ),
-            baseline=baseline,
-            out=out,
-            replace=replace,
-        )
+    result = tuning.run_tune(
+        console.Screen(),
+        tuning.RoadOptions(vehicle, road, start, speed, duration, dt, seed),
+        tuning.TuneOptions(
+            minimise, tuple(limit), tuple(over), tuple(freeze), tuple(bound), tuple(tie), roads, starts, max_steps
+        ),
+        baseline=baseline,
+        out=out,
+        replace=replace,
+    )
     if not tuning.meets_limits(result):
         raise typer.Exit(1)
 
 
-@app.command()
-@spread
+@command("report")
 def report(
     files: Files,
     *,
@@ -125,7 +117,9 @@ def report(
     ] = ["all"],  # noqa: B006
     minimise: Annotated[str, typer.Option(help="comfort, travel, grip, or the name of a ride metric.")] = "comfort",
     limit: Limit = [],  # noqa: B006
-    over: Annotated[list[str], typer.Option(help="Parameters to tune, by path or pattern.")] = ["*damper*"],  # noqa: B006
+    over: Annotated[
+        list[str], typer.Option(help="Parameters to tune, by path or pattern; what a workshop can change if left out.")
+    ] = [],  # noqa: B006
     reading: ReadOptions,
     processing: ProcessOptions,
     speed: Speed = 20.0,
@@ -134,7 +128,6 @@ def report(
     seed: Seed = 0,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-report"),
     replace: Replace = False,
-    debug: Debug = False,
 ) -> None:
     """The whole chain on one page: bench records, fitted laws, rides on the best one, and its tuning.
 
@@ -142,17 +135,15 @@ def report(
     """
     from jaxdamp.cli import chaining, console, tuning
 
-    with console.plain_errors(debug):
-        console.prepare()
-        on = tuning.RoadOptions(vehicle, road, None, speed, duration, dt, seed)
-        options = tuning.TuneOptions(minimise, tuple(limit), tuple(over))
-        screen, where = console.Screen(), {"out": out, "replace": replace}
-        result = chaining.run_report(screen, files, reading, processing, on, options, laws=law, **where)
+    on = tuning.RoadOptions(vehicle, road, None, speed, duration, dt, seed)
+    options = tuning.TuneOptions(minimise, tuple(limit), tuple(over))
+    screen, where = console.Screen(), {"out": out, "replace": replace}
+    result = chaining.run_report(screen, files, reading, processing, on, options, laws=law, **where)
     if not tuning.meets_limits(result):
         raise typer.Exit(1)
 
 
-@app.command(name="sweep")
+@command("sweep")
 def sweep_command(
     vehicle: Vehicle,
     road: Road,
@@ -169,13 +160,10 @@ def sweep_command(
     seed: Seed = 0,
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("jaxdamp-sweep"),
     replace: Replace = False,
-    debug: Debug = False,
 ) -> None:
     """Compute ride metrics over a grid of parameters: curves, maps and a table."""
     from jaxdamp.cli import console, tuning
 
-    with console.plain_errors(debug):
-        console.prepare()
-        on = tuning.RoadOptions(vehicle, road, start, speed, duration, dt, seed)
-        marks = {"limit": limit, "baseline": baseline}
-        tuning.run_sweep(console.Screen(), on, over=over, metrics=metric, **marks, out=out, replace=replace)
+    on = tuning.RoadOptions(vehicle, road, start, speed, duration, dt, seed)
+    marks = {"limit": limit, "baseline": baseline}
+    tuning.run_sweep(console.Screen(), on, over=over, metrics=metric, **marks, out=out, replace=replace)

@@ -6,6 +6,7 @@ from pathlib import Path
 from jaxdamp import _checks, export, roads, simulate
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.early import refuse_road
 from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.run_warnings import with_step_warnings, without_range_warnings
@@ -39,8 +40,7 @@ def parse_road(text: str, *, speed: float, duration: float, seed: int, white: bo
     elif Path(text).is_file():
         road = roads.read_crg(text, speed) if text.endswith(".crg") else roads.read_profile(text, speed)
     else:
-        remedy = 'Examples: "iso:C", "bump:0.06:5", "profile.csv", "course.crg".'
-        _checks.refuse("road", "be iso:CLASS, bump:HEIGHT:LENGTH or a file that is there", repr(text), remedy)
+        refuse_road(text)
     return road
 
 

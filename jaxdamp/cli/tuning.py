@@ -9,7 +9,7 @@ from typing import Any
 from jaxdamp import Ride, _checks, export, roads, sweep, tune
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.metric_words import axis_words, limit_words, metric_names, objective_word, pairs, span
+from jaxdamp.cli.metric_words import axis_words, default_limits, limit_words, metric_names, objective_word, pairs, span
 from jaxdamp.cli.option_types import command_line
 from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.riding import USUAL, parse_road
@@ -19,6 +19,8 @@ from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.report import Attempts, sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
+from jaxdamp.simulation import stationary_notes
+from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import Status, TuneResult, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -60,7 +62,7 @@ class TuneOptions:
 
     minimise: str = "comfort"
     limit: tuple[str, ...] = ()
-    over: tuple[str, ...] = ("*damper*",)
+    over: tuple[str, ...] = ()  # what a workshop can change
     freeze: tuple[str, ...] = ()
     bound: tuple[str, ...] = ()
     tie: tuple[str, ...] = ()
@@ -81,7 +83,8 @@ def run_tune(
     """Tune a vehicle, and write the law, the vehicle, tables, then pictures and a page."""
     car = on.car()
     beside = None if baseline is None else _baseline(baseline, car)
-    call = tuning_arguments(car, on, options)
+    call, remarks = tuning_arguments(car, on, options)
+    screen.points(remarks)
     screen.points(unusual(on.road, on.speed), style="yellow")
     attempts = Attempts(interrupt.check, message)
     with results_folder(out, "tune", replace=replace) as results:
@@ -98,35 +101,37 @@ def run_tune(
     return result
 
 
-def tuning_arguments(car: AbstractVehicle, on: RoadOptions, options: TuneOptions) -> dict[str, Any]:
-    """The arguments of `tune.minimise`."""
+def tuning_arguments(car: AbstractVehicle, on: RoadOptions, options: TuneOptions) -> tuple[dict[str, Any], list[str]]:
+    """The arguments of `tune.minimise`, and what was chosen by default, in words."""
     if options.roads < 1:
         _checks.refuse("roads", "be 1 or more", options.roads)
     roads_driven, run = on.roads(options.roads)
     white = isinstance(roads_driven[0], WhiteRoad)
     if options.roads > 1 and (white or not on.road.startswith("iso:")):
         _checks.refuse("roads", "be 1 for a road that is not random", options.roads, "Take iso:CLASS.")
+    limits = limit_words(options.limit, car, white=white)
+    more, sentence = default_limits(options.limit, options.minimise, car, white=white)
     return run | {
         "metric": objective_word(options.minimise, car, white=white),
         "vehicle": car,
         "road": roads_driven[0] if len(roads_driven) == 1 else tune.Scenarios(roads_driven),
-        "over": options.over,
+        "over": options.over or None,
         "freeze": options.freeze,
         "bounds": {name: span("bound", value) for name, value in pairs("bound", options.bound)},
         "tie": dict(pairs("tie", options.tie)),
-        "limits": limit_words(options.limit, car, white=white),
+        "limits": limits | more,
         "starts": options.starts,
         "max_steps": options.max_steps,
-    }
+    }, [sentence] * bool(sentence)
 
 
 def tuned(screen: Screen, call: Mapping[str, Any]) -> TuneResult[Any]:
     """The result of `tune.minimise` with these arguments, shown at the terminal."""
     with screen.stage("Tuning") as advance:
         result = tune.minimise(**call, progress=lambda step, value: advance(f"step {step}: {value:.5g}", step))
+    screen.say(result.summary)
     for table in (result.parameter_table(), result.table()):
         screen.table(table)
-    screen.say(result.summary)
     screen.points([*result.active, *result.warnings], style="yellow")
     return result
 
@@ -138,9 +143,9 @@ def _baseline(path: Path, car: AbstractVehicle) -> AbstractVehicle:
     return with_law(car, module) if isinstance(module, AbstractDamper) else module
 
 
-def meets_limits(result: TuneResult[Any]) -> bool:
-    """Whether all limits are met."""
-    return result.status is not Status.LIMIT_NOT_MET
+def meets_limits(result: TuneResult[Any] | None) -> bool:
+    """Whether all limits are met, or nothing was tuned."""
+    return result is None or result.status is not Status.LIMIT_NOT_MET
 
 
 def write_tuning(folder: Path, result: TuneResult[Any]) -> None:
@@ -179,7 +184,7 @@ def run_sweep(
     limits = limit_words(limit, car, white=white)
     names = [n for word in words for n in metric_names("metric", word, car, white=white)]
     names = list(dict.fromkeys([*names, *limits]))
-    limit_spans(limits, names)  # refuses what is no limit before anything is driven
+    limit_spans(limits, names, dict.fromkeys(names, 1.0))  # refuses what is no limit before anything is driven
     beside = None if baseline is None else _baseline(baseline, car)
     axes = axis_words(over)
     ride = Ride(car, road, metrics=names, **run)
@@ -192,6 +197,8 @@ def run_sweep(
             data = sweep(ride, axes, progress=lambda done, total: advance(f"{done} of {total} points", done))
         remarks = [str(warning.message) for warning in caught]
         screen.table(data.jaxdamp.table())
+        remarks += stationary_notes(ride.vehicle, road) if isinstance(road, WhiteRoad) else []
+        remarks += [f"No effect on {name}: {', '.join(flat)}." for name, flat in without_effect(data).items()]
         screen.points(remarks, style="yellow")
         with interrupt.saving(), screen.stage("Tables"):
             (results.draft / "sweep.csv").write_text(data.jaxdamp.table().to_csv(), encoding="utf-8")
@@ -199,7 +206,9 @@ def run_sweep(
             results.publish("the pictures and the report")
         with screen.stage("Pictures and report"):
             drawn = {"folder": results.draft, "attempts": attempts}
-            marks = {"limits": limits, "baseline": None if beside is None else dict(ride.on_axles_of(beside)())}
+            if limits:
+                limits = limit_spans(limits, names, {name: float(value) for name, value in ride().items()})
+            marks = {"limits": limits, "baseline": None if beside is None else dict(ride.of_vehicle(beside)())}
             page = sweep_report(data, remarks=remarks, **marks, **drawn)
             page.write(results.draft / "report.html", command_line())
     screen.files(out, results.published)

@@ -62,6 +62,7 @@ def run_fit_vehicle(
             result = identify.fit_vehicle(**call)
         for table in (result.scores_table(), result.table()):
             screen.table(table)
+        screen.points([result.patterns] * bool(result.patterns))
         screen.points(result.warnings, style="yellow")
         interrupt.keep()
         with interrupt.saving(), screen.stage("Vehicle and tables"):
@@ -163,15 +164,15 @@ def _write(folder: Path, result: VehicleFit) -> None:
     export.to_json(result.vehicle, folder / "vehicle.json")
     for name, table in {"parameters": result.table(), "channels": result.scores_table()}.items():
         (folder / f"{name}.csv").write_text(table.to_csv(), encoding="utf-8")
-    for record, fitted in result.predict().items():
-        _write_channels(folder / f"{record.replace('/', '_')}_fitted.csv", result, record, fitted)
+    for record in result.records:
+        _write_channels(folder / f"{record.name.replace('/', '_')}_fitted.csv", result, record)
     text = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
     (folder / "fit.json").write_text(text, encoding="utf-8")
 
 
-def _write_channels(file: Path, result: VehicleFit, name: str, fitted: Mapping[str, np.ndarray]) -> None:
+def _write_channels(file: Path, result: VehicleFit, record: RideRecord) -> None:
     """Measured and fitted channels of a record over time."""
-    record, units = next(r for r in result.records if r.name == name), result.vehicle.units
+    fitted, units = result.respond(record), result.vehicle.units
     header = ["time [s]"] + [f"{c} {kind} [{units[c]}]" for c in fitted for kind in ("measured", "fitted")]
     columns = [record.time] + [values for c in fitted for values in (record[c], fitted[c])]
     np.savetxt(file, np.column_stack(columns), fmt="%.8g", delimiter=",", header=",".join(header), comments="")

@@ -1,18 +1,17 @@
 """What a vehicle is called on the command line: a published one, or a file of one's own."""
 
 import inspect
-import json
 import tomllib
 from collections.abc import Callable, Mapping
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 import equinox as eqx
 
 from jaxdamp import _checks, export, vehicles
+from jaxdamp.cli.early import FROM_FIT, FROM_LIST, read_json, require_file
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.parameters import get, replace
+from jaxdamp.parameters import get, matching, replace
 from jaxdamp.report import Column, Table
 from jaxdamp.tune import damper_paths
 from jaxdamp.vehicles import AbstractVehicle
@@ -52,10 +51,9 @@ def parse_vehicle(word: str) -> MakeCar:
         _checks.one_of("vehicle", word, presets())
         return lambda law: presets()[word](damper=law)
     if path.suffix == ".json":
-        car = read_module("vehicle", path, AbstractVehicle, "a vehicle", 'Or give a name, see "jaxdamp vehicles".')
+        car = read_module("vehicle", path, AbstractVehicle, "a vehicle", FROM_LIST)
         return lambda law: car if law is None else with_law(car, law)
-    if not path.is_file():
-        _checks.refuse("vehicle", "be a file that is there", word, 'Or a name, see "jaxdamp vehicles".')
+    require_file("vehicle", path, FROM_LIST)
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except tomllib.TOMLDecodeError as error:
@@ -70,7 +68,7 @@ def read_law(argument: str, path: Path) -> AbstractDamper:
         argument: that gives the file, for messages.
         path: of the file.
     """
-    return read_module(argument, path, AbstractDamper, "a law", "`jaxdamp fit` writes best_law.json from records.")
+    return read_module(argument, path, AbstractDamper, "a law", FROM_FIT)
 
 
 def read_module(argument: str, path: Path, kinds: type | tuple[type, ...], words: str, remedy: str = "") -> Any:
@@ -86,12 +84,7 @@ def read_module(argument: str, path: Path, kinds: type | tuple[type, ...], words
     Raises:
         ValueError: no such file, one that is not JSON, or that holds something else.
     """
-    if not path.is_file():
-        _checks.refuse(argument, "be a file that is there", path, remedy)
-    try:
-        json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:  # also of bytes that are no text
-        _checks.refuse(argument, f"be {words} as JSON", f"{path}: {error}", remedy)
+    read_json(argument, path, words, remedy)
     module = export.from_json(path)
     _checks.instance(argument, module, kinds, f"be {words} as JSON", remedy)
     return module
@@ -128,7 +121,7 @@ def with_law(vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:
 
 def write_laws(folder: Path, vehicle: AbstractVehicle) -> None:
     """The dampers of a vehicle as JSON: law.json if all are alike, otherwise a file named after each path."""
-    laws = {path: get(vehicle, path) for path in damper_paths(vehicle) if fnmatchcase(path, "*damper")}
+    laws = {path: get(vehicle, path) for path in matching(damper_paths(vehicle), "*damper")}
     first = next(iter(laws.values()), None)
     if first is not None and all(bool(eqx.tree_equal(first, law)) for law in laws.values()):
         laws = {"law": first}
@@ -139,7 +132,7 @@ def write_laws(folder: Path, vehicle: AbstractVehicle) -> None:
 def damper_places(vehicle: AbstractVehicle) -> list[str]:
     """The paths of the dampers of a vehicle."""
     known = damper_paths(vehicle)
-    places = [path for path in known if fnmatchcase(path, "*damper")]
+    places = matching(known, "*damper")
     if not places:
         remedy = "Leave the law out, to take those of the vehicle."
         _checks.refuse("vehicle", "have a law whose path ends with 'damper'", ", ".join(known) or "none", remedy)

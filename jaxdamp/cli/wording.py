@@ -1,5 +1,6 @@
 """What the library says of Python's arguments, said of the options of the command line."""
 
+import re
 import shlex
 from typing import Any
 
@@ -66,6 +67,26 @@ OTHER_WORDS = {
     "skip_cycles": "Option --cycles",
     "start": "The beginning in --between",
 }
+CALLS = {
+    r'add "(\w+)" or "(\w+)" to the machine \(`rig`\)': r"add --rig \1 or --rig \2",
+    r'add "(\w+)" to the machine \(`rig`\)': r"add --rig \1",
+    r"or a `Spring` to the law": "or fit a law with a spring",
+    r"or put the law into `Play`": "or fit --law besinger_play",
+    r" \(`identify\.design_experiment` proposes tests\)": "",
+    r"Freeze all but one of them, or add": "Fit a simpler law, or add",
+    r"Freeze it or add records that excite it": "Fit a simpler law, or add records that excite it",
+    r"Add records beyond it, or freeze it": "Add records beyond it",
+    r"Try another start, bounds, or fewer free parameters": "Fit a simpler law",
+    r"such as `Bilinear` or `PiecewiseLinear`": "such as --law bilinear,piecewise_linear",
+    r"state what was set on the damper \(`command`\)": "state what was set on the damper (--command)",
+    r"`process\(low_pass=([^)]*)\)`": r"--filter \1",
+    r"`process\(between=[^)]*\)`": "--between start:end",
+    r"`process\(moving=True\)` cuts it off": "it is cut off without --keep-rest",
+    r"`process\(skip_cycles=[^)]*\)`": "--cycles skip:1",
+    r"subtract it, `process\(without=[^`]*`": "fit it beside the law, --rig gas",
+    r"`process\(delay=[^)]*\)`": "fit with --rig delay",
+}
+"""Calls of Python in the sentences of the library, as patterns, and what the command line says instead."""
 
 
 def option(argument: str) -> str:
@@ -101,6 +122,13 @@ def in_options(text: str, settings: tuple[Setting, ...] = ()) -> str:
     for setting in settings:
         if setting.argument in OPTIONS:
             text = text.replace(str(setting), option_text(setting))
+    return text
+
+
+def in_command_line(text: str) -> str:
+    """A sentence of the library that names calls of Python, with options instead."""
+    for python, words in CALLS.items():
+        text = re.sub(python, words, text)
     return text
 
 

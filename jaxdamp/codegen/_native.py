@@ -58,9 +58,19 @@ def registered(text: str, platform: str = "cpu", name: str = "") -> str:
         name: another one than that made from the text, under which another platform has the same function.
 
     Raises:
-        NotImplementedError: no C compiler, or one that refuses the text; the message holds what it says.
+        NotImplementedError: no C compiler, or one that refuses the text; no room for temporary files, or none from
+            which programs may run. The message holds what was said.
     """
     tool = compiled_by()
+    try:
+        return _compiled(tool, text, platform, name)
+    except OSError as error:
+        remedy = "Name another folder for temporary files, from which programs may run, in the variable TMPDIR."
+        raise NotImplementedError(f"The printed loop cannot be compiled or loaded here ({error}). {remedy}") from error
+
+
+def _compiled(tool: str, text: str, platform: str, name: str) -> str:
+    """Compile a text, load it and tell XLA its name."""
     own = f"jaxdamp_loop_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
     source, target = _folder() / f"{own}.c", _folder() / f"{own}.so"
     source.write_text(text, encoding="utf-8")

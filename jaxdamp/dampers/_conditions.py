@@ -2,10 +2,10 @@
 
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._traced import row, rows
 
 
 class Condition(NamedTuple):
@@ -18,11 +18,12 @@ class Condition(NamedTuple):
 
 
 def check_conditions(law: Any) -> None:
-    """Refuse parameters that violate a condition between them (traced values are not checked)."""
-    if not law.has_conditions() or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(law)):
-        return
-    for condition in jax.tree.map(np.asarray, law).conditions():
-        value = np.asarray(getattr(law, condition.parameter))
-        if not np.all(value > condition.least):
-            must = f"be above {condition.formula}, {np.array2string(np.asarray(condition.least), precision=4)}"
-            _checks.refuse(f"{type(law).__name__}.{condition.parameter}", must, value, condition.reason)
+    """Refuse parameters that violate a condition between them (inside `jax.jit` they are not known)."""
+    values = rows(law) if law.has_conditions() else None
+    for index in range(len(values[0]) if values else 0):
+        one = row(law, values, index)
+        for condition in one.conditions():
+            value = np.asarray(getattr(one, condition.parameter))
+            if not np.all(value > condition.least):
+                must = f"be above {condition.formula}, {np.array2string(np.asarray(condition.least), precision=4)}"
+                _checks.refuse(f"{type(law).__name__}.{condition.parameter}", must, value, condition.reason)

@@ -71,7 +71,9 @@ class AccelerationSurface(AbstractDamper):
     495.0
     """
 
-    coefficients: Matrix = parameter("N", "Cᵢⱼ, weights of Tᵢ(velocity) Tⱼ(acceleration)", linear=True)
+    coefficients: Matrix = parameter(
+        "N", "Cᵢⱼ, weights of Tᵢ(velocity) Tⱼ(acceleration)", linear=True, adjustable=False
+    )
     velocity_range: Vector = setting("m/s", "velocities covered by data", around_zero)
     acceleration_range: Vector = setting("m/s²", "accelerations covered by data", around_zero)
     outside_rate: Number = setting("N s/m", "slope over the velocity outside its range", nonnegative, default=0.0)

@@ -16,7 +16,7 @@ from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, State
 from jaxdamp.dampers._conditions import Condition, check_conditions
 from jaxdamp.dampers._starts import Reach, from_samples, starts_of_bends
-from jaxdamp.dampers.fitted_range import FittedRange
+from jaxdamp.dampers.fitted_range import FittedRange, RangeNote
 from jaxdamp.dampers.motion import Motion
 from jaxdamp.dampers.traits import Traits, combined_traits
 from jaxdamp.parameters import Module, check_parameters, readable
@@ -33,19 +33,26 @@ class AbstractDamper(Module):
     `AbstractMemoryless`, which define it.
 
     `traits()` are the properties of a law that solvers, fits and other laws need to know besides its forces.
-    `fitted_to` is the range of the records that the law was fitted to (`with_fitted_range`).
     """
 
-    fitted_to: FittedRange | None = eqx.field(kw_only=True, default=None, repr=False)
+    range_note: RangeNote = eqx.field(kw_only=True, default=RangeNote(), repr=False)
 
     def __check_init__(self) -> None:
-        if "fitted_to" not in vars(self):  # after a hand-written `__init__`; JAX needs the field
-            object.__setattr__(self, "fitted_to", None)
+        if "range_note" not in vars(self):  # after a hand-written `__init__`; JAX needs the field
+            object.__setattr__(self, "range_note", RangeNote())
         check_parameters(self)
         check_conditions(self)
 
+    # By identity, whatever is equal, as JAX asks of a function: `jax.jit(law.force)`.
+    __hash__ = object.__hash__
+
     def __repr__(self) -> str:
         return readable(self)
+
+    @property
+    def fitted_to(self) -> FittedRange | None:
+        """The range of the records that the law was fitted to (`with_fitted_range`); results of `jit` have none."""
+        return self.range_note.fitted_to
 
     @abstractmethod
     def initial_state(self) -> State:
@@ -132,6 +139,14 @@ class AbstractDamper(Module):
 
         The constructor refuses a law that violates one, and fits satisfy them. Write them with operators only, so that
         they also work on NumPy arrays without JAX.
+        """
+        return ()
+
+    def constant_forces(self) -> tuple[str, ...]:
+        """Own parameters whose only part, or a common part of whose numbers, is a force that never changes [N].
+
+        A zero error of the load cell has the same effect, so that a fit with one gives these no part of it. A law whose
+        static force has a meaning of its own, such as a gas charge, names none.
         """
         return ()
 

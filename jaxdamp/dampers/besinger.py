@@ -63,7 +63,9 @@ class Besinger(AbstractMemoryless):
     rebound_rate: Number = parameter("N s/m", "C_e, damping coefficient in rebound, valve closed", positive)
     blow_off_rate: Number = parameter("N s/m", "C_b, slope in rebound, valve open", positive)
     limit_velocity: Number = parameter("m/s", "v_lim, rebound velocity where the valve opens", positive)
-    transition_velocity: Number = parameter("m/s", "α, centre and width of the change from C_c to C_e", positive)
+    transition_velocity: Number = parameter(
+        "m/s", "α, centre and width of the change from C_c to C_e", positive, adjustable=False
+    )
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

@@ -98,16 +98,24 @@ class BoucWen(AbstractDamper):
     """
 
     viscous_rate: Number = parameter("N s/m", "c₀, viscous damping coefficient", nonnegative)
-    stiffness: Number = parameter("N/m", "k₀, parallel stiffness", nonnegative)
+    stiffness: Number = parameter("N/m", "k₀, parallel stiffness", nonnegative, adjustable=False)
     yield_force: Number = parameter("N", "F_y, hysteretic force when saturated", positive)
-    yield_displacement: Number = parameter("m", "x_y, travel from rest to F_y at the first slope", positive)
-    shape: Number = parameter("", "γ̂ = γ/(β + γ), shape of the unloading", interval(0.5, 1.0), default=0.75)
-    exponent: Number = parameter("", "n, sharpness of the knee", interval(1.0, 20.0), default=2.0)
+    yield_displacement: Number = parameter(
+        "m", "x_y, travel from rest to F_y at the first slope", positive, adjustable=False
+    )
+    shape: Number = parameter(
+        "", "γ̂ = γ/(β + γ), shape of the unloading", interval(0.5, 1.0), default=0.75, adjustable=False
+    )
+    exponent: Number = parameter("", "n, sharpness of the knee", interval(1.0, 20.0), default=2.0, adjustable=False)
     static_force: Number = parameter("N", "f₀, force at rest at stroke zero", real, default=0.0)
 
     def traits(self) -> Traits:
         """The static force is an offset."""
         return super().traits()._replace(contains_offset=True)
+
+    def constant_forces(self) -> tuple[str, ...]:
+        """The static force."""
+        return ("static_force",)
 
     def initial_state(self) -> State:
         """No hysteretic force."""

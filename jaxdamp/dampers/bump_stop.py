@@ -47,7 +47,9 @@ class BumpStop(AbstractStateless):
     clearance: Number = parameter("m", "stroke from zero to first contact", nonnegative)
     stiffness: Number = parameter("N/m", "k₁, stiffness of the stop", nonnegative)
     cubic_stiffness: Number = parameter("N/m³", "k₃, cubic stiffness of the stop", nonnegative, default=0.0)
-    damping: Number = parameter("N s/m", "c, damping coefficient in contact", nonnegative, default=0.0)
+    damping: Number = parameter(
+        "N s/m", "c, damping coefficient in contact", nonnegative, default=0.0, adjustable=False
+    )
     engagement_width: Number = setting("m", "penetration over which the contact begins", positive, default=1e-3)
     end: str = eqx.field(static=True, default="compression")
 

@@ -40,9 +40,9 @@ class Bushing(AbstractSeries):
     """
 
     law: AbstractDamper
-    oil_stiffness: Number = parameter("N/m", "k_o, stiffness of the oil column", positive)
-    stiffness: Number = parameter("N/m", "k_b, stiffness of the bushing", positive)
-    damping: Number = parameter("N s/m", "c_b, damping of the bushing", positive)
+    oil_stiffness: Number = parameter("N/m", "k_o, stiffness of the oil column", positive, adjustable=False)
+    stiffness: Number = parameter("N/m", "k_b, stiffness of the bushing", positive, adjustable=False)
+    damping: Number = parameter("N s/m", "c_b, damping of the bushing", positive, adjustable=False)
 
     def __check_init__(self) -> None:
         require_feed_through("law", self.law, "Bushing")

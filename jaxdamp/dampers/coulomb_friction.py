@@ -21,8 +21,8 @@ class CoulombFriction(AbstractMemoryless):
     -40.0
     """
 
-    friction_force: Number = parameter("N", "friction force", positive, linear=True)
-    friction_velocity: Number = parameter("m/s", "velocity over which the jump is spread", positive)
+    friction_force: Number = parameter("N", "friction force", positive, linear=True, adjustable=False)
+    friction_velocity: Number = parameter("m/s", "velocity over which the jump is spread", positive, adjustable=False)
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

@@ -69,7 +69,11 @@ class CreepingViscoPlastic(AbstractViscoPlastic):
     """
 
     creep_exponent: Number = parameter(
-        "", "m, power of the load with which the elements creep", interval(0.1, 20.0), default=3.0
+        "",
+        "m, power of the load with which the elements creep",
+        interval(0.1, 20.0),
+        default=3.0,
+        adjustable=False,
     )
 
     def relaxation_rates(self, deflections: State) -> State:

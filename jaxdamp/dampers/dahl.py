@@ -38,8 +38,8 @@ class Dahl(AbstractDamper):
     25.284822
     """
 
-    stiffness: Number = parameter("N/m", "σ₀, stiffness of the contact at rest", positive)
-    friction_force: Number = parameter("N", "F_c, sliding friction", positive)
+    stiffness: Number = parameter("N/m", "σ₀, stiffness of the contact at rest", positive, adjustable=False)
+    friction_force: Number = parameter("N", "F_c, sliding friction", positive, adjustable=False)
 
     def traits(self) -> Traits:
         """The force is a state."""

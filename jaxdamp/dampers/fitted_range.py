@@ -1,11 +1,11 @@
 """The range of the records that a law was fitted to, stored in the law."""
 
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeVar, final
 
-import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Array, Float
+from jax.extend.core import unsafe_am_i_under_a_jit_DO_NOT_USE
 
 from jaxdamp import _checks
 
@@ -28,11 +28,12 @@ class Quantity(NamedTuple):
 
 
 @final
-class FittedRange(eqx.Module):
+@dataclass(frozen=True, kw_only=True)
+class FittedRange:
     """Lowest and highest value of each quantity in the records that a law was fitted to.
 
     Outside these limits the law is an extrapolation, which no record confirms. A quantity that the records do not
-    contain is `None`. The limits are data of the law, not parameters: fits, tunings and gradients do not change them.
+    contain is `None`. The limits describe a law; they are no parameters and no arrays of it.
 
     Arguments:
         velocity: velocity [m/s], positive in extension.
@@ -50,69 +51,25 @@ class FittedRange(eqx.Module):
     FittedRange(velocity=(-0.5, 0.9), command=(0.0, 2.0))
     """
 
-    # One array, with infinite limits for unknown quantities: laws that differ only in their range have the same
-    # structure and share compiled programs. A NumPy array is in double precision, whatever the precision of JAX.
-    limits: Float[np.ndarray, "6 2"] | Float[Array, "6 2"]
+    velocity: Limits | None = None
+    stroke: Limits | None = None
+    frequency: Limits | None = None
+    force: Limits | None = None
+    temperature: Limits | None = None
+    command: Limits | None = None
 
-    def __init__(
-        self,
-        *,
-        velocity: Limits | None = None,
-        stroke: Limits | None = None,
-        frequency: Limits | None = None,
-        force: Limits | None = None,
-        temperature: Limits | None = None,
-        command: Limits | None = None,
-    ) -> None:
-        given = dict(zip(UNITS, (velocity, stroke, frequency, force, temperature, command), strict=True))
-        self.limits = np.array([_checked(name, limits) for name, limits in given.items()])
-
-    def _of(self, name: str) -> tuple[float, float] | None:
-        known = _checks.concrete(self.limits)
-        if known is None or not np.all(np.isfinite(row := known[list(UNITS).index(name)])):
-            return None
-        return float(row[0]), float(row[1])
-
-    @property
-    def velocity(self) -> tuple[float, float] | None:
-        """Velocities [m/s]."""
-        return self._of("velocity")
-
-    @property
-    def stroke(self) -> tuple[float, float] | None:
-        """Strokes [m]."""
-        return self._of("stroke")
-
-    @property
-    def frequency(self) -> tuple[float, float] | None:
-        """Dominant frequencies of the records [Hz]."""
-        return self._of("frequency")
-
-    @property
-    def force(self) -> tuple[float, float] | None:
-        """Forces [N]."""
-        return self._of("force")
-
-    @property
-    def temperature(self) -> tuple[float, float] | None:
-        """Temperatures [K]."""
-        return self._of("temperature")
-
-    @property
-    def command(self) -> tuple[float, float] | None:
-        """Commands, in the unit of the law's command."""
-        return self._of("command")
+    def __post_init__(self) -> None:
+        for name in UNITS:
+            object.__setattr__(self, name, _checked(name, getattr(self, name)))
 
     def known(self) -> list[Quantity]:
-        """The quantities that the records contain (none while JAX traces the law)."""
-        quantities = ((name, self._of(name), unit) for name, unit in UNITS.items())
+        """The quantities that the records contain."""
+        quantities = ((name, getattr(self, name), unit) for name, unit in UNITS.items())
         return [Quantity(name, limits, unit) for name, limits, unit in quantities if limits is not None]
 
     def without(self, *names: str) -> "FittedRange":
         """The same range without some quantities."""
-        return FittedRange(
-            **{quantity.name: quantity.limits for quantity in self.known() if quantity.name not in names}
-        )
+        return replace(self, **dict.fromkeys(names))
 
     def words(self) -> str:
         """The range in words: "velocity −0.5 to 0.9 m/s, stroke −20 to 20 mm"."""
@@ -139,9 +96,10 @@ def shown_unit(name: str) -> str:
     return {"stroke": "mm", "temperature": "°C"}.get(name, UNITS[name])
 
 
-def _checked(name: str, limits: Limits | None) -> tuple[float, float]:
+def _checked(name: str, limits: Limits | None) -> tuple[float, float] | None:
     if limits is None:
-        return -np.inf, np.inf
+        return None
+    _checks.untraced(name, limits, "A range is what records covered: give plain numbers.")
     numbers = np.asarray(limits, dtype=float)
     if numbers.shape != (2,) or not np.all(np.isfinite(numbers)) or numbers[0] > numbers[1]:
         unit = f" [{UNITS[name]}]" if UNITS[name] else ""
@@ -150,15 +108,57 @@ def _checked(name: str, limits: Limits | None) -> tuple[float, float]:
     return float(numbers[0]), float(numbers[1])
 
 
-def without_fitted_ranges(tree: Tree) -> Tree:
-    """A law, a vehicle or any tree without the ranges of its laws.
+@final
+@dataclass(frozen=True)
+class RangeNote:
+    """The fitted range as part of a law, or that there is none: a pytree without leaves, equal to any other.
 
-    Compiled code uses laws without them, so that laws fitted to different records share one program.
+    So laws with any range and without one have one structure, share compiled programs and can be mapped together.
+
+    JAX stores the structure of what a compiled function returns, and returns it from later calls with other laws. A
+    structure that arises in such a trace therefore has no range: results of `jit` have none, rather than that of the
+    law of the first call.
+
+    Arguments:
+        fitted_to: the range, if any.
+    """
+
+    fitted_to: FittedRange | None = None
+
+
+class _Unseen:
+    """A note in a structure, which compares and hashes like any other."""
+
+    def __init__(self, note: RangeNote) -> None:
+        self.note = note
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Unseen)
+
+    def __hash__(self) -> int:
+        return hash(_Unseen)
+
+    def __repr__(self) -> str:
+        return ""
+
+
+def _noted(note: RangeNote) -> RangeNote:
+    """The note, without a range in a program that JAX compiles."""
+    return RangeNote() if note.fitted_to is not None and unsafe_am_i_under_a_jit_DO_NOT_USE() else note
+
+
+jax.tree_util.register_pytree_node(
+    RangeNote, lambda note: ((), _Unseen(_noted(note))), lambda unseen, _: _noted(unseen.note)
+)
+
+
+def without_fitted_ranges(tree: Tree) -> Tree:
+    """A law, a vehicle or any tree without the ranges of its laws, as for a law that is mixed from several.
 
     Arguments:
         tree: the tree.
     """
-    return jax.tree.map(lambda leaf: None if isinstance(leaf, FittedRange) else leaf, tree, is_leaf=_is_range)
+    return jax.tree.map(lambda leaf: RangeNote() if _is_note(leaf) else leaf, tree, is_leaf=_is_note)
 
 
 def has_fitted_range(tree: Any) -> bool:
@@ -167,8 +167,9 @@ def has_fitted_range(tree: Any) -> bool:
     Arguments:
         tree: a law, a vehicle or another module.
     """
-    return any(map(_is_range, jax.tree.leaves(tree, is_leaf=_is_range)))
+    notes = filter(_is_note, jax.tree.leaves(tree, is_leaf=_is_note))
+    return any(note.fitted_to is not None for note in notes)
 
 
-def _is_range(node: Any) -> bool:
-    return isinstance(node, FittedRange)
+def _is_note(node: Any) -> bool:
+    return isinstance(node, RangeNote)

@@ -50,7 +50,7 @@ class ForceSurface(AbstractStateless):
     550.0
     """
 
-    coefficients: Matrix = parameter("N", "Cᵢⱼ, weights of Tᵢ(stroke) Tⱼ(velocity)", linear=True)
+    coefficients: Matrix = parameter("N", "Cᵢⱼ, weights of Tᵢ(stroke) Tⱼ(velocity)", linear=True, adjustable=False)
     stroke_range: Vector = setting("m", "strokes covered by data", ends)
     velocity_range: Vector = setting("m/s", "velocities covered by data", around_zero)
     outside_rate: Number = setting("N s/m", "slope over the velocity outside its range", nonnegative, default=0.0)

@@ -46,8 +46,8 @@ class FrequencySelective(AbstractDamper):
 
     high: AbstractDamper
     low: AbstractDamper
-    filter_time: Number = parameter("s", "τ_f, time constant of the velocity filter", positive)
-    response_time: Number = parameter("s", "τ_r, time constant of the force", positive)
+    filter_time: Number = parameter("s", "τ_f, time constant of the velocity filter", positive, adjustable=False)
+    response_time: Number = parameter("s", "τ_r, time constant of the force", positive, adjustable=False)
 
     def traits(self) -> Traits:
         """The force is a state, linear in that of the laws inside."""

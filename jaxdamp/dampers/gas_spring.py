@@ -50,8 +50,8 @@ class GasSpring(AbstractStateless):
 
     pressure: Number = parameter("Pa", "p₀, absolute gas pressure at stroke zero", positive)
     volume: Number = parameter("m³", "V₀, gas volume at stroke zero", positive)
-    rod_area: Number = parameter("m²", "A, cross-section of the rod", positive)
-    exponent: Number = parameter("", "n, polytropic exponent", positive, default=1.3)
+    rod_area: Number = parameter("m²", "A, cross-section of the rod", positive, adjustable=False)
+    exponent: Number = parameter("", "n, polytropic exponent", positive, default=1.3, adjustable=False)
     atmospheric_pressure: Number = setting("Pa", "pressure outside", positive, default=101_325.0)
     relative: bool = eqx.field(static=True, default=False)
 

@@ -31,8 +31,8 @@ class AtRise(AbstractWrapper):
 
     law: AbstractDamper
     rise: Number = setting("K", "ϑ, rise of the temperature")
-    sensitivity: Number = parameter("1/K", "κ, relative loss of damping force per kelvin")
-    static_force_slope: Number = parameter("N/K", "s, change of the static force per kelvin")
+    sensitivity: Number = parameter("1/K", "κ, relative loss of damping force per kelvin", adjustable=False)
+    static_force_slope: Number = parameter("N/K", "s, change of the static force per kelvin", adjustable=False)
 
     def outer_force(self, force: Scalar) -> Scalar:
         """Force [N] at this temperature."""
@@ -74,10 +74,14 @@ class Heated(AbstractWrapper):
     """
 
     law: AbstractDamper
-    sensitivity: Number = parameter("1/K", "κ, relative loss of damping force per kelvin", default=0.002)
-    cooling_time: Number = parameter("s", "τ, time constant of cooling", positive, default=600.0)
-    static_force_slope: Number = parameter("N/K", "s, change of the static force per kelvin", default=0.0)
-    initial_rise: Number = parameter("K", "ϑ at the start", default=0.0)
+    sensitivity: Number = parameter(
+        "1/K", "κ, relative loss of damping force per kelvin", default=0.002, adjustable=False
+    )
+    cooling_time: Number = parameter("s", "τ, time constant of cooling", positive, default=600.0, adjustable=False)
+    static_force_slope: Number = parameter(
+        "N/K", "s, change of the static force per kelvin", default=0.0, adjustable=False
+    )
+    initial_rise: Number = parameter("K", "ϑ at the start", default=0.0, adjustable=False)
     heat_capacity: Number = setting("J/K", "C, heat capacity of oil and body", positive, default=1000.0)
     reference_temperature: Number = setting(
         "K", "T₀, temperature of the law's own parameters", positive, default=293.15

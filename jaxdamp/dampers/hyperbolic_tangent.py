@@ -38,16 +38,20 @@ class HyperbolicTangent(AbstractStateless):
     """
 
     viscous_rate: Number = parameter("N s/m", "c, viscous damping coefficient", nonnegative)
-    stiffness: Number = parameter("N/m", "k, stiffness", nonnegative)
+    stiffness: Number = parameter("N/m", "k, stiffness", nonnegative, adjustable=False)
     yield_force: Number = parameter("N", "α, height of the hysteresis", positive)
-    steepness: Number = parameter("s/m", "β, steepness over the velocity", positive)
-    branch_offset: Number = parameter("", "δ, offset of the two branches", real)
+    steepness: Number = parameter("s/m", "β, steepness over the velocity", positive, adjustable=False)
+    branch_offset: Number = parameter("", "δ, offset of the two branches", real, adjustable=False)
     static_force: Number = parameter("N", "f₀, force at rest at stroke zero", real, default=0.0)
     stroke_width: Number = setting("m", "w, stroke over which the sign of x changes", positive, default=1e-3)
 
     def traits(self) -> Traits:
         """The static force is an offset."""
         return super().traits()._replace(contains_offset=True)
+
+    def constant_forces(self) -> tuple[str, ...]:
+        """The static force."""
+        return ("static_force",)
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m] and velocity v [m/s]."""

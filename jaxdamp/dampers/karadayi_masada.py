@@ -33,10 +33,12 @@ class KaradayiMasada(AbstractClearance):
 
     rebound_rate: Number = parameter("N s/m", "c_r, slope of the dashpot for v > 0", positive)
     compression_rate: Number = parameter("N s/m", "c_c, slope of the dashpot for v < 0", positive)
-    friction_force: Number = parameter("N", "F_c, friction force", positive)
-    friction_velocity: Number = parameter("m/s", "v_f, velocity over which the friction jump is smoothed", positive)
-    stiffness: Number = parameter("N/m", "k, series stiffness", positive)
-    clearance: Number = parameter("m", "δ, half the free travel", nonnegative)
+    friction_force: Number = parameter("N", "F_c, friction force", positive, adjustable=False)
+    friction_velocity: Number = parameter(
+        "m/s", "v_f, velocity over which the friction jump is smoothed", positive, adjustable=False
+    )
+    stiffness: Number = parameter("N/m", "k, series stiffness", positive, adjustable=False)
+    clearance: Number = parameter("m", "δ, half the free travel", nonnegative, adjustable=False)
 
     def inner_law(self) -> AbstractDamper:
         """Dashpot and friction, without spring and clearance."""

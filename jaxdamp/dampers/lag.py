@@ -26,7 +26,7 @@ class Lag(AbstractWrapper):
     """
 
     law: AbstractDamper
-    lag_time: Number = parameter("s", "time constant of the lag", positive)
+    lag_time: Number = parameter("s", "time constant of the lag", positive, adjustable=False)
 
     def is_linear_in_law(self) -> bool:
         """A lag is linear."""

@@ -5,6 +5,7 @@ from typing import final
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._traced import behind
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractMemoryless
 from jaxdamp.parameters import parameter, positive
@@ -24,7 +25,7 @@ class Linear(AbstractMemoryless):
     rate: Number = parameter("N s/m", "damping coefficient", positive, linear=True)
 
     def __check_init__(self) -> None:
-        rate = _checks.concrete(self.rate)
+        rate = behind(self.rate)
         if rate is not None and np.any(rate == 0.0):
             remedy = "For a vehicle without damping write `Linear(1e-6)`, whose force is negligible."
             _checks.refuse("Linear.rate", "be positive [N s/m]", rate, remedy)

@@ -33,12 +33,14 @@ class LuGre(AbstractDamper):
     40.0
     """
 
-    stiffness: Number = parameter("N/m", "σ₀, stiffness of the bristles", positive)
-    contact_damping: Number = parameter("N s/m", "σ₁, damping of the bristles at rest", nonnegative)
+    stiffness: Number = parameter("N/m", "σ₀, stiffness of the bristles", positive, adjustable=False)
+    contact_damping: Number = parameter("N s/m", "σ₁, damping of the bristles at rest", nonnegative, adjustable=False)
     viscous_rate: Number = parameter("N s/m", "σ₂, viscous damping coefficient", nonnegative)
-    friction_force: Number = parameter("N", "F_c, friction at high sliding velocity", positive)
-    breakaway_force: Number = parameter("N", "F_s, friction at low sliding velocity", positive)
-    stribeck_velocity: Number = parameter("m/s", "v_s, velocity over which F_s decreases to F_c", positive)
+    friction_force: Number = parameter("N", "F_c, friction at high sliding velocity", positive, adjustable=False)
+    breakaway_force: Number = parameter("N", "F_s, friction at low sliding velocity", positive, adjustable=False)
+    stribeck_velocity: Number = parameter(
+        "m/s", "v_s, velocity over which F_s decreases to F_c", positive, adjustable=False
+    )
 
     def traits(self) -> Traits:
         """No force at rest."""

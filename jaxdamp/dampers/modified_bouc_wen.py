@@ -37,17 +37,29 @@ class ModifiedBoucWen(AbstractDamper):
     """
 
     viscous_rate: Number = parameter("N s/m", "c₀, viscous damping parallel to the hysteresis", nonnegative)
-    series_rate: Number = parameter("N s/m", "c₁, dashpot in series", positive)
-    stiffness: Number = parameter("N/m", "k₀, stiffness parallel to the hysteresis", nonnegative)
+    series_rate: Number = parameter("N s/m", "c₁, dashpot in series", positive, adjustable=False)
+    stiffness: Number = parameter("N/m", "k₀, stiffness parallel to the hysteresis", nonnegative, adjustable=False)
     yield_force: Number = parameter("N", "F_y, hysteretic force when saturated", positive)
-    yield_displacement: Number = parameter("m", "x_y, inner travel from rest to F_y at the first slope", positive)
-    shape: Number = parameter("", "γ̂ = γ/(β + γ), shape of the unloading", interval(0.5, 1.0), default=0.75)
-    exponent: Number = parameter("", "n, sharpness of the knee", interval(1.0, 20.0), default=2.0)
-    accumulator_stiffness: Number = parameter("N/m", "k₁, stiffness of the accumulator", nonnegative, default=0.0)
+    yield_displacement: Number = parameter(
+        "m", "x_y, inner travel from rest to F_y at the first slope", positive, adjustable=False
+    )
+    shape: Number = parameter(
+        "", "γ̂ = γ/(β + γ), shape of the unloading", interval(0.5, 1.0), default=0.75, adjustable=False
+    )
+    exponent: Number = parameter("", "n, sharpness of the knee", interval(1.0, 20.0), default=2.0, adjustable=False)
+    accumulator_stiffness: Number = parameter(
+        "N/m", "k₁, stiffness of the accumulator", nonnegative, default=0.0, adjustable=False
+    )
     static_force: Number = parameter("N", "f₀, force at rest at stroke zero", real, default=0.0)
-    viscous_rate_per_volt: Number = parameter("N s/m/V", "c₀ᵤ, change of c₀ with voltage", nonnegative, default=0.0)
-    series_rate_per_volt: Number = parameter("N s/m/V", "c₁ᵤ, change of c₁ with voltage", nonnegative, default=0.0)
-    yield_force_per_volt: Number = parameter("N/V", "F_yᵤ, change of F_y with voltage", nonnegative, default=0.0)
+    viscous_rate_per_volt: Number = parameter(
+        "N s/m/V", "c₀ᵤ, change of c₀ with voltage", nonnegative, default=0.0, adjustable=False
+    )
+    series_rate_per_volt: Number = parameter(
+        "N s/m/V", "c₁ᵤ, change of c₁ with voltage", nonnegative, default=0.0, adjustable=False
+    )
+    yield_force_per_volt: Number = parameter(
+        "N/V", "F_yᵤ, change of F_y with voltage", nonnegative, default=0.0, adjustable=False
+    )
     voltage: Number = setting("V", "U, voltage at the damper", nonnegative, command=True, default=0.0)
 
     def at_voltage(self) -> tuple[Scalar, Scalar, Scalar]:

@@ -92,7 +92,7 @@ class MonoTube(AbstractDamper):
     gas: GasSpring
     friction: CoulombFriction
     rebound_volume: Number = setting("m³", "V_r, oil above the piston at stroke zero", positive)
-    bulk_modulus: Number = parameter("Pa", "B, of the oil and its chamber", positive)
+    bulk_modulus: Number = parameter("Pa", "B, of the oil and its chamber", positive, adjustable=False)
     cavitation_pressure: Number = setting("Pa", "p_v, absolute pressure of a cavity", positive, default=1e5)
 
     def traits(self) -> Traits:

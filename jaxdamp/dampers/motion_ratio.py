@@ -22,7 +22,7 @@ class MotionRatio(AbstractWrapper):
     """
 
     law: AbstractDamper
-    ratio: Number = parameter("", "damper travel divided by wheel travel", positive)
+    ratio: Number = parameter("", "damper travel divided by wheel travel", positive, adjustable=False)
 
     def is_linear_in_law(self) -> bool:
         """A factor on the force is linear, whatever the motion."""

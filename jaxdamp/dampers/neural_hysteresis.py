@@ -53,11 +53,15 @@ class NeuralHysteresis(AbstractDamper):
     ((2,), (4, 3))
     """
 
-    stiffness: Vector = parameter("N/m", "kᵢ, stiffness of each element", positive)
-    hidden_weights: Float[Array, "width inputs"] = parameter("", "W₁, from v and z to the hidden layer", weight)
-    hidden_biases: Vector = parameter("", "b₁, of the hidden layer", weight)
-    output_weights: Float[Array, "outputs width"] = parameter("", "W₂, from the hidden layer to α and β", weight)
-    output_biases: Vector = parameter("", "b₂, of α and β", weight)
+    stiffness: Vector = parameter("N/m", "kᵢ, stiffness of each element", positive, adjustable=False)
+    hidden_weights: Float[Array, "width inputs"] = parameter(
+        "", "W₁, from v and z to the hidden layer", weight, adjustable=False
+    )
+    hidden_biases: Vector = parameter("", "b₁, of the hidden layer", weight, adjustable=False)
+    output_weights: Float[Array, "outputs width"] = parameter(
+        "", "W₂, from the hidden layer to α and β", weight, adjustable=False
+    )
+    output_biases: Vector = parameter("", "b₂, of α and β", weight, adjustable=False)
     velocity_scale: Number = setting("m/s", "v₀, velocity scale of the network", positive)
     force_scale: Number = setting("N", "F₀, force scale of the network", positive)
 

@@ -98,7 +98,7 @@ class PistonFlow(AbstractMemoryless):
     compression_opening_pressure: Number = parameter("Pa", "p_o of the compression valve", positive)
     compression_valve_stiffness: Number = parameter("Pa/m²", "k, pressure per area of the compression valve", positive)
     compression_valve_area: Number = parameter("m²", "A_max, largest area of the compression valve", positive)
-    leak: Number = parameter("m³/s/Pa", "k_l, laminar leak past the piston", nonnegative, default=0.0)
+    leak: Number = parameter("m³/s/Pa", "k_l, laminar leak past the piston", nonnegative, default=0.0, adjustable=False)
     density: Number = setting("kg/m³", "ρ, of the oil", positive, default=DENSITY)
     discharge: Number = setting("", "C_d, discharge coefficient", positive, default=DISCHARGE)
     transition_pressure: Number = setting("Pa", "ε, drop below which orifice flow is laminar", positive, default=1e3)

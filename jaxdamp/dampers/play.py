@@ -79,8 +79,8 @@ class Play(AbstractClearance):
     """
 
     law: AbstractDamper
-    stiffness: Number = parameter("N/m", "k, stiffness of the contact", positive)
-    clearance: Number = parameter("m", "δ, half the free travel", nonnegative)
+    stiffness: Number = parameter("N/m", "k, stiffness of the contact", positive, adjustable=False)
+    clearance: Number = parameter("m", "δ, half the free travel", nonnegative, adjustable=False)
 
     def __check_init__(self) -> None:
         require_feed_through("law", self.law, "Play")

@@ -6,6 +6,7 @@ import equinox as eqx
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._traced import behind
 from jaxdamp._types import Number, Scalar
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.motion import Motion
@@ -28,7 +29,7 @@ class Scaled(AbstractWrapper):
     allow_active: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self) -> None:
-        factor = _checks.concrete(self.factor)
+        factor = behind(self.factor)
         if factor is not None and np.any(factor < 0) and not self.allow_active:
             remedy = "The law would add energy. If this is intended: `Scaled(law, factor, allow_active=True)`."
             _checks.refuse("factor", "not be negative", factor, remedy)

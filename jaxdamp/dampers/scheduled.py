@@ -1,7 +1,9 @@
-"""Any law with parameters that depend on a command: coil current, valve current, clicks."""
+"""Any law with parameters or a force that depends on a command: coil current, valve current, clicks."""
 
+from collections.abc import Sequence
 from typing import final
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -12,32 +14,53 @@ from jaxdamp._limits import within
 from jaxdamp._types import Number, Vector
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.fitted_range import without_fitted_ranges
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.scaled import Scaled
+from jaxdamp.dampers.sum import Sum
+from jaxdamp.dampers.traits import Traits, combined_traits
 from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import increasing, setting
 
 
+BLENDS = ("parameters", "force")
+
+
 @final
 class Scheduled(AbstractWrapper):
-    """A law whose parameters are interpolated between laws of equal structure, given at commands uₖ.
+    """A law between laws that are given at commands uₖ: their parameters are interpolated, or their forces.
 
-    p(u) = pₖ + (pₖ₊₁ − pₖ)(u − uₖ)/(uₖ₊₁ − uₖ) for every parameter p. For a law that is linear in its parameters, such
-    as a table, this interpolates the force. Parameters stay in their domains, since between two positive numbers all
-    are positive. The command is constant during a run, like a coil current on the bench. It can be any quantity, in the
-    unit of the levels; commands outside the levels are refused (inside compiled code the nearest level is used). States
-    are those of the law. Put a wrapper outside if its parameters do not depend on the command: `Lag(Scheduled(...),
-    lag_time)`.
+    With the shares wₖ of straight lines between the levels, (uₖ₊₁ − u)/(uₖ₊₁ − uₖ) for the level below the command,
+    (u − uₖ)/(uₖ₊₁ − uₖ) for the one above and zero for all others, which add up to one:
+
+        blend="parameters":  p(u) = Σ wₖ pₖ for every parameter p of laws of equal structure
+        blend="force":       F(u) = Σ wₖ Fₖ, every law with its own states, which all go on at any command
+
+    A wider orifice or a larger yield force is a parameter that moves with the command: interpolated parameters then are
+    the damper in between, with one law's states and cost. But the force in between is sensible only if the parameters
+    mean the same at both levels. Fits of laws with numbers that the records do not determine can have the same force by
+    other knots, stiffnesses or exponents, and the law between such numbers may be far from both. The blended force is
+    never outside the span of its neighbours' forces; the laws may be of any structure. It takes the states and the time
+    of all laws. For a law that is linear in its parameters and has no states, such as a table, both are the same.
+
+    Parameters stay in their domains, since between two positive numbers all are positive. The command is constant
+    during a run, like a coil current on the bench. It can be any quantity, in the unit of the levels; commands outside
+    the levels are refused (inside compiled code the nearest level is used). Put a wrapper outside if its parameters do
+    not depend on the command: `Lag(Scheduled(...), lag_time)`.
 
     `identify.fit` fits records at several commands (`bench.read(..., command=...)`) by one law, each record at its own
     command. With as many levels as commands, every command has its own parameters; with fewer, the fit interpolates.
+    `identify.fit_scheduled` finds the laws at all commands and the blend that predicts the records between them.
 
     Arguments:
-        laws: two or more laws of equal structure.
+        laws: two or more laws, of equal structure unless forces are blended.
         levels: strictly increasing commands uₖ of these laws, shape (laws,).
         command: the present command u.
+        blend: `"parameters"` or `"force"`.
 
-    >>> from jaxdamp.dampers import Bilinear
+    >>> from jaxdamp.dampers import Bilinear, Linear
     >>> law = Scheduled((Bilinear(900.0, 500.0), Bilinear(4900.0, 2500.0)), levels=[0.0, 2.0], command=0.5)
+    >>> float(law.force(0.0, 1.0, law.initial_state()))
+    1900.0
+    >>> law = Scheduled((Linear(900.0), Bilinear(4900.0, 2500.0)), levels=[0.0, 2.0], command=0.5, blend="force")
     >>> float(law.force(0.0, 1.0, law.initial_state()))
     1900.0
     """
@@ -45,23 +68,30 @@ class Scheduled(AbstractWrapper):
     laws: tuple[AbstractDamper, ...]
     levels: Vector = setting("", "commands of the laws", increasing)
     command: Number = setting("", "command, in the unit of the levels", command=True)
+    blend: str = eqx.field(static=True, default="parameters")
 
     def __check_init__(self) -> None:
         check_field_types(self)
+        _checks.one_of("blend", self.blend, BLENDS)
         if len(self.laws) < 2 or self.levels.shape != (len(self.laws),):
             must = "contain two or more laws, with a level for each"
             _checks.refuse("laws", must, f"{len(self.laws)} laws and levels of shape {self.levels.shape}")
-        structures = {
-            (jax.tree.structure(law), tuple(jnp.shape(leaf) for leaf in jax.tree.leaves(law)))
-            for law in without_fitted_ranges(self.laws)
-        }
-        if len(structures) > 1:
-            remedy = "Use one law class with vectors of equal length, such as tables over the same velocities."
+        if self.blend == "parameters" and not self.of_equal_structure(self.laws):
+            remedy = 'Blend their forces, `blend="force"`, or use one law class with vectors of equal length.'
             _checks.refuse("laws", "be of equal structure", ", ".join(map(repr, self.laws)), remedy)
         command, levels = _checks.concrete(self.command), _checks.concrete(self.levels)
         if command is not None and levels is not None and not levels[0] <= command <= levels[-1]:
             must = f"be between the levels {levels[0]:g} and {levels[-1]:g}"
             _checks.refuse("command", must, f"{command:g}", "Add a law at a level further out.")
+
+    @staticmethod
+    def of_equal_structure(laws: Sequence[AbstractDamper]) -> bool:
+        """Whether all laws have the same parameters in the same shapes, so that these can be interpolated."""
+        structures = {
+            (jax.tree.structure(law), tuple(jnp.shape(leaf) for leaf in jax.tree.leaves(law)))
+            for law in without_fitted_ranges(tuple(laws))
+        }
+        return len(structures) == 1
 
     def shares(self) -> Float[Array, " laws"]:
         """Weight of each law in the interpolation; the sum is one."""
@@ -70,8 +100,10 @@ class Scheduled(AbstractWrapper):
         return edges[:-1] - edges[1:]
 
     def at_command(self) -> AbstractDamper:
-        """The law with the parameters at the command."""
+        """The law at the command: with the interpolated parameters, or the weighted sum of the laws."""
         shares, laws = self.shares(), without_fitted_ranges(self.laws)
+        if self.blend == "force":
+            return Sum(tuple(Scaled(law, share) for law, share in zip(laws, shares, strict=True)))
         return jax.tree.map(lambda *leaves: jnp.tensordot(shares, jnp.stack(leaves), 1), *laws)
 
     def inner_law(self) -> AbstractDamper:
@@ -79,8 +111,8 @@ class Scheduled(AbstractWrapper):
         return self.at_command()
 
     def traits(self) -> Traits:
-        """Those of the laws, which have equal structure."""
-        return self.laws[0].traits()
+        """Those of the laws, combined; linear in the parameters if all laws are."""
+        return combined_traits(law.traits() for law in self.laws)
 
     def side_by_side(self) -> tuple[AbstractDamper, ...]:
         """The terms of the law at the command."""

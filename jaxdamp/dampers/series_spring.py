@@ -27,8 +27,10 @@ class SeriesSpring(AbstractSeries):
     """
 
     law: AbstractDamper
-    stiffness: Number = parameter("N/m", "k₁, series stiffness", positive)
-    cubic_stiffness: Number = parameter("N/m³", "k₂, cubic series stiffness", nonnegative, default=0.0)
+    stiffness: Number = parameter("N/m", "k₁, series stiffness", positive, adjustable=False)
+    cubic_stiffness: Number = parameter(
+        "N/m³", "k₂, cubic series stiffness", nonnegative, default=0.0, adjustable=False
+    )
 
     def __check_init__(self) -> None:
         require_feed_through("law", self.law, "SeriesSpring")

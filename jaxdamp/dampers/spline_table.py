@@ -81,6 +81,10 @@ class SplineTable(AbstractMemoryless):
         """The points may all move by one force."""
         return super().traits()._replace(contains_offset=True)
 
+    def constant_forces(self) -> tuple[str, ...]:
+        """The points may all move by one force."""
+        return ("force_points",)
+
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
         if jnp.ndim(v):

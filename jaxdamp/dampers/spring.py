@@ -29,6 +29,10 @@ class Spring(AbstractStateless):
         """Independent of the velocity; the preload is an offset."""
         return super().traits()._replace(has_feed_through=False, contains_offset=True)
 
+    def constant_forces(self) -> tuple[str, ...]:
+        """The preload."""
+        return ("preload",)
+
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m]."""
         del v

@@ -34,10 +34,16 @@ class StribeckFriction(AbstractMemoryless):
     [68.99, -51.04, 40.0]
     """
 
-    friction_force: Number = parameter("N", "F_c, friction force at high velocity", positive, linear=True)
-    breakaway_force: Number = parameter("N", "F_s, friction force near rest", positive, linear=True)
-    stribeck_velocity: Number = parameter("m/s", "v_s, velocity over which the friction decreases", positive)
-    friction_velocity: Number = parameter("m/s", "v_f, velocity over which the jump is smoothed", positive)
+    friction_force: Number = parameter(
+        "N", "F_c, friction force at high velocity", positive, linear=True, adjustable=False
+    )
+    breakaway_force: Number = parameter("N", "F_s, friction force near rest", positive, linear=True, adjustable=False)
+    stribeck_velocity: Number = parameter(
+        "m/s", "v_s, velocity over which the friction decreases", positive, adjustable=False
+    )
+    friction_velocity: Number = parameter(
+        "m/s", "v_f, velocity over which the jump is smoothed", positive, adjustable=False
+    )
 
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""

@@ -13,7 +13,6 @@ from jaxdamp._field_types import check_field_types
 from jaxdamp._limits import within
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers.base import AbstractDamper, AbstractStateless, refuse_states
-from jaxdamp.dampers.fitted_range import without_fitted_ranges
 from jaxdamp.dampers.table import Table
 from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import as_float, increasing, setting
@@ -24,7 +23,6 @@ Grid = Float[Array, "strokes velocities"] | Float[np.ndarray, "strokes velocitie
 
 def _forces(laws: tuple[AbstractDamper, ...], x: ScalarLike, v: ScalarLike) -> Float[Array, " laws"]:
     """Forces [N] of the laws; laws that differ only in their parameters are computed as one batch."""
-    laws = without_fitted_ranges(laws)
     kinds = {(jax.tree.structure(law), tuple(jnp.shape(a) for a in jax.tree.leaves(law))) for law in laws}
     if len(kinds) > 1:
         return jnp.stack([law.force(x, v, law.initial_state()) for law in laws])

@@ -49,6 +49,10 @@ class Table(AbstractMemoryless):
         """The points may all move by one force."""
         return super().traits()._replace(contains_offset=True)
 
+    def constant_forces(self) -> tuple[str, ...]:
+        """The points may all move by one force."""
+        return ("force_points",)
+
     def force_velocity(self, v: ScalarLike) -> Scalar:
         """Force [N] at velocity v [m/s]."""
         slopes = jnp.diff(self.force_points) / jnp.diff(self.velocity)
@@ -61,4 +65,6 @@ class Table(AbstractMemoryless):
         """Points from measured data by least squares, closer together towards zero velocity."""
         grid = velocity_grid(np.asarray(velocity), points_a_side)
         hats = np.stack([np.interp(velocity, grid, unit) for unit in np.eye(grid.size)], axis=1)
-        return cls(grid, np.linalg.lstsq(hats, np.asarray(force), rcond=None)[0], allow_active=True)
+        points, shown = np.linalg.lstsq(hats, np.asarray(force), rcond=None)[0], hats.any(axis=0)
+        # A point without a sample beside it lies between its neighbours.
+        return cls(grid, np.interp(grid, grid[shown], points[shown]), allow_active=True)

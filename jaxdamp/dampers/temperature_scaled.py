@@ -45,7 +45,7 @@ class TemperatureScaled(AbstractWrapper):
     law: AbstractDamper
     temperature: Number = setting("K", "oil temperature", positive)
     reference_temperature: Number = setting("K", "temperature at which the law was measured", positive, default=293.15)
-    sensitivity: Number = parameter("1/K", "κ, relative loss of force per kelvin", default=0.002)
+    sensitivity: Number = parameter("1/K", "κ, relative loss of force per kelvin", default=0.002, adjustable=False)
 
     def traits(self) -> Traits:
         """Those of the law, and a dependence on the temperature."""

@@ -22,7 +22,7 @@ class Traits(NamedTuple):
             affects the static equilibrium of a vehicle.
         has_explicit_step: some states have an explicit step, which must be shorter than their time constants.
         contains_offset: a parameter adds a constant to the force, as a zero error of a load cell does, so that a fit
-            cannot tell the two apart.
+            cannot tell the two apart (`constant_forces` names it, if it has no other meaning).
         temperature_dependent: the force depends on the temperature of the oil, which a measured one may replace
             (`at_temperature`).
         solves_equation: the step solves an equation by iteration, so that a law around it should write out none of its

@@ -47,12 +47,16 @@ class AbstractViscoPlastic(AbstractDamper):
 
     yield_force: Number = parameter("N", "F_y, yield force that follows the velocity at once", nonnegative, linear=True)
     viscous_force: Number = parameter("N", "K, viscous force at 1 m/s", nonnegative, linear=True)
-    exponent: Number = parameter("", "n, exponent of the viscous force", interval(0.1, 2.0))
-    flow_velocity: Number = parameter("m/s", "v_f, velocity over which the flow begins", positive)
-    sliding_forces: Vector = parameter("N", "Yᵢ, sliding force of each element", positive, linear=True)
-    elastic_travels: Vector = parameter("m", "eᵢ, travel that loads each element", positive)
-    clearances: Vector = parameter("m", "δᵢ, half the free travel of each element", nonnegative)
-    relaxation_times: Vector = parameter("s", "τᵢ, time in which the force of each element decays at rest", positive)
+    exponent: Number = parameter("", "n, exponent of the viscous force", interval(0.1, 2.0), adjustable=False)
+    flow_velocity: Number = parameter("m/s", "v_f, velocity over which the flow begins", positive, adjustable=False)
+    sliding_forces: Vector = parameter(
+        "N", "Yᵢ, sliding force of each element", positive, linear=True, adjustable=False
+    )
+    elastic_travels: Vector = parameter("m", "eᵢ, travel that loads each element", positive, adjustable=False)
+    clearances: Vector = parameter("m", "δᵢ, half the free travel of each element", nonnegative, adjustable=False)
+    relaxation_times: Vector = parameter(
+        "s", "τᵢ, time in which the force of each element decays at rest", positive, adjustable=False
+    )
     asymmetry: Number = parameter("", "a, force in compression relative to rebound", positive, default=1.0)
 
     def __check_init__(self) -> None:

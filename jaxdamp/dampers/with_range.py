@@ -4,7 +4,7 @@ from typing import TypeVar
 
 from jaxdamp import _checks
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.fitted_range import UNITS, FittedRange, Limits
+from jaxdamp.dampers.fitted_range import UNITS, FittedRange, Limits, RangeNote
 
 
 L = TypeVar("L")
@@ -15,6 +15,9 @@ def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Li
 
     `identify.fit` and `train` do this; state the range yourself for a law with parameters from another source. Laws
     inside have their own ranges. Simulations with the law then report by how much it is used outside the range.
+
+    The range is no array of the law: a law with a range has the same structure as one without, and `jax.tree.map` of
+    several laws returns that of the first. A law that a compiled function (`jax.jit`, `jax.lax.scan`) returns has none.
 
     Arguments:
         law: any law.
@@ -37,6 +40,6 @@ def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Li
         remedy = "Write for example `with_fitted_range(law, velocity=(-0.5, 0.5))`."
         _checks.refuse("fitted_to", "be given, or limits by name, and not both", repr(fitted_to), remedy)
     changed = object.__new__(type(law))
-    for name, value in (vars(law) | {"fitted_to": fitted_to or FittedRange(**limits)}).items():
+    for name, value in (vars(law) | {"range_note": RangeNote(fitted_to or FittedRange(**limits))}).items():
         object.__setattr__(changed, name, value)
     return changed

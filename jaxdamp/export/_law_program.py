@@ -13,7 +13,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.codegen import Program, Symbols, lower, symbols
-from jaxdamp.dampers import AbstractDamper, laws_inside, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper, laws_inside
 from jaxdamp.parameters import Domain, domain_of, modules_inside, with_values
 
 
@@ -88,7 +88,7 @@ class LawProgram:
     """A law whose functions can be printed.
 
     Attributes:
-        law: the law, without the range that it was fitted to.
+        law: the law.
         numbers: its parameters and settings.
         states: the number of its states.
         dtype: the type of all numbers, "float64" or "float32".
@@ -97,7 +97,7 @@ class LawProgram:
 
     def __init__(self, law: AbstractDamper, dtype: str = "float64", member: str = "->") -> None:
         _checks.one_of("precision", dtype, ("float64", "float32"))
-        self.law = without_fitted_ranges(law)
+        self.law = law
         self.numbers = law_numbers(self.law)
         self.states = int(law.initial_state().size)
         self.dtype, self.member = dtype, member

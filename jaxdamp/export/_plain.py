@@ -47,13 +47,20 @@ def declared(field: Any) -> dict[str, Any] | None:
 
 
 def own_fields(module: eqx.Module | type[eqx.Module]) -> list[dataclasses.Field]:
-    """All fields except the fitted range, which all laws have."""
-    return [field for field in dataclasses.fields(module) if field.name != FITTED_TO]
+    """All fields except the note of the fitted range, which all laws have."""
+    return [field for field in dataclasses.fields(module) if field.name != "range_note"]
 
 
 def plain_module(module: Any) -> dict[str, Any]:
     """A module with all modules inside."""
     name = type(module).__name__
+    if type(module).__module__.split(".")[0] in BORROWED:
+        remedy = (
+            "Save its numbers by `equinox.tree_serialise_leaves(path, law)`, and read them into a law made by the same "
+            "constructor; `NeuralHysteresis` is a network that can be written."
+        )
+        must = "be of this package or your own: a module of another package holds functions, which no file does"
+        _checks.refuse("module", must, f"a {type(module).__module__.split('.')[0]} {name}", remedy)
     if known_classes().get(name) is not type(module):
         remedy = "Give your class a unique name; after redefining it, create its objects again."
         wrong = f"a {name} that differs from another {name}"
@@ -64,7 +71,6 @@ def plain_module(module: Any) -> dict[str, Any]:
         result[field.name] = _plain(value, where) if number is None else _quantity(value, number["unit"], where)
     covered = module.fitted_to if isinstance(module, AbstractDamper) else None
     if covered is not None:
-        _known_number(covered.limits, f"{name}.{FITTED_TO}")
         result[FITTED_TO] = {q.name: {"value": list(q.limits), "unit": q.unit} for q in covered.known()}
     return result
 

@@ -10,7 +10,7 @@ from jax.tree_util import Partial
 
 from jaxdamp import _checks
 from jaxdamp._types import Number
-from jaxdamp.dampers import UNITS, AbstractDamper, FittedRange
+from jaxdamp.dampers import UNITS, AbstractDamper, FittedRange, with_fitted_range
 from jaxdamp.export._plain import FITTED_TO, declared, known_classes, known_functions, own_fields
 from jaxdamp.parameters import as_float
 
@@ -49,7 +49,9 @@ def rebuilt(plain: Any, where: str) -> Any:
             _checks.refuse(here, "be one number", value)
         object.__setattr__(module, field.name, value)
     if is_law:
-        object.__setattr__(module, FITTED_TO, _fitted_to(plain.get(FITTED_TO), name))
+        object.__setattr__(module, "range_note", kind.range_note)
+        covered = _fitted_to(plain.get(FITTED_TO), name)
+        return module if covered is None else with_fitted_range(module, covered)
     return module
 
 

@@ -30,7 +30,7 @@ def sample_motion(program: LawProgram) -> tuple[np.ndarray, np.ndarray, np.ndarr
 def law_test(program: LawProgram, name: str) -> str:
     """The text of the program for a law; it returns zero if the greatest difference is due to rounding."""
     time, stroke, velocity = sample_motion(program)
-    computed = respond(program.law, time, stroke, velocity)
+    computed = respond(program.law, time, stroke, velocity, state=program.law.initial_state())
     force = np.asarray(computed, float)
     real = "double" if program.dtype == "float64" else "float"
     close = _tolerance(program.dtype, computed.dtype)

@@ -12,7 +12,6 @@ import numpy as np
 
 from jaxdamp._vectors import MemoryLayout, scalars
 from jaxdamp.codegen import Constant, Program, Symbols, lower, symbols
-from jaxdamp.dampers import without_fitted_ranges
 from jaxdamp.export._law_program import law_numbers
 from jaxdamp.parameters import with_values
 from jaxdamp.simulation import Equations, Exponential, RoadInput, settled
@@ -61,13 +60,13 @@ class VehicleProgram:
         member: what the language writes between `p` and the name of a number: "->" in C, "." in JavaScript.
 
     Attributes:
-        vehicle: without the ranges that its laws were fitted to.
+        vehicle: the vehicle.
         numbers: its parameters and settings.
         wheels: their number.
     """
 
     def __init__(self, vehicle: AbstractVehicle, dtype: str = "float64", member: str = "->") -> None:
-        self.vehicle, self.dtype, self.member = without_fitted_ranges(vehicle), dtype, member
+        self.vehicle, self.dtype, self.member = vehicle, dtype, member
         self.numbers = law_numbers(self.vehicle)
         self.layout, self.wheels = vehicle.layout, len(vehicle.wheel_names)
         self._stepper, self._carry = FlatTree(), FlatTree()

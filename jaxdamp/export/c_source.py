@@ -6,6 +6,7 @@ from pathlib import Path
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._c_text import INCLUDES
 from jaxdamp.export._law_program import LawProgram, identifier
@@ -13,7 +14,6 @@ from jaxdamp.export._law_source import DERIVATIVES, law_source
 from jaxdamp.export._self_test import law_test, vehicle_test
 from jaxdamp.export._vehicle_program import VehicleProgram
 from jaxdamp.export._vehicle_source import vehicle_source
-from jaxdamp.export._write import write_whole
 from jaxdamp.vehicles import AbstractVehicle
 
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._writing import write_whole
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, laws_inside
 from jaxdamp.export._javascript import bump_function, closed, law_functions, vehicle_functions
 from jaxdamp.export._law_program import LawNumber, LawProgram
 from jaxdamp.export._ride_program import RideProgram
-from jaxdamp.export._write import write_whole
 from jaxdamp.export.module_file import to_json
 from jaxdamp.parameters import weight
 from jaxdamp.roads import AbstractRoad, iso8608
@@ -138,7 +138,7 @@ def _assembled(data: dict[str, Any], programs: str) -> str:
     parts = {
         "style": text["style.css"],
         "version": importlib.metadata.version("jaxdamp"),
-        "data": json.dumps(data, allow_nan=False).replace("</", "<\\/"),
+        "data": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
         "programs": programs,
         "scripts": "\n".join(text[name] for name in _SCRIPTS),
     }

@@ -12,13 +12,13 @@ from pathlib import Path
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._law_program import LawProgram, identifier
 from jaxdamp.export._law_source import law_source
 from jaxdamp.export._model_description import description, variables
 from jaxdamp.export._vehicle_program import VehicleProgram
 from jaxdamp.export._vehicle_source import vehicle_source
-from jaxdamp.export._write import write_whole
 from jaxdamp.simulation import substeps_needed
 from jaxdamp.vehicles import AbstractVehicle
 

@@ -10,8 +10,8 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._types import VectorLike
+from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper, extrapolated
-from jaxdamp.export._write import write_whole
 from jaxdamp.rig import quasi_static
 
 

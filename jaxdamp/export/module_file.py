@@ -8,10 +8,10 @@ from typing import Any, NoReturn
 import equinox as eqx
 
 from jaxdamp import _checks
+from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper, has_fitted_range
 from jaxdamp.export._plain import FITTED_TO, plain_module
 from jaxdamp.export._rebuild import rebuilt
-from jaxdamp.export._write import write_whole
 from jaxdamp.parameters import checked
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.vehicles import AbstractVehicle

@@ -8,8 +8,8 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._types import VectorLike
+from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
-from jaxdamp.export._write import write_whole
 from jaxdamp.export.force_velocity import SettledTable, settled_table, warn_of_rows
 from jaxdamp.rig import respond
 
@@ -213,7 +213,8 @@ def _left_out(law: AbstractDamper, table: SettledTable) -> list[str]:
         speed = min(peak, 0.9 * reach * 2.0 * np.pi * frequency)
         stroke, velocity = speed / (2.0 * np.pi * frequency) * np.sin(turn), speed * np.cos(turn)
         try:
-            force = np.asarray(respond(law, turn / (2.0 * np.pi * frequency), stroke, velocity))[-_SAMPLES:]
+            time = turn / (2.0 * np.pi * frequency)
+            force = np.asarray(respond(law, time, stroke, velocity, state=law.initial_state()))[-_SAMPLES:]
         except ValueError as error:
             return [f"what the table leaves out is not known in a sine of {frequency:g} Hz, {speed:.3g} m/s: {error}"]
         lost = force - np.interp(velocity[-_SAMPLES:], table.velocity, table.force)

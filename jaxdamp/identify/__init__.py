@@ -22,9 +22,10 @@ from jaxdamp.identify.profile_curve import ProfileCurve
 from jaxdamp.identify.propagation import Band, Evidence, Propagated
 from jaxdamp.identify.record_sensitivity import RecordSensitivity
 from jaxdamp.identify.residual import ErrorShares, error_shares
-from jaxdamp.identify.result import FitResult, Score, fit_percent
+from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.rungs import Failure, Rung
 from jaxdamp.identify.scheduling import LeftOutSetting, ScheduledFit, fit_scheduled
+from jaxdamp.identify.scoring import Score, fit_percent
 from jaxdamp.identify.targets import TargetFit, fit_targets
 from jaxdamp.identify.training import Training, train
 from jaxdamp.identify.vehicle_fitting import fit_vehicle

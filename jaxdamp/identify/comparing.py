@@ -1,6 +1,7 @@
-"""`compare`: several laws on the same records, scored on records they were not fitted to."""
+"""`compare`: several laws on the same records, judged on motion that they were not fitted to."""
 
 import dataclasses
+import functools
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -11,13 +12,15 @@ import jax.numpy as jnp
 
 from jaxdamp._progress import Progress
 from jaxdamp._tables import Table, with_unit
-from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.identify.fitting import NUMERICAL, fit
+from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
 from jaxdamp.identify.machine import OFFSET, Machine
+from jaxdamp.identify.recommending import Recommendation, recommendation
 from jaxdamp.identify.result import FitResult
-from jaxdamp.identify.rungs import Failure, Rung, best_of, ladder_table
+from jaxdamp.identify.rungs import Failure, Rung, ladder_table
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
-from jaxdamp.identify.starting import Start, check_starts
+from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts
 from jaxdamp.identify.verdict import verdict
 
 
@@ -34,7 +37,7 @@ class Comparison:
 
     Attributes:
         rungs: the laws that were fitted, with their errors.
-        held_out: the records scored on, not fitted.
+        held_out: the records scored on, not fitted; empty if parts of the fitted ones were held out.
         failed: the laws without a fit, and why.
     """
 
@@ -58,10 +61,24 @@ class Comparison:
             raise ValueError(f"None of {len(failed)} laws could be fitted. {' '.join(texts)}")
         return cls(rungs, tuple(held_out), failed)
 
+    @functools.cached_property
+    def recommendation(self) -> Recommendation:
+        """The recommended law, those that predict as well, and those left aside."""
+        return recommendation(self.rungs)
+
     @property
     def best(self) -> Rung:
-        """The law with the smallest error on the held-out records, or on the fitted ones if there are none."""
-        return best_of(self.rungs)
+        """The recommended law: the simplest that predicts motion held out as well as any, within the noise.
+
+        It is no law with numbers at bounds or not identifiable, or whose search did not converge, where another is as
+        good (`recommendation`).
+        """
+        return self.recommendation.rung
+
+    @property
+    def best_fit(self) -> Rung:
+        """The law with the smallest error on the fitted records, however many numbers it needs."""
+        return min(self.rungs, key=lambda rung: rung.rmse)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -79,13 +96,16 @@ class Comparison:
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """Sentences on the error of the best law and on the shares of the errors (shape, hysteresis, noise)."""
+        """Sentences on the recommended law, why it is this one, and the shares of the errors."""
         between = self.best.by_setting.between if self.best.by_setting else ()
-        return (*verdict(self.rungs, self.held_out), *(left.sentence(self.best.name) for left in between))
+        return (
+            *verdict(self.recommendation, self.rungs, self.held_out),
+            *(left.sentence(self.best.name) for left in between),
+        )
 
     def table(self) -> Table:
         """Each law with its number of free parameters, its errors, their shares, and remarks."""
-        return ladder_table(self.rungs, self.failed)
+        return ladder_table(self.rungs, self.failed, self.best.name)
 
     def to_dict(self) -> dict[str, Any]:
         """All fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""
@@ -99,6 +119,7 @@ class Comparison:
         }
         return {
             "best": self.best.name,
+            "best_fit": self.best_fit.name,
             "verdict": list(self.verdict),
             "held_out": [run.name for run in self.held_out],
             "laws": laws,
@@ -112,9 +133,8 @@ class Comparison:
         return ladder(self)
 
     def __repr__(self) -> str:
-        head = f"{'law':<24}{'free':>5}{'fit %':>8}{'RMSE N':>9}" + f"{'held-out %':>12}{'RMSE N':>9}" * bool(
-            self.held_out
-        )
+        judged = any(rung.judged_on for rung in self.rungs)
+        head = f"{'law':<24}{'free':>5}{'fit %':>8}{'RMSE N':>9}" + f"{'held-out %':>12}{'RMSE N':>9}" * judged
         lines = [head]
         for r in self.rungs:
             line = f"{r.name:<24}{r.parameters:>5}{r.fit_percent:>8.1f}{r.rmse:>9.1f}"
@@ -123,7 +143,8 @@ class Comparison:
             lines.append(line)
         lines += [f"{failure.name:<24} failed: {failure.reason}" for failure in self.failed]
         about_records = [f"warning: {warning}" for warning in self.warnings if len(self.rungs) > 1]
-        return "\n".join([*lines, *about_records, f"best: {self.best.name}"])
+        answer = " ".join(self.verdict[: 2 if len(self.rungs) > 1 else 1])
+        return "\n".join([*lines, *about_records, answer, f"best: {self.best.name}"])
 
 
 def compare(
@@ -134,25 +155,33 @@ def compare(
     rig: Machine = OFFSET,
     scheduled: bool = False,
     progress: Callable[[str], None] | None = None,
+    bad_records: str = "refuse",
     **options: Any,
 ) -> Comparison:
-    """Fit several laws to the same records and score them on others.
+    """Fit several laws to the same records, judge them on motion held out, and recommend one (`.best`).
+
+    Without `held_out`, parts of the records are left out in turn and predicted by fits to the rest, which start at the
+    fit of all records: whole records in up to four groups where there are three motions or more, otherwise the quarters
+    of the records in time. A law trained before the fit (`LearntStart`) has seen all records and is judged only on
+    `held_out`.
 
     A law that cannot be fitted or scored does not stop the comparison: it is listed in `failed` with the reason.
 
     Arguments:
         laws: starts by name, such as `default_ladder(runs)`.
         runs: records to fit.
-        held_out: records to score on, not fitted.
+        held_out: records to judge on, which are not fitted, instead of parts of `runs`.
         rig: the test machine of all fits, as in `fit`; a zero error of the load cell if left out, since a law that must
             explain it comes out wrong. `None` is a machine that adds nothing.
         scheduled: whether the parameters of each law are functions of the records' command, as in `fit_scheduled`;
             starts are carried over from neighbouring settings, and the best law is also scored between settings.
         progress: called with each name before its fit; a line in the terminal if it is left out.
+        bad_records: "refuse", "leave_out" or "keep" records with an error, as in `fit`; those held out are checked too.
         options: passed on to `fit`.
 
     Raises:
-        ValueError: no laws, or none that could be fitted; with `scheduled`, records of one command only.
+        ValueError: no laws, or none that could be fitted; a record with an error; with `scheduled`, records of one
+            command only.
 
     >>> from jaxdamp import bench, dampers
     >>> runs = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=5.0).run(
@@ -163,7 +192,9 @@ def compare(
     """
     call = "compare(laws, runs)"
     check_starts(laws, call)
-    runs, held_out = as_runs(runs, call=call), as_runs(held_out, "held_out")
+    robust = options.get("loss", "squares") != "squares"
+    runs = usable(as_runs(runs, call=call), bad_records, robust=robust)
+    held_out = usable(as_runs(held_out, "held_out"), bad_records, robust=robust, argument="held_out")
     with Progress("Fitting") as shown:
         number = 0
 
@@ -172,7 +203,7 @@ def compare(
             number += 1
             shown(f"{name}, {number} of {len(laws)}")
 
-        how = {"rig": rig, "scheduled": scheduled, "progress": progress or counted}
+        how = {"rig": rig, "scheduled": scheduled, "progress": progress or counted, "bad_records": "keep"}
         comparison = Comparison.of(fit_each(laws, runs, held_out, **how, **options), held_out)
     _ = comparison.verdict  # which leaves out settings if there are any: that is part of this work
     return comparison
@@ -195,7 +226,7 @@ def fit_each(
     Arguments:
         laws: starts by name.
         runs: records to fit.
-        held_out: records to score on, not fitted.
+        held_out: records to judge on, as in `compare`.
         rig: the test machine of all fits, as in `compare`.
         scheduled: whether the parameters are functions of the command, as in `compare`.
         progress: called with each name before its result is waited for.
@@ -214,12 +245,13 @@ def fit_each(
             with jax.enable_x64(double):
                 by_setting = fit_scheduled(start, runs, rig=rig, progress=_silent, **options) if scheduled else None
                 result = by_setting.result if by_setting else fit(start, runs, rig=rig, **options)
-                percent, rmse, scores = result.score(held_out) if held_out else (None, None, result.scores)
+                judged = _judged(start, result, held_out, scheduled)
         except NUMERICAL as error:
             return Failure(name, str(error))
-        return Rung(
-            name, len(result.parameters), result.fit_percent, result.rmse, percent, rmse, result, scores, by_setting
-        )
+        own = (name, len(result.parameters), result.fit_percent, result.rmse)
+        if judged is None:
+            return Rung(*own, None, None, result, result.scores, by_setting)
+        return Rung(*own, judged.fit_percent, judged.rmse, result, judged.scores, by_setting, judged.words)
 
     pool = ThreadPoolExecutor(max_workers=min(os.cpu_count() or 1, MOST_THREADS))
     try:
@@ -229,6 +261,13 @@ def fit_each(
             yield outcome.result()
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _judged(start: Start, result: FitResult, held_out: Sequence[BenchRun], scheduled: bool) -> HeldOut | None:
+    """The errors of a fit on records held out, or on parts of its own."""
+    if held_out:
+        return on_records(result, held_out)
+    return None if isinstance(start, AbstractTrainedStart) else without_parts(result, in_time=scheduled)
 
 
 def _silent(text: str) -> None:

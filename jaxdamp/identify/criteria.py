@@ -61,6 +61,11 @@ class Priors(AbstractResiduals):
         values = zip(self.paths, self.mean, self.deviation, strict=True)
         return self.noise * jnp.concatenate([jnp.ravel((get(model, path) - m) / d) for path, m, d in values])
 
+    def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "Priors":
+        """The same: no weight of samples changes what is known beforehand."""
+        del factor
+        return self
+
     def used(self) -> Bool[np.ndarray, " samples"]:
         """They are no samples of the records."""
         return np.zeros(self.size, bool)
@@ -148,14 +153,10 @@ def noise_factor(loss: Loss, relative: np.ndarray) -> float:
 
 def _weighted(problem: Problem, root: Float[np.ndarray, " samples"], noise: float) -> Problem:
     """The problem with weights times `root`, and priors relative to this noise."""
-    parts, begin = [], 0
-    for part in problem.residuals:
-        size = part.used().size
-        if isinstance(part, Priors):
-            parts.append(eqx.tree_at(lambda p: p.noise, part, jnp.asarray(noise)))
-        else:
-            parts.append(part.reweighted(root[begin : begin + size]))
-        begin += size
+    parts = (
+        eqx.tree_at(lambda p: p.noise, part, jnp.asarray(noise)) if isinstance(part, Priors) else part
+        for part in problem.reweighted(root).residuals
+    )
     return problem._replace(residuals=tuple(parts))
 
 

@@ -12,7 +12,7 @@ from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.ends import at_ends
 from jaxdamp.identify.identifiability import on_identifiability
 from jaxdamp.identify.model import START_PATH
-from jaxdamp.identify.noise import Noise
+from jaxdamp.identify.noise import Noise, noise_of
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.profile import Profile, profile
 from jaxdamp.identify.result import Estimate, Minimum
@@ -35,6 +35,7 @@ class Estimates(NamedTuple):
     covariance: Float[np.ndarray, "free free"]
     minima: tuple[Minimum, ...]
     notes: tuple[str, ...]
+    summary: tuple[str, ...]  # of the notes, with groups of numbers named once
 
 
 def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
@@ -76,8 +77,27 @@ def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     estimates = _estimates(problem, found, moved.errors, weak, sides != 0, noise.dof)
     directions = weak_directions(found.jacobian, float(np.sqrt(variance)), large, WEAK)
     estimates, notes = on_identifiability(problem, found, estimates, directions)
-    notes += on_minima(minima, estimates) + on_reach(estimates, spans)
-    return Estimates(estimates, uncertain.covariance, minima, tuple(notes))
+    further = on_minima(minima, estimates) + on_reach(estimates, spans)
+    summary = (*in_groups(estimates), *further)
+    return Estimates(estimates, uncertain.covariance, minima, (*notes, *further), summary)
+
+
+def undetermined(problem: Problem, found: SearchEnd) -> tuple[str, ...]:
+    """The free numbers of the law that the records do not determine: all of them after a search without an end.
+
+    As `estimate` judges it, but by the derivatives alone, without following a number to where the error rises.
+
+    Arguments:
+        problem: the problem that was minimised.
+        found: the minimum.
+    """
+    free, of_law = problem.free, [not name.startswith(("rig.", "records.")) for name in problem.free.names]
+    if not found.finite:
+        return tuple(np.array(free.names)[of_law])
+    covariance = uncertainty(found.jacobian, found.residual, noise_of(problem, found, None)).covariance
+    large = large_changes(free, found.values, np.linalg.norm(found.jacobian, axis=0) / problem.level)
+    weak = ~(np.sqrt(np.diag(covariance)) <= WEAK * large)
+    return tuple(name for name, open_end in zip(free.names, weak & of_law, strict=True) if open_end)
 
 
 def _weakly_known(problem: Problem) -> tuple[Bool[np.ndarray, " free"], Float[np.ndarray, " free"]]:
@@ -140,6 +160,22 @@ def _spans(free: FreeParameters, reach: Reach) -> Float[np.ndarray, " free"]:
     """Extent of the records in the unit of each number; infinite for units other than m/s and m."""
     spans = {"m/s": reach.velocity, "m": 2.0 * reach.stroke}
     return np.array([spans.get(p.unit, np.inf) for p in free.owners])
+
+
+def in_groups(estimates: Sequence[Estimate]) -> list[str]:
+    """How many numbers are not identifiable, and how many at bounds, vectors and their like named once.
+
+    Arguments:
+        estimates: the fitted numbers with their notes.
+    """
+    kinds = {"not identifiable": "cannot be told from these records", "at a bound": "ended at a bound"}
+    lines = []
+    for note, words in kinds.items():
+        names = [e.name.rpartition(".")[2].partition("[")[0] for e in estimates if e.note == note]
+        if names:
+            each = ", ".join(dict.fromkeys(names))
+            lines.append(f"{len(names)} of {len(estimates)} numbers {words}: {each}.")
+    return lines
 
 
 def on_reach(estimates: Sequence[Estimate], spans: Float[np.ndarray, " free"]) -> list[str]:

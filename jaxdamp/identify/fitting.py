@@ -9,14 +9,14 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._status import Status
-from jaxdamp.bench import BenchRun
+from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
 from jaxdamp.identify.front_door import also_of_vehicles
 from jaxdamp.identify.input_noise import input_noise_bias, on_bias
-from jaxdamp.identify.judging import judge
+from jaxdamp.identify.judging import MOST_WARNINGS, judge
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import rig_of
 from jaxdamp.identify.preparing import prepare, records_in_words
@@ -25,9 +25,11 @@ from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
-from jaxdamp.parameters import FreeParameters
+from jaxdamp.identify.static_force import holds_static_force, static_force_in_words, with_static_force_on_machine
+from jaxdamp.parameters import FreeParameters, matched_in_words, parameters
 
 
+UNSEEN = 1e-12  # of the largest derivative, up to which one is a rounding error
 # Errors due to a law that does not suit the records, as opposed to a wrong call (`TypeError` and so on).
 NUMERICAL = (ValueError, ArithmeticError, eqx.EquinoxRuntimeError, jax.errors.JaxRuntimeError)
 
@@ -51,6 +53,7 @@ def fit(
     samples_per_cycle: int | None = 400,
     starts: int | None = None,
     max_steps: int = 200,
+    bad_records: str = "refuse",
 ) -> FitResult:
     """Fit a damper law to bench records by least squares on the force; a vehicle to its records, as `fit_vehicle` says.
 
@@ -78,12 +81,13 @@ def fit(
             free, with these values as start, beside those of the law: `rig=Rig(gas_force=-100.0, force_delay=1e-3)`
             estimates a gas force and a delay. `freeze` the known ones (`"rig.moving_mass"`). Names of effects get their
             starts from the records: `rig=["gas", "friction", "delay"]`, out of offset, gas, gas_stiffness, friction,
-            mass, delay, lag, stroke_offset, heat; an offset or gas force named so is left out beside a law that
-            contains an offset itself. All paths of parameters then begin with `law.` or `rig.`; their last parts stay
-            the same.
+            mass, delay, lag, stroke_offset, heat. An offset or gas force named so is the whole static force: a
+            constant force of the law is held at zero, or zero at rest in a table, unless the call gives it a value; it
+            is left out beside a law with a static force of its own meaning, such as a gas charge. All paths of
+            parameters then begin with `law.` or `rig.`; their last parts stay the same.
         freeze: parameters to hold at their start, by path, last part of a path, or pattern.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
-        tie: parameters that take the values of others, such as `{"terms.1.*": "terms.0.*"}`: one free value for each
+        tie: parameters that take the values of others, such as `{"terms.1.**": "terms.0.**"}`: one free value for each
             group (see `jaxdamp.parameters.free_parameters`).
         per_record: parameters with one value for each record, such as a friction that depends on the temperature; names
             as in `freeze`. All other parameters are common to the records.
@@ -108,14 +112,16 @@ def fit(
         starts: largest number of starts: `law` first, then those that its laws propose (`other_starts`); all of them if
             left out. With 1, the search starts from `law` only.
         max_steps: largest number of steps of each search.
+        bad_records: what is done with records in which the preflight finds an error, such as a clipped or lost force:
+            "refuse" the fit, "leave_out" these records, or "keep" them. Spikes are no error for a robust `loss`.
 
     Returns:
         The law with the range of the fitted records (`law.fitted_to`), its parameters with standard errors, scores and
         warnings; `status` and `warnings` report a search that failed.
 
     Raises:
-        ValueError: no records; names that fit no parameter; a start outside its bounds or without finite forces; a
-            constant force.
+        ValueError: no records; a record with an error; names that fit no parameter; a start outside its bounds or
+            without finite forces; a constant force.
 
     >>> from jaxdamp import bench, dampers
     >>> dyno = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=5.0, seed=1)
@@ -127,6 +133,7 @@ def fit(
     _checks.one_of("loss", loss, LOSSES)
     if force_noise is not None:
         _checks.positive("force_noise", force_noise)
+    runs = usable(as_runs(runs, call="fit(law, runs)"), bad_records, robust=loss != "squares")
     problem = prepare(
         law,
         runs,
@@ -145,15 +152,29 @@ def fit(
         return solve(problem, starts=starts, max_steps=max_steps)
 
     problem, solution = solve_by(problem, by_squares, loss=loss, force_noise=force_noise, starts=starts)
-    result = judge(problem, solution, force_noise=force_noise)
+    on_machine = holds_static_force(rig)
+    if on_machine:
+        problem, solution = with_static_force_on_machine(problem, solution)
+    known = [p.path for p in parameters(problem.free.tree)]
+    named = matched_in_words(known, freeze=freeze, bounds=bounds or {}, per_record=per_record)
+    result = dataclasses.replace(judge(problem, solution, force_noise=force_noise), patterns=named)
+    if on_machine:
+        said = static_force_in_words(result, problem.runs)
+        result = dataclasses.replace(result, warnings=(*result.warnings, *said))
     words = (criterion_in_words(problem, loss, priors or {}), records_in_words(problem))
     criterion = "; ".join(filter(None, words))
     if input_noise is None:
         return dataclasses.replace(result, criterion=criterion)
     biases = map(float, input_noise_bias(problem, solution.best, input_noise))
     estimates = tuple(e._replace(bias=bias) for e, bias in zip(result.parameters, biases, strict=True))
-    warnings = (*result.warnings, *on_bias(estimates))
-    return dataclasses.replace(result, criterion=criterion, parameters=estimates, warnings=warnings)
+    biased = on_bias(estimates)
+    return dataclasses.replace(
+        result,
+        criterion=criterion,
+        parameters=estimates,
+        warnings=(*result.warnings, *biased),
+        main_warnings=(*result.main_warnings, *biased)[:MOST_WARNINGS],
+    )
 
 
 @one_thread()
@@ -188,18 +209,19 @@ def _solve_linear(problem: Problem) -> Solution:
     begin = np.asarray(free.values)
     residual, jacobian = (np.asarray(a) for a in linearised(free, free.values, problem.residuals))
     norms = np.linalg.norm(jacobian, axis=0)
-    scale = np.where(norms > 0, norms, 1.0)
+    unseen = norms <= UNSEEN * norms.max()  # no sample shows these numbers: they keep their start
+    scale, jacobian = np.where(unseen, 1.0, norms), np.where(unseen, 0.0, jacobian)
     lower, upper = (coordinates.to_physical(np.asarray(y)) for y in coordinates.bounds())
     target = jacobian @ begin - residual
     whole = triangle(np.concatenate([jacobian / scale, target[:, None]], axis=1))
     r, target = whole[: begin.size, : begin.size], whole[: begin.size, begin.size]
-    values = np.linalg.lstsq(r, target, rcond=None)[0] / scale
+    values = np.where(unseen, begin, np.linalg.lstsq(r, target, rcond=None)[0] / scale)
     status = Status.CONVERGED
     if np.any((values < lower) | (values > upper)):
         from scipy.optimize import lsq_linear  # few fits need it
 
         answer = lsq_linear(r, target, (lower * scale, upper * scale), method="bvls")
-        values = np.clip(answer.x / scale, lower, upper)
+        values = np.where(unseen, begin, np.clip(answer.x / scale, lower, upper))
         status = Status.CONVERGED if answer.success else Status.STEP_LIMIT
     end = SearchEnd(values, residual + jacobian @ (values - begin), jacobian, status, 0)
     return Solution(end, (end,), 1, closed_form=True)

@@ -1,14 +1,17 @@
 """`judge`: from the minimum of a problem to a result with errors, scores and warnings."""
 
+import dataclasses
 from collections.abc import Sequence
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
-from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, takes_command
+from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, laws_inside, takes_command
 from jaxdamp.identify._blas import one_thread
+from jaxdamp.identify.blending import off_span
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.estimating import estimate, on_misfit
 from jaxdamp.identify.left_out import left_out
@@ -17,11 +20,13 @@ from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.predicting import predict_runs
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
-from jaxdamp.identify.result import FitResult, score
+from jaxdamp.identify.result import FitResult
+from jaxdamp.identify.scoring import score
 from jaxdamp.identify.several import Solution
-from jaxdamp.parameters import get, with_values
+from jaxdamp.parameters import get, modules_inside, with_values
 
 
+MOST_WARNINGS = 5  # that are shown at a terminal
 _REMEDY = "Try another start, bounds, or fewer free parameters."
 
 
@@ -45,12 +50,15 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         )
     noise = noise_of(problem, best, force_noise)
     estimates = estimate(problem, solution, noise)
-    models, model = _fitted(problem, best.values)
+    models, model = fitted_models(problem, best.values)
     law, rig = law_of(model), rig_of(model)
     fitted = np.isfinite(problem.sigma)
     percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
     notes = [f"The search did not converge: {best.status.sentence} {_REMEDY}"] * (not best.converged)
-    notes += [*notes_on(law, problem.fitted_to), *estimates.notes, *on_misfit(noise), *left_out(problem, best)]
+    on_records = (*notes_on(law, problem.fitted_to), *off_span(model, problem.fitted_to, problem.initial_state))
+    on_rest, effects = on_misfit(noise), left_out(problem, best)
+    main = (*notes, *on_records, *effects, *estimates.summary, *on_rest)
+    notes += [*on_records, *estimates.notes, *on_rest, *effects]
     return FitResult(
         law=law,
         runs=problem.runs,
@@ -60,6 +68,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         rmse=rmse,
         scores=scores,
         warnings=tuple(notes),
+        main_warnings=main[:MOST_WARNINGS],
         status=best.status,
         steps=best.steps,
         starts=solution.starts,
@@ -74,7 +83,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     )
 
 
-def _fitted(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:
+def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:
     """The fitted model of each record, where they differ, and the one with the mean of what differs."""
     built = with_range(problem.free.started_at(values).tree, covered_range(problem.fitted_to))
     if starts := starts_in(built):
@@ -90,8 +99,28 @@ def _fitted(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:
 
 
 def notes_on(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
-    """Sentences on records that contradict each other, strokes without a place, and a curve that adds energy."""
-    return _contradicting(law, runs) + _without_place(law, runs) + _driving(law, runs)
+    """Sentences on numbers left as they were, records that contradict, strokes without place, a curve adding energy."""
+    return _undeclared(law) + _contradicting(law, runs) + _without_place(law, runs) + _driving(law, runs)
+
+
+def _undeclared(law: AbstractDamper) -> list[str]:
+    """A sentence on numbers of a law that are neither parameters nor settings, such as a network of equinox."""
+    owners = [prefix for prefix, _ in laws_inside(law)]
+    counts: dict[str, int] = {}
+    for prefix, module in modules_inside(law):
+        owner = max((own for own in owners if prefix.startswith(own)), key=len)
+        for field in dataclasses.fields(module):
+            value = getattr(module, field.name)
+            if eqx.is_inexact_array(value) and not {"parameter", "setting"} & set(field.metadata):
+                name = owner + f"{prefix}{field.name}"[len(owner) :].split(".")[0]
+                counts[name] = counts.get(name, 0) + value.size
+    held = ", ".join(f"`{name}` ({count} numbers)" for name, count in counts.items())
+    if not held:
+        return []
+    return [
+        f"The fit left {held} as it was: only numbers that are declared by `parameter` are fitted. Train a network by "
+        "optax before the fit, or use `NeuralHysteresis`."
+    ]
 
 
 def _contradicting(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:

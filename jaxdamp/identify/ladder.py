@@ -112,7 +112,7 @@ def default_ladder(runs: Iterable[BenchRun], names: Sequence[str] = LAWS, *, rig
             ladder[name] = start  # its training is the work of the fit
             continue
         try:
-            ladder[name] = started_on(start, runs, rig)[0]
+            ladder[name] = started_on(start, runs, rig).law
         except NUMERICAL as error:
             ladder[name] = functools.partial(_no_start, error)
     return ladder

@@ -1,16 +1,18 @@
 """The test machine of a fit: stated as a `Rig`, or by the names of its effects, with starts from the records."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, laws_inside
 from jaxdamp.identify.starting import AbstractTrainedStart, Start, started
-from jaxdamp.parameters import parameters
+from jaxdamp.parameters import get, matching, parameters, with_values
 from jaxdamp.rig import Rig
 
 
@@ -91,21 +93,69 @@ def started_machine(rig: Machine, runs: Sequence[BenchRun]) -> Rig | None:
     return rig
 
 
-def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine) -> tuple[AbstractDamper, Rig | None]:
+class Beginning(NamedTuple):
+    """A law to start from and the machine beside it.
+
+    Attributes:
+        law: the law.
+        rig: the machine.
+        held: paths of the constant forces in the law, which are zero since the machine has the static force.
+    """
+
+    law: AbstractDamper
+    rig: Rig | None
+    held: tuple[str, ...] = ()
+
+
+def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine, named: Iterable[str] = ()) -> Beginning:
     """The law to start from and the machine beside it, which was asked for as `rig`.
 
     A law class or function gets the records without what the machine adds at rest. If the machine was asked for by
-    names, an offset or gas force is left out beside a law that contains an offset itself.
+    names with an offset or gas force, this has the whole static force of the records: a constant force of the law, such
+    as the preload of a `Spring`, is held at zero. The machine's is left out beside a law whose static force has a
+    meaning of its own, such as the gas charge of a `MonoTube`, which is the points of a table together, or which the
+    call gives a value or a name.
+
+    Arguments:
+        law: the start.
+        runs: the records.
+        rig: the machine.
+        named: names and patterns of parameters to which the call gives bounds, priors, partners or values by record.
     """
     machine = started_machine(rig, runs)
     bare, trained = without_machine(machine, runs), isinstance(law, AbstractTrainedStart)
     begin = law.untrained(bare) if isinstance(law, AbstractTrainedStart) else started(law, bare)
     if machine is not None and not isinstance(rig, Rig) and begin.traits().contains_offset:
+        constants = constant_forces(begin)
+        stated = any(matching(constants or (), name.removeprefix("law.")) for name in named)
+        if isinstance(law, AbstractDamper):
+            stated |= any(float(get(begin, path)) != 0.0 for path in constants or ())
+        if constants and not stated:
+            begin = started(law, bare) if trained else begin
+            zero = with_values(begin, {path: jnp.zeros_like(get(begin, path)) for path in constants})
+            return Beginning(zero, machine, tuple(f"law.{path}" for path in constants))
         left = dataclasses.replace(machine, force_offset=Rig().force_offset, gas_force=Rig().gas_force)
         machine = left if free_fields(left) else None
     elif not trained:
-        return begin, machine
-    return started(law, without_machine(machine, runs)), machine
+        return Beginning(begin, machine)
+    return Beginning(started(law, without_machine(machine, runs)), machine)
+
+
+def constant_forces(law: AbstractDamper) -> list[str] | None:
+    """Paths of the single numbers that only add a constant to the force; None if its static force is more than these.
+
+    Arguments:
+        law: the damper law.
+    """
+    paths = []
+    for prefix, part in laws_inside(law):
+        if part.inner_laws() or not part.traits().contains_offset:
+            continue
+        names = part.constant_forces()
+        if not names or any(jnp.ndim(getattr(part, name)) for name in names):
+            return None
+        paths += [prefix + name for name in names]
+    return paths
 
 
 def free_fields(rig: Rig) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import Reach
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.criteria import FIRST_NOISE, LOSSES, priors_on
@@ -50,6 +50,7 @@ def fit_many(
     samples_per_cycle: int | None = 400,
     starts: int = 1,
     max_steps: int = 200,
+    bad_records: str = "refuse",
 ) -> ManyFits:
     """Fit one law to many dampers at once: the same least squares as `fit`, for all of them side by side.
 
@@ -79,13 +80,15 @@ def fit_many(
         samples_per_cycle: slow records are averaged in blocks down to this number.
         starts: largest number of starts of each damper, side by side: `law`, then those that it proposes.
         max_steps: largest number of steps of each search.
+        bad_records: "refuse", "leave_out" or "keep" records with an error, as in `fit`; a damper keeps one at least.
 
     Returns:
         The laws with their parameters, standard errors, scores and a status each; dampers that differ from the others
         by their error or their parameters are named in `remarks`.
 
     Raises:
-        ValueError: no dampers; names that fit no parameter; settings or degrees that do not suit the dampers.
+        ValueError: no dampers; a record with an error; names that fit no parameter; settings or degrees that do not
+            suit the dampers.
 
     >>> from jaxdamp import bench
     >>> from jaxdamp.dampers import Bilinear
@@ -97,6 +100,11 @@ def fit_many(
     2150.0
     """
     names, records = _named(dampers)
+    robust = loss != "squares"
+    records = [
+        usable(runs, bad_records, robust=robust, argument=f"dampers[{name!r}]")
+        for name, runs in zip(names, records, strict=True)
+    ]
     _checks.one_of("weighting", weighting, ["samples", "runs"])
     _checks.one_of("loss", loss, LOSSES)
     _checks.one_of("initial_state", initial_state, INITIAL_STATES)
@@ -111,8 +119,8 @@ def fit_many(
             "settings", f"give one number for each of {len(names)} dampers", f"{len(list(settings))} numbers"
         )
     some = [run for runs in records[:: -(-len(records) // STARTED_FROM)] for run in runs]
-    begun, machine = started_on(law, some, rig)
-    model, absent = on_rig(begun, machine), absent_paths(machine)
+    begun, machine, held = started_on(law, some, rig, [*(bounds or ()), *(priors or ()), *(tie or ()), *shared])
+    model, absent = on_rig(begun, machine), [*absent_paths(machine), *held]
     free = free_parameters(model, freeze=[*freeze, *absent], bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
     coordinates = Coordinates(free, smooth="ordered")

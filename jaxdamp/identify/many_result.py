@@ -12,10 +12,11 @@ from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Shown, Table, plain, with_unit
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, Scheduled, with_fitted_range
 from jaxdamp.identify.covered import covered_range
-from jaxdamp.identify.dependence import Dependence
+from jaxdamp.identify.dependence import OWN, Dependence
 from jaxdamp.identify.estimates import rounded
+from jaxdamp.identify.estimating import WEAK
 from jaxdamp.identify.initial_states import DRIFT
 from jaxdamp.identify.model import Model, law_of, rig_of, with_range
 from jaxdamp.parameters import Coordinates, FreeParameters
@@ -107,21 +108,47 @@ class ManyFits:
         _checks.one_of("name", name, self.names)
         return self.laws[self.names.index(name)]
 
-    def law_at(self, setting: float) -> AbstractDamper:
+    def law_at(self, setting: float, blend: str | None = None) -> AbstractDamper:
         """The law at a setting between those of the dampers.
 
-        Shared parameters follow their polynomials; all others are interpolated by straight lines between the
-        neighbouring settings.
+        Shared parameters follow their polynomials. All others are interpolated by straight lines between the
+        neighbouring settings, or the forces of the laws at these settings are blended (`dampers.Scheduled`).
+
+        Arguments:
+            setting: between the lowest and the highest of the dampers.
+            blend: `"parameters"` or `"force"`. If it is left out, forces are blended where the records of a neighbour
+                leave a number that is not shared undetermined: such numbers may differ from setting to setting without
+                a meaning.
 
         Raises:
-            ValueError: no settings were given, or the setting is outside them.
+            ValueError: no settings were given, or the setting is outside them; an unknown blend.
         """
+        if blend is not None:
+            _checks.one_of("blend", blend, ("parameters", "force"))
         if self.settings is None:
             _checks.refuse("settings", "be given to `fit_many` for a law between them", None)
         known = np.array(self.settings)
         if not known.min() <= setting <= known.max():
             must = f"be from {known.min():g} to {known.max():g}, where there are dampers"
             _checks.refuse("setting", must, setting)
+        low, high = float(known[known <= setting].max()), float(known[known >= setting].min())
+        if low == high or (blend or self._blend_at(low, high)) == "parameters":
+            law = self._interpolated(setting)
+        else:
+            law = Scheduled((self._interpolated(low), self._interpolated(high)), [low, high], setting, "force")
+        return with_fitted_range(law, covered_range([run for own in self.records for run in own]))
+
+    def _blend_at(self, low: float, high: float) -> str:
+        """What lies between two settings: forces if a number that is not shared is undetermined at one of them."""
+        own = np.ones(len(self.free.names), bool) if self.dependence is None else self.dependence.degree == OWN
+        own &= np.array([not name.startswith("rig.") for name in self.free.names])
+        at = np.isin(np.array(self.settings), (low, high))
+        weak = ~(self.standard_errors[at] <= WEAK * np.abs(self.values[at]))
+        return "force" if np.any(weak[:, own]) else "parameters"
+
+    def _interpolated(self, setting: float) -> AbstractDamper:
+        """The law with parameters on their polynomials, or on straight lines between the settings."""
+        known = np.array(self.settings)
         distinct = np.unique(known)
         means = np.stack([self.values[known == own].mean(axis=0) for own in distinct])
         values = np.array([np.interp(setting, distinct, column) for column in means.T])
@@ -130,8 +157,7 @@ class ManyFits:
             with_own = np.where(np.isnan(y), Coordinates(self.free, smooth="ordered").start, y)
             shared = np.asarray(Coordinates(self.free, smooth="ordered").to_physical(jnp.asarray(with_own)))
             values = np.where(np.isnan(y), values, shared)
-        runs = [run for own in self.records for run in own]
-        return law_of(with_range(self.free.started_at(values).tree, covered_range(runs)))
+        return law_of(self.free.started_at(values).tree)
 
     @functools.cached_property
     def remarks(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from jaxtyping import Array
 
 from jaxdamp import _checks
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import require_finite_force, without_fitted_ranges
+from jaxdamp.dampers import require_finite_force
 from jaxdamp.identify.estimated_states import with_first_states
 from jaxdamp.identify.initial_states import DRIFT, rest_window, start_of
 from jaxdamp.identify.model import Model, blind_end, initial_state_for, is_memoryless, law_of, of_record, starts_in
@@ -44,7 +44,6 @@ def predict_runs(model: Model, runs: Sequence[BenchRun], initial_state: str = "w
     Raises:
         ValueError: forces that are not finite; states that drift in a motion that is said to be periodic.
     """
-    model = without_fitted_ranges(model)
     if initial_state == "estimated":
         model = with_first_states(model, runs)
     memoryless = is_memoryless(model)

@@ -26,8 +26,11 @@ from jaxdamp.identify.model import (
 )
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.starting import Start, frozen_by
-from jaxdamp.identify.traces import batches, owners
+from jaxdamp.identify.traces import batches, owners, places
 from jaxdamp.parameters import free_parameters, match_paths, name_patterns, parameters, with_values
+
+
+FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residuals of a `Problem` can be traced."
 
 
 def prepare(
@@ -73,6 +76,7 @@ def prepare(
     1500.0
     """
     _checks.one_of("initial_state", initial_state, INITIAL_STATES)
+    _checks.untraced("law", law, FIT_OUTSIDE)
     runs = as_runs(runs, call="fit(law, runs)")
     if not runs:
         _checks.refuse("runs", "hold at least one record", "empty", "Read some with `bench.read`.")
@@ -80,8 +84,9 @@ def prepare(
         _checks.refuse("runs", "hold a force that varies", "records of a constant force", "Check the force channel.")
     sigma = weights(weighting, runs)
     fitted_to = [run for run, s in zip(runs, sigma, strict=True) if np.isfinite(s)]
-    begin, machine = started_on(law, fitted_to, rig)
-    model, absent = on_rig(begin, machine), absent_paths(machine)
+    named = [*name_patterns("per_record", per_record), *(bounds or ()), *(priors or ()), *(tie or {})]
+    begin, machine, held = started_on(law, fitted_to, rig, named)
+    model, absent = on_rig(begin, machine), [*absent_paths(machine), *held]
     initial_state = initial_state_for(model, initial_state)
     expected: tuple[Priors, ...] = ()
     if initial_state == "estimated":
@@ -99,10 +104,12 @@ def prepare(
     noise = FIRST_NOISE * level / np.sqrt(max(np.count_nonzero(owner >= 0), 1))
     known = (*priors_on(free, priors or {}, noise), *(replace(prior, noise=jnp.asarray(noise)) for prior in expected))
     owner = np.concatenate([owner, *(np.zeros(part.size, owner.dtype) for part in known)])
-    residuals = (*residuals, *known)
     steps = tuple(at.block / run.sampling_rate for at, run in zip(ranges, runs, strict=True))
     each, sigma = weighting == "runs", tuple(sigma)
-    return Problem(free, residuals, level, runs, sigma, owner, reach, begin, own, each, steps, initial_state)
+    where = places(residuals, ranges)
+    return Problem(
+        free, (*residuals, *known), level, runs, sigma, owner, reach, begin, own, each, steps, where, initial_state
+    )
 
 
 def _with_estimated_states(

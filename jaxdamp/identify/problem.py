@@ -54,6 +54,7 @@ class Problem(NamedTuple):
         per_record: paths of the parameters with a value for each record.
         each: whether every record has its own noise level.
         sample_steps: time [s] from one sample of the residuals to the next, for each record.
+        places: where the samples of each record of a bench are in the residuals.
         initial_state: how the records start, of `INITIAL_STATES`.
         noise_factor: factor on the noise that weighted residuals show, because of a robust loss.
         share_left_out: share of the samples that a robust loss gives less than half weight.
@@ -70,6 +71,7 @@ class Problem(NamedTuple):
     per_record: tuple[str, ...]
     each: bool
     sample_steps: tuple[float, ...] = ()
+    places: tuple[slice, ...] = ()
     initial_state: str = "warm_up"
     noise_factor: float = 1.0
     share_left_out: float = 0.0
@@ -92,6 +94,13 @@ class Problem(NamedTuple):
     def started_at(self, values: Float[np.ndarray, " free"]) -> "Problem":
         """The same with another start."""
         return self._replace(free=self.free.started_at(values))
+
+    def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "Problem":
+        """The same with the weight of every sample times a factor; the compiled programs are the same."""
+        sizes = [part.used().size for part in self.residuals]
+        factors = np.split(factor, np.cumsum(sizes)[:-1])
+        parts = (part.reweighted(own) for part, own in zip(self.residuals, factors, strict=True))
+        return self._replace(residuals=tuple(parts))
 
     def is_rounding(self, squares: float) -> bool:
         """Whether a sum of squares is so small that it consists of rounding errors, not of noise."""

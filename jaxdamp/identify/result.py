@@ -2,8 +2,9 @@
 
 import dataclasses
 import functools
+import warnings
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 from jaxtyping import Float
@@ -15,12 +16,13 @@ from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.bayes import Posterior, posterior
 from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
-from jaxdamp.identify.model import Model, RecordStart, is_memoryless, on_rig
-from jaxdamp.identify.predicting import predict_by_record, predict_runs, used_samples
+from jaxdamp.identify.model import Model, RecordStart, on_rig
+from jaxdamp.identify.predicting import predict_runs
 from jaxdamp.identify.profile_curve import ProfileCurve, profile_curve
 from jaxdamp.identify.propagation import Band, Evidence, Propagated, band, propagate
 from jaxdamp.identify.record_sensitivity import RecordSensitivity, sensitivity_to_records
 from jaxdamp.identify.residual import ErrorShares, error_shares
+from jaxdamp.identify.scoring import Score, score
 from jaxdamp.rig import Rig
 
 
@@ -34,74 +36,6 @@ class Minimum(NamedTuple):
     values: dict[str, float]  # of the free numbers, in their units
     chi_square: float  # sum of squares over the variance of the noise, above that of the best minimum
     starts: int  # number of starts that ended here
-
-
-class Score(NamedTuple):
-    """Errors of the force of a law on one record, after settling.
-
-    Attributes:
-        name: of the record.
-        rmse: root of the mean squared error [N].
-        fit_percent: 100 is perfect, 0 no better than a constant [%].
-        largest_error: largest magnitude of the error [N].
-    """
-
-    name: str
-    rmse: float  # N
-    fit_percent: float
-    largest_error: float  # N
-
-    def to_dict(self) -> dict[str, Any]:
-        """The errors with units, ready for JSON."""
-        return {
-            "record": self.name,
-            "fit": with_unit(self.fit_percent, "%"),
-            "rmse": with_unit(self.rmse, "N"),
-            "largest_error": with_unit(self.largest_error, "N"),
-        }
-
-
-def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray]) -> float:
-    """100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all samples: 100 is perfect, 0 no better than a constant.
-
-    −∞ for a constant measured force that is not matched exactly.
-
-    Arguments:
-        measured: measured force of each record [N].
-        predicted: force of the law at the same samples [N].
-    """
-    y, p = np.concatenate(list(measured)), np.concatenate(list(predicted))
-    missed, spread = (float(np.sqrt(np.sum(a * a))) for a in (y - p, y - y.mean()))
-    if missed == 0.0:
-        return 100.0
-    return 100.0 * (1.0 - missed / spread) if spread > 0.0 else -np.inf
-
-
-def score(
-    model: Model | Sequence[Model],
-    runs: Sequence[BenchRun],
-    counted: Sequence[bool] | np.ndarray | None = None,
-    initial_state: str = "warm_up",
-) -> tuple[float, float, tuple[Score, ...]]:
-    """Fit percent and RMSE [N] of a model, or of one for each record, over the records that count, and for each."""
-    models, forces = predict_by_record(model, runs, initial_state)
-    memoryless = {
-        id(own): is_memoryless(own) for own in {id(own): own for own in models}.values()
-    }  # most often one model for all records
-    pairs = zip(models, runs, strict=True)
-    used = [used_samples(own, run, memoryless[id(own)], initial_state) for own, run in pairs]
-    measured = [run.force[k] for run, k in zip(runs, used, strict=True)]
-    predicted = [force[k] for force, k in zip(forces, used, strict=True)]
-    rows = []
-    for run, y, p in zip(runs, measured, predicted, strict=True):
-        error = p - y
-        rows.append(
-            Score(run.name, float(np.sqrt(np.mean(error**2))), fit_percent([y], [p]), float(np.abs(error).max()))
-        )
-    chosen = [i for i in range(len(runs)) if counted is None or counted[i]]
-    y, p = [measured[i] for i in chosen], [predicted[i] for i in chosen]
-    errors = np.concatenate(p) - np.concatenate(y)
-    return fit_percent(y, p), float(np.sqrt(np.mean(errors**2))), tuple(rows)
 
 
 def describe(minima: Sequence[Minimum], starts: int) -> str:
@@ -156,13 +90,32 @@ class AbstractFitted:
         known = {id(run): start for run, start in zip(self.runs, self.record_starts, strict=False)}
         return on_rig(self.law, self.rig, [known.get(id(run)) for run in runs] if known else ())
 
-    def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
-        """Force [N] that the fit expects at every sample of records, old or new, of the same machine."""
-        runs = as_runs(runs)
-        return predict_runs(self.model_of(runs), runs, self.initial_state)
+    @overload
+    def respond(self, runs: BenchRun) -> np.ndarray: ...
+    @overload
+    def respond(self, runs: Iterable[BenchRun]) -> list[np.ndarray]: ...
+    def respond(self, runs: BenchRun | Iterable[BenchRun]) -> np.ndarray | list[np.ndarray]:
+        """Force [N] that the fit expects at every sample of a record, old or new, of the same machine.
 
-    def score(self, runs: Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
-        """Fit percent, RMSE [N] and the scores by record, on other records."""
+        It is the force of the law with what the fit found beside it: gas force and zero error of the load cell
+        (`rig`), and the states at the beginning (`initial_state`). `jaxdamp.respond(result.law, ...)` is the damper
+        alone, started at rest.
+
+        Arguments:
+            runs: one record, or several for a list of forces.
+        """
+        records = as_runs(runs)
+        forces = predict_runs(self.model_of(records), records, self.initial_state)
+        return forces[0] if isinstance(runs, BenchRun) else forces
+
+    def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
+        """Deprecated: `respond` gives the same, without a list for one record."""
+        text = "`predict` is deprecated: `respond(run)` gives the force of one record, `respond(runs)` a list."
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return self.respond(as_runs(runs))
+
+    def score(self, runs: BenchRun | Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
+        """Fit percent, RMSE [N] and the scores by record, on records old or new, as `respond` predicts them."""
         runs = as_runs(runs)
         return score(self.model_of(runs), runs, initial_state=self.initial_state)
 
@@ -198,6 +151,9 @@ class FitResult(AbstractFitted):
         record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
         record_rigs: the test machine of each record, as `record_laws`.
         criterion: loss, priors and what is special about the records in words; empty for plain least squares.
+        main_warnings: the gist of `warnings`: at most five, the one with the gravest consequence first, groups of
+            numbers named once.
+        patterns: what each pattern with `*` in the call stood for, in words.
         evidence: the minimum and the noise, for `band`, `propagate`, `profile` and `posterior`.
     """
 
@@ -210,6 +166,8 @@ class FitResult(AbstractFitted):
     record_laws: tuple[AbstractDamper, ...] = ()
     record_rigs: tuple[Rig, ...] = ()
     criterion: str = ""
+    main_warnings: tuple[str, ...] = ()
+    patterns: str = ""
     evidence: Evidence | None = None
 
     @property
@@ -241,9 +199,8 @@ class FitResult(AbstractFitted):
             true_rig: the true test machine, if one was fitted.
             title: of the table.
         """
-        title = (
-            f"{title or f'Parameters of {type(self.law).__name__}'}{f' ({self.criterion})' if self.criterion else ''}"
-        )
+        title = title or f"Parameters of {type(self.law).__name__}"
+        title += f" ({self.criterion})" if self.criterion else ""
         true = None if truth is None else on_rig(truth, None if self.rig is None else true_rig or Rig())
         return parameter_table(title, self.parameters, true)
 
@@ -321,7 +278,7 @@ class FitResult(AbstractFitted):
     def to_dict(self) -> dict[str, Any]:
         """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         return super().to_dict() | {
-            **({"criterion": self.criterion} if self.criterion else {}),
+            **{name: words for name in ("criterion", "patterns") if (words := getattr(self, name))},
             "error_shares": plain(self.error_shares._asdict()),
             "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
             "covariance": plain(self.covariance),
@@ -342,7 +299,7 @@ class FitResult(AbstractFitted):
         for e, (value, error) in zip(self.parameters, texts, strict=True):
             note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
             lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
-        lines += [f"  {self.criterion}"] * bool(self.criterion)
+        lines += [f"  {words}" for words in (self.criterion, self.patterns) if words]
         if len(self.minima) > 1:
             lines.append(f"  {describe(self.minima, self.starts)}")
         return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])

@@ -14,14 +14,16 @@ from jaxdamp._progress import Progress
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, Scheduled, takes_command
+from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
+from jaxdamp.identify.estimating import undetermined
 from jaxdamp.identify.fitting import fit, solve
-from jaxdamp.identify.machine import OFFSET, Machine
+from jaxdamp.identify.machine import OFFSET, Machine, constant_forces
 from jaxdamp.identify.model import law_of, rig_of
 from jaxdamp.identify.preparing import prepare
-from jaxdamp.identify.result import FitResult, score
+from jaxdamp.identify.result import FitResult
+from jaxdamp.identify.scoring import score
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
-from jaxdamp.rig import Rig
 
 
 if TYPE_CHECKING:
@@ -30,26 +32,6 @@ if TYPE_CHECKING:
 
 CALL = "fit_scheduled(law, runs)"
 OF_THE_RESULT = ("loss", "force_noise", "input_noise")  # options of `fit` without a part in starts
-
-
-class AtSetting(NamedTuple):
-    """A law fitted to the records of one setting alone.
-
-    Attributes:
-        law: the fitted law.
-        rig: the fitted test machine, if one was fitted.
-        runs: the records.
-        fit_percent: over all records.
-        rmse: the same [N].
-        is_only_minimum: whether no other start can lead elsewhere.
-    """
-
-    law: AbstractDamper
-    rig: Rig | None
-    runs: tuple[BenchRun, ...]
-    fit_percent: float
-    rmse: float
-    is_only_minimum: bool
 
 
 Alone = dict[float, AtSetting]
@@ -96,18 +78,21 @@ class ScheduledFit:
     Attributes:
         result: the fit of all records together; its law is a `Scheduled`.
         alone: the fit of the records of each setting alone, whose laws the common fit started from.
+        choice: whether parameters are interpolated between settings or forces blended, and why.
         chain: the fits behind it.
     """
 
     result: FitResult
     alone: Alone
+    choice: Choice
     chain: "Chain"
 
     @functools.cached_property
     def between(self) -> tuple[LeftOutSetting, ...]:
         """How well the law interpolates, for each setting between others; fitted when first asked for."""
         with Progress("Leaving out settings") as shown:
-            return tuple(self.chain.without(setting, shown) for setting in self.chain.settings[1:-1])
+            blend = self.choice.blend
+            return tuple(self.chain.without(setting, blend, shown) for setting in self.chain.settings[1:-1])
 
     @property
     def law(self) -> Scheduled:
@@ -123,7 +108,7 @@ class ScheduledFit:
             f"One law for the settings {settings}: fit {self.result.fit_percent:.1f} %, RMSE {self.result.rmse:.1f} N."
         )
         none = "No setting lies between two others, so the interpolation cannot be scored: measure a third one."
-        return head, *([left.sentence("The law") for left in self.between] or [none])
+        return head, self.choice.reason, *([left.sentence("The law") for left in self.between] or [none])
 
     def table(self) -> Table:
         """For each setting, the fit of the law of this setting alone, of the common law, and of an interpolated one."""
@@ -134,7 +119,8 @@ class ScheduledFit:
         for setting, own in self.alone.items():
             percent = self.result.score(own.runs)[0]
             rows.append((setting, len(own.runs), own.fit_percent, percent, between.get(setting)))
-        return Table("Fit by setting", tuple(columns), tuple(rows))
+        between_settings = "parameters interpolated" if self.choice.blend == "parameters" else "forces blended"
+        return Table(f"Fit by setting ({between_settings} between settings)", tuple(columns), tuple(rows))
 
     def to_dict(self) -> dict[str, Any]:
         """The fits as numbers with units and words, ready for JSON."""
@@ -160,15 +146,21 @@ def fit_scheduled(
     rig: Machine = OFFSET,
     weighting: str = "samples",
     freeze: Sequence[str] = (),
+    blend: str | None = None,
     progress: Callable[[str], None] | None = None,
     **options: Any,
 ) -> ScheduledFit:
-    """Fit one law to records at several settings: its parameters are functions of the command, a `Scheduled`.
+    """Fit one law to records at several settings: it depends on the command, a `Scheduled`.
 
-    Every setting has its own parameters, with straight lines between them. First the law is fitted at each setting
-    alone, from its own start and from the law of the neighbouring setting, of which the better fit counts, so that the
-    parameters of neighbours belong together. From there all records are fitted as one problem. `between` then leaves
-    each setting between two others out in turn and predicts it by the law interpolated from all others.
+    Every setting has its own parameters. First the law is fitted at each setting alone, from its own start and from the
+    law of the neighbouring setting, of which the better fit counts, so that the parameters of neighbours belong
+    together. From there all records are fitted as one problem. `between` then leaves each setting between two others
+    out in turn and predicts it by the law interpolated from all others.
+
+    Between the settings, parameters are interpolated or forces blended (`Scheduled.blend`). With three or more
+    settings the records decide: each setting between two others is predicted from the laws of its neighbours in both
+    ways. With two, forces are blended if some number of a law is not determined by the records or if the law halfway
+    leaves the span of its neighbours' forces, since such numbers differ from setting to setting without a meaning.
 
     Arguments:
         law: the start, as in `fit`, of a law without a command.
@@ -177,6 +169,7 @@ def fit_scheduled(
         rig: the test machine as in `compare`, common to all settings.
         weighting: `"samples"` or `"runs"`, as in `fit`.
         freeze: parameters to hold at their start, as in `fit`.
+        blend: `"parameters"` or `"force"`; chosen as above if it is left out, and `choice` says why.
         progress: called with what is fitted next; a line in the terminal if it is left out.
         options: passed on to `fit`.
 
@@ -193,6 +186,8 @@ def fit_scheduled(
     """
     runs = settings_stated(as_runs(runs, call=CALL))
     _checks.one_of("weighting", weighting, ("samples", "runs"))
+    if blend is not None:
+        _checks.one_of("blend", blend, ("parameters", "force"))
     frozen = [*name_patterns("freeze", freeze), *frozen_by(law)]
     if options.get("initial_state") == "estimated":
         remedy = 'Estimate states in fits of one setting: `fit(law, runs, initial_state="estimated")`.'
@@ -201,8 +196,9 @@ def fit_scheduled(
     with Progress("Fitting by setting") as line:
         shown = progress or line
         alone = chain.alone(chain.settings, shown)
+        choice = Choice(blend, f"Chosen by the call: blend={blend!r}.") if blend else chain.choice(alone)
         shown("all settings as one law")
-        return ScheduledFit(chain.together(alone), alone, chain)
+        return ScheduledFit(chain.together(alone, choice.blend), alone, choice, chain)
 
 
 def settings_stated(runs: Sequence[BenchRun]) -> tuple[BenchRun, ...]:
@@ -262,26 +258,45 @@ class Chain:
         solution = solve(problem, **search)
         model = problem.free.started_at(solution.best.values).tree
         errors = score(model, problem.runs)[:2]
-        return AtSetting(law_of(model), rig_of(model), problem.runs, *errors, solution.closed_form)
+        open_numbers = undetermined(problem, solution.best)
+        return AtSetting(law_of(model), rig_of(model), problem.runs, *errors, solution.closed_form, open_numbers)
 
-    def together(self, alone: Alone) -> FitResult:
-        """The fit of all records of these settings as one law, from the laws of each."""
+    def choice(self, alone: Alone) -> Choice:
+        """What lies between the settings, by what the fits at each show."""
+        return choose_blend(alone, self.options.get("initial_state", "warm_up"))
+
+    def together(self, alone: Alone, blend: str) -> FitResult:
+        """The fit of all records of these settings as one law, from the laws of each.
+
+        At the settings, where all records are, interpolated parameters and blended forces are one law. So laws of equal
+        structure are fitted with interpolated parameters, which takes the states and the time of one law.
+        """
         laws = [at.law for at in alone.values()]
-        known = [p.path for p in parameters(laws[0])]
+        alike = Scheduled.of_equal_structure(laws)
+        known = [p.path for p in parameters(laws[0]) if all(p.path in paths_of(law) for law in laws)]
         shared = match_paths(known, name_patterns("common", self.common))
         means = {path: np.mean([np.asarray(get(law, path)) for law in laws], axis=0) for path in shared}
         rigs = [at.rig for at in alone.values() if at.rig is not None]
         machine = jax.tree.map(lambda *leaves: sum(leaves) / len(leaves), *rigs) if rigs else None
         place = "law.laws" if rigs else "laws"
         tie = {f"{place}.{k}.{path}": f"{place}.0.{path}" for path in shared for k in range(1, len(laws))}
-        scheduled = Scheduled(tuple(with_values(law, means) for law in laws), list(alone), command=min(alone))
+        blended = tuple(with_values(law, means) for law in laws)
+        scheduled = Scheduled(blended, list(alone), min(alone), "parameters" if alike else "force")
         members = [run for setting in alone for run in self.at(setting)]
-        options: dict[str, Any] = self.options | {"starts": 1, "tie": tie}
-        return fit(scheduled, members, rig=machine, **options)
+        constants = constant_forces(scheduled) or [] if rigs else []
+        held = [path for path in constants if float(get(scheduled, path)) == 0.0]  # the machine has the static force
+        options: dict[str, Any] = self.options | {"starts": 1, "tie": tie, "freeze": [*self.options["freeze"], *held]}
+        result = fit(scheduled, members, rig=machine, **options)
+        return with_blended_forces(result) if alike and blend == "force" else result
 
-    def without(self, setting: float, shown: Callable[[str], None]) -> LeftOutSetting:
+    def without(self, setting: float, blend: str, shown: Callable[[str], None]) -> LeftOutSetting:
         """The score at a setting of the law interpolated from all others; its records have no part in any start."""
         alone = self.alone([other for other in self.settings if other != setting], shown)
         shown(f"all but {setting:g} as one law")
-        result, runs, own = self.together(alone), tuple(self.at(setting)), self.own[setting]
+        result, runs, own = self.together(alone, blend), tuple(self.at(setting)), self.own[setting]
         return LeftOutSetting(setting, runs, result, *result.score(runs)[:2], own.fit_percent, own.rmse)
+
+
+def paths_of(law: AbstractDamper) -> list[str]:
+    """The paths of the parameters of a law."""
+    return [p.path for p in parameters(law)]

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 
+ALIKE = 1e-2  # difference of sums of squares, in squared tolerances, of searches that count as equally good
+APART = 0.01  # relative difference of a parameter between them that is named
 NORMAL = 1.959964  # 97.5 % quantile of the normal distribution
 Goal: TypeAlias = float | int | tuple[float | int, float | int]
 
@@ -127,7 +129,7 @@ class TargetResiduals(AbstractResiduals):
 
     def __call__(self, model: Any) -> Float[Array, " samples"]:
         """The deviations."""
-        reached = self.numbers.on_axles_of(model)({}) if isinstance(self.numbers, Ride) else self.numbers(model)
+        reached = self.numbers.of_vehicle(model)({}) if isinstance(self.numbers, Ride) else self.numbers(model)
         values = jnp.stack([jnp.asarray(reached[name], self.wanted.dtype) for name in self.names])
         return jnp.concatenate([(values - self.wanted) / self.tolerance, jnp.zeros(self.padding, values.dtype)])
 
@@ -152,6 +154,8 @@ def fit_targets(
     tie: Mapping[str, str] | None = None,
     tolerance: float = 0.01,
     max_steps: int = 100,
+    starts: int = 4,
+    seed: int = 0,
 ) -> TargetFit:
     """Find the parameters with which a model has given numbers, by least squares in units of the tolerances.
 
@@ -167,9 +171,13 @@ def fit_targets(
         tie: parameters that take the values of others, as in `fit`.
         tolerance: of targets without one of their own, relative to their value.
         max_steps: largest number of steps.
+        starts: number of searches, the first from `start`, the others from parameters up to twice and half of it. The
+            first one counts unless another one meets the targets better.
+        seed: of the other starts.
 
     Returns:
-        The model, its parameters and the numbers reached. Targets outside their tolerance are named by a warning.
+        The model, its parameters and the numbers reached. Targets outside their tolerance are named by a warning, and
+        so are parameters that differ between searches that meet the targets equally well.
 
     Raises:
         ValueError: no targets; a target that `numbers` does not return; a target of zero without a tolerance; numbers
@@ -192,8 +200,15 @@ def fit_targets(
     _check_numbers(residuals, free.tree)
     owner, level = np.zeros(len(goals) + padding, int), float(jnp.linalg.norm(wanted / allowed)) or 1.0
     everywhere = Reach(np.inf, np.inf)
-    problem = Problem(free, (residuals,), level, (), (1.0,), owner, everywhere, free.tree, (), False)
-    end = search(problem, max_steps)
+    if starts < 1:
+        _checks.refuse("starts", "be 1 or more", starts)
+    ends = []
+    for values in _starts(free, starts, seed):
+        begun = free if values is None else free.started_at(values)
+        problem = Problem(begun, (residuals,), level, (), (1.0,), owner, everywhere, begun.tree, (), False)
+        ends.append((problem, search(problem, max_steps)))
+    squares = np.array([end.squares if end.finite else np.inf for _, end in ends])
+    problem, end = ends[int(np.argmax(squares <= squares.min() + ALIKE * max(squares.min(), 1.0)))]
     if not end.finite:
         remedy = "Start nearer to the targets, or give `bounds`."
         _checks.refuse("numbers", "give finite numbers and derivatives", "one that does not", remedy)
@@ -205,8 +220,41 @@ def fit_targets(
     notes += [
         f"{t.name} is missed: {t.value:.4g} instead of {t.target:.4g} ± {t.tolerance:.2g}." for t in met if not t.met
     ]
+    notes += _disagreements(free, end, [other for _, other in ends if other.finite])
     model = free.started_at(end.values).tree
     return TargetFit(model, estimates, met, tuple(notes), end.status, end.steps)
+
+
+def _starts(free: FreeParameters, count: int, seed: int) -> list[np.ndarray | None]:
+    """None for the start itself, then other values: one factor between a half and two for each parameter."""
+    random, (lower, upper) = np.random.default_rng(seed), free.limits()
+    values = np.asarray(free.values, float)
+    starts: list[np.ndarray | None] = [None]
+    for _ in range(count - 1):
+        factors = [np.full(p.value.size, 2.0 ** random.uniform(-1.0, 1.0)) for p in free.chosen]
+        moved = values * np.concatenate(factors)
+        starts.append(np.where((moved > lower) & (moved < upper), moved, values))
+    return starts
+
+
+def _disagreements(free: FreeParameters, best: SearchEnd, ends: Sequence[SearchEnd]) -> list[str]:
+    """A sentence on searches that ended elsewhere: with the same deviations, or with larger ones."""
+    if len(ends) < 2:
+        return []
+    alike = [end for end in ends if end.squares <= best.squares + ALIKE * max(best.squares, 1.0)]
+    spread = np.ptp([end.values for end in alike], axis=0)
+    apart = spread > APART * np.maximum(np.abs(best.values), np.finfo(float).tiny)
+    notes = []
+    if apart.any():
+        found = [
+            f"{name} {min(values):.4g} to {max(values):.4g}"
+            for name, values, differs in zip(free.names, np.transpose([e.values for e in alike]), apart, strict=True)
+            if differs
+        ]
+        notes.append(f"Several minima meet the targets alike, which do not determine {', '.join(found)}.")
+    if len(alike) < len(ends):
+        notes.append(f"{len(alike)} of {len(ends)} starts ended at the best minimum; the others in worse ones.")
+    return notes
 
 
 def _goals(targets: Mapping[str, Goal], tolerance: float) -> dict[str, tuple[float, float]]:

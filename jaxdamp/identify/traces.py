@@ -289,9 +289,16 @@ def _row_batches(
     return rows, groups, tuple(_batch(*of, fixed, per_record, effects_of(model)) for of in members)
 
 
+def places(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> tuple[slice, ...]:
+    """Where the samples of each record are in the residuals of all batches."""
+    begins = np.cumsum([0, *(batch.weight.size for batch in made)])
+    rows = [int(begins[at.batch]) + at.row * made[at.batch].weight.shape[1] for at in ranges]
+    return tuple(slice(row + at.start, row + at.stop) for row, at in zip(rows, ranges, strict=True))
+
+
 def owners(made: Sequence[Batch], ranges: Sequence[SampleRange]) -> Int[np.ndarray, " samples"]:
     """The number of the record that each sample of the residuals belongs to."""
-    numbers = [np.zeros(batch.weight.shape, dtype=int) for batch in made]
-    for i, at in enumerate(ranges):
-        numbers[at.batch][at.row, at.start : at.stop] = i
-    return np.concatenate([np.ravel(a) for a in numbers])
+    numbers = np.zeros(sum(batch.weight.size for batch in made), dtype=int)
+    for i, place in enumerate(places(made, ranges)):
+        numbers[place] = i
+    return numbers

@@ -23,7 +23,8 @@ from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import Model, law_of, rig_of, with_range
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals
-from jaxdamp.identify.result import AbstractFitted, score
+from jaxdamp.identify.result import AbstractFitted
+from jaxdamp.identify.scoring import score
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.traces import batches
 from jaxdamp.parameters import Coordinates

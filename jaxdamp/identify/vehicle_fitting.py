@@ -1,5 +1,6 @@
 """`fit_vehicle`: masses, rates, friction and damper laws of a vehicle from its records."""
 
+import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 
 import jax.numpy as jnp
@@ -30,7 +31,7 @@ from jaxdamp.identify.vehicle_preparing import (
 )
 from jaxdamp.identify.vehicle_result import VehicleFit, channel_scores
 from jaxdamp.identify.vehicle_scale import FreeScale, free_scale, without
-from jaxdamp.parameters import free_parameters, get, with_values
+from jaxdamp.parameters import free_parameters, get, matched_in_words, parameters, with_values
 from jaxdamp.rig import Sensor
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -129,7 +130,12 @@ def fit_vehicle(
         if not end.finite or all(abs(np.log(sigma[name] / before[name])) < ALIKE for name in sigma):
             break
         problem = data.problem(free.started_at(end.values), sigma)
-    return _judged(data, problem, end, scale)
+    known = [p.path for p in parameters(model)]
+    of_vehicle = [path for path in known if path.startswith("vehicle.")]
+    named = matched_in_words(of_vehicle, over=over or ())
+    others = matched_in_words(known, freeze=freeze, bounds=bounds or {}, per_record=per_record)
+    patterns = "; ".join(filter(None, (named, others)))
+    return dataclasses.replace(_judged(data, problem, end, scale), patterns=patterns)
 
 
 def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScale) -> VehicleFit:

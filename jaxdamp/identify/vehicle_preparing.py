@@ -11,7 +11,7 @@ from jaxtyping import Array
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp.bench import BenchRun, RideRecord, as_runs
-from jaxdamp.dampers import AbstractDamper, Reach, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.machine import Machine, absent_paths
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
@@ -141,7 +141,7 @@ def vehicle_test(
         check_module(f"sensors[{name!r}]", sensor, (Sensor,), "fit_vehicle(..., sensors={'stroke': Sensor(offset=0)})")
     count = len(vehicle.coordinates)
     starts = [InitialMotion(jnp.zeros(count), jnp.zeros(count)) for _ in rides] if start == "free" else []
-    return VehicleTest(without_fitted_ranges(vehicle), dict(sensors), tuple(starts), rig)
+    return VehicleTest(vehicle, dict(sensors), tuple(starts), rig)
 
 
 def frozen_paths(model: VehicleTest, over: Sequence[str] | None, freeze: Sequence[str]) -> list[str]:

@@ -125,8 +125,8 @@ def ride_batches(
     records: Sequence[RideRecord],
     drives: Sequence[Drive],
     sigma: Mapping[str, float],
-    settling: float,
-    per_record: tuple[str, ...],
+    settling: float = 0.0,
+    per_record: tuple[str, ...] = (),
 ) -> list[RideBatch]:
     """Records in groups that are driven together, in the order of their first members.
 

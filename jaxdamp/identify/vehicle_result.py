@@ -1,7 +1,8 @@
 """The result of a fit of a vehicle."""
 
 import dataclasses
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
@@ -13,9 +14,10 @@ from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.result import fit_percent
+from jaxdamp.identify.scoring import fit_percent
 from jaxdamp.identify.vehicle_model import VehicleTest
-from jaxdamp.identify.vehicle_residuals import DamperOnBench, RideBatch
+from jaxdamp.identify.vehicle_preparing import checked_records, drives_of
+from jaxdamp.identify.vehicle_residuals import DamperOnBench, RideBatch, ride_batches
 from jaxdamp.rig import Rig, Sensor
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -66,6 +68,7 @@ class VehicleFit:
         scale_free: the parameters that may all be larger by one factor, which the records do not show.
         rig: the fitted test machine of the bench records, if one was fitted.
         problem: the least squares at the result.
+        patterns: what each pattern with `*` in the call stood for, in words.
     """
 
     vehicle: AbstractVehicle
@@ -83,6 +86,7 @@ class VehicleFit:
     scale_free: tuple[str, ...]
     rig: Rig | None
     problem: Problem
+    patterns: str = ""
 
     @property
     def converged(self) -> bool:
@@ -104,14 +108,57 @@ class VehicleFit:
             raise KeyError(f"{what} named {name!r}; there are {', '.join(e.name for e in self.parameters)}.")
         return found[0]
 
+    def respond(self, record: RideRecord) -> dict[str, Float[np.ndarray, " time"]]:
+        """What the sensors would show in a record without noise, by channel, in SI.
+
+        A record that was fitted has its own values of the parameters per record and its initial motion. Another record
+        has the means of such parameters and begins at rest.
+
+        Arguments:
+            record: old or new, of the same vehicle, whose road or platform motion is prescribed.
+
+        Raises:
+            ValueError: a channel that the vehicle does not have, or of another unit; a road of other wheels.
+        """
+        for part in (part for part in self.problem.residuals if isinstance(part, RideBatch)):
+            for row, number in enumerate(np.asarray(part.number)):
+                if self.records[number] is record:
+                    return dict(
+                        zip(part.channels, np.asarray(_predict(part, self.problem.free.tree))[row], strict=True)
+                    )
+        rides = checked_records(self.vehicle, record)
+        steps = [part.dt for part in self.problem.residuals if isinstance(part, RideBatch)]
+        (part,) = ride_batches(rides, drives_of(self.vehicle, rides, max(steps)), dict.fromkeys(record.channels, 1.0))
+        shown = np.asarray(_predict(part, VehicleTest(self.vehicle, self.sensors)))[0]
+        return dict(zip(part.channels, shown, strict=True))
+
+    def score(self, records: RideRecord | Iterable[RideRecord]) -> tuple[ChannelScore, ...]:
+        """Errors of each channel of records, old or new, after the settling time of the fit.
+
+        Arguments:
+            records: as in `respond`.
+        """
+        rides = (records,) if isinstance(records, RideRecord) else tuple(records)
+        scores, units = [], self.vehicle.units
+        for ride in rides:
+            begin = int(np.ceil(self._settling / ride.dt))
+            for channel, values in self.respond(ride).items():
+                measured = ride[channel][begin:]
+                figures = _figures(measured, values[begin:] - measured)
+                scores.append(ChannelScore(ride.name, channel, units[channel], *figures))
+        return tuple(scores)
+
+    @property
+    def _settling(self) -> float:
+        """Time at the beginning of each record that was not compared [s]."""
+        part = next(part for part in self.problem.residuals if isinstance(part, RideBatch))
+        return int(np.argmax(np.asarray(part.weight)[0, 0] > 0)) * part.dt * part.finer
+
     def predict(self) -> dict[str, dict[str, Float[np.ndarray, " time"]]]:
-        """What the sensors would show without noise, by the name of the record and the channel, in SI."""
-        model, channels = self.problem.free.tree, {}
-        for part in self.problem.residuals:
-            if isinstance(part, RideBatch):
-                for number, rows in zip(np.asarray(part.number), np.asarray(_predict(part, model)), strict=True):
-                    channels[int(number)] = dict(zip(part.channels, rows, strict=True))
-        return {record.name: channels[i] for i, record in enumerate(self.records)}
+        """Deprecated: `respond(record)` gives the channels of one record."""
+        text = "`predict()` of a fitted vehicle is deprecated: write `respond(record)` for one record."
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return {record.name: self.respond(record) for record in self.records}
 
     def table(
         self,
@@ -147,6 +194,7 @@ class VehicleFit:
             "warnings": list(self.warnings),
             "held": list(self.held),
             "scale_free": list(self.scale_free),
+            **({"patterns": self.patterns} if self.patterns else {}),
             "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
             "covariance": plain(self.covariance),
             "scores": [
@@ -174,6 +222,7 @@ class VehicleFit:
         for e, (value, error) in zip(self.parameters, texts, strict=True):
             note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
             lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
+        lines += [f"  {self.patterns}"] * bool(self.patterns)
         return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])
 
 

@@ -3,44 +3,17 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.special import stdtrit
 
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import PiecewiseLinear, Table
 from jaxdamp.identify.model import is_memoryless
-from jaxdamp.identify.rungs import Rung, best_of
-from jaxdamp.parameters import parameters
+from jaxdamp.identify.recommending import Recommendation, not_worse, recommendation
+from jaxdamp.identify.rungs import Rung
 
 
 HYSTERESIS = 0.05  # share of the squared error above which a law with states is worthwhile
 SHAPE = 0.3  # share of the squared error above which another curve is worthwhile
-
-FEWEST_RECORDS = 3  # whose errors show by how much they vary from record to record
-ALIKE = 0.01  # relative difference of errors that is never a reason to prefer a law
-
-
-def not_worse(errors: Mapping[str, Sequence[float]], best: str) -> list[str]:
-    """Laws whose errors on the same records do not tell them from the best one, in the order given.
-
-    A law is worse if the logarithms of the ratios of its errors to those of the best one have a mean that is above
-    zero by more than chance: by Student's t at 95 %, two-sided, every record being one observation. Fewer than three
-    records cannot show this: then only `ALIKE` counts.
-
-    Arguments:
-        errors: RMSE [N] on each record by law.
-        best: one of these laws.
-
-    >>> not_worse({"a": [10.0, 20.0, 15.0], "b": [11.0, 18.0, 16.0], "c": [20.0, 41.0, 29.0]}, "a")
-    ['b']
-    """
-    alike = []
-    for name, own in errors.items():
-        ratios = np.log(np.maximum(own, 1e-300) / np.maximum(errors[best], 1e-300))
-        n = ratios.size
-        spread = float(stdtrit(n - 1, 0.975) * np.std(ratios, ddof=1) / np.sqrt(n)) if n >= FEWEST_RECORDS else 0.0
-        if name != best and float(np.mean(ratios)) < max(spread, ALIKE):
-            alike.append(name)
-    return alike
+CURVES = {"piecewise_linear": PiecewiseLinear, "table": Table}  # laws that follow any curve, by name
 
 
 def cannot_choose(errors: Mapping[str, Sequence[float]], best: str, numbers: Mapping[str, int]) -> list[str]:
@@ -61,18 +34,19 @@ def cannot_choose(errors: Mapping[str, Sequence[float]], best: str, numbers: Map
     ]
 
 
-def verdict(rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> tuple[str, ...]:
-    """Sentences on the error of the best law and on the shares of the errors of the laws.
+def verdict(choice: Recommendation, rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> tuple[str, ...]:
+    """Sentences on the recommended law, why it is this one, and the shares of the errors of the laws.
 
     Arguments:
+        choice: the recommendation.
         rungs: the fitted laws, at least one.
-        held_out: the records that they were scored on, if any.
+        held_out: the records that they were scored on, if any were given.
     """
-    best = best_of(rungs)
+    best = choice.rung
     static = [rung for rung in rungs if is_memoryless(rung.result.law)]
-    sentences = [_error_of(best, rungs, held_out)]
+    sentences = [_error_of(best, rungs, held_out), *_why(choice, rungs)]
     if static:
-        rung = best_of(static)
+        rung = best if is_memoryless(best.result.law) else recommendation(static).rung
         part = rung.result.error_shares.hysteresis
         lead = "It is a law of velocity alone" if rung is best else f"The best law of velocity alone is {rung.name}"
         if part >= HYSTERESIS:
@@ -92,24 +66,41 @@ def verdict(rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> tuple[str, .
         sentences.append(f"{100 * remaining.hysteresis:.0f} % of the squared error of {best.name} is still hysteresis.")
     if remaining.shape >= SHAPE:
         part = 100 * remaining.shape
-        sentences.append(f"{part:.0f} % of the squared error of {best.name} is shape: another curve would fit better.")
-    errors = {rung.name: [score.rmse for score in rung.scores] for rung in rungs}
-    numbers = {rung.name: max(rung.parameters, _numbers_of(rung.result.law)) for rung in rungs}  # some may be frozen
-    sentences += cannot_choose(errors, best.name, numbers)
+        missing = [name for name, law in CURVES.items() if not any(isinstance(r.result.law, law) for r in rungs)]
+        remedy = f"try {' or '.join(missing)}, which follow any curve" if missing else "no law tried follows it better"
+        sentences.append(f"{part:.0f} % of the squared error of {best.name} is shape, of the curve: {remedy}.")
     return tuple(sentences)
 
 
-def _numbers_of(law: AbstractDamper) -> int:
-    return sum(np.size(p.value) for p in parameters(law))
-
-
 def _error_of(best: Rung, rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> str:
-    where, runs = ("held-out", held_out) if held_out else ("fitted", best.result.runs)
     percent = best.fit_percent if best.held_out_fit_percent is None else best.held_out_fit_percent
-    largest = max(float(abs(run.force).max()) for run in runs)
+    largest = max(float(abs(run.force).max()) for run in held_out or best.result.runs)
     share = 100 * best.error / largest
-    lead = "Smallest error" if len(rungs) > 1 else "Error"
-    return (
-        f"{lead} on the {where} records: {best.name}, RMSE {best.error:.1f} N, {share:.1f} % of their largest force"
-        f" of {largest:.0f} N (fit {percent:.1f} %)."
+    lead = f"Recommended: {best.name}" if len(rungs) > 1 else f"Error of {best.name}"
+    where = (
+        f"held-out fit {percent:.1f} %" if best.judged_on else f"fit {percent:.1f} % on the records it was fitted to"
     )
+    how = f" ({best.judged_on})" if best.judged_on else "; nothing could be held out"
+    return f"{lead}, {where}, RMSE {best.error:.1f} N, {share:.1f} % of the largest force of {largest:.0f} N{how}."
+
+
+def _why(choice: Recommendation, rungs: Sequence[Rung]) -> list[str]:
+    """One sentence on why it is this law, of several."""
+    best, numbers = choice.rung, choice.rung.numbers
+    *others, last = [rung.name for rung in choice.alike] or [""]
+    if len(rungs) == 1:
+        return []
+    if others:
+        names = f"{', '.join(others)} and {last}"
+        why = f"With {numbers} numbers it is the simplest of {names}, which predict alike within the scatter"
+    else:
+        next_best = min((rung.error for rung in rungs if rung is not best), default=best.error)
+        factor = next_best / best.error if best.error > 0 else np.inf
+        why = f"No other law predicts as well: the next error is {factor:.2f} times as large"
+        why = (
+            why if factor > 1 else f"With {numbers} numbers it predicts as well as any law whose numbers are all known"
+        )
+    if best.doubt:
+        why += f"; of its numbers, {best.doubt}, and no law without such doubt comes near"
+    aside = ", ".join(f"{rung.name} ({rung.doubt})" for rung in choice.doubted)
+    return [why + f"; left aside: {aside}" * bool(aside) + "."]

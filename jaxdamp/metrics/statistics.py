@@ -61,6 +61,15 @@ class Reduction(enum.Enum):
                 return values[-1]
 
 
+def _sample(y: Samples, first: Any) -> Samples:
+    del first
+    return y
+
+
+def _same_unit(unit: str) -> str:
+    return unit
+
+
 class Term(NamedTuple):
     """A function of a sample y and of the first sample, and the reduction of its values.
 
@@ -73,7 +82,7 @@ class Term(NamedTuple):
     """
 
     reduction: Reduction
-    value: Callable[[Samples, Any], Samples] = lambda y, first: y
+    value: Callable[[Samples, Any], Samples] = _sample
 
 
 @final
@@ -107,7 +116,7 @@ class Statistic:
     terms: tuple[Term, ...] = ()
     of_terms: Callable[[Gathered, int, ScalarLike], Scalar] | None = None
     of_record: Callable[[Signal, ScalarLike], Scalar] | None = None
-    unit: Callable[[str], str] = lambda unit: unit
+    unit: Callable[[str], str] = _same_unit
     of_rms: Callable[[Scalar], Scalar] | None = None
     differentiable: bool = True
     signed: bool = False
@@ -119,6 +128,10 @@ class Statistic:
 
     def __repr__(self) -> str:
         return self.name
+
+    def __reduce_ex__(self, protocol: Any) -> str | tuple[Any, ...]:
+        """Those of this module are pickled by name: the copy is the same statistic, and compiles nothing anew."""
+        return (_named, (self.name,)) if STATISTICS.get(self.name) is self else super().__reduce_ex__(protocol)
 
     @property
     def needs_record(self) -> bool:
@@ -242,6 +255,22 @@ _ALL = (
 STATISTICS: dict[str, Statistic] = {statistic.name: statistic for statistic in _ALL}
 
 
+def _named(name: str) -> Statistic:
+    """The statistic of this module with this name."""
+    return STATISTICS[name]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Percentile:
+    """Of a record; equal for an equal share."""
+
+    share: float | int
+
+    def __call__(self, record: Signal, dt: ScalarLike) -> Scalar:
+        del dt
+        return jnp.percentile(record, self.share)
+
+
 @functools.cache
 def percentile(share: float | int) -> Statistic:
     """The value that a share of the samples of a record stays below.
@@ -257,4 +286,4 @@ def percentile(share: float | int) -> Statistic:
     """
     if not 0 <= share <= 100:
         _checks.refuse("share", "be 0 to 100 percent", share)
-    return Statistic(f"percentile_{share:g}", of_record=lambda record, _: jnp.percentile(record, share), signed=True)
+    return Statistic(f"percentile_{share:g}", of_record=_Percentile(share), signed=True)

@@ -34,7 +34,7 @@ from jaxdamp.parameters._domains import (
     weight,
 )
 from jaxdamp.parameters._free import FreeParameters, free_parameters
-from jaxdamp.parameters._paths import get, match_paths, name_patterns, replace, with_values
+from jaxdamp.parameters._paths import get, match_paths, matched_in_words, matching, name_patterns, replace, with_values
 
 
 __all__ = [
@@ -56,6 +56,8 @@ __all__ = [
     "increasing_negative",
     "interval",
     "match_paths",
+    "matched_in_words",
+    "matching",
     "modules_inside",
     "name_patterns",
     "nonnegative",

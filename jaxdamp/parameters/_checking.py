@@ -4,9 +4,11 @@ import dataclasses
 from typing import TypeVar
 
 import equinox as eqx
+import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types
+from jaxdamp._traced import behind
 from jaxdamp.parameters._declaration import domain_of, modules_inside
 
 
@@ -14,7 +16,7 @@ Tree = TypeVar("Tree")
 
 
 def check_parameters(module: eqx.Module) -> None:
-    """Refuse fields of a wrong type and values outside their domain (traced values are not checked).
+    """Refuse fields of a wrong type and values outside their domain (inside `jax.jit` they are not known).
 
     Modules call it in `__check_init__`.
 
@@ -24,13 +26,15 @@ def check_parameters(module: eqx.Module) -> None:
     check_field_types(module)
     for field in dataclasses.fields(module):
         declared = field.metadata.get("parameter") or field.metadata.get("setting")
-        value = _checks.concrete(getattr(module, field.name)) if declared else None
+        value = behind(getattr(module, field.name)) if declared else None
         if declared is None or value is None:
             continue
         argument = f"{type(module).__name__}.{field.name}"
         _checks.finite(argument, value)
         domain = domain_of(declared, module)
-        if not domain.contains(value):
+        size = np.ndim(getattr(module, field.name))
+        each = [value] if value.ndim <= size or not size else value.reshape(-1, *value.shape[-size:])  # of a batch
+        if not all(map(domain.contains, each)):
             unit = f" [{declared['unit']}]" if declared["unit"] else ""
             _checks.refuse(argument, f"be {domain.name}{unit}", value, f"It is the {declared['meaning']}.")
 

@@ -28,6 +28,8 @@ def as_float(value: Any, name: str = "value") -> Array:
         return value
     if value is None or isinstance(value, str | bytes | type | eqx.Module):
         _checks.refuse(name, "be a number", _checks.described(value))
+    if jnp.iscomplexobj(value):
+        _checks.refuse(name, "be a real number", _checks.described(value))
     try:
         if isinstance(value, int | float | np.ndarray):
             value = np.asarray(value)  # arrays of NumPy are copied; numbers would be converted by a compiled program
@@ -39,7 +41,13 @@ def as_float(value: Any, name: str = "value") -> Array:
 
 
 def parameter(
-    unit: str, meaning: str, domain: Domain | Callable[[Any], Domain] = real, *, linear: bool = False, **field: Any
+    unit: str,
+    meaning: str,
+    domain: Domain | Callable[[Any], Domain] = real,
+    *,
+    linear: bool = False,
+    adjustable: bool = True,
+    **field: Any,
 ) -> Any:
     """Declare a field of an equinox module as a parameter.
 
@@ -48,9 +56,12 @@ def parameter(
         meaning: one line for tables and labels.
         domain: the allowed values; a function of the instance if they depend on a setting.
         linear: whether the force of the law is linear in all parameters marked so; a fit then has a closed form.
+        adjustable: whether a workshop can change it, as it can a rate, a blow-off, a preload, an orifice or a spring. A
+            tuning leaves others alone unless it is told to move them: lag, friction, oil, masses, geometry.
         field: passed on to `equinox.field`, such as `default=0.0`.
     """
-    return _number("parameter", {"unit": unit, "meaning": meaning, "domain": domain, "linear": linear}, field)
+    declared = {"unit": unit, "meaning": meaning, "domain": domain, "linear": linear, "adjustable": adjustable}
+    return _number("parameter", declared, field)
 
 
 def setting(unit: str, meaning: str, domain: Domain = real, *, command: bool = False, **field: Any) -> Any:
@@ -101,6 +112,7 @@ class Parameter(eqx.Module):
         meaning: in words.
         domain: the values that it may take.
         linear: whether the force is linear in it.
+        adjustable: whether a workshop can change it.
     """
 
     path: str = eqx.field(static=True)
@@ -109,6 +121,7 @@ class Parameter(eqx.Module):
     meaning: str = eqx.field(static=True)
     domain: Domain = eqx.field(static=True)
     linear: bool = eqx.field(static=True)
+    adjustable: bool = eqx.field(static=True, default=True)
 
 
 def modules_inside(tree: Any, prefix: str = "") -> Iterator[tuple[str, eqx.Module]]:
@@ -166,8 +179,9 @@ def parameters(tree: Any, prefix: str = "") -> list[Parameter]:
             if declared is None:
                 found += parameters(value, f"{prefix}{field.name}.")
             else:
-                domain, others = domain_of(declared, tree), (declared["unit"], declared["meaning"])
-                found.append(Parameter(prefix + field.name, value, *others, domain, declared["linear"]))
+                words = declared["unit"], declared["meaning"]
+                traits = domain_of(declared, tree), declared["linear"], declared["adjustable"]
+                found.append(Parameter(prefix + field.name, value, *words, *traits))
     return found
 
 

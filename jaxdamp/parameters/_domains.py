@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -23,6 +24,7 @@ class Domain:
         contains: whether an array of values lies inside.
         lower: limit below; −∞ if there is none.
         upper: limit above; ∞ if there is none.
+        remade: function and arguments that return this domain again, for one that is not in a module by its name.
     """
 
     name: str
@@ -32,6 +34,12 @@ class Domain:
     lower: float = -np.inf
     upper: float = np.inf
     steps: Callable[[Array], Array] | None = None
+    remade: tuple[Callable[..., "Domain"], tuple[float, ...]] | None = dataclasses.field(default=None, repr=False)
+
+    def __reduce_ex__(self, protocol: Any) -> str | tuple[Any, ...]:
+        """Pickled by name or by ends: its copy is the domain itself, so that nothing is compiled anew for it."""
+        own = next((name for name, value in globals().items() if value is self), None)
+        return own or self.remade or super().__reduce_ex__(protocol)
 
     @property
     def ordered(self) -> bool:
@@ -117,6 +125,7 @@ def _bounded(
     upper: float,
     share_of: Callable[[Array], Array],
     raw_of: Callable[[Array], Array],
+    remade: Callable[[float, float], Domain],
     steps: Callable[[Array], Array] | None = None,
 ) -> Domain:
     """A domain between two finite numbers, from the map of raw numbers to shares of the range (0 to 1) and back."""
@@ -135,6 +144,7 @@ def _bounded(
         lower,
         upper,
         steps,
+        (remade, (lower, upper)),
     )
 
 
@@ -153,7 +163,7 @@ def _raw_of_ordered_shares(shares: Array) -> Array:
     return jnp.log(gaps[:-1] / gaps[-1])
 
 
-@functools.lru_cache
+@functools.cache
 def interval(lower: float, upper: float) -> Domain:
     """Numbers between two finite ones (scaled logistic map).
 
@@ -161,10 +171,10 @@ def interval(lower: float, upper: float) -> Domain:
         lower: lower end, in the unit of the parameter.
         upper: upper end.
     """
-    return _bounded("", lower, upper, jax.nn.sigmoid, _logit)
+    return _bounded("", lower, upper, jax.nn.sigmoid, _logit, interval)
 
 
-@functools.lru_cache
+@functools.cache
 def ordered_interval(lower: float, upper: float) -> Domain:
     """Increasing numbers between two finite ones: their gaps are the shares of a softmax.
 
@@ -172,5 +182,5 @@ def ordered_interval(lower: float, upper: float) -> Domain:
         lower: lower end, in the unit of the parameter.
         upper: upper end.
     """
-    shares = _ordered_shares, _raw_of_ordered_shares
-    return _bounded("strictly increasing ", lower, upper, *shares, steps=increasing.steps)
+    maps = _ordered_shares, _raw_of_ordered_shares, ordered_interval
+    return _bounded("strictly increasing ", lower, upper, *maps, steps=increasing.steps)

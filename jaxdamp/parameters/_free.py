@@ -1,5 +1,6 @@
 """The free parameters of a fit or a tuning as one vector."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -100,10 +101,10 @@ def free_parameters(
 
     Arguments:
         tree: a law, a vehicle or any module.
-        over: paths, last parts of paths or patterns with `*`; all parameters if not given.
+        over: paths, last parts of paths or patterns with `*` and `**` (`match_paths`); all parameters if not given.
         freeze: names of parameters to hold at their values.
         bounds: extra limits `{path: (lower, upper)}` in the parameter's unit.
-        tie: parameters that take the values of others, as `{"front.damper.*": "rear.damper.*"}`; a `*` stands
+        tie: parameters that take the values of others, as `{"front.damper.**": "rear.damper.**"}`; `*` and `**` stand
             for the same text on both sides. A group of tied parameters is one free value: it is free if `over` names
             one of them, frozen if `freeze` names one of them, and the bounds of one apply to all.
 
@@ -130,10 +131,13 @@ def free_parameters(
     limits = _limits_by_path(known, free, leaders, bounds or {})
     linear = free - {leader for path, leader in leaders.items() if not all_parameters[known.index(path)].linear}
     chosen = [
-        Parameter(p.path, p.value, p.unit, p.meaning, _limited(p, limits.get(p.path)), p.linear and p.path in linear)
+        dataclasses.replace(p, domain=_limited(p, limits.get(p.path)), linear=p.linear and p.path in linear)
         for p in all_parameters
         if p.path in free
     ]
+    if not known:
+        remedy = "Declare its numbers by `parameter(unit, meaning)`; the weights of a network are trained by optax."
+        _checks.refuse("law", "have parameters", f"a {type(tree).__name__} without", remedy)
     if not chosen:
         raise ValueError(f"All parameters are frozen, nothing is left to change: {', '.join(known)}.")
     return FreeParameters(tree, tuple(chosen), tuple(pair for pair in leaders.items() if pair[1] in free))

@@ -1,8 +1,8 @@
 """Paths of parameters: matching names and patterns, reading and replacing values."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
-from fnmatch import fnmatchcase
 from typing import Any, TypeVar
 
 import equinox as eqx
@@ -66,21 +66,89 @@ def replace(tree: Tree, values: Mapping[str, Any]) -> Tree:
 
 
 def match_paths(known: Sequence[str], patterns: Sequence[str]) -> list[str]:
-    """The known paths that patterns name: exactly, by their last part, or with `*`.
+    """The known paths that names and patterns stand for.
+
+    A name is a whole path, or the last parts of paths if no path is equal to it. In a pattern a `*` stands for text
+    without a dot, `**` for any text: `"guides.*.stiffness"` is the stiffness of every guide, `"guides.**.stiffness"`
+    also that of laws inside the guides, `"damper.**"` everything in the damper. A pattern without a dot, such as
+    `"*_rate"`, is compared with the last part of every path.
 
     Arguments:
         known: all paths.
-        patterns: names, last parts of names, or patterns with `*`.
+        patterns: names, last parts of names, or patterns with `*` and `**`.
+
+    Raises:
+        ValueError: a name or pattern that fits no path; the message names the nearest ones.
+
+    >>> paths = ["damper.law.rebound_rate", "damper.lag_time", "mass"]
+    >>> match_paths(paths, ["*_rate"]), match_paths(paths, ["damper.*"]), match_paths(paths, ["damper.**"])
+    (['damper.law.rebound_rate'], ['damper.lag_time'], ['damper.law.rebound_rate', 'damper.lag_time'])
     """
     chosen = []
     for pattern in [patterns] if isinstance(patterns, str) else patterns:
-        hits = [p for p in known if fnmatchcase(p, pattern)] or [p for p in known if fnmatchcase(p, f"*.{pattern}")]
+        hits = matching(known, pattern)
         if not hits:
-            near = get_close_matches(pattern, list(known) + [p.rsplit(".", 1)[-1] for p in known], 1)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            raise ValueError(f"No parameter is named {pattern!r}: {hint}The parameters are {', '.join(known)}.")
+            raise ValueError(f"No parameter is named {pattern!r}: {_nearest(known, pattern)}")
         chosen += [p for p in hits if p not in chosen]
     return [p for p in known if p in chosen]
+
+
+def matching(known: Sequence[str], pattern: str) -> list[str]:
+    """The known paths that one name or pattern stands for, as in `match_paths`; none if there is no such path.
+
+    Arguments:
+        known: all paths.
+        pattern: a name, last parts of a name, or a pattern.
+    """
+    exact = re.compile(expression(pattern))
+    whole = [] if "*" in pattern and "." not in pattern else [path for path in known if exact.fullmatch(path)]
+    inside = re.compile(rf"(?:.*\.)?{expression(pattern)}")
+    return whole or [path for path in known if inside.fullmatch(path)]
+
+
+def expression(pattern: str) -> str:
+    """The regular expression of a pattern, with a group for the text that each `*` or `**` stands for."""
+    groups = {"*": r"([^.]*)", "**": "(.*)", "**.": r"((?:.*\.)?)"}  # the last: any number of parts, also none
+    pieces = re.split(r"((?<![^.])\*\*\.|\*\*|\*)", pattern)
+    return "".join(groups.get(piece) or re.escape(piece) for piece in pieces)
+
+
+def _nearest(known: Sequence[str], pattern: str) -> str:
+    """What could be meant by a name or pattern that fits no path."""
+    every = f"The parameters are {', '.join(known)}."
+    if "*" not in pattern:
+        near = get_close_matches(pattern, list(known) + [p.rsplit(".", 1)[-1] for p in known], 1)
+        return (f"did you mean {near[0]!r}? " if near else "") + every
+    across = re.sub(r"\*+", "**", pattern)
+    if across != pattern and (deeper := matching(known, across)):
+        return f"a `*` stands for text without a dot. {across!r} would be {listed(deeper)}."
+    near = get_close_matches(pattern, known, 3, 0.3)
+    return (f"the nearest are {', '.join(near)}. " if near else "") + every
+
+
+def listed(paths: Sequence[str], most: int = 6) -> str:
+    """Paths in words, the first ones of many.
+
+    Arguments:
+        paths: the paths.
+        most: how many are written out.
+    """
+    return ", ".join(paths[:most]) + f" and {len(paths) - most} more" * (len(paths) > most)
+
+
+def matched_in_words(known: Sequence[str], **patterns: Iterable[str]) -> str:
+    """What each pattern with `*` stands for, as in "freeze 'guides.*.stiffness' = guides.0.stiffness"; else empty.
+
+    Arguments:
+        known: all paths.
+        patterns: names and patterns by the argument that they were given for.
+    """
+    return "; ".join(
+        f"{argument} {pattern!r} = {listed(matching(known, pattern))}"
+        for argument, given in patterns.items()
+        for pattern in ([given] if isinstance(given, str) else given)
+        if "*" in pattern
+    )
 
 
 def name_patterns(argument: str, names: Any) -> list[str]:
@@ -98,6 +166,6 @@ def name_patterns(argument: str, names: Any) -> list[str]:
         _checks.refuse(argument, "be names of parameters", repr(names), remedy)
     listed = [names] if isinstance(names, str) else list(names) if isinstance(names, Iterable) else None
     if listed is None or not all(isinstance(name, str) for name in listed):
-        remedy = "Write ['damper.rate'], or a pattern such as ['damper.*_rate']."
+        remedy = "Write ['damper.rate'], or a pattern such as ['damper.**_rate']."
         _checks.refuse(argument, "be names of parameters", repr(names), remedy)
     return listed

@@ -8,10 +8,10 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp.parameters._declaration import Parameter
-from jaxdamp.parameters._paths import match_paths
+from jaxdamp.parameters._paths import expression, match_paths
 
 
-EXAMPLE = "Write for example tie={'front.damper.*': 'rear.damper.*'}: the front takes the values of the rear."
+EXAMPLE = "Write for example tie={'front.damper.**': 'rear.damper.**'}: the front takes the values of the rear."
 
 
 def resolve_ties(known: Sequence[Parameter], tie: Mapping[str, str] | None) -> dict[str, str]:
@@ -20,7 +20,7 @@ def resolve_ties(known: Sequence[Parameter], tie: Mapping[str, str] | None) -> d
     Arguments:
         known: all parameters of the tree.
         tie: names or patterns of the parameters that follow, each with the name or pattern of those they follow; what a
-            `*` stands for must be the same on both sides. A name without `*` may lead several parameters.
+            `*` or `**` stands for must be the same on both sides. A name without `*` may lead several parameters.
 
     Raises:
         ValueError: names that fit no parameter or no partner; a parameter tied twice or in a circle; partners of
@@ -46,7 +46,7 @@ def resolve_ties(known: Sequence[Parameter], tie: Mapping[str, str] | None) -> d
 
 def _wildcards(pattern: str, path: str) -> tuple[str, ...] | None:
     """What each `*` of a pattern stands for in a path that it matches, as a whole or by its last parts."""
-    inner = "(.*)".join(map(re.escape, pattern.split("*")))
+    inner = expression(pattern)
     found = re.fullmatch(inner, path) or re.fullmatch(rf"(?:.*\.)?{inner}", path)
     return found and found.groups()
 

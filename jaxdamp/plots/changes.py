@@ -62,7 +62,10 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
     _style.dress(curves, _style.VELOCITY, _style.FORCE, "Damper law")
     _style.cross(curves)
     curves.legend(loc="upper left", facecolor="white", edgecolor="none")
-    figure.suptitle("\n".join(textwrap.wrap(result.summary, 130)), fontsize="medium")
+    verdict = result.verdict
+    colour = _style.COLOURS[2 if verdict.better else 1]
+    lines = [verdict.outcome.value, *textwrap.wrap(verdict.sentence, 130)]
+    figure.suptitle("\n".join(lines), fontsize="medium", color=colour)
     _bars(bars, result)
     _search(search, result)
     _style.note_below(figure, gaps)
@@ -102,6 +105,7 @@ def _bars(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
             fontsize="small",
         )
     reached = {n: " (limit reached)" if n in result.active_limits else " (limited)" for n in result.limits}
+    reached |= dict.fromkeys(result.violated, " (LIMIT VIOLATED)")
     marks = [" (minimised)" if n == result.metric else reached.get(n, "") for n in names]
     axes.set_yticks(rows, [n.replace("_", " ") + mark for n, mark in zip(names, marks, strict=True)])
     axes.invert_yaxis()

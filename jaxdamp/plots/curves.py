@@ -1,5 +1,6 @@
 """Laws as curves of force over velocity."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -30,6 +31,7 @@ def force_velocity(
     note: str = "",
     title: str = "",
     bands: Band | Mapping[str, Band] | None = None,
+    static_force: float = 0.0,
 ) -> "matplotlib.figure.Figure":
     """Force over velocity of one law or several, over the samples and the peak-velocity points of records.
 
@@ -47,6 +49,8 @@ def force_velocity(
         note: a remark to write under the picture.
         title: above the picture; the only law and the records if left out.
         bands: 95 % bands of the laws by name (`FitResult.band`), or that of the only law.
+        static_force: gas force or zero error [N] in the records and not in the laws, such as
+            `float(result.rig.force_offset)`; the points are drawn without it, and a remark says so.
 
     Raises:
         ValueError: no law, or a baseline or band that is not of one of the laws.
@@ -55,7 +59,10 @@ def force_velocity(
     laws = _style.by_name(
         "laws", laws, AbstractDamper, "a damper law", "Take `result.law` of a fit, or laws by name.", alone
     )
+    _checks.finite("static_force", static_force)
     runs = () if runs is None else as_runs(runs)
+    runs = tuple(dataclasses.replace(run, force=run.force - static_force) for run in runs)
+    without = f"The measured points are drawn without the static force of {static_force:.0f} N: gas or zero error."
     if baseline is not None:
         _checks.one_of("baseline", baseline, laws)
     if velocities is None:
@@ -78,7 +85,7 @@ def force_velocity(
     _style.cross(axes)
     axes.set_xlim(float(points.min()), float(points.max()))
     _style.legend_beside(figure, handles)
-    _style.note_below(figure, [*([note] if note else []), *gaps])
+    _style.note_below(figure, [*([note] if note else []), *([without] if runs and static_force else []), *gaps])
     return figure
 
 

@@ -46,7 +46,7 @@ def fit_loops(
         _checks.refuse("runs", "hold at least one record", "empty")
     shown = spread(runs, most)
     # All records at once: their shapes are those of the fit's scores, for which all is compiled.
-    predicted = dict(zip(map(id, runs), result.predict(runs), strict=True))
+    predicted = dict(zip(map(id, runs), result.respond(tuple(runs)), strict=True))
     forces = [predicted[id(run)] for run in shown]
     figure = _style.new_figure(12.0, 8.0)
     (loops, football), (over_velocity, over_time) = figure.subplots(2, 2, height_ratios=(1.6, 1.0))

@@ -8,6 +8,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
 from jaxdamp.plots import _style
+from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import limit_spans
 
 
@@ -70,7 +71,9 @@ def sweep(
     figure = _style.new_figure(7.0, 4.6)
     plot = figure.add_subplot()
     over_axes = " and ".join(_words(data, name) for name in axes)
-    plot.set_title(f"{_words(data, metric)} over {over_axes}", loc="left", fontsize="medium")
+    idle = without_effect(data).get(metric, [])
+    flat = f" (no effect of {' and '.join(_words(data, name) for name in idle)})" if idle else ""
+    plot.set_title(f"{_words(data, metric)} over {over_axes}{flat}", loc="left", fontsize="medium")
     (_curves if curves else _map)(figure, plot, data, metric, chosen, rest, _ends(data, spans))
     return figure
 
@@ -135,10 +138,13 @@ def _map(
         figure.colorbar(filled, ax=plot, label=_label(data, metric))
         beyond = [end.beyond(data[end.name].transpose(over[1], over[0]).values) for end in ends]
         allowed = np.ma.masked_where(np.any(beyond, axis=0), shown) if beyond else shown
-        row, column = np.unravel_index(np.ma.argmin(allowed if allowed.count() else shown), shown.shape)
-        within = " within the limits" * bool(beyond and allowed.count())
-        least = f"smallest{within}: {_style.short(float(values[row, column]))}{_unit(data, metric)}"
-        plot.plot(x[column], y[row], "o", color="white", markeredgecolor=_style.BLACK, label=least, clip_on=False)
+        if allowed.count():
+            row, column = np.unravel_index(np.ma.argmin(allowed), shown.shape)
+            least = f"smallest{' within the limits' * bool(beyond)}: {_style.short(float(values[row, column]))}"
+            label = f"{least}{_unit(data, metric)}"
+            plot.plot(x[column], y[row], "o", color="white", markeredgecolor=_style.BLACK, label=label, clip_on=False)
+        else:
+            plot.plot([], [], " ", label="no point within the limits")
     hatched = [
         _hatch(plot, x, y, data[end.name].transpose(over[1], over[0]).values, end, i) for i, end in enumerate(ends)
     ]

@@ -26,7 +26,8 @@ def vehicle_fit(result: VehicleFit, record: str | None = None) -> "matplotlib.fi
     names = [one.name for one in result.records]
     name = names[0] if record is None else record
     _checks.one_of("record", name, names)
-    shown, fitted = result.records[names.index(name)], result.predict()[name]
+    shown = result.records[names.index(name)]
+    fitted = result.respond(shown)
     units = {score.channel: score.unit for score in result.scores if score.record == name}
     figure = _style.new_figure(12.0, 1.0 + 2.2 * len(units))
     rows = figure.subplots(len(units), 2, sharex=True, squeeze=False, width_ratios=(2.0, 1.0))

@@ -53,7 +53,7 @@ def chain_report(
     >>> comparison = identify.compare({"bilinear": Bilinear}, runs)
     >>> car = vehicles.presets.quarter_car_000(comparison.best.result.law)
     >>> ride = simulate(car, roads.cosine_bump(0.05, start=0.2, duration=0.25), duration=1.0)
-    >>> tuned = tune.minimise("rms_dynamic_tyre_load", car, roads.white("C", 20.0), over=["damper.*"])
+    >>> tuned = tune.minimise("rms_dynamic_tyre_load", car, roads.white("C", 20.0), over=["damper.**"])
     >>> page = report.chain_report(comparison, {"a bump": {"bilinear": ride}}, tuned)  # page.write("chain.html")
     >>> tuned.summary.replace(">", "&gt;") in page.to_html()
     True
@@ -75,7 +75,7 @@ def chain_report(
         report.points(notes_of(ride))
         add_rides(report, ride, road, f"ride_{number}_")
     if tuned is not None:
-        report.heading("A better damper")
+        report.heading(tuned.verdict.outcome.value)
         add_tuning(report, tuned)
     add_other_fits(report, comparison)
     return report

@@ -55,7 +55,7 @@ def fit_report(
     >>> runs = bench.VirtualDyno(Bilinear(2600.0, 1200.0), force_noise=5.0).run(bench.SineTest(0.01, 2.0))
     >>> comparison = identify.compare({"linear": Linear, "bilinear": Bilinear}, runs)
     >>> page = report.fit_report(comparison)  # page.write("fit.html")
-    >>> "Smallest error on the fitted records: bilinear" in page.to_html()
+    >>> "Recommended: bilinear" in page.to_html()
     True
     """
     report = Report(title, folder, attempts)
@@ -111,8 +111,10 @@ def add_fits(
     report.points(failure_sentences(comparison) if failures is None else failures)
     if several:
         report.picture(lambda: plots.ladder(comparison), "Errors of the laws", "ladder.png")
-    report.heading(f"The best law: {best.name}" if several else best.name)
+    report.heading(f"The recommended law: {best.name}" if several else best.name)
     report.table(parameters_of(best))
+    if best.judged_on:
+        report.table(best.scores_table())
     add_findings(report, best.result)
     report.picture(lambda: plots.fit_loops(best.result), f"{best.name} over the fitted records", "best_law_loops.png")
     if comparison.held_out:
@@ -180,7 +182,7 @@ def _add_curves(report: Report, comparison: Comparison, baseline: AbstractDamper
     The baseline is dashed and black; without one, the best of several laws is.
     """
     best = comparison.best
-    order = sorted(comparison.rungs, key=lambda rung: rung.error)
+    order = sorted(comparison.rungs, key=lambda rung: (rung is not best, rung.error))
     points = fitted_velocities(comparison)
     laws = _with_curves(report, {name: law for rung in order for name, law in rung.laws().items()}, points)
     bands: dict[str, Band] = {}
@@ -190,14 +192,24 @@ def _add_curves(report: Report, comparison: Comparison, baseline: AbstractDamper
     note = ""
     if len(laws) > len(drawn):
         rest = ", ".join(list(laws)[MOST_CURVES:])
-        note = f"Drawn are the {MOST_CURVES} laws with the smallest errors. The other {len(laws) - len(drawn)}: {rest}."
+        note = (
+            f"Drawn are {best.name} and the laws with the smallest errors. The other {len(laws) - len(drawn)}: {rest}."
+        )
     dashed = best.name if len(drawn) > 1 and best.name in drawn else None
     if baseline is not None:
         drawn |= _with_curves(report, {BASELINE: baseline}, points)
         dashed = BASELINE if BASELINE in drawn else dashed
+    machine, runs = best.result.rig, best.result.runs
+    static = 0.0 if machine is None else float(machine.force_offset) + float(machine.gas_force)
+    rest = None if machine is None else dataclasses.replace(machine, force_offset=0.0, gas_force=0.0)
     report.picture(
         lambda: plots.force_velocity(
-            drawn, runs=without_machine(best.result.rig, best.result.runs), baseline=dashed, note=note, bands=bands
+            drawn,
+            runs=without_machine(rest, runs),
+            baseline=dashed,
+            note=note,
+            bands=bands,
+            static_force=static,
         ),
         "Force over velocity",
         "force_velocity.png",

@@ -8,6 +8,7 @@ from jaxdamp import plots
 from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
+from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import limit_spans
 
 
@@ -77,17 +78,28 @@ def best_points(
         allowed = allowed & (data[name] >= lower) & (data[name] <= upper)
     count, total = int(allowed.sum()), int(allowed.size)
     sentences = [f"{count} of {total} points are within all limits."] if limits else []
+    idle = without_effect(data)
+    sentences += [
+        f"{_words(over)} has no effect on {_words(name)}: no value of it is better than another."
+        for name, flat in idle.items()
+        for over in flat
+    ]
     for name in names if count else ():
+        acting = [axis for axis in axes if axis not in idle.get(name, ())]
+        if not acting:
+            continue
         values = data[name].where(allowed)
         place = values.isel(values.argmin(...)).coords
-        where = ", ".join(f"{axis} = {_in_words(data, axis, place[axis])}" for axis in axes)
+        where = ", ".join(f"{axis} = {_in_words(data, axis, place[axis])}" for axis in acting)
         beside = ""
         if baseline is not None and (change := percent_change(float(baseline[name]), float(values.min()))) is not None:
             beside = f", {change:+.1f} % from the baseline ({_in_words(data, name, baseline[name])})"
-        sentences.append(
-            f"Smallest {name.replace('_', ' ')}: {_in_words(data, name, values.min())} at {where}{beside}."
-        )
+        sentences.append(f"Smallest {_words(name)}: {_in_words(data, name, values.min())} at {where}{beside}.")
     return sentences
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _in_words(data: "xarray.Dataset", name: str, value: Any) -> str:

@@ -45,8 +45,8 @@ def tuning_report(
     True
     """
     report = Report(title, folder, attempts)
-    report.verdict(result.summary, *([result.fresh.summary] if rescored is None and result.fresh else []))
-    report.heading("Before and after")
+    report.verdict(result.summary)
+    report.heading(result.verdict.outcome.value)
     add_tuning(report, result, rescored)
     if baseline is not None:
         add_baseline(report, result, baseline)

@@ -2,7 +2,8 @@
 
 from jaxdamp.rig.constant_velocity import QuasiStatic, quasi_static
 from jaxdamp.rig.machine import Readings, Rig
-from jaxdamp.rig.response import AbstractLawEngine, march, respond, solve_law
+from jaxdamp.rig.marching import march, solve_law
+from jaxdamp.rig.response import AbstractLawEngine, StartsInMotionWarning, respond
 from jaxdamp.rig.sensor import Sensor
 
 
@@ -12,6 +13,7 @@ __all__ = [
     "Readings",
     "Rig",
     "Sensor",
+    "StartsInMotionWarning",
     "march",
     "quasi_static",
     "respond",

@@ -6,7 +6,7 @@ from jaxtyping import Array
 
 from jaxdamp._limits import within
 from jaxdamp._types import Scalar, Signal
-from jaxdamp.rig.response import hermite, slopes
+from jaxdamp.rig.marching import hermite, slopes
 
 
 def delayed(values: Signal, samples: Scalar) -> Signal:

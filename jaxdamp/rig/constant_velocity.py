@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp.dampers import AbstractDamper, coverage, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper, coverage
 from jaxdamp.parameters import as_float
 
 
@@ -22,12 +22,14 @@ class QuasiStatic(NamedTuple):
         force: settled force [N], NaN where the law does not settle or has no finite force, shape (points,).
         settled: which points have a force, shape (points,).
         note: how many points have none, where and why, in words; empty if all have one.
+        states: states of the law at the end, shape (points, states): a start for `respond` of a record in motion.
     """
 
     velocity: Float[Array, " points"]
     force: Float[Array, " points"]
     settled: Bool[np.ndarray, " points"]
     note: str
+    states: Float[Array, "points states"]
 
 
 LONGEST_HOLD = 64  # s at constant velocity
@@ -62,12 +64,12 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     if velocities.ndim != 1 or velocities.size == 0:
         _checks.refuse("velocities", "be one or more in one dimension", f"of shape {velocities.shape}")
     _checks.finite("velocities", velocities)
-    law = without_fitted_ranges(law)
     states = jnp.broadcast_to(law.initial_state(), (velocities.size, law.initial_state().size))
     states, force = _hold(law, velocities, states, jnp.asarray(0))
     if law.initial_state().size == 0:
         settled = np.isfinite(force)
-        return QuasiStatic(velocities, force, settled, _gaps(law, np.asarray(velocities), np.asarray(force), settled))
+        note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
+        return QuasiStatic(velocities, force, settled, note, states)
     seconds, change = 0, np.full(velocities.shape, np.inf)
     while seconds < LONGEST_HOLD:
         longer = max(2 * seconds, 1)
@@ -80,7 +82,7 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     alone = change <= limit * size
     settled = np.isfinite(size) & (alone | (change <= limit * np.max(size, where=alone, initial=0.0)))
     note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
-    return QuasiStatic(velocities, jnp.where(settled, force, jnp.nan), settled, note)
+    return QuasiStatic(velocities, jnp.where(settled, force, jnp.nan), settled, note, states)
 
 
 def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled: np.ndarray) -> str:

@@ -13,7 +13,8 @@ from jaxdamp._types import Number, Scalar, Signal, SignalLike, State
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import Module, as_float, check_parameters, nonnegative, parameter, positive, readable, setting
 from jaxdamp.rig.channel import delayed, lagged
-from jaxdamp.rig.response import march, respond, slopes
+from jaxdamp.rig.marching import march, slopes
+from jaxdamp.rig.response import respond
 
 
 not_positive = dataclasses.replace(
@@ -144,7 +145,9 @@ class Rig(Module):
             _checks.finite("temperature", temperature)
         motion = self.delayed_motion(self.effects(), dt, stroke, rate)
         own = temperature if law.traits().temperature_dependent else None
-        law_force = respond(law, time, motion[0] - self.stroke_offset, motion[1], temperature=own, substeps=substeps)
+        rest = (law if own is None else law.at_temperature(own[0])).initial_state()
+        inside = motion[0] - self.stroke_offset
+        law_force = respond(law, time, inside, motion[1], state=rest, temperature=own, substeps=substeps)
         return _readings(self, self.effects(), law_force, dt, *motion, temperature)
 
     def march(

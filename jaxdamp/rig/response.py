@@ -2,17 +2,15 @@
 
 import warnings
 from abc import abstractmethod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._jacobian import Mode
 from jaxdamp._types import Signal, SignalLike, State
 from jaxdamp.dampers import (
     AbstractDamper,
@@ -22,16 +20,20 @@ from jaxdamp.dampers import (
     require_finite_force,
     sentence,
     warn_outside,
-    without_fitted_ranges,
 )
 from jaxdamp.parameters import as_float
+from jaxdamp.rig.marching import march_states, solve_law
 
 
 if TYPE_CHECKING:
     import diffrax
 
 
-_STIFF = "Stiff laws need an implicit solver, `diffrax.Kvaerno5()`, or their own steps: leave `engine` out."
+IN_MOTION = 0.1  # of the largest velocity, above which a record begins in motion
+
+
+class StartsInMotionWarning(UserWarning):
+    """A law with states starts at rest although the record begins in motion."""
 
 
 class AbstractLawEngine(eqx.Module):
@@ -42,25 +44,54 @@ class AbstractLawEngine(eqx.Module):
         """Force [N] of a law at uniform instants [s] of a stroke [m] and its velocity [m/s], without checks."""
 
 
+@overload
+def respond(
+    law: AbstractDamper,
+    time: SignalLike,
+    stroke: SignalLike,
+    velocity: SignalLike | None = ...,
+    *,
+    return_state: Literal[False] = ...,
+    **options: Any,
+) -> Signal: ...
+
+
+@overload
+def respond(
+    law: AbstractDamper,
+    time: SignalLike,
+    stroke: SignalLike,
+    velocity: SignalLike | None = ...,
+    *,
+    return_state: Literal[True],
+    **options: Any,
+) -> tuple[Signal, State]: ...
+
+
 def respond(
     law: AbstractDamper,
     time: SignalLike,
     stroke: SignalLike,
     velocity: SignalLike | None = None,
     *,
+    state: Float[ArrayLike, " states"] | None = None,
+    return_state: bool = False,
     temperature: Float[ArrayLike, "..."] | None = None,
     substeps: int = 1,
     engine: AbstractLawEngine | None = None,
     method: "str | diffrax.AbstractSolver | None" = None,
     rtol: float = 1e-8,
     atol: float = 1e-10,
-) -> Signal:
+) -> Signal | tuple[Signal, State]:
     """Force [N] of a damper law whose stroke is prescribed, as on a test bench.
 
     A motion outside the range that the law was fitted to (`law.fitted_to`) gives an `OutsideFittedRangeWarning`.
 
-    The law starts at rest (`law.initial_state()`), so a law with states needs about a cycle, or a few lag times, to
-    forget the start of a record that begins in motion.
+    A law with states starts at rest (`law.initial_state()`) unless it is given a `state`. In a record that begins in
+    motion it then needs about a cycle, or a few lag times, to forget the start, and a `StartsInMotionWarning` says so.
+    Better starts are the state after a cycle of a periodic motion (`return_state`) and that of a constant velocity
+    (`rig.quasi_static(law, velocity[:1]).states[0]`). A long record can be computed in pieces: each begins with the
+    last sample and the state of the one before.
 
     Arguments:
         law: the damper law.
@@ -68,6 +99,8 @@ def respond(
         stroke: stroke [m] at these instants, positive in extension, shape (time,).
         velocity: velocity [m/s], shape (time,). If it is left out, the stroke is differentiated by central
             differences, which is only good for a stroke without noise.
+        state: states of the law at the first instant, shape (states,).
+        return_state: whether to return the states at the last instant too.
         temperature: measured temperature of the oil [K], one value or shape (time,), in place of that which a
             `TemperatureScaled` states and that which a `Heated` computes.
         substeps: steps from one instant to the next for laws with states, between which stroke and velocity are
@@ -80,13 +113,14 @@ def respond(
         atol: deprecated: of a `method`.
 
     Returns:
-        Force [N], positive when it resists extension, shape (time,).
+        Force [N], positive when it resists extension, shape (time,); with `return_state` a pair of it and the states
+        at the last instant, shape (states,).
 
     Raises:
         ValueError: time not uniform or not increasing, shapes that differ, fewer than two instants; a stroke outside
             the limits of a law (`law.stroke_limits`); a force that is not finite, as where the motion leaves the data
             that a law was made from; a solver that gives up; a temperature beside a law that does
-            not depend on it, or beside an engine.
+            not depend on it, or beside an engine; a state of another size, or beside an engine.
 
     >>> from jaxdamp.dampers import Linear
     >>> time = np.linspace(0.0, 1.0, 1001)
@@ -95,14 +129,42 @@ def respond(
     120.0
     """
     check_module("law", law, (AbstractDamper,), "respond(law, time, stroke, velocity)")
-    instants = _checks.concrete(time)
-    time, stroke = as_float(time), as_float(stroke)
+    instants, time, stroke = _checks.concrete(time), as_float(time), as_float(stroke)
+    _check_record(instants, time, stroke, velocity)
+    if substeps < 1:
+        _checks.refuse("substeps", "be 1 or more", substeps)
+    dt = (time[-1] - time[0]) / (time.size - 1)
+    rate = jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else as_float(velocity)
+    _refuse_strokes(law, stroke)
+    if method is not None:
+        _refuse_method(method, engine)
+    solver = None if isinstance(method, str) else method
+    if engine is not None or solver is not None:
+        _refuse_beside_engine(temperature, substeps, state, return_state)
+    if temperature is not None:
+        temperature = _of_instants(law, temperature, time)
+    if state is None:
+        _warn_of_motion(law, rate)
+    last: State | None = None
+    if engine is not None:
+        check_module("engine", engine, (AbstractLawEngine,), "respond(law, time, stroke, engine=...)")
+        force = engine.respond(law, time, stroke, rate)
+    elif solver is not None:
+        force = solve_law(law, time, stroke, rate, solver, rtol, atol)
+    else:
+        begin = None if state is None else _checked_state(law, state, temperature)
+        force, last = march_states(law, dt, stroke, rate, substeps, temperature, begin)
+    require_finite_force(law, force, "over the whole motion")
+    _warn_of_range(law, stroke, rate, force)
+    return (force, last) if return_state and last is not None else force
+
+
+def _check_record(instants: np.ndarray | None, time: Signal, stroke: Signal, velocity: SignalLike | None) -> None:
+    """Refuse a record with other shapes, missing samples or unequal steps."""
     if time.ndim != 1 or time.size < 2 or stroke.shape != time.shape:
         _checks.refuse("stroke", "be as long as `time`, two or more", f"of shape {stroke.shape} for time {time.shape}")
     if velocity is not None and jnp.shape(velocity) != time.shape:
         _checks.refuse("velocity", "be as long as `time`", f"of shape {jnp.shape(velocity)} for time {time.shape}")
-    if substeps < 1:
-        _checks.refuse("substeps", "be 1 or more", substeps)
     for name, values in (("stroke", stroke), ("velocity", velocity)):
         if values is not None:
             _checks.finite(name, values, "Remove or interpolate the missing samples first.")
@@ -112,30 +174,41 @@ def respond(
         if not (np.all(steps > 0) and np.ptp(steps) <= 1e-3 * steps.mean() + rounding):
             value = f"stepping from {steps.min():g} to {steps.max():g} s"
             _checks.refuse("time", "increase in equal steps", value, "Resample the record to a uniform rate.")
-    dt = (time[-1] - time[0]) / (time.size - 1)
-    rate = jnp.asarray(jnp.gradient(stroke, dt)) if velocity is None else as_float(velocity)
-    _refuse_strokes(law, stroke)
-    fitted, law = law, without_fitted_ranges(law)
-    if method is not None:
-        _refuse_method(method, engine)
-    solver = None if isinstance(method, str) else method
-    if (engine is not None or solver is not None) and substeps != 1:
+
+
+def _refuse_beside_engine(temperature: Any, substeps: int, state: Any, return_state: bool) -> None:
+    """Refuse what only the steps of the laws have."""
+    if substeps != 1:
         must = "be left out beside an engine, which has its own or chooses them"
         _checks.refuse("substeps", must, substeps, "Write `engine=simulation.Exponential(substeps=...)`.")
-    if temperature is not None:
-        if engine is not None or solver is not None:
-            _checks.refuse("temperature", "be left out beside an engine", temperature, "Leave out `engine`.")
-        temperature = _of_instants(law, temperature, time)
-    if engine is not None:
-        check_module("engine", engine, (AbstractLawEngine,), "respond(law, time, stroke, engine=...)")
-        force = engine.respond(law, time, stroke, rate)
-    elif solver is not None:
-        force = solve_law(law, time, stroke, rate, solver, rtol, atol)
-    else:
-        force = march(law, dt, stroke, rate, substeps, temperature)
-    require_finite_force(law, force, "over the whole motion")
-    _warn_of_range(fitted, stroke, rate, force)
-    return force
+    others = {"temperature": temperature, "state": state, "return_state": return_state or None}
+    for name, value in others.items():
+        if value is not None:
+            _checks.refuse(name, "be left out beside an engine", value, "Leave out `engine`.")
+
+
+def _checked_state(law: AbstractDamper, state: Any, temperature: Signal | None) -> State:
+    """The states, as many as the law has."""
+    own = law if temperature is None else law.at_temperature(temperature[0])
+    begin, known = as_float(state), own.initial_state().shape
+    if begin.shape != known:
+        _checks.refuse("state", f"have the shape {known} for {type(law).__name__}", f"of shape {begin.shape}")
+    _checks.finite("state", begin)
+    return begin
+
+
+def _warn_of_motion(law: AbstractDamper, velocity: Signal) -> None:
+    """Say that a law with states starts at rest in a record that begins in motion."""
+    known = _checks.concrete(velocity)
+    if known is None or not law.initial_state().size or abs(known[0]) <= IN_MOTION * np.abs(known).max():
+        return
+    text = (
+        f"The record begins at {known[0]:.3g} m/s, but the states of {type(law).__name__} start at rest: the first "
+        "forces are wrong, for about a cycle or a few lag times. Begin at rest, or pass a state: "
+        "`rig.quasi_static(law, velocity[:1]).states[0]`, that after a cycle (`return_state=True`), or "
+        "`law.initial_state()` if it is meant."
+    )
+    warnings.warn(text, StartsInMotionWarning, stacklevel=3)
 
 
 def _of_instants(law: AbstractDamper, temperature: Float[ArrayLike, "..."], time: Signal) -> Signal:
@@ -181,123 +254,3 @@ def _refuse_method(method: "str | diffrax.AbstractSolver", engine: AbstractLawEn
         _checks.refuse("engine", "be given without `method`", repr(engine))
     instead = "`engine=simulation.Adaptive(solver, rtol=..., atol=...)`, or leave it out for the steps of the laws"
     warnings.warn(f"`method` of `respond` is deprecated: pass {instead}.", DeprecationWarning, stacklevel=3)
-
-
-def solve_law(
-    law: AbstractDamper,
-    time: Signal,
-    stroke: Signal,
-    velocity: Signal,
-    solver: "diffrax.AbstractSolver",
-    rtol: float,
-    atol: float,
-    mode: Mode = "forward",
-) -> Signal:
-    """`march` by a solver of diffrax.
-
-    Arguments:
-        law: the damper law.
-        time: uniform instants [s], shape (time,).
-        stroke: [m], positive in extension, shape (time,).
-        velocity: [m/s], shape (time,).
-        solver: of diffrax.
-        rtol: relative tolerance.
-        atol: absolute tolerance, in the units of the states.
-        mode: "forward" or "reverse", the derivatives that pass through it.
-    """
-    from jaxdamp._driven import check_solver, driven_states, verdict
-
-    start = law.initial_state()
-    if not start.size:
-        return jax.vmap(lambda x, v: law.force(x, v, start))(stroke, velocity)
-    check_solver(solver, rtol, atol)
-    states, result = driven_states(law.state_rate, start, time, stroke, velocity, solver, rtol, atol, mode)
-    last = _checks.concrete(states[-1])
-    if last is not None and not np.all(np.isfinite(last)):
-        said = verdict(result) or "finished with states that are not finite"
-        _checks.refuse("engine", "reach the end", f"one with {type(solver).__name__}, which says: {said}", _STIFF)
-    return jax.vmap(law.force)(stroke, velocity, states)
-
-
-@eqx.filter_jit
-def march(
-    law: AbstractDamper,
-    dt: Array,
-    stroke: Signal,
-    velocity: Signal,
-    substeps: int,
-    temperature: Signal | None = None,
-    state: State | None = None,
-) -> Signal:
-    """`respond` without its checks, for use inside compiled functions, from this state if one is given.
-
-    Arguments:
-        law: the damper law.
-        dt: step [s].
-        stroke: [m], positive in extension, shape (time,).
-        velocity: [m/s], shape (time,).
-        substeps: steps from one instant to the next.
-        temperature: [K], shape (time,), for laws that depend on one; within a step it is the mean of both ends.
-        state: of the law at the first instant; its own initial state if left out.
-    """
-    warm = None if temperature is None or not law.traits().temperature_dependent else temperature
-
-    def at(temperature: Array | None) -> AbstractDamper:
-        return law if temperature is None else law.at_temperature(temperature)
-
-    def force(x: Array, v: Array, state: Array, temperature: Array | None) -> Array:
-        return at(temperature).force(x, v, state)
-
-    state = at(None if warm is None else warm[0]).initial_state() if state is None else state
-    if state.size == 0:
-        return jax.vmap(force, (0, 0, None, 0))(stroke, velocity, state, warm)
-    fine_x = _refine(stroke, dt * velocity, substeps)
-    fine_v = _refine(velocity, dt * slopes(velocity, dt), substeps)
-    h = dt / substeps
-
-    def sample(state: Array, inputs: tuple[tuple[Array, Array, Array, Array], Array | None]) -> tuple[Array, Array]:
-        ends, own = inputs[0], at(inputs[1])
-
-        def step(state: Array, ends: tuple[Array, Array, Array, Array]) -> tuple[Array, None]:
-            x0, v0, x1, v1 = ends
-            return own.advance(x0, v0, x1, v1, state, h), None
-
-        if substeps == 1:
-            after = step(state, (ends[0][0], ends[1][0], ends[2][0], ends[3][0]))[0]
-        else:
-            after = jax.lax.scan(step, state, ends)[0]
-        return after, state  # the state before: XLA would compute that after the step twice, also to store it
-
-    def grouped(values: Array) -> Array:
-        return values.reshape(-1, substeps)
-
-    grid = (grouped(fine_x[:-1]), grouped(fine_v[:-1]), grouped(fine_x[1:]), grouped(fine_v[1:]))
-    between = None if warm is None else 0.5 * (warm[:-1] + warm[1:])
-    last, states = jax.lax.scan(sample, state, (grid, between))
-    states = jnp.concatenate([states, last[None]])
-    return jax.vmap(force)(stroke, velocity, states, warm)
-
-
-def slopes(values: Signal, dt: Array) -> Signal:
-    """Derivative by five-point differences, exact for quartics up to the ends."""
-    if values.size < 5:
-        return jnp.asarray(jnp.gradient(values, dt))
-    inner = (values[:-4] - 8.0 * values[1:-3] + 8.0 * values[3:-1] - values[4:]) / 12.0
-    edge = jnp.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0, 1.0]]) / 12.0
-    return jnp.concatenate([edge @ values[:5], inner, -(edge @ values[:-6:-1])[::-1]]) / dt
-
-
-def _refine(values: Signal, steps: Signal, parts: int) -> Float[Array, " fine"]:
-    """Cubic Hermite interpolation to `parts` intervals per sample; `steps` are slopes times the sample spacing."""
-    if parts == 1:
-        return values
-    ends = (values[:-1, None], steps[:-1, None], values[1:, None], steps[1:, None])
-    fine = hermite(ends, (jnp.arange(parts) / parts)[None, :])
-    return jnp.append(jnp.ravel(fine), values[-1])
-
-
-def hermite(ends: tuple[Array, Array, Array, Array], s: Array) -> Array:
-    """The cubic at a share s of an interval, from value and rise (slope × width) at its start and at its end."""
-    start, start_rise, stop, stop_rise = ends
-    rises = start_rise * (s * (1 - s) ** 2) + stop_rise * (s * s * (s - 1))
-    return start * ((1 + 2 * s) * (1 - s) ** 2) + stop * (s * s * (3 - 2 * s)) + rises

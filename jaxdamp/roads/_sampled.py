@@ -1,5 +1,6 @@
 """Roads made of uniformly spaced samples."""
 
+import abc
 import math
 from typing import final
 
@@ -34,6 +35,14 @@ def interpolate(
     return height if inside is None else jnp.where(inside[:, None], height, jnp.nan)
 
 
+class AbstractProcess(eqx.Module):
+    """What draws the samples of a random road."""
+
+    @abc.abstractmethod
+    def draw(self, seed: int | Array, count: int) -> Float[Array, " samples"]:
+        """So many heights [m]."""
+
+
 @final
 class SampledRoad(AbstractRoad):
     """Samples at equal spacing in time, or in distance when there is a `speed`."""
@@ -43,6 +52,7 @@ class SampledRoad(AbstractRoad):
     spacing: float = eqx.field(static=True)  # [s], or [m] with a speed
     periodic: bool = eqx.field(static=True)
     ramp: float = eqx.field(static=True)
+    process: AbstractProcess | None = None  # of a random road that can be drawn again
 
     def heights_at(self, time: SignalLike) -> Float[Array, "time wheels"]:
         """The height [m] at each `time` [s], by linear interpolation between the samples.
@@ -95,6 +105,12 @@ class SampledRoad(AbstractRoad):
             return -math.inf, math.inf
         length = (self.samples.shape[0] - 1) * self.spacing
         return 0.0, length if self.speed is None else length / self.speed
+
+    def reseeded(self, seed: int) -> "SampledRoad | None":
+        """Another realisation of a random road whose process is known."""
+        if self.process is None:
+            return None
+        return eqx.tree_at(lambda road: road.samples, self, self.process.draw(seed, len(self.samples))[:, None])
 
     def _refuse_outside(self, time: SignalLike) -> None:
         times, grid, duration = _checks.concrete(time), self.grid, self.duration

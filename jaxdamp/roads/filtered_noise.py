@@ -1,6 +1,7 @@
 """The ISO 8608 road as white noise through a first-order filter."""
 
 import math
+from typing import final
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +10,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._random import normal
 from jaxdamp._types import Scalar, ScalarLike
-from jaxdamp.roads._sampled import SampledRoad
+from jaxdamp.roads._sampled import AbstractProcess, SampledRoad
 from jaxdamp.roads.iso_classes import LOWEST_SPATIAL_FREQUENCY, REFERENCE_SPATIAL_FREQUENCY, roughness
 
 
@@ -29,6 +30,23 @@ def autoregressive(noise: Float[Array, " samples"], correlation: Scalar) -> Floa
 
     _, rest = jax.lax.scan(advance, noise[0], noise[1:])
     return jnp.concatenate([noise[:1], rest])
+
+
+@final
+class FilteredNoise(AbstractProcess):
+    """The shaping filter at equally spaced samples.
+
+    Arguments:
+        deviation: standard deviation of the heights [m].
+        correlation: of neighbouring samples.
+    """
+
+    deviation: Scalar
+    correlation: Scalar
+
+    def draw(self, seed: int | Array, count: int) -> Float[Array, " samples"]:
+        """So many heights [m]."""
+        return self.deviation * autoregressive(normal(seed, (count,)), self.correlation)
 
 
 def iso8608_filtered(
@@ -82,14 +100,15 @@ def iso8608_filtered(
     _checks.positive("spacing", spacing)
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
     samples = math.ceil(_length(speed, duration, length) / spacing - 1e-9) + 1
-    noise = normal(seed, (samples,))
-    shape = autoregressive(noise, jnp.asarray(jnp.exp(-2.0 * math.pi * spacing * jnp.asarray(cutoff, float))))
+    correlation = jnp.asarray(jnp.exp(-2.0 * math.pi * spacing * jnp.asarray(cutoff, float)))
+    process = FilteredNoise(jnp.sqrt(filtered_noise_variance(density, cutoff)), correlation)
     return SampledRoad(
-        samples=(jnp.sqrt(filtered_noise_variance(density, cutoff)) * shape)[:, None],
+        samples=process.draw(seed, samples)[:, None],
         driven_at=jnp.asarray(speed, float),
         spacing=float(spacing),
         periodic=False,
         ramp=float(ramp),
+        process=process,
     )
 
 

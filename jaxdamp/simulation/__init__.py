@@ -15,8 +15,8 @@ from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride
 from jaxdamp.simulation.run import simulate
 from jaxdamp.simulation.stability import substeps_needed
-from jaxdamp.simulation.stationary import DEVIATIONS
-from jaxdamp.simulation.step_size import CoarseStepWarning, RunCheck
+from jaxdamp.simulation.stationary import DEVIATIONS, stationary_notes
+from jaxdamp.simulation.step_size import CoarseStepWarning, RunCheck, TracedStepWarning
 from jaxdamp.simulation.tables import comfort_table, metrics_table
 from jaxdamp.simulation.wheels import AxleTiming, moves_axles
 
@@ -39,6 +39,7 @@ __all__ = [
     "RoadInput",
     "RunCheck",
     "StepState",
+    "TracedStepWarning",
     "comfort_table",
     "metrics_table",
     "moves_axles",
@@ -47,5 +48,6 @@ __all__ = [
     "recorded",
     "settled",
     "simulate",
+    "stationary_notes",
     "substeps_needed",
 ]

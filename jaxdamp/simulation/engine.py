@@ -160,6 +160,7 @@ def chosen_engine(
     own = engine.spacing
     if dt is None:
         return engine, 1e-3 if own is None else own
+    dt = _checks.plain_number("dt", dt)
     if own is not None and own != dt:
         _checks.refuse("dt", f"be left out, or be that of the engine, {own:g} s", dt)
     return engine, dt

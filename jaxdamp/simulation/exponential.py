@@ -134,9 +134,9 @@ class Exponential(AbstractFixedStep):
             and on one core of a quiet CPU come 1.3 to 1.6 times as fast for laws of arithmetic and roots
             (`docs/speed.md`). On a GPU the loop is one CUDA kernel: compiled, and compared as C, but not yet
             run. Derivatives do not pass. What cannot be printed is refused with the reason (`NotImplementedError`),
-            with "arithmetic" also laws with exponentials, powers and the like. If left out (None), a `sweep` of half a
-            minute and more tries the loop of XLA and a printed one, and goes on with the faster; with False all is left
-            to XLA.
+            with "arithmetic" also laws with exponentials, powers and the like. If left out (None), a `sweep` that has a
+            minute and more to go tries the loop of XLA and a printed one, and goes on with the faster; with False all
+            is left to XLA.
 
     >>> from jaxdamp import roads, simulate, vehicles
     >>> bump = roads.cosine_bump(0.05, start=0.1, duration=0.25)

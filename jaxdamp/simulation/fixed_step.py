@@ -6,7 +6,6 @@ small arrays and carries no more than it must.
 """
 
 from abc import abstractmethod
-from contextlib import nullcontext
 from typing import Any, TypeAlias
 
 import equinox as eqx
@@ -15,10 +14,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp._jacobian import Mode
+from jaxdamp._sharded import varying_as
 from jaxdamp._types import Scalar, ScalarLike
-from jaxdamp._vectors import MemoryLayout, between, laid_out
+from jaxdamp._vectors import between, laid_out
 from jaxdamp.codegen import printed_scan
-from jaxdamp.configuration import one_at_a_time
 from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome
 from jaxdamp.simulation.equations import FOR_REVERSE, Equations, RoadInput, StepState
 
@@ -77,18 +76,8 @@ class AbstractFixedStep(AbstractEngine):
         observer: AbstractObserver,
     ) -> Outcome:
         """Step after step; of a long run reverse derivatives keep the beginnings of blocks only."""
-        with one_at_a_time() if equations.layout is MemoryLayout.SCALARS else nullcontext():
-            return self._run(equations, heights, dt, start, observer)
-
-    def _run(
-        self,
-        equations: Equations,
-        heights: Float[Array, "time wheels"],
-        dt: ScalarLike,
-        start: Float[Array, " n"],
-        observer: AbstractObserver,
-    ) -> Outcome:
         stepper = self.stepper(equations, jnp.asarray(dt / self.step_count, dtype=float))
+        heights, start = varying_as((heights, start), eqx.filter(stepper, eqx.is_array))
         half_rate, layout = jnp.asarray(0.5 / dt, dtype=heights.dtype), equations.layout
         rated = equations.road_deflection is not None or not observer.saves_motion
 
@@ -126,7 +115,7 @@ class AbstractFixedStep(AbstractEngine):
             window = heights[0], heights[1]
             road = jnp.concatenate([heights[2:], 2.0 * heights[-1:] - heights[-2:-1]])  # it ends as straight as it came
         now = stepper.start(start, first)
-        carry = now, observer.begin(now, first), first, window
+        carry = varying_as((now, observer.begin(now, first), first, window))
         if self.runs_printed:
             carry = self._printed(step, carry, road, observer)
             return Outcome(carry[1], observer.saved(carry[0], carry[1]), equations.ports.by_port(carry[0].states))

@@ -1,7 +1,9 @@
 """`Ride`: a vehicle on a road as one function of its parameters, the metrics gathered while it drives."""
 
-import functools
+import copy
+import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from typing import Any, final
 
 import equinox as eqx
@@ -13,13 +15,14 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import Mode
 from jaxdamp._many_points import outside_domains
+from jaxdamp._traced import is_batched, look_behind
 from jaxdamp._types import Scalar
 from jaxdamp._vectors import MemoryLayout
 from jaxdamp.codegen import compiler
-from jaxdamp.configuration import target
+from jaxdamp.configuration import one_at_a_time, target
 from jaxdamp.dampers import RangeUse, has_fitted_range
 from jaxdamp.metrics import Metric, MetricValues
-from jaxdamp.parameters import match_paths, parameters, replace
+from jaxdamp.parameters import as_float, match_paths, parameters, replace
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation.engine import AbstractEngine, chosen_engine
 from jaxdamp.simulation.equations import Equations, settled
@@ -27,11 +30,10 @@ from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.observer import MetricObserver
 from jaxdamp.simulation.range_notes import range_uses
 from jaxdamp.simulation.recorder import recorded
-from jaxdamp.simulation.run import half_sampled, sampled
-from jaxdamp.simulation.stationary import stationary_metrics, stationary_range_use
-from jaxdamp.simulation.step_size import RunCheck
+from jaxdamp.simulation.run import refuse_stacked, run_check, sampled
+from jaxdamp.simulation.stationary import in_motion, stationary_dampers, stationary_metrics, stationary_range_use
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
-from jaxdamp.vehicles import AbstractVehicle, is_stationary
+from jaxdamp.vehicles import AbstractVehicle, EquivalentDamper, is_stationary
 
 
 @final
@@ -39,15 +41,17 @@ class Ride(eqx.Module):
     """The ride metrics of a vehicle on a road as a pure function of its parameters: `ride({path: value})`.
 
     The same numbers as `simulate(...).metrics()`, but gathered in the loop over time: nothing is kept of the run, so
-    that memory does not grow with its length, and many cars run side by side. `sweep`, `jax.jit`, `jax.jacfwd` and
-    `jax.grad` take it as it is (`side_by_side` is for `jax.vmap`). Forward derivatives keep nothing of the run; reverse
+    that memory does not grow with its length, and many cars run side by side. `sweep`, `jax.jit`, `jax.vmap`,
+    `jax.jacfwd` and `jax.grad` take it as it is. Forward derivatives keep nothing of the run; reverse
     ones keep up to four numbers of each element and the channels of up to 16 384 instants, and drive longer runs twice.
 
     Where the road reaches the rear axles by the vehicle's own axle positions, parameters that move an axle take part:
     its road is then computed anew.
 
-    On a white road (`roads.white`) the same call gives the stationary ride of the linearised vehicle: the metrics that
-    follow from an RMS, without a run. `duration`, `dt`, `substeps` and `engine` then mean nothing.
+    On a white road (`roads.white`) the same call gives the stationary ride: metrics that follow from an RMS, without a
+    run. Each law is replaced by the linear one that is equivalent in the motion that results, taken as normally
+    distributed (`vehicles.linearise` says how accurate that is); `equivalent_dampers` names it. `duration`, `dt`,
+    `substeps` and `engine` then mean nothing.
 
     Metrics are gathered, but for those that need the whole record (`percentile`, "max_transient_value", a function of
     your own): their channels are saved, so that memory grows with the run.
@@ -78,7 +82,7 @@ class Ride(eqx.Module):
     heights: Float[Array, "time wheels"] | None  # of a road that is driven over
     road: AbstractRoad | WhiteRoad | None  # a white one, or where the delay of its axles follows from the vehicle
     engine: AbstractEngine  # with as many substeps as this vehicle needs
-    layout: MemoryLayout
+    layout: MemoryLayout = eqx.field(static=True)
     dt: float = eqx.field(static=True)
     metrics: tuple[Metric, ...] = eqx.field(static=True)
 
@@ -97,6 +101,7 @@ class Ride(eqx.Module):
         check_module("road", road, (AbstractRoad, WhiteRoad), "Ride(vehicle, road)")
         if engine is not None:
             check_module("engine", engine, (AbstractEngine,), "Ride(vehicle, road, engine=...)")
+        refuse_stacked(vehicle)
         chosen, self.vehicle = vehicle.chosen_metrics(metrics), vehicle
         if isinstance(road, WhiteRoad):
             for name, value in (("duration", duration), ("substeps", substeps), ("engine", engine)):
@@ -108,12 +113,14 @@ class Ride(eqx.Module):
         engine, self.dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
         _, self.heights = sampled(vehicle, road, duration, self.dt)
         self.road = road if delays_by_itself(vehicle, road) else None
-        half = functools.partial(half_sampled, vehicle, road, self.heights.shape[0] - 1, self.dt)
-        self.engine = engine.prepared(RunCheck(vehicle.system(), self.heights, half, self.dt, grid=road.grid))
+        self.engine = engine.prepared(run_check(vehicle, road, self.heights, self.dt))
         self.layout = self.engine.layout(2 * len(vehicle.coordinates), side_by_side=False)
         self.metrics = tuple(chosen)
         for metric in self.metrics:
             metric.samples(self.heights.shape[0], self.dt)  # a window that does not fit is refused here
+
+    # By identity, whatever is equal, as JAX asks of a function: `jax.jit(ride)`.
+    __hash__ = object.__hash__
 
     def __repr__(self) -> str:
         on = repr(self.road) if isinstance(self.road, WhiteRoad) else f"by {self.engine}"
@@ -148,21 +155,29 @@ class Ride(eqx.Module):
         return self.engine.step_count
 
     def of_vehicle(self, vehicle: AbstractVehicle) -> "Ride":
-        """The same ride of another vehicle, on the same heights under its wheels."""
-        return eqx.tree_at(lambda ride: ride.vehicle, self, vehicle)
-
-    def on_axles_of(self, vehicle: AbstractVehicle) -> "Ride":
         """The same ride of another vehicle, with the road under its axles wherever they are."""
-        ride = self.of_vehicle(vehicle)
+        ride = eqx.tree_at(lambda ride: ride.vehicle, self, vehicle)
         if self.road is None or self.heights is None or isinstance(self.road, WhiteRoad):
             return ride
         time = self.dt * jnp.arange(self.heights.shape[0], dtype=float)
         return eqx.tree_at(lambda ride: ride.heights, ride, heights_under_wheels(vehicle, self.road, time))
 
+    def on_axles_of(self, vehicle: AbstractVehicle) -> "Ride":
+        """Deprecated: `of_vehicle` does the same."""
+        warnings.warn("`Ride.on_axles_of` is deprecated: use `of_vehicle`.", DeprecationWarning, stacklevel=2)
+        return self.of_vehicle(vehicle)
+
     def side_by_side(self) -> "Ride":
-        """The same, compiled for many cars at a time: for `jax.vmap`. `sweep` does it itself."""
-        layout = self.engine.layout(2 * len(self.vehicle.coordinates), side_by_side=True)
-        return eqx.tree_at(lambda ride: ride.layout, self, layout)
+        """The same, compiled for many cars at a time, as `sweep` and `jax.vmap` of a ride compile it by themselves.
+
+        Only a compiled function that is batched afterwards, `jax.vmap(jax.jit(ride))`, needs to be told so.
+        """
+        return self._compiled_as(self.engine.layout(2 * len(self.vehicle.coordinates), side_by_side=True))
+
+    def _compiled_as(self, layout: MemoryLayout) -> "Ride":
+        other = copy.copy(self)
+        object.__setattr__(other, "layout", layout)
+        return other
 
     def printed_side_by_side(self) -> "Ride | None":
         """The same with its loop printed as C, if the engine allows it, numbers are double and a compiler is at hand.
@@ -187,11 +202,20 @@ class Ride(eqx.Module):
             return {}
         if isinstance(self.road, WhiteRoad):
             return stationary_range_use(vehicle, self.road)
-        heights, step = self.on_axles_of(vehicle).heights, jnp.asarray(self.dt, dtype=float)
+        heights, step = self.of_vehicle(vehicle).heights, jnp.asarray(self.dt, dtype=float)
         assert heights is not None
         system = vehicle.system()
         saved, _ = recorded(self.engine, system, heights, step)
         return range_uses(vehicle, system.form, saved.motion, saved.road, saved.road_rate, saved.port_force)
+
+    def equivalent_dampers(self, point: Mapping[str, Any] | None = None) -> dict[str, EquivalentDamper]:
+        """On a white road, the linear damper that stands for each law at a point; empty on other roads.
+
+        `EquivalentDamper.words` says it as in "Gaussian, equivalent slope 2006 N s/m at 0.21 m/s RMS".
+        """
+        if not isinstance(self.road, WhiteRoad):
+            return {}
+        return stationary_dampers(replace(self.vehicle, dict(point or {})), self.road)
 
     def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
@@ -203,12 +227,16 @@ class Ride(eqx.Module):
         for name, value in point.items():
             if np.shape(value) != ():
                 self._check_shape(name, np.shape(value))
-        numbers = {name: value for name, value in point.items() if isinstance(value, int | float | np.number)}
-        if numbers:  # checked here, and compiled for all values
-            replace(self.vehicle, numbers)
-            point |= {name: jnp.asarray(value, float) for name, value in numbers.items()}
+        known = {name: value for name, value in point.items() if look_behind(value) is not None}
+        if known:  # checked here; the compiled function is for all values
+            replace(self.vehicle, known)
+        point = {name: as_float(value, name) for name, value in point.items()}
+        ride = self.side_by_side() if is_batched((self, point)) else self
         with self.engine.naming_derivatives():
-            return MetricValues.with_units(_drive(self, point), self.units)
+            values = _drive(ride, point)
+        if isinstance(self.road, WhiteRoad) and any(_infinite(value) for value in values.values()):
+            in_motion(replace(self.vehicle, point), self.road)  # which refuses laws that have no stationary motion
+        return MetricValues.with_units(values, self.units)
 
     def _check_shape(self, name: str, shape: tuple[int, ...]) -> None:
         """Refuse several numbers for one, which would be several cars."""
@@ -216,8 +244,13 @@ class Ride(eqx.Module):
         for path in match_paths(list(known), [name]):
             if known[path] != shape:
                 must = "be one number for one car" if known[path] == () else f"be of shape {known[path]}"
-                remedy = "For several cars use `jaxdamp.sweep(ride, {...})`, or `jax.vmap` of `ride.side_by_side()`."
+                remedy = "For several cars use `jaxdamp.sweep(ride, {...})`, or `jax.vmap(ride)`."
                 _checks.refuse(f"point[{name!r}]", must, f"of shape {shape}", remedy)
+
+
+def _infinite(value: Scalar) -> bool:
+    known = _checks.concrete(value)
+    return known is not None and not np.all(np.isfinite(known))
 
 
 @eqx.filter_jit
@@ -227,12 +260,13 @@ def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     if isinstance(ride.road, WhiteRoad):
         return stationary_metrics(vehicle, ride.road, ride.metrics)
     if ride.road is not None and point and moves_axles(lambda point: replace(ride.vehicle, point), point):
-        ride = ride.on_axles_of(vehicle)
+        ride = ride.of_vehicle(vehicle)
     heights = ride.heights
     assert heights is not None
     equations = Equations(vehicle.system(), ride.layout)
     observer = MetricObserver(equations, ride.metrics, ride.dt, heights.shape[0])
-    outcome = ride.engine.run(equations, heights, ride.dt, settled(equations.system, heights[0]), observer)
+    with one_at_a_time() if ride.layout is MemoryLayout.SCALARS else nullcontext():
+        outcome = ride.engine.run(equations, heights, ride.dt, settled(equations.system, heights[0]), observer)
     return observer.end(outcome.gathered, outcome.records)
 
 

@@ -10,9 +10,11 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._field_types import check_module
+from jaxdamp._field_types import check_field_types, check_module
+from jaxdamp._traced import at_compile_time, behind, is_traced
 from jaxdamp._types import Signal
 from jaxdamp.dampers import coverage, warn_outside
+from jaxdamp.parameters import modules_inside
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.adaptive import Adaptive
 from jaxdamp.simulation.engine import AbstractEngine, chosen_engine
@@ -20,7 +22,7 @@ from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.range_notes import range_sentences
 from jaxdamp.simulation.recorder import recorded
 from jaxdamp.simulation.response import Response
-from jaxdamp.simulation.stability import rounded_down
+from jaxdamp.simulation.stability import known_system, rounded_down
 from jaxdamp.simulation.step_size import RunCheck
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
 from jaxdamp.vehicles import AbstractVehicle, refuse_restless, static_equilibrium
@@ -89,6 +91,7 @@ def simulate(
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "simulate(vehicle, road)")
     check_module("road", road, (AbstractRoad,), "simulate(vehicle, road)")
+    refuse_stacked(vehicle)
     if engine is not None:
         check_module("engine", engine, (AbstractEngine,), "simulate(vehicle, road, engine=...)")
     if method is not None or rtol is not None or atol is not None:
@@ -99,13 +102,12 @@ def simulate(
     time, heights = sampled(vehicle, road, duration, dt)
     _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)
-    half = functools.partial(half_sampled, vehicle, road, time.size - 1, dt)
-    engine = engine.prepared(RunCheck(system, heights, half, dt, begin, road.grid))
+    engine = engine.prepared(run_check(vehicle, road, heights, dt, begin))
     with engine.naming_derivatives():
         saved, status = recorded(engine, system, heights, jnp.asarray(dt, dtype=float), begin, every)
-    last = _checks.concrete(saved.motion[-1])
+    last = behind(saved.motion[-1])
     if last is not None and not np.all(np.isfinite(last)):
-        if not np.all(np.isfinite(np.asarray(saved.motion[0]))):
+        if not np.all(np.isfinite(behind(saved.motion[0]))):
             refuse_restless(vehicle)
         remedy = " ".join([*filter(None, map(coverage, system.laws)), engine.remedy(status, dt)])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
@@ -152,6 +154,7 @@ def sampled(
     duration = road.duration if duration is None else duration
     if duration is None:
         _checks.refuse("duration", "be given for a road without an end of its own", None, "Pass `duration=10.0`.")
+    duration = _checks.plain_number("duration", duration)
     _checks.positive("duration", duration)
     _checks.positive("dt", dt)
     longest = road.longest_run
@@ -171,6 +174,28 @@ def sampled(
     count = round(duration / dt)
     time = jnp.arange(count + 1, dtype=float) * dt
     return time, heights_under_wheels(vehicle, road, time)
+
+
+def refuse_stacked(vehicle: AbstractVehicle) -> None:
+    """Refuse a vehicle or a law in it that stands for several, as `jax.vmap` of a constructor makes it."""
+    for _, module in modules_inside(vehicle):
+        check_field_types(module)
+
+
+def run_check(
+    vehicle: AbstractVehicle,
+    road: AbstractRoad,
+    heights: Float[Array, "time wheels"],
+    dt: float,
+    start: Float[Array, " n"] | None = None,
+) -> RunCheck:
+    """The checks of a run before it is driven, with known numbers as far as they are not arguments of `jax.jit`."""
+    count = heights.shape[0] - 1
+    if is_traced(heights) and not is_traced((vehicle, road)):
+        with at_compile_time():
+            heights = sampled(vehicle, road, count * dt, dt)[1]
+    half = functools.partial(half_sampled, vehicle, road, count, dt)
+    return RunCheck(known_system(vehicle), heights, half, dt, start, road.grid)
 
 
 def half_sampled(vehicle: AbstractVehicle, road: AbstractRoad, count: int, dt: float) -> Float[Array, "fine wheels"]:

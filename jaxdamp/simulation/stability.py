@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._traced import at_compile_time, is_batched, is_traced, known, row, rows
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.vehicles import AbstractVehicle, System
@@ -52,20 +53,86 @@ class Slopes(NamedTuple):
     rate: float = 0.0
 
 
+class _Samples(NamedTuple):
+    """Slopes of a law at many velocities and strokes, as `Slopes` takes the largest of them."""
+
+    over_step: Array | None = None  # where states are extrapolated, [N s/m]
+    damping: Array | None = None  # at an instant, [N s/m]
+    by_velocity: Array | None = None  # through the states, [N/m]
+    by_stroke: Array | None = None  # [N/m]
+    rates: Array | None = None  # of the states by the states, where an explicit step carries them on, [1/s]
+
+    def largest(self) -> Slopes:
+        """The largest of each."""
+        rate = 0.0
+        if self.rates is not None:
+            rate = float(np.max(np.abs(np.linalg.eigvals(np.nan_to_num(self.rates)))))
+        if self.over_step is not None:
+            return Slopes(2.0 * _largest(self.over_step), rate=rate)
+        assert self.damping is not None and self.by_velocity is not None and self.by_stroke is not None
+        at_rest = float(np.nan_to_num(self.by_stroke[_STROKES.size // 2]))
+        by_travel = _largest(self.by_velocity) + _largest(np.abs(self.by_stroke))
+        return Slopes(_largest(self.damping), by_travel, at_rest, rate)
+
+
+class KnownCar(NamedTuple):
+    """A car whose numbers are known: its equations, with arrays of NumPy, and the largest slopes of each law."""
+
+    system: System
+    slopes: list[Slopes]
+
+
 def substeps_needed(vehicle: AbstractVehicle, dt: float) -> int:
     """Steps of the exponential engine between two instants that keep every law stable: see `step_need`.
+
+    Under `jax.grad` and `jax.vmap` those of the values that are differentiated, the most of a batch.
 
     Arguments:
         vehicle: any vehicle.
         dt: spacing of the instants [s].
+
+    Raises:
+        ValueError: a vehicle whose numbers are not known, as inside `jax.jit`.
     """
-    system = vehicle.system()
-    return step_need(system, law_slopes(system, dt), dt).substeps
+    cars = known_cars(known_system(vehicle), dt)
+    if cars is None:
+        _checks.refuse("vehicle", "have numbers that are known", "traced", "Call it outside `jax.jit`.")
+    return max(step_need(*car, dt).substeps for car in cars)
 
 
-def law_slopes(system: System, dt: float) -> list[Slopes]:
-    """The largest slopes of the law of each element, over a step of dt [s] where they depend on it."""
-    return [_steepest(law, dt) for law in system.laws]
+def known_system(vehicle: AbstractVehicle) -> System:
+    """The equations of a vehicle, with known numbers also inside `jax.jit` if the vehicle is not an argument there."""
+    if is_traced(vehicle):
+        return vehicle.system()
+    with at_compile_time():
+        return vehicle.system()
+
+
+def known_cars(system: System, dt: float) -> list[KnownCar] | None:
+    """A car, or each car of a batch; None where numbers are not known.
+
+    Arguments:
+        system: of the vehicle; derivatives and batches are looked behind.
+        dt: the step over which slopes are taken where they depend on it [s].
+    """
+    if is_batched(system):
+        return _cars_of_batch(jax.tree.map(lambda a: jax.lax.stop_gradient(a) if eqx.is_array(a) else a, system), dt)
+    with at_compile_time():
+        one = known(system)
+        return None if one is None else _cars_of_batch(one, dt)
+
+
+def _cars_of_batch(system: System, dt: float) -> list[KnownCar] | None:
+    both = system, [_samples(law, dt) for law in system.laws]
+    values = rows(both)
+    if values is None:
+        return None
+    cars = []
+    for index in range(len(values[0])):
+        of_one, samples = row(both, values, index)
+        slopes = [Slopes(*map(sum, zip(*(term.largest() for term in terms), strict=True))) for terms in samples]
+        cars.append(KnownCar(of_one, slopes))
+    return cars
 
 
 def step_need(system: System, slopes: Sequence[Slopes], dt: float, *, most: int | float = MOST) -> Need:
@@ -76,14 +143,13 @@ def step_need(system: System, slopes: Sequence[Slopes], dt: float, *, most: int 
     1/m = P M⁻¹ Pᵀ. The steepest slopes count, such as that of friction at standstill, and k also through the states:
     a law in which a fast state follows the travel is a spring over a short step, whatever its own step makes of it.
     Laws whose states are extrapolated, such as a lag much shorter than the step, count twice. Slow states, carried on
-    by the explicit step of `AbstractStateful`, also need a step shorter than their time constant. Where parameters are
-    traced their slopes are not known, and one step is taken.
+    by the explicit step of `AbstractStateful`, also need a step shorter than their time constant.
 
     Raises:
         ValueError: more than `most` would be needed.
     """
-    mass, ports = _checks.concrete(system.form.mass), _checks.concrete(system.form.ports)
-    if mass is None or ports is None or not any(any(s) for s in slopes):
+    mass, ports = np.asarray(system.form.mass), np.asarray(system.form.ports)
+    if not any(any(s) for s in slopes):
         return Need(1, 0.0)
     felt = np.diag(ports @ np.linalg.solve(mass, ports.T))
     by_rate = 0.5 * dt * np.array([s.damping for s in slopes]) * felt
@@ -118,24 +184,17 @@ def rounded_down(value: float) -> float:
     return math.floor(value / unit * (1.0 + 1e-12)) * unit
 
 
-def _steepest(law: AbstractDamper, dt: float) -> Slopes:
-    """Largest slopes of all laws that act side by side in a law, together; zero where they are not known."""
-    return Slopes(*map(sum, zip(*(_of_term(term, dt) for term in law.side_by_side()), strict=True)))
+def _samples(law: AbstractDamper, dt: float) -> list[_Samples]:
+    """The slopes of each of the laws that act side by side in a law."""
+    return [_of_term(term, dt) for term in law.side_by_side()]
 
 
-def _of_term(law: AbstractDamper, dt: float) -> Slopes:
-    if any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(eqx.filter(law, eqx.is_array))):
-        return Slopes()
-    velocity, rate = jnp.asarray(_VELOCITIES), _state_rate(law)
-    if law.initial_state().size and law.traits().extrapolable_states:
-        found = _checks.concrete(_slopes_over_step(law, velocity, jnp.asarray(dt, dtype=float)))
-        return Slopes() if found is None else Slopes(2.0 * _largest(found), rate=rate)
-    found = _slopes_at_instant(law, velocity, jnp.asarray(_STROKES))
-    damping, by_velocity, by_stroke = (_checks.concrete(a) for a in found)
-    if damping is None or by_velocity is None or by_stroke is None:
-        return Slopes()
-    at_rest = float(np.nan_to_num(by_stroke[_STROKES.size // 2]))
-    return Slopes(_largest(damping), _largest(by_velocity) + _largest(np.abs(by_stroke)), at_rest, rate)
+def _of_term(law: AbstractDamper, dt: float) -> _Samples:
+    velocity, size, traits = jnp.asarray(_VELOCITIES), law.initial_state().size, law.traits()
+    rates = _slopes_of_rates(law, velocity) if size and traits.has_explicit_step else None
+    if size and traits.extrapolable_states:
+        return _Samples(_slopes_over_step(law, velocity, jnp.asarray(dt, dtype=float)), rates=rates)
+    return _Samples(None, *_slopes_at_instant(law, velocity, jnp.asarray(_STROKES)), rates)
 
 
 def _largest(values: np.ndarray) -> float:
@@ -171,14 +230,6 @@ def _slopes_at_instant(
 
     by_stroke = jax.vmap(lambda x: jax.jvp(lambda x: law.force(x, zero, start), (x,), (jnp.ones_like(x),))[1])(stroke)
     return *jax.vmap(at)(velocity), by_stroke
-
-
-def _state_rate(law: AbstractDamper) -> float:
-    """Fastest rate of the states of a law [1/s], if an explicit step carries some of them on."""
-    if not law.initial_state().size or not law.traits().has_explicit_step:
-        return 0.0
-    slopes = _checks.concrete(_slopes_of_rates(law, jnp.asarray(_VELOCITIES)))
-    return 0.0 if slopes is None else float(np.max(np.abs(np.linalg.eigvals(np.nan_to_num(slopes)))))
 
 
 @eqx.filter_jit

@@ -9,7 +9,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp._vectors import between
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState, road_rate, settled
@@ -122,8 +121,3 @@ def _driven(
     now = stepper.start(start, first)
     found = jnp.zeros((heights.shape[0], len(names)), heights.dtype).at[0].set(values(now, first))
     return jax.lax.fori_loop(0, count * substeps, step, (now, found))[1]
-
-
-def known(system: System) -> bool:
-    """Whether all numbers of a vehicle are known, not traced."""
-    return all(_checks.concrete(leaf) is not None for leaf in jax.tree.leaves(eqx.filter(system, eqx.is_array)))

@@ -3,14 +3,18 @@
 import inspect
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp.simulation.stability import LARGEST, MOST, Need, Slopes, law_slopes, rounded_down, step_need
-from jaxdamp.simulation.step_error import StepError, known, step_error
+from jaxdamp._traced import at_compile_time, is_batched, row, rows
+from jaxdamp.simulation.stability import LARGEST, MOST, KnownCar, Need, known_cars, rounded_down, step_need
+from jaxdamp.simulation.step_error import StepError, step_error
 from jaxdamp.vehicles import System
 
 
@@ -21,12 +25,16 @@ STEEP = 0.25  # share of a velocity's error that comes back through the travel, 
 SAMPLES_PER_PERIOD = 3.0  # of a record of the road; the tyre of a real wheel smooths what lies between them
 SAMPLES = 32  # in a run, from which on a road of samples is taken for a record, and not for a few straight pieces
 WARNED, REFUSED = 0.01, 0.2  # estimated RMS of the error over the RMS of a channel
-INSIDE = ("jaxdamp", "equinox", "jaxtyping", "beartype", "contextlib")  # modules that no user wrote
+INSIDE = ("jaxdamp", "equinox", "jax", "jaxtyping", "beartype", "contextlib")  # modules that no user wrote
 AIM = 0.005  # error to which the step that a warning names should lead
 
 
 class CoarseStepWarning(UserWarning):
     """A run with a step so long that it shows in the results; the message states the estimated error."""
+
+
+class TracedStepWarning(UserWarning):
+    """A run whose numbers are not known while it is compiled; the message states what was assumed of its steps."""
 
 
 class FastestMode(NamedTuple):
@@ -37,10 +45,11 @@ class FastestMode(NamedTuple):
 
 
 class RunCheck(NamedTuple):
-    """A run before it is driven, and the checks that its steps must pass, on numbers that are known by then.
+    """A run before it is driven, and the checks that its steps must pass.
 
-    Where numbers are traced nothing is known of them, and what needs them is left out. Ordinary cars at 1 ms pass
-    without a run.
+    They look behind numbers that `jax.grad` and the like differentiate, and at all cars of a `jax.vmap`, of which the
+    worst counts. Inside `jax.jit` and `jax.lax.scan` numbers are not known: a `TracedStepWarning` says what is assumed
+    unless the caller has said how many substeps to take. Ordinary cars at 1 ms pass without a run.
 
     Attributes:
         system: the vehicle.
@@ -75,40 +84,67 @@ class RunCheck(NamedTuple):
         Raises:
             ValueError: a step that the vehicle cannot bear, with the one to write.
         """
-        slopes, per_period = self._per_period()
-        need = step_need(self.system, slopes, self.dt, most=MOST if wanted is None else np.inf)
-        count = need.substeps if wanted is None else _allowed(wanted, need, self.dt)
-        if per_period < ENOUGH_PER_PERIOD or need.by_travel > STEEP or count < need.substeps:
-            self._judge_error(count)
+        cars = known_cars(self.system, self.dt)
+        if cars is None:
+            if wanted is None:
+                _warn(_assumed(self.dt), TracedStepWarning)
+            return wanted or 1
+        per_period = self._per_period(cars)
+        needs = [step_need(*car, self.dt, most=MOST if wanted is None else np.inf) for car in cars]
+        most = max(needs, key=lambda need: need.substeps)
+        count = most.substeps if wanted is None else _allowed(wanted, most, self.dt)
+        by_travel = [need.by_travel for need in needs]
+        suspects = {int(np.argmin(per_period))} if min(per_period) < ENOUGH_PER_PERIOD else set()
+        suspects |= {int(np.argmax(by_travel))} if max(by_travel) > STEEP else set()
+        suspects |= {needs.index(most)} if count < most.substeps else set()
+        self._judge_errors(suspects, len(cars), count)
         return count
 
     def road(self) -> None:
         """The same for engines that choose their own steps: what the instants miss of the road is judged alike."""
-        slopes, per_period = self._per_period()
-        if per_period < ENOUGH_PER_PERIOD:
+        cars = known_cars(self.system, self.dt)
+        if cars is None:
+            return
+        per_period = self._per_period(cars)
+        worst = int(np.argmin(per_period))
+        if per_period[worst] < ENOUGH_PER_PERIOD:
             try:  # so many steps that only the road differs
-                count = min(4 * step_need(self.system, slopes, self.dt).substeps, MOST)
+                count = min(4 * step_need(*cars[worst], self.dt).substeps, MOST)
             except ValueError:  # too steep for the engine that estimates the error
                 return
-            self._judge_error(count)
+            self._judge_errors({worst}, len(cars), count)
 
-    def _per_period(self) -> tuple[list[Slopes], float]:
-        """The slopes of the laws, and the instants in a period of the fastest mode that follows the road."""
-        slopes = law_slopes(self.system, self.dt)
-        mode = fastest_mode(self.system, [s.at_rest for s in slopes])
-        if mode is None:
-            return slopes, np.inf
-        if 1.0 / (mode.frequency * self.dt) < LEAST_PER_PERIOD:
-            _refuse_unresolved(mode, self.dt)
-        if self.grid is not None and SAMPLES * self.grid < self.dt * self.heights.shape[0]:
-            _warn_of_samples(mode, self.grid)
-        return slopes, 1.0 / (mode.frequency * self.dt)
+    def _per_period(self, cars: Sequence[KnownCar]) -> list[float]:
+        """The instants in a period of the fastest mode that follows the road, of each car."""
+        modes = [fastest_mode(car.system, [s.at_rest for s in car.slopes]) for car in cars]
+        fastest = max((mode for mode in modes if mode), key=lambda mode: mode.frequency, default=None)
+        if fastest is not None and 1.0 / (fastest.frequency * self.dt) < LEAST_PER_PERIOD:
+            _refuse_unresolved(fastest, self.dt)
+        if fastest is not None and self.grid is not None and SAMPLES * self.grid < self.dt * self.heights.shape[0]:
+            _warn_of_samples(fastest, self.grid)
+        return [np.inf if mode is None else 1.0 / (mode.frequency * self.dt) for mode in modes]
 
-    def _judge_error(self, count: int) -> None:
-        """Estimate the error, where all numbers are known, and judge it."""
-        track, begin = _checks.concrete(self.heights), None if self.start is None else _checks.concrete(self.start)
-        if track is not None and known(self.system) and (self.start is None) == (begin is None):
-            _judge(step_error(self.system, track, self.half, self.dt, count, self.start), self.dt)
+    def _judge_errors(self, suspects: set[int], cars: int, count: int) -> None:
+        """Estimate the error of these cars of a batch, and judge the largest."""
+        if not suspects:
+            return
+        known = self.system, self.heights, self.start
+        with nullcontext() if is_batched(known) else at_compile_time():
+            if rows(known) is None:
+                _warn(_unknown_road(self.dt), TracedStepWarning)
+                return
+            run = self.system, self.heights, self.half(), self.start
+            runs = rows(run)
+            assert runs is not None
+            if len(runs[0]) != cars:  # the road is a batch of its own
+                roughness = [np.sum(np.diff(row(run, runs, i)[1], axis=0) ** 2) for i in range(len(runs[0]))]
+                suspects = {int(np.argmax(roughness))}
+            chosen = [jax.tree.map(jnp.asarray, row(run, runs, i)) for i in suspects]
+            estimates = [
+                step_error(system, np.asarray(heights), lambda fine=fine: fine, self.dt, count, start)
+                for system, heights, fine, start in chosen
+            ]
+        _judge(max(estimates, key=lambda estimate: estimate.error), self.dt)
 
 
 def _allowed(substeps: int, need: Need, dt: float) -> int:
@@ -138,12 +174,29 @@ def _judge(estimate: StepError, dt: float) -> None:
     )
 
 
-def _warn(text: str) -> None:
+def _assumed(dt: float) -> str:
+    return (
+        "JAX is compiling this run (`jax.jit`, `jax.lax.scan`), and the numbers of its vehicle are not known: one step "
+        f"from instant to instant (dt = {dt:g} s) is assumed and not checked. Friction and other steep laws need more, "
+        "without which the result is wrong. Pass `substeps=`, as many as `simulation.substeps_needed(vehicle, dt)` "
+        "says of the steepest vehicle outside the compiled function (`substeps=1` where it says 1), or make a `Ride` "
+        "outside and call it inside."
+    )
+
+
+def _unknown_road(dt: float) -> str:
+    return (
+        f"JAX is compiling this run and does not know its road, so that the error of a step of dt = {dt:g} s, which "
+        "may be coarse for this vehicle, is not estimated. Compare with half the step, or make a `Ride` outside."
+    )
+
+
+def _warn(text: str, kind: type[UserWarning] = CoarseStepWarning) -> None:
     """Warn at the line outside this package that asked for the run."""
     frame, level = inspect.currentframe(), 1
     while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] in INSIDE:
         frame, level = frame.f_back, level + 1
-    warnings.warn(text, CoarseStepWarning, stacklevel=level)
+    warnings.warn(text, kind, stacklevel=level)
 
 
 def _refuse_unresolved(mode: FastestMode, dt: float) -> None:
@@ -176,19 +229,15 @@ def _warn_of_samples(mode: FastestMode, grid: float) -> None:
 
 
 def fastest_mode(system: System, stiffness: Sequence[float]) -> FastestMode | None:
-    """The fastest undamped mode that takes part in following the road; none where numbers are traced.
+    """The fastest undamped mode that takes part in following the road, of a vehicle whose numbers are known.
 
     Of masses, linear springs and the slopes of the elements' forces by their deflection. On a road that has come to
     rest at a height of one a mode moves the coordinates by φ (φᵀ K_r)/ω²; those that move all of them by less than a
     tenth, such as a light mass between stiff springs, are not shaken by the road.
     """
     form = system.form
-    parts = (form.mass, form.stiffness, form.road_stiffness, form.ports, form.port_road)
-    numbers = [None if part is None else _checks.concrete(part) for part in parts]
-    if any(number is None for number, part in zip(numbers, parts, strict=True) if part is not None):
-        return None
-    mass, springs, road, ports, standing = numbers
-    assert mass is not None and springs is not None and road is not None and ports is not None
+    mass, springs, road, ports = map(np.asarray, (form.mass, form.stiffness, form.road_stiffness, form.ports))
+    standing = None if form.port_road is None else np.asarray(form.port_road)
     if not np.all(np.isfinite(mass)) or np.any(np.linalg.eigvalsh(mass) <= 0.0):
         return None  # no vehicle: whoever drives it finds that its response is not finite
     slopes = np.nan_to_num(np.array(stiffness))[:, None]

@@ -4,12 +4,11 @@ from collections.abc import Callable
 from typing import Any, Literal, final
 
 import equinox as eqx
-import jax
 import numpy as np
-from jax.extend.core import Var
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._dependence import depends
 from jaxdamp._types import Scalar, Signal
 from jaxdamp.roads import AbstractRoad, Columns, delayed
 from jaxdamp.vehicles import AbstractVehicle
@@ -109,12 +108,7 @@ def moves_axles(build: Callable[[Any], AbstractVehicle], values: Any) -> bool:
         build: function of the values that gives the vehicle.
         values: what the vehicle is built from.
     """
-    traced = jax.make_jaxpr(lambda values: build(values).axle_positions)(values).jaxpr
-    moving = set(traced.invars)
-    for equation in traced.eqns:
-        if any(isinstance(variable, Var) and variable in moving for variable in equation.invars):
-            moving.update(equation.outvars)
-    return any(isinstance(variable, Var) and variable in moving for variable in traced.outvars)
+    return depends(lambda values: build(values).axle_positions, values)
 
 
 def _refuse_misfit(vehicle: AbstractVehicle, columns: Columns) -> None:

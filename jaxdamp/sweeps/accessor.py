@@ -7,6 +7,7 @@ import numpy as np
 import xarray
 
 from jaxdamp._tables import Column, Table, plain, typeset_unit
+from jaxdamp.sweeps.effects import without_effect
 
 
 if TYPE_CHECKING:
@@ -46,7 +47,8 @@ class SweepResults:
         if data["failed"].any():
             columns, cells = [*columns, Column("reason")], [*cells, data["reason"].values.ravel().tolist()]
         rows = tuple(zip(*([_cell(cell) for cell in column] for column in cells), strict=True))
-        return Table(f"Sweep over {', '.join(map(str, axes))}", tuple(columns), rows)
+        flat = [f"; no effect of {', '.join(over)} on {name}" for name, over in without_effect(data).items()]
+        return Table(f"Sweep over {', '.join(map(str, axes))}{''.join(flat)}", tuple(columns), rows)
 
     def to_dict(self) -> dict[str, Any]:
         """As `Dataset.to_dict`, ready for JSON: numbers that are not finite are None."""

@@ -4,6 +4,7 @@ import json
 import os
 import time
 import warnings
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, final
 
@@ -11,6 +12,7 @@ import jax
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._writing import whole
 from jaxdamp.sweeps import processes
 from jaxdamp.sweeps.table import Table
 
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 INTERVAL = 10.0  # s between two writings
 LARGEST = 2**31 - 1  # bytes of one variable in a classic netCDF file
 MARK, AXES = "jaxdamp_sweep", "axes"  # attributes that hold the fingerprint of the function, and the axes in order
+CHECKSUMS = "checksums"  # attribute: of each block of points
+BLOCK = 4096  # points
 
 
 @final
@@ -78,6 +82,23 @@ class SweepFile:
         reasons = np.array(kept["reason"].values, str).ravel()
         for reason in dict.fromkeys(reasons[reasons != ""]):
             table.give_reasons(np.flatnonzero(reasons == reason), str(reason))
+        self._drop_damaged(json.loads(kept.attrs[CHECKSUMS]))
+
+    def _drop_damaged(self, checksums: list[int]) -> None:
+        """Points in blocks of the file that are not as they were written count as not done, and are computed anew."""
+        table = self._table
+        pairs = enumerate(zip(checksums, _checksums(table), strict=True))
+        damaged = np.isin(np.arange(len(table.done)) // BLOCK, [i for i, (before, now) in pairs if before != now])
+        if not damaged.any():
+            return
+        for values in table.values.values():
+            values[damaged] = np.nan
+        table.done[damaged], table.reason[damaged] = False, 0
+        warnings.warn(
+            f"{np.count_nonzero(damaged)} of {len(damaged)} points in {self.path} were damaged on the disk, and are "
+            "computed anew.",
+            stacklevel=5,
+        )
 
     def _differences(self, kept: "xarray.Dataset") -> list[str]:
         """What keeps the file from being a part of this sweep, in words."""
@@ -85,6 +106,8 @@ class SweepFile:
             return ["it was not written by `jaxdamp.sweep`"]
         if "reason" not in kept.coords:
             return ["an older jaxdamp wrote it, which did not note why points fail"]
+        if CHECKSUMS not in kept.attrs:
+            return ["an older jaxdamp wrote it, without the sums by which damage is seen"]
         mine, found = self._table.label(), []
         axes = json.loads(kept.attrs[AXES])
         if kept["failed"].dims != mine["failed"].dims or axes != self._table.points.names:
@@ -130,10 +153,21 @@ class SweepFile:
             MARK: self._fingerprint,
             AXES: json.dumps(self._table.points.names),
             "jax_version": jax.__version__,
+            CHECKSUMS: json.dumps(_checksums(self._table)),
         }
-        draft = self.path.with_name(f".{self.path.name}.{os.getpid()}.draft")
-        try:
+        with whole(self.path) as draft:
             data.to_netcdf(draft, engine="scipy", format="NETCDF3_64BIT")
-            os.replace(draft, self.path)
-        finally:
-            draft.unlink(missing_ok=True)
+
+
+def _checksums(table: Table) -> list[int]:
+    """A sum over the results, states and reasons of each block of points."""
+    count = len(table.done)
+    texts = np.array(table.reasons, dtype=object)[table.reason]
+    sums = []
+    for start in range(0, count, BLOCK):
+        part = slice(start, start + BLOCK)
+        total = zlib.crc32("\n".join(texts[part]).encode())
+        for values in (*table.values.values(), table.done):
+            total = zlib.crc32(np.ascontiguousarray(values[part]).tobytes(), total)
+        sums.append(total)
+    return sums

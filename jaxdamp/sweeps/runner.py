@@ -14,7 +14,7 @@ from jaxdamp.sweeps.program import Program, forget_errors, with_chunk
 
 
 CALL = 0.3  # s that one call of the program should take
-LONG = 30.0  # s of work left, from which it pays to compile another program and to compare
+LONG = 60.0  # s of work left: compiling another program and comparing takes 4 to 10, and may save a fifth of them
 TURNS = 3  # calls of each program before one of them is chosen; the fastest counts, other work only adds time
 
 

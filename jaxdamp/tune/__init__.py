@@ -34,6 +34,7 @@ from jaxdamp.tune.targets import Targets
 from jaxdamp.tune.tolerance import ToleranceEffect, tolerance_effects
 from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
 from jaxdamp.tune.valving_search import valving
+from jaxdamp.tune.verdict import Outcome
 
 
 __all__ = [
@@ -46,6 +47,7 @@ __all__ = [
     "Difference",
     "FittedLaw",
     "OutOfReach",
+    "Outcome",
     "ParetoFront",
     "Rescore",
     "RobustResult",

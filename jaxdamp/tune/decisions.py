@@ -148,6 +148,10 @@ def _check(dampers: Any, vehicle: Any, roads: Any) -> None:
         _checks.refuse("roads", "be two or more roads, or a white one", _checks.described(roads), remedy)
     for i, road in enumerate([] if isinstance(roads, WhiteRoad) else roads):
         check_module(f"roads[{i}]", road, (AbstractRoad,), call)
+        again = next((j for j in range(i) if bool(eqx.tree_equal(roads[j], road))), None)
+        if again is not None:
+            remedy = "Take several seeds: a road that counts twice makes the error of the mean too small."
+            _checks.refuse(f"roads[{i}]", "be another road than the others", f"roads[{again}] again", remedy)
 
 
 def _chosen(car: AbstractVehicle, roads: Sequence[Any], metrics: Sequence[str | Metric] | None) -> list[Any]:

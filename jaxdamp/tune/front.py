@@ -158,11 +158,13 @@ class ParetoFront(Generic[V]):
 
     @property
     def summary(self) -> str:
-        """The range of each objective, and the knee, in a sentence."""
+        """The range of each objective, and the knee, in a sentence; or that no design meets the limits."""
         ends = [
             f"{name} {self.values[name].min():.4g} to {self.values[name].max():.4g} {self.units[name]}".rstrip()
             for name in self.names
         ]
+        if self.status is Status.LIMIT_NOT_MET:
+            return f"No design within the limits; the nearest one: {' '.join(self.warnings[:1])} {'; '.join(ends)}."
         knee = ", ".join(f"{name} {self.values[name][self.knee]:.4g}" for name in self.names)
         from_start = [f"{100 * (self.values[n][self.knee] / self.before[n] - 1):+.1f} %" for n in self.names]
         return (

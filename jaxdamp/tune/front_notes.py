@@ -1,6 +1,6 @@
 """Which points belong to a front, how their searches ended, and warnings in words."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -50,29 +50,36 @@ def judged(lanes: Sequence[Lane], problem: FrontProblem) -> tuple[list[Lane], St
     return best, status, notes
 
 
-def notes_on_points(front: ParetoFront, task: DesignTask) -> list[str]:
+def notes_on_points(front: ParetoFront, task: DesignTask, start_on_fresh: Mapping[str, np.ndarray]) -> list[str]:
     """Limits that the points do not keep by their true values or on fresh roads; doubts about step and fitted ranges.
 
     The step and the ranges are looked at at the ends and the knee of the front.
+
+    Arguments:
+        front: the front.
+        task: its task.
+        start_on_fresh: the metrics of the start on the fresh roads, for relative limits.
     """
     notes = []
     exact = {m.name: other for m in task.objective.metrics if (other := exact_counterpart(m))}
-    for name, (lower, upper) in task.allowed.items():
+    for name, allowed in task.allowed.items():
+        lower, upper = allowed.at(front.before[name])
         if name in exact:
             true = front.values[exact[name].name]
             if beyond := int(np.sum(~((lower <= true) & (true <= upper)))):
                 notes.append(f"{name} is limited, but the true {exact[name].name} is beyond at {beyond} points.")
         if front.fresh:
             fresh = front.fresh[name]
-            outside = ~((lower <= fresh) & (fresh <= upper))
-            if outside.any():
+            ends = np.array([allowed.at(float(start)) for start in start_on_fresh[name]])
+            above, below = fresh > ends[:, 1:], fresh < ends[:, :1]
+            if (outside := above | below | np.isnan(fresh)).any():
                 places = f"{int(outside.any(axis=0).sum())} of {len(front)} points"
-                furthest = fresh.max() if np.any(fresh > upper) else fresh.min()
+                furthest = fresh.max() if above.any() else fresh.min()
                 notes.append(
                     f"On {int(outside.any(axis=1).sum())} of {len(fresh)} fresh roads {name} is beyond its limit at "
                     f"{places}, up to {furthest:.4g}."
                 )
     by_point: dict[str, None] = {}
     for i in dict.fromkeys([0, front.knee, len(front) - 1]):
-        by_point |= dict.fromkeys(f"Point {i}: {note}" for note in task.notes_on_runs(front.point(i)))
+        by_point |= dict.fromkeys(f"Point {i}: {note}" for note in task.notes_on_runs(front.point(i))[0])
     return [*notes, *by_point]

@@ -1,6 +1,7 @@
 """Hard limits of a tuning: on metrics, in every scenario, and on the shape of the force-velocity curve."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -12,7 +13,38 @@ from jaxdamp.metrics import Metric, current_name
 
 
 EXAMPLE = "Write `{'working_space_peak_to_peak': 0.1}`, or `{...: (smallest, largest)}`."
+ENDS = "Write 0.1, or (-0.08, 0.1); None for an end without a limit, '+10%' for one relative to the start."
+PERCENT = re.compile(r"([+-]\d+(?:\.\d*)?) *%")
 Span = tuple[float, float]  # smallest and largest allowed value, infinite without one
+
+
+class LimitRange(NamedTuple):
+    """The allowed range of a metric as it is written: ends in its unit, or relative to the start.
+
+    Attributes:
+        lower: smallest allowed value, or its relative distance from the start; −∞ without one.
+        upper: the largest one, likewise; ∞ without one.
+        relative: whether the two ends are relative to the start.
+    """
+
+    lower: float
+    upper: float
+    relative: tuple[bool, bool] = (False, False)
+
+    def at(self, start: float) -> Span:
+        """Smallest and largest allowed value where the start has this value; shares of a negative one by its size."""
+        ends = zip((self.lower, self.upper), self.relative, strict=True)
+        lower, upper = (start + end * abs(start) if relative else end for end, relative in ends)
+        return lower, upper
+
+    def nearer(self, value: float, start: float, unit: str) -> str:
+        """The nearer end in words: "<= 0.1 m", "<= start +10 %"."""
+        lower, upper = self.at(start)
+        is_upper = upper - value <= value - lower
+        sign, end = ("<=", upper) if is_upper else (">=", lower)
+        if self.relative[is_upper]:
+            return f"{sign} start {100 * (self.upper if is_upper else self.lower):+.4g} %"
+        return f"{sign} {end:.4g} {typeset_unit(unit)}".rstrip()
 
 
 class Limit(NamedTuple):
@@ -40,18 +72,47 @@ class Limit(NamedTuple):
         """Relative distance to the nearer end, negative beyond it."""
         return min(self.upper - value, value - self.lower) / self.scale
 
+    def tightened(self, by: float) -> "Limit":
+        """The same with ends moved inwards by a share of the scale."""
+        return self._replace(lower=self.lower + by * self.scale, upper=self.upper - by * self.scale)
+
     def nearer(self, value: float) -> str:
         """The nearer end in words, such as "<= 0.1 m"."""
         sign, end = ("<=", self.upper) if self.upper - value <= value - self.lower else (">=", self.lower)
         return f"{sign} {end:.4g} {typeset_unit(self.unit)}".rstrip()
 
 
-def limit_spans(limits: Mapping[Any, Any] | None, known: Sequence[str]) -> dict[str, Span]:
+def limit_spans(
+    limits: Mapping[Any, Any] | None, known: Sequence[str], start: Mapping[str, float] | None = None
+) -> dict[str, Span]:
     """The smallest and the largest allowed value of metrics by their current names, infinite without one.
 
     Arguments:
         limits: `{metric: largest value}` or `{metric: (smallest, largest)}`, by name or as a `metrics.Metric`; None for
-            an end without a limit.
+            an end without a limit, `"+10%"` for one relative to the start.
+        known: names of metrics, for those that were renamed.
+        start: the metrics of the start, for relative limits.
+
+    Raises:
+        ValueError: limits that are neither a largest value nor a smallest and a largest one; a relative one without a
+            start.
+
+    >>> limit_spans({"grip": "+10%", "travel": (0.02, 0.1)}, ["grip", "travel"], {"grip": 1000.0})
+    {'grip': (-inf, 1100.0), 'travel': (0.02, 0.1)}
+    """
+    spans = {}
+    for name, allowed in limit_ranges(limits, known).items():
+        if any(allowed.relative) and (start is None or name not in start):
+            _checks.refuse(f"limits[{name!r}]", "be a number here, where there is no start", "relative to one", ENDS)
+        spans[name] = allowed.at(math.nan if start is None else float(start.get(name, math.nan)))
+    return spans
+
+
+def limit_ranges(limits: Mapping[Any, Any] | None, known: Sequence[str]) -> dict[str, LimitRange]:
+    """The allowed ranges of metrics by their current names, as they are written.
+
+    Arguments:
+        limits: as in `limit_spans`.
         known: names of metrics, for those that were renamed.
 
     Raises:
@@ -60,26 +121,33 @@ def limit_spans(limits: Mapping[Any, Any] | None, known: Sequence[str]) -> dict[
     if not isinstance(limits, Mapping | None):
         _checks.refuse("limits", "be a mapping of metrics to limits", _checks.described(limits), EXAMPLE)
     return {
-        one.name if isinstance(one, Metric) else current_name(one, known): _span(one, span)
+        one.name if isinstance(one, Metric) else current_name(one, known): _range(one, span)
         for one, span in (limits or {}).items()
     }
 
 
-def _span(one: str | Metric, given: Any) -> Span:
+def _range(one: str | Metric, given: Any) -> LimitRange:
     label = f"limits[{one.name if isinstance(one, Metric) else one!r}]"
     must = "be the largest allowed value, or the smallest and the largest one"
     pair = given if isinstance(given, tuple | list) else (None, given)
-    if any(isinstance(end, str) for end in pair) or all(end is None for end in pair):
-        _checks.refuse(label, must, repr(given), "Write 0.1, or (-0.08, 0.1); None for an end without a limit.")
+    shares = [PERCENT.fullmatch(end.strip()) if isinstance(end, str) else None for end in pair]
+    texts = any(isinstance(end, str) and share is None for end, share in zip(pair, shares, strict=True))
+    if texts or len(pair) != 2 or all(end is None for end in pair):
+        _checks.refuse(label, must, repr(given), ENDS)
     try:
         lower, upper = (
-            default if x is None else float(x) for x, default in zip(pair, (-math.inf, math.inf), strict=True)
+            0.01 * float(share.group(1)) if share else default if end is None else float(end)
+            for end, share, default in zip(pair, shares, (-math.inf, math.inf), strict=True)
         )
     except (TypeError, ValueError):
-        _checks.refuse(label, must, repr(given), "Write 0.1, or (-0.08, 0.1); None for an end without a limit.")
-    if not lower < upper:
+        _checks.refuse(label, must, repr(given), ENDS)
+    relative = shares[0] is not None, shares[1] is not None
+    comparable = relative[0] == relative[1]
+    if math.isnan(lower) or math.isnan(upper) or (comparable and lower >= upper):
         _checks.refuse(label, f"{must}, in increasing order", repr(given), "Write (-0.08, 0.1).")
-    return lower, upper
+    if math.isinf(lower) and math.isinf(upper):
+        _checks.refuse(label, "be finite", repr(given), "Leave the limit out, or write None for an end without one.")
+    return LimitRange(lower, upper, relative)
 
 
 def written(span: Span) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any, final
 
+import equinox as eqx
 import numpy as np
 
 from jaxdamp import _checks
@@ -92,7 +93,9 @@ class Measurement:
             each = self.objective.of_each(ride.of_vehicle(vehicle).each())
             values = {name: ride.risk(of_all, ride.weights) for name, of_all in each.items()}
             return values | {entry: each[name][i] for name in self._each for i, entry in enumerate(self.entries(name))}
-        return self.objective.of((ride.on_axles_of(vehicle) if self._follows else ride.of_vehicle(vehicle))())
+        if self._follows:
+            return self.objective.of(ride.of_vehicle(vehicle)())
+        return self.objective.of(eqx.tree_at(lambda ride: ride.vehicle, ride, vehicle)())  # on the same heights
 
     def rides_of(self) -> list[Callable[[AbstractVehicle], Ride]]:
         """For each road a function that makes the checked ride of a vehicle on it, in no special condition."""

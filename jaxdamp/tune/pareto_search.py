@@ -32,7 +32,7 @@ def pareto(
     vehicle: V,
     road: Road | Scenarios,
     *,
-    over: Sequence[str] | Mapping[str, Any] = ("damper*",),
+    over: Sequence[str] | Mapping[str, Any] | None = None,
     freeze: Sequence[str] = (),
     bounds: Mapping[str, Any] | None = None,
     tie: Mapping[str, str] | None = None,
@@ -136,7 +136,7 @@ def pareto(
     if between and len(chosen) > len(names):
         designs, numbers = with_designs_between(evaluator, designs, numbers, all_limits, between)
     free = zip(space.free.names, space.free.owners, space.start, space.lower, space.upper, strict=True)
-    fresh = _on_fresh_roads(evaluator, designs, fresh_roads)
+    fresh, start_on_fresh = _on_fresh_roads(evaluator, designs, fresh_roads)
     front = ParetoFront[V](
         start=vehicle,
         names=names,
@@ -145,7 +145,7 @@ def pareto(
         units=task.units,
         parameters=tuple(FrontParameter(n, p.unit, float(a), float(b), float(c)) for n, p, a, b, c in free),
         designs=designs,
-        limits=task.shown_limits(),
+        limits=task.shown_limits(before),
         reference={name: float(value) for name, value in worst.items()} | given,
         warnings=tuple(notes),
         status=status,
@@ -156,7 +156,7 @@ def pareto(
         measured=task.measured,
         fresh=fresh,
     )
-    return dataclasses.replace(front, warnings=(*notes, *notes_on_points(front, task)))
+    return dataclasses.replace(front, warnings=(*notes, *notes_on_points(front, task, start_on_fresh)))
 
 
 def _check(objectives: Any, vehicle: Any, road: Any, points: int, counts: Mapping[str, tuple[int, int]]) -> None:
@@ -185,9 +185,15 @@ def _reference(reference: Mapping[str, float] | None, names: Sequence[str]) -> d
     return {name: float(value) for name, value in given.items()}
 
 
-def _on_fresh_roads(evaluator: BatchEvaluator, designs: np.ndarray, count: int) -> dict[str, np.ndarray]:
-    """The metrics of designs on other realisations of the road, shape (roads, points); none of a road that has none."""
+def _on_fresh_roads(
+    evaluator: BatchEvaluator, designs: np.ndarray, count: int
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """The metrics of designs on other realisations of the road, shape (roads, points), and of the start, (roads,).
+
+    Nothing of a road that has no other realisation.
+    """
     task = evaluator.task
-    rides = [task.measured.on_road(road).side_by_side() for road in other_roads(task.road, count)]
-    runs = [evaluator.numbers_at(designs, ride) for ride in rides]
-    return {name: np.stack([run[name] for run in runs]) for name in task.units if runs}
+    rides = [task.measured.on_road(road).side_by_side() for road in other_roads(task.road, range(count))]
+    runs = [evaluator.numbers_at(np.vstack([designs, task.space.start]), ride) for ride in rides]
+    values = {name: np.stack([run[name] for run in runs]) for name in task.units if runs}
+    return {name: rows[:, :-1] for name, rows in values.items()}, {name: rows[:, -1] for name, rows in values.items()}

@@ -23,6 +23,7 @@ from jaxdamp.parameters import (
 Pair = tuple[float, float]
 FACTOR = 3.0  # default factor by which a number may decrease or increase
 INSIDE = 1e-6  # distance from the open ends of a domain, relative to the unit of the coordinate
+DAMPERS = ("damper*",)  # what is tuned by default, as far as it is adjustable
 NO_BOUND = (-math.inf, math.inf)
 
 
@@ -61,17 +62,18 @@ class SearchRange:
 
 def search_range(
     vehicle: Any,
-    over: Sequence[str] | Mapping[str, Any],
+    over: Sequence[str] | Mapping[str, Any] | None,
     freeze: Sequence[str],
     bounds: Mapping[str, Any] | None,
     tie: Mapping[str, str] | None = None,
 ) -> SearchRange:
-    """The free parameters and their ranges.
+    """The free parameters and their ranges: of all dampers what a workshop can change, if `over` is None.
 
     Raises:
         ValueError: names that fit no parameter, or no free one; bounds of a wrong shape, given twice, or without the
-            start between them.
+            start between them; dampers of which nothing can be changed.
     """
+    over = _adjustable(vehicle) if over is None else over
     in_over, names = (over, list(over)) if isinstance(over, Mapping) else ({}, over)
     free = free_parameters(vehicle, over=name_patterns("over", names), freeze=freeze, tie=tie)
     given, more = _given("over", in_over, free), _given("bounds", bounds or {}, free)
@@ -87,6 +89,18 @@ def search_range(
     rows = [_one_range(name, p, float(value), size, given.get(p.path)) for name, p, value, size in numbers]
     lower, upper, origin = zip(*rows, strict=True)
     return SearchRange(coordinates, start, unit, np.array(lower), np.array(upper), origin)
+
+
+def _adjustable(vehicle: Any) -> list[str]:
+    """The parameters of the dampers that a workshop can change."""
+    known = {p.path: p for p in parameters(vehicle)}
+    inside = match_paths(list(known), DAMPERS)
+    adjustable = [path for path in inside if known[path].adjustable]
+    if not adjustable:
+        remedy = "Name parameters in `over` to move them nevertheless."
+        must = "be given where no workshop can change a parameter of the dampers"
+        _checks.refuse("over", must, f"None, for {', '.join(inside)}", remedy)
+    return adjustable
 
 
 def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> dict[str, Pair]:

@@ -1,6 +1,7 @@
 """`rescore`: the result of a tuning on other roads."""
 
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, final
 
@@ -14,8 +15,11 @@ from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
+from jaxdamp.tune.limits import LimitRange
 from jaxdamp.tune.objective import Objective
+from jaxdamp.tune.risk import exact
 from jaxdamp.tune.scenarios import Scenarios
+from jaxdamp.tune.verdict import decided, half_interval
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -24,6 +28,7 @@ if TYPE_CHECKING:
 
     from jaxdamp.tune.result import TuneResult
 
+FEWEST = 4  # fresh roads before their interval is looked at; then twice as many, and so on
 FIRST_SEED = 4711  # of fresh roads, which are thereby others than those of usual small seeds
 
 
@@ -54,13 +59,24 @@ class Rescore:
         before, after = self.before[name], self.after[name]
         return np.divide(after, before, out=np.full(len(before), np.nan), where=before != 0.0) - 1.0
 
+    def and_on(self, other: "Rescore") -> "Rescore":
+        """The same vehicles on these roads and on those of another rescoring."""
+        sides = zip((self.before, self.after), (other.before, other.after), strict=True)
+        before, after = ({name: np.append(side[name], more[name]) for name in side} for side, more in sides)
+        return dataclasses.replace(self, before=before, after=after)
+
+    def half_width(self, name: str) -> float:
+        """Half the 95 % interval of the mean relative change of a metric; infinite for one road."""
+        return half_interval(self.change(name))
+
     @property
     def summary(self) -> str:
         """Number of roads on which the minimised metric decreases, and by how much, in a sentence."""
         gain = -100 * self.change(self.metric)
+        error = f" ± {100 * self.half_width(self.metric):.1f}" if self.roads > 1 else ""
         return (
-            f"On {np.count_nonzero(gain > 0)} of {self.roads} roads {self.metric} decreases, by {gain.mean():.0f} % on "
-            f"average ({gain.min():.0f} to {gain.max():.0f} %)."
+            f"On {np.count_nonzero(gain > 0)} of {self.roads} roads {self.metric} decreases, by "
+            f"{gain.mean():.1f}{error} % on average ({gain.min():.0f} to {gain.max():.0f} %)."
         )
 
     def table(self) -> Table:
@@ -159,7 +175,8 @@ def rescored(
         if isinstance(road, Scenarios):
             ride = road.ride(car, metrics=metrics, duration=duration, dt=dt)
             each = objective.of_each(ride.each()) if objective else ride.each()
-            return {name: ride.risk(values, ride.weights) for name, values in each.items()}
+            risk = exact(ride.risk)
+            return {name: risk(values, ride.weights) for name, values in each.items()}
         values = Ride(car, road, metrics=metrics, duration=duration, dt=dt)()
         return objective.of(values) if objective else values
 
@@ -170,12 +187,50 @@ def rescored(
     return Rescore(before, after, units, metric)
 
 
-def other_roads(road: Any, count: int) -> list[Any]:
-    """So many other realisations of a random road, or of scenarios on random roads; none of others."""
+def on_fresh_roads(
+    cars: tuple[AbstractVehicle, AbstractVehicle],
+    road: Any,
+    numbers: Sequence[int],
+    allowed: Mapping[str, LimitRange],
+    objective: Objective,
+    units: dict[str, str],
+    *,
+    duration: float | None,
+    dt: float,
+) -> Rescore | None:
+    """The vehicle before and after on other realisations of a road, on so many that gain and limits are decided.
+
+    Arguments:
+        cars: before and after.
+        road: of the tuning.
+        numbers: of the realisations, as many as there may be.
+        allowed: the limits.
+        objective: of the tuning.
+        units: of its metrics.
+        duration: as in `simulate`.
+        dt: as in `simulate`.
+
+    Returns:
+        None where there is no other realisation.
+    """
+    others, driven = other_roads(road, numbers), None
+    for first, last in itertools.pairwise([0, *(FEWEST * 2**i for i in range(len(numbers)))]):
+        part = others[first:last]
+        if not part:
+            break
+        new = rescored(cars, part, objective.metrics, objective, units, objective.name, duration=duration, dt=dt)
+        driven = new if driven is None else driven.and_on(new)
+        if decided(driven, allowed):
+            break
+    return driven
+
+
+def other_roads(road: Any, numbers: Sequence[int]) -> list[Any]:
+    """Other realisations of a random road, or of scenarios on random roads; none of others."""
     if isinstance(road, Scenarios):
-        roads = [road.on_other_roads(FIRST_SEED + i) for i in range(count)]
+        roads = [road.on_other_roads(FIRST_SEED + i) for i in numbers]
     elif isinstance(road, AbstractRoad):
-        roads = [road.reseeded(FIRST_SEED + i) for i in range(count)]
+        roads = [road.reseeded(FIRST_SEED + i) for i in numbers]
     else:
         roads = []
     return [other for other in roads if other is not None]

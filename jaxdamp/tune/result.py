@@ -11,13 +11,14 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_tied, with_unit
-from jaxdamp.tune.limits import written
+from jaxdamp.tune.limits import LimitRange, written
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.rescoring import Rescore
 from jaxdamp.tune.scenarios import Road
 from jaxdamp.tune.spectra import Spectrum, spectra
 from jaxdamp.tune.starts import Attempt
 from jaxdamp.tune.targets import Targets
+from jaxdamp.tune.verdict import Verdict, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -92,7 +93,7 @@ class TuneResult(Generic[V]):
         after: all ride metrics of the tuned vehicle.
         units: unit of each metric.
         limits: largest allowed value of metrics, or the smallest and the largest one.
-        active_limits: names of the metrics at their limit or beyond.
+        active_limits: names of the metrics at their limit.
         warnings: doubts about the result, in words.
         status: how the search ended; `CONVERGED` only if the gradient condition of an optimum is satisfied.
         history: the metric after each step of the search.
@@ -102,6 +103,11 @@ class TuneResult(Generic[V]):
         starts: the searches from several starts.
         scenarios: all metrics in every scenario; None for a tuning on one road.
         drive: what was driven over.
+        without_effect: names of the parameters by which the derivative of the minimised metric is zero.
+        violated: each metric or shape beyond its limit, in words with its number.
+        extrapolated: each damper that the tuned vehicle takes out of its fitted range for 1 % of the time or more.
+        allowed: the limits as they are written, which may be relative to the start on each road.
+        elsewhere: where the numbers hold if there are no fresh roads, in words.
     """
 
     vehicle: V
@@ -122,6 +128,16 @@ class TuneResult(Generic[V]):
     starts: tuple[Attempt, ...] = ()
     scenarios: ScenarioValues | None = None
     drive: Drive | None = None
+    without_effect: tuple[str, ...] = ()
+    violated: dict[str, str] = dataclasses.field(default_factory=dict)
+    extrapolated: tuple[str, ...] = ()
+    allowed: dict[str, LimitRange] = dataclasses.field(default_factory=dict)
+    elsewhere: str = ""
+
+    @property
+    def verdict(self) -> Verdict:
+        """Better or not, by how much and at what price: on fresh roads if there are any."""
+        return verdict_of(self)
 
     @property
     def converged(self) -> bool:
@@ -136,15 +152,17 @@ class TuneResult(Generic[V]):
 
     @property
     def summary(self) -> str:
-        """The improvement, and the bounds and limits that are active, in a sentence."""
+        """The verdict, then the change on the road of the tuning, and the bounds and limits that are active."""
         before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
         share = f" ({100 * (after / before - 1):+.1f} %)" if before else ""
         stops = [f"{name} at its limit" for name in self.active_limits]
         stops += [f"{change.name} {change.note}" for change in self.parameters if change.note]
         inside = "all parameters inside their bounds" if not any(c.note for c in self.parameters) else ""
+        stops = [*(f"{name} beyond its limit" for name in self.violated), *stops]
         state = "an optimum" if self.converged else "not an optimum"
+        stops += [f"no effect of {name}" for name in self.without_effect]
         parts = [f"{state} after {len(self.history)} steps", *stops, *[inside] * bool(inside)]
-        return f"{self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
+        return f"{self.verdict.sentence} {self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
 
     def table(self) -> Table:
         """The ride metrics before and after, with notes on the minimised metric and on limits."""
@@ -166,7 +184,8 @@ class TuneResult(Generic[V]):
             return target
         span = self.limits[name]
         text = written(span if isinstance(span, tuple) else (-math.inf, span))
-        return "; ".join(filter(None, (f"{text}{', reached' * (name in self.active_limits)}", target)))
+        mark = ", violated" if name in self.violated else ", reached" * (name in self.active_limits)
+        return "; ".join(filter(None, (f"{text}{mark}", target)))
 
     def scenario_table(self, metrics: Sequence[str] | None = None) -> Table:
         """Metrics in every scenario before and after.
@@ -221,6 +240,8 @@ class TuneResult(Generic[V]):
         sides = {"before": self.before, "after": self.after}
         return {
             "summary": self.summary,
+            "verdict": self.verdict.outcome.name,
+            "violated": self.violated,
             "metric": self.metric,
             "converged": self.converged,
             "metrics": {
@@ -231,6 +252,7 @@ class TuneResult(Generic[V]):
             "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
             "active_limits": list(self.active_limits),
             "active": list(self.active),
+            "without_effect": list(self.without_effect),
             "fresh": None if self.fresh is None else self.fresh.to_dict(),
             "scenarios": None if self.scenarios is None else plain(self.scenarios._asdict()),
             "starts": [plain(attempt._asdict()) for attempt in self.starts],

@@ -93,7 +93,7 @@ def robust(
         scenarios: roads and conditions; `tolerances(...)` makes conditions of a production scatter.
         risk: `"mean"`, `"worst"` or `CVaR(share)`, in place of that of the scenarios.
         scatter: standard deviations, relative to the values, of parameters whose cost is stated at the result, such as
-            `{"damper.*_rate": 0.1}`; none if left out.
+            `{"damper.**_rate": 0.1}`; none if left out.
         duration: as in `simulate`.
         dt: as in `simulate`.
         options: further arguments of `minimise`: `over`, `limits`, `shape`, `starts`, ...

@@ -26,7 +26,7 @@ class Condition(NamedTuple):
     Attributes:
         values: by path, last part or pattern, in SI units: `{"sprung_mass": 1500.0}` is a payload,
             `{"damper.temperature": 350.0}` a hot damper.
-        factors: on the values of the vehicle, whatever these are: `{"damper.*_rate": 0.85}` is a worn damper. What is
+        factors: on the values of the vehicle, whatever these are: `{"damper.**_rate": 0.85}` is a worn damper. What is
             tuned can have factors, but no values.
         weight: relative to the other conditions.
     """
@@ -176,7 +176,7 @@ def tolerances(scatter: Mapping[str, float], count: int, *, seed: int = 0) -> di
     """Conditions of `count` dampers or vehicles from one production, whose parameters scatter independently.
 
     Arguments:
-        scatter: standard deviation of each parameter relative to its value, such as `{"damper.*_rate": 0.05}`; all
+        scatter: standard deviation of each parameter relative to its value, such as `{"damper.**_rate": 0.05}`; all
             that a pattern names have one factor in each sample. Factors are normally distributed, within ±3 standard
             deviations.
         count: number of samples.
@@ -191,7 +191,7 @@ def tolerances(scatter: Mapping[str, float], count: int, *, seed: int = 0) -> di
     from scipy.stats import qmc, truncnorm
 
     if not scatter:
-        _checks.refuse("scatter", "name one or more parameters", scatter, "Write `{'damper.*_rate': 0.05}`.")
+        _checks.refuse("scatter", "name one or more parameters", scatter, "Write `{'damper.**_rate': 0.05}`.")
     for name, deviation in scatter.items():
         if not 0.0 < deviation < 1.0 / 3.0:
             remedy = "It is a standard deviation relative to the value: 0.05 is 5 %."

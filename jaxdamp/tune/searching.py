@@ -28,6 +28,7 @@ DOUBLE, SINGLE = Tolerance(1e-4, 1e-6), Tolerance(1e-2, 1e-4)
 Measured = Callable[[AbstractVehicle], Mapping[str, Scalar]]
 Evaluate = Callable[[np.ndarray], tuple[Array | np.ndarray, Array | np.ndarray]]
 OUT_OF_STEPS = 9  # SLSQP's own code
+NEAR = 1e-3  # how far around an end gradients are sampled, relative to the unit of each coordinate
 RESTARTS = 2  # with a new estimate of the curvature, if the search ends before an optimum
 
 
@@ -157,12 +158,15 @@ def search(
         if ended.slope_left < evaluator.tolerance.slope or len(history) >= max_steps:
             break
         ended = attempt(ended.values / unit)
+    if ended.slope_left >= evaluator.tolerance.slope and not ended.out_of_steps:
+        left = _slope_left_at_kink(evaluator, space, ended.values, metric, limits)
+        ended = ended._replace(slope_left=min(left, ended.slope_left))
     return ended
 
 
-def active(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tolerance) -> list[Limit]:
-    """The active or violated limits."""
-    return [limit for limit in limits if limit.margin(values[limit.name]) < tolerance.limit]
+def reached(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tolerance) -> list[Limit]:
+    """The limits that are met, and hold the search."""
+    return [limit for limit in limits if abs(limit.margin(values[limit.name])) <= tolerance.limit]
 
 
 def missed(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tolerance) -> list[Limit]:
@@ -190,8 +194,40 @@ def _slope_left(
     metrics, slopes = evaluator.at(values)
     unbound = np.array([not side for side in space.side(values)])
     gradient = (slopes[metric] * space.unit)[unbound]
-    tight = active(limits, metrics, evaluator.tolerance)
+    tight = [limit for limit in limits if limit.margin(metrics[limit.name]) < evaluator.tolerance.limit]
     if tight and gradient.size:
         walls = np.stack([(slopes[limit.name] * space.unit)[unbound] for limit in tight], axis=1)
         gradient = gradient - walls @ np.linalg.lstsq(walls, gradient, rcond=None)[0]
     return float(np.linalg.norm(gradient)) / max(abs(metrics[metric]), 1e-300)
+
+
+def _slope_left_at_kink(
+    evaluator: Evaluator, space: SearchRange, values: np.ndarray, metric: str, limits: Sequence[Limit]
+) -> float:
+    """The slope that is left where the metric or a limit has a kink, relative to the metric.
+
+    The length of the shortest convex combination of gradients sampled around the end, balanced by those of active
+    limits and bounds: zero at a minimum, also of a function whose gradient jumps there. Away from one all sampled
+    gradients point in similar directions, and no combination is short.
+
+    Source: Burke, Lewis, Overton, A robust gradient sampling algorithm for nonsmooth, nonconvex optimization, SIAM J.
+    Optim. 15 (2005).
+    """
+    import scipy.optimize
+
+    free, size = len(values), max(abs(evaluator.at(values)[0][metric]), 1e-300)
+    near = NEAR * space.unit * np.random.default_rng(0).uniform(-1.0, 1.0, (4 * free + 4, free))
+    at_end, _ = evaluator.at(values)
+    tight = [end for end in limit_ends(limits) if margins([end], at_end)[0] < evaluator.tolerance.limit]
+    gradients, walls = [], []
+    for point in (values, *np.clip(values + near, space.lower, space.upper)):
+        slopes = evaluator.at(point)[1]
+        gradients.append(slopes[metric] * space.unit / size)
+        walls += [end.sign * slopes[end.name] * space.unit for end in tight]
+    sides = {"lower": -1.0, "upper": 1.0}
+    walls += [sides[side] * row for side, row in zip(space.side(values), np.eye(free), strict=True) if side]
+    walls = [wall / length for wall in walls if (length := np.linalg.norm(wall)) > 0.0]
+    heavy = 1e3 * max(float(np.linalg.norm(gradient)) for gradient in gradients)  # weights add up to one
+    columns = [np.append(gradient, heavy) for gradient in gradients] + [np.append(wall, 0.0) for wall in walls]
+    weights, _ = scipy.optimize.nnls(np.stack(columns, axis=1), np.append(np.zeros(free), heavy))
+    return float(np.linalg.norm(np.stack(columns, axis=1)[:-1] @ weights))

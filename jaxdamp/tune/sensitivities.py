@@ -2,7 +2,6 @@
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from fnmatch import fnmatchcase
 from typing import Any
 
 import equinox as eqx
@@ -13,7 +12,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp.metrics import Metric
-from jaxdamp.parameters import FreeParameters, free_parameters, get, match_paths, name_patterns, parameters
+from jaxdamp.parameters import FreeParameters, free_parameters, get, match_paths, matching, name_patterns, parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.hats import is_hat, with_hats
@@ -61,7 +60,7 @@ def sensitivity(
         freeze: parameters among these to leave out.
         quantities: of the road by name, such as `{"speed": 20.0}`.
         dampers: the laws whose curves are looked at, by path or pattern; None for none. On a white road there are none,
-            since the linearised vehicle has no curves.
+            where no run over time is made.
         reach: largest velocity of the curves [m/s]; three times the largest RMS of a damper velocity if left out.
         hats: number of velocities on each side.
         second_order: also the second derivatives by the parameters: how flat an optimum is.
@@ -153,7 +152,7 @@ def _check(wanted: Sequence[Any], vehicle: Any, road: Any, quantities: Mapping[s
 def _curves(vehicle: AbstractVehicle, pattern: str) -> list[str]:
     """The laws whose curves are looked at."""
     known = damper_paths(vehicle)
-    chosen = [path for path in known if fnmatchcase(path, pattern)]
+    chosen = matching(known, pattern)
     if not chosen:
         _checks.refuse("dampers", f"name a law of the vehicle ({', '.join(known)})", repr(pattern), "None for none.")
     return chosen
@@ -198,7 +197,7 @@ def _on_made_roads(
     def measured(x: Any) -> Mapping[str, Any]:
         road = make(**{name: x[count + i] for i, name in enumerate(names)})
         ride = Ride(vehicle, road, metrics=objective.metrics, **run)
-        return objective.of(ride.on_axles_of(free.build(x[:count]))())
+        return objective.of(ride.of_vehicle(free.build(x[:count]))())
 
     return measured
 

@@ -4,7 +4,6 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from fnmatch import fnmatchcase
 from typing import Any, final
 
 import jax
@@ -15,7 +14,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper, laws_inside
-from jaxdamp.parameters import get
+from jaxdamp.parameters import get, matching
 from jaxdamp.tune.limits import Limit, scaled
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -129,7 +128,7 @@ class ShapeNumbers:
         self._pairs: list[tuple[Shape, str]] = []
         for shape in shapes:
             _checks.instance("shape", shape, Shape, "be made by `tune.slope`, `monotone`, `knee` or `ratio`")
-            chosen = [path for path in paths if fnmatchcase(path, shape.dampers)]
+            chosen = matching(paths, shape.dampers)
             if not chosen:
                 _checks.refuse("shape", f"name a damper of the vehicle ({', '.join(paths)})", repr(shape.dampers))
             self._pairs += [(shape, path) for path in chosen]

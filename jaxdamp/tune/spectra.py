@@ -10,7 +10,7 @@ from jaxtyping import Float
 from jaxdamp.metrics import power_spectral_density
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import simulate
-from jaxdamp.vehicles import AbstractVehicle, frequency_response
+from jaxdamp.vehicles import AbstractVehicle, frequency_response, linearise
 
 
 LOWEST, HIGHEST = 0.3, 30.0  # Hz
@@ -37,12 +37,13 @@ def spectra(
 ) -> dict[str, Spectrum]:
     """The spectrum of each channel between 0.3 and 30 Hz.
 
-    On a white road it is that of the linearised vehicle; otherwise Welch's estimate with segments of 4 s, or of the
-    whole run if that is shorter.
+    On a white road it is that of the vehicle with equivalent linear laws; otherwise Welch's estimate with
+    segments of 4 s, or of the whole run if that is shorter.
     """
     if isinstance(road, WhiteRoad):
         frequency = np.geomspace(LOWEST, HIGHEST, 400)
-        gains = frequency_response(vehicle, frequency, speed=road.speed)
+        linear = linearise(vehicle, velocity_psd=road.velocity_psd, speed=road.speed)
+        gains = frequency_response(linear, frequency, speed=road.speed)
         height = 2.0 * float(road.velocity_psd) / (2.0 * np.pi * frequency) ** 2
         return {name: Spectrum(frequency, np.abs(np.asarray(gains[name])) ** 2 * height) for name in channels}
     with warnings.catch_warnings():

@@ -10,8 +10,8 @@ from jaxdamp._field_types import check_module
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import Ride
-from jaxdamp.tune.limits import Limit, limit_spans, scaled
+from jaxdamp.simulation import Ride, stationary_notes
+from jaxdamp.tune.limits import Limit, LimitRange, limit_ranges, scaled
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.objective import Function, objective_of
 from jaxdamp.tune.range_notes import range_notes
@@ -42,7 +42,7 @@ class DesignTask(Generic[V]):
         space: the free parameters and their ranges.
         measured: the metrics of a vehicle.
         names: of all numbers that the search computes.
-        allowed: smallest and largest value of each limited metric.
+        allowed: the range of each limited metric, as it is written.
         units: of the metrics.
         run: duration [s] and step [s].
         tolerance: that the precision of the vehicle permits.
@@ -55,7 +55,7 @@ class DesignTask(Generic[V]):
         road: Road | Scenarios,
         *,
         argument: str,
-        over: Sequence[str] | Mapping[str, Any],
+        over: Sequence[str] | Mapping[str, Any] | None,
         freeze: Sequence[str],
         bounds: Mapping[str, Any] | None,
         tie: Mapping[str, str] | None,
@@ -65,9 +65,9 @@ class DesignTask(Generic[V]):
         duration: float | None,
         dt: float,
     ) -> None:
-        self.vehicle, self.road, self.run = vehicle, road, (duration, dt)
+        self.vehicle, self.road, self.run, self._argument = vehicle, road, (duration, dt), argument
         known = [m.name for m in (*vehicle.ride_metrics, *(m for m in metrics if isinstance(m, Metric)))]
-        self.allowed = limit_spans(limits, known)
+        self.allowed = limit_ranges(limits, known)
         limited = [metric for metric in limits or {} if isinstance(metric, Metric)]
         targets = [one for one in objectives if isinstance(one, Targets)]
         of_targets = [metric for one in targets for metric in one.metrics]
@@ -76,6 +76,7 @@ class DesignTask(Generic[V]):
             _checks.one_of("targets", current_name(name, known), with_targets)
         more, white = [*metrics, *limited, *of_targets], is_white(road)
         self.objective = objective_of(objectives, vehicle, more, list(self.allowed), white=white, argument=argument)
+        _refuse_negative(self.allowed, self.objective.metrics)
         self.space = search_range(vehicle, over, freeze, bounds, tie)
         self.tolerance = tolerance_of(self.space.free)
         shapes = [shape] if isinstance(shape, Shape) else shape
@@ -110,26 +111,45 @@ class DesignTask(Generic[V]):
             name, value = next(iter(wrong.items()))
             remedy = "Call `simulate` with this road; its error messages explain the cause."
             _checks.refuse("vehicle", "have finite metrics to start from", f"{name} = {value}", remedy)
-        of_metrics = [
-            Limit(entry, name, *span, scaled(*span, before[entry]), self.units[name])
-            for name, span in self.allowed.items()
-            for entry in self.measured.entries(name)
-        ]
+        of_metrics = []
+        for name, allowed in self.allowed.items():
+            for entry in self.measured.entries(name):
+                span = allowed.at(before[entry])
+                of_metrics.append(Limit(entry, name, *span, scaled(*span, before[entry]), self.units[name]))
         return of_metrics + self._curves.limits(before)
 
-    def shown_limits(self) -> dict[str, float | tuple[float, float]]:
+    def shown_limits(self, before: Mapping[str, float]) -> dict[str, float | tuple[float, float]]:
         """The limits of metrics as they are shown: the largest value, or the smallest and the largest one."""
-        return {name: span[1] if np.isinf(span[0]) else span for name, span in self.allowed.items()}
+        spans = {name: allowed.at(before[name]) for name, allowed in self.allowed.items()}
+        return {name: span[1] if np.isinf(span[0]) else span for name, span in spans.items()}
 
-    def notes_on_runs(self, design: AbstractVehicle) -> list[str]:
-        """Notes on the step and on the fitted ranges for a design, on every road."""
-        notes = []
-        for ride_of in self.measured.rides_of():
+    def refuse_constant(self, before: Mapping[str, float], slopes: Mapping[str, np.ndarray]) -> None:
+        """Refuse objectives that do not depend on what is free."""
+        if not any(np.any(slopes[name]) for name in self.objective.names):
+            values = ", ".join(f"{name} = {before[name]:.4g}" for name in self.objective.names)
+            remedy = "Free a parameter that it depends on, or take a road on which it does."
+            _checks.refuse(self._argument, "depend on what is free", f"{values} whatever they are", remedy)
+
+    def notes_on_runs(self, design: AbstractVehicle) -> tuple[list[str], list[str]]:
+        """Notes on the step and on the fitted ranges for a design, on every road; and the dampers far outside."""
+        rides, far = list(self.measured.rides_of()), []
+        road = rides[0](design).road if self.measured.white else None
+        notes = stationary_notes(design, road) if isinstance(road, WhiteRoad) else []
+        for ride_of in rides:
             coarse = [] if self.measured.white else step_notes(self.vehicle, design, ride_of)
             notes += coarse
             if not any("does not bear" in note for note in coarse):
-                notes += range_notes(self.vehicle, design, ride_of)
-        return notes
+                ranges, outside = range_notes(self.vehicle, design, ride_of)
+                notes, far = notes + ranges, far + outside
+        return notes, list(dict.fromkeys(far))
+
+
+def _refuse_negative(allowed: Mapping[str, LimitRange], metrics: Sequence[Metric]) -> None:
+    """Refuse a largest value below zero of a metric that is never negative."""
+    for metric in metrics:
+        upper = allowed[metric.name].upper if metric.name in allowed else 0.0
+        if upper < 0.0 and not metric.statistic.signed and not allowed[metric.name].relative[1]:
+            _checks.refuse(f"limits[{metric.name!r}]", "not be negative, as the metric never is", upper)
 
 
 def is_white(road: Road | Scenarios) -> bool:
@@ -147,6 +167,7 @@ def check_call(call: str, vehicle: Any, road: Any, counts: Mapping[str, tuple[in
         counts: value and least value by argument.
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
+    _checks.untraced("vehicle", vehicle, "Call it outside `jax.jit` and `jax.grad`; a `Ride` can be traced.")
     if not isinstance(road, Scenarios):
         check_module("road", road, (AbstractRoad, WhiteRoad), call)
     for name, (count, least) in counts.items():

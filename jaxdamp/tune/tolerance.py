@@ -86,7 +86,7 @@ def tolerance_effects(
 
 def check_scatter(scatter: Any) -> None:
     """Refuse what is no mapping of parameters to positive standard deviations."""
-    remedy = "Write `{'damper.*_rate': 0.1}`: 0.1 is a standard deviation of 10 %."
+    remedy = "Write `{'damper.**_rate': 0.1}`: 0.1 is a standard deviation of 10 %."
     if not isinstance(scatter, Mapping) or not scatter:
         _checks.refuse("scatter", "be a mapping of one or more parameters", _checks.described(scatter), remedy)
     for name, deviation in scatter.items():

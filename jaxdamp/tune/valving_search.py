@@ -205,8 +205,9 @@ def _loop(target: AbstractDamper, start: MonoTube, frequency: float, amplitude: 
     angle = 2.0 * np.pi * np.arange(2 * steps + 1) / steps
     stroke, velocity = amplitude * np.sin(angle), 2.0 * np.pi * frequency * amplitude * np.cos(angle)
     time = dt * np.arange(len(angle))
-    respond(start, time, stroke, velocity)  # refuses strokes beyond its chambers
-    return Loop(dt, stroke, velocity, np.asarray(respond(target, time, stroke, velocity), float), steps)
+    respond(start, time, stroke, velocity, state=start.initial_state())  # refuses strokes beyond its chambers
+    wanted = respond(target, time, stroke, velocity, state=target.initial_state())
+    return Loop(dt, stroke, velocity, np.asarray(wanted, float), steps)
 
 
 def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> Any:

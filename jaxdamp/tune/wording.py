@@ -5,18 +5,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jaxdamp._status import Status
-from jaxdamp._tables import percent_change
-from jaxdamp.tune.limits import Limit, Span
+from jaxdamp.tune.limits import Limit, LimitRange
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.ranges import FACTOR, SearchRange
-from jaxdamp.tune.rescoring import Rescore
 from jaxdamp.tune.result import Change
 from jaxdamp.tune.searching import Ended
 from jaxdamp.tune.smooth import exact_counterpart
 from jaxdamp.tune.starts import Attempt
 
 
-LOST = 0.5  # share of an improvement: if less is left on fresh roads, a warning states it
+_ROUNDING = 1e-12  # of a metric, by which its derivative times the parameter counts as zero
 ALIKE = 1e-3  # relative difference of metrics at ends that count as one optimum
 
 
@@ -76,13 +74,15 @@ def missed_notes(short: Sequence[Limit], values: Mapping[str, float], changes: S
     ]
 
 
-def true_value_notes(objective: Objective, values: Mapping[str, float], allowed: Mapping[str, Span]) -> list[str]:
+def true_value_notes(
+    objective: Objective, values: Mapping[str, float], before: Mapping[str, float], allowed: Mapping[str, LimitRange]
+) -> list[str]:
     """A sentence for each limit on a smooth metric that the true one does not meet."""
     notes = []
     for metric in objective.metrics:
         exact = exact_counterpart(metric)
         if exact is not None and metric.name in allowed:
-            lower, upper = allowed[metric.name]
+            lower, upper = allowed[metric.name].at(before[metric.name])
             if not lower <= values[exact.name] <= upper:
                 beyond = f"the true {exact.name} is {values[exact.name]:.4g}, beyond the limit"
                 notes.append(f"{metric.name} is limited, but {beyond}.")
@@ -129,20 +129,54 @@ def start_notes(attempts: Sequence[Attempt], metric: str) -> list[str]:
     return [f"{alike} of {len(attempts)} starts ended at the best {metric}, {best:.5g}{rest}{failed}."]
 
 
-def fresh_notes(fresh: Rescore, sides: Sequence[Mapping[str, float]], allowed: Mapping[str, Span]) -> list[str]:
-    """What does not hold on fresh roads: the improvement, or the limits."""
-    before, after = (side[fresh.metric] for side in sides)
-    gained, left = percent_change(before, after), 100.0 * float(np.mean(fresh.change(fresh.metric)))
-    notes = []
-    if gained is not None and gained < 0.0 and not left < LOST * gained:
-        notes.append(
-            f"On {fresh.roads} fresh roads {fresh.metric} changes by {left:+.1f} % on average, on the road of the "
-            f"tuning by {gained:+.1f} %: tune on longer or several roads (`tune.Scenarios`)."
-        )
-    for name, (lower, upper) in allowed.items():
-        values = fresh.after[name]
-        beyond = int(np.sum((values > upper) | (values < lower)))
-        if beyond:
-            furthest = float(values.max() if np.any(values > upper) else values.min())
-            notes.append(f"On {beyond} of {fresh.roads} fresh roads {name} is beyond its limit, up to {furthest:.4g}.")
-    return notes
+def violations(short: Sequence[Limit], values: Mapping[str, float]) -> dict[str, str]:
+    """Each metric or shape beyond its limit, in words, at its worst place."""
+    worst = sorted(short, key=lambda limit: limit.margin(values[limit.name]), reverse=True)
+    return {
+        limit.of: f"{limit.name} is {values[limit.name]:.4g}, and must be {limit.nearer(values[limit.name])}"
+        for limit in worst
+    }
+
+
+def tightened_notes(limits: Sequence[Limit], searched: Sequence[Limit]) -> list[str]:
+    """A sentence on the limits that were tighter in the search than they are."""
+    pairs = zip(limits, searched, strict=True)
+    tight = [one.name for one, other in pairs if (one.lower, one.upper) != (other.lower, other.upper)]
+    words = "Tightened on the road of the tuning, so that they hold on others: the limits of"
+    return [f"{words} {', '.join(tight)}."] if tight else []
+
+
+def workshop_notes(space: SearchRange) -> list[str]:
+    """A sentence on the free parameters that no workshop can change."""
+    fixed = [p.path for p in space.free.chosen if not p.adjustable]
+    return [f"No workshop can change {', '.join(fixed)}: what was tuned cannot be built as it is."] if fixed else []
+
+
+def without_effect(
+    names: Sequence[str],
+    values: Sequence[np.ndarray],
+    metric: str,
+    sides: Sequence[tuple[Mapping[str, float], Mapping[str, np.ndarray]]],
+) -> tuple[str, ...]:
+    """The parameters by which the derivative of the metric is zero at the start and at the end, but for rounding.
+
+    Arguments:
+        names: of the parameters.
+        values: of the parameters on both sides.
+        metric: what is minimised.
+        sides: metrics and their derivatives at the start and at the end.
+    """
+    idle = np.ones(len(names), bool)
+    for at, (numbers, slopes) in zip(values, sides, strict=True):
+        rounded = np.abs(slopes[metric] * at) <= _ROUNDING * abs(numbers[metric])
+        idle &= (slopes[metric] == 0.0) | (rounded & (at != 0.0))
+    return tuple(name for name, none in zip(names, idle, strict=True) if none)
+
+
+def effect_notes(idle: Sequence[str], metric: str) -> list[str]:
+    """A sentence on the parameters without effect."""
+    if not idle:
+        return []
+    theirs = "their tuned values say" if len(idle) > 1 else "its tuned value says"
+    remedy = "Free others, or choose another metric or road."
+    return [f"No effect on {metric}: {', '.join(idle)}; {theirs} nothing. {remedy}"]

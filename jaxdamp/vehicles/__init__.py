@@ -34,7 +34,7 @@ from jaxdamp.vehicles.quarter_car import QuarterCar
 from jaxdamp.vehicles.ride_metrics import is_stationary
 from jaxdamp.vehicles.roll_car import RollCar
 from jaxdamp.vehicles.seat import Seat, SeatMass
-from jaxdamp.vehicles.stationary import stationary_rms
+from jaxdamp.vehicles.stationary import EquivalentDamper, equivalent_dampers, stationary_rms
 from jaxdamp.vehicles.suspension import Suspension
 from jaxdamp.vehicles.system import Layout, System
 from jaxdamp.vehicles.tandem import IndependentTandem, WalkingBeam
@@ -54,6 +54,7 @@ __all__ = [
     "CubicSpring",
     "Earlier",
     "Element",
+    "EquivalentDamper",
     "ForceDriven",
     "Frame",
     "FullCar",
@@ -84,6 +85,7 @@ __all__ = [
     "TrackedHull",
     "WalkingBeam",
     "Wheel",
+    "equivalent_dampers",
     "frequency_response",
     "is_stationary",
     "linearise",

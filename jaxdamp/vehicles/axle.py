@@ -22,7 +22,7 @@ class Axle(AbstractPart):
     """
 
     corner: Corner
-    track_width: Number = parameter("m", "distance between the left and the right wheel", positive)
+    track_width: Number = parameter("m", "distance between the left and the right wheel", positive, adjustable=False)
     anti_roll_rate: Number = parameter("N m/rad", "stiffness of the anti-roll bar", nonnegative, default=0.0)
 
     def parts(self, name: str, body: Body, *, ahead: Any = None, behind: Any = 0.0) -> Parts:

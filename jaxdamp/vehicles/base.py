@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
-from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
+from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import Module, check_parameters, readable
 from jaxdamp.vehicles.channels import channels_of
@@ -40,12 +40,12 @@ class AbstractVehicle(Module):
 
     def system(self) -> System:
         """The assembled vehicle: matrices, laws, outputs. Compiled once for all vehicles of one layout."""
-        return _assembled(without_fitted_ranges(self))  # vehicles with laws fitted to other records share one program
+        return _assembled(self)
 
     @property
     def layout(self) -> Layout:
         """Names of coordinates, ports, wheels, channels and metrics, independent of all parameter values."""
-        leaves, structure = jax.tree.flatten(without_fitted_ranges(self))
+        leaves, structure = jax.tree.flatten(self)
         shapes = (jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) if eqx.is_array(leaf) else leaf for leaf in leaves)
         return _layout_of(structure, tuple(shapes))
 

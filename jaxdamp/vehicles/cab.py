@@ -31,11 +31,13 @@ class Cab(AbstractPart):
         rear_friction: friction of the rear mount.
     """
 
-    mass: Number = parameter("kg", "mass of the cab", positive)
-    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the cab in pitch", positive)
-    ahead: Number = parameter("m", "cab ahead of the centre of gravity of the sprung mass")
-    front_distance: Number = parameter("m", "front mount ahead of the cab's centre of gravity", positive)
-    rear_distance: Number = parameter("m", "rear mount behind the cab's centre of gravity", positive)
+    mass: Number = parameter("kg", "mass of the cab", positive, adjustable=False)
+    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the cab in pitch", positive, adjustable=False)
+    ahead: Number = parameter("m", "cab ahead of the centre of gravity of the sprung mass", adjustable=False)
+    front_distance: Number = parameter(
+        "m", "front mount ahead of the cab's centre of gravity", positive, adjustable=False
+    )
+    rear_distance: Number = parameter("m", "rear mount behind the cab's centre of gravity", positive, adjustable=False)
     front_rate: Number = parameter("N/m", "spring rate of the front mount", positive)
     rear_rate: Number = parameter("N/m", "spring rate of the rear mount", positive)
     front_damper: AbstractDamper

@@ -15,11 +15,11 @@ from jaxdamp.vehicles.suspension import Suspension
 class AbstractCorner(Module):
     """The common fields of a `Corner` and a `QuarterCar`."""
 
-    unsprung_mass: Number = parameter("kg", "mass of wheel and hub", positive)
+    unsprung_mass: Number = parameter("kg", "mass of wheel and hub", positive, adjustable=False)
     spring_rate: Number = parameter("N/m", "suspension spring rate at the wheel", positive)
-    tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness", positive)
+    tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness", positive, adjustable=False)
     damper: AbstractDamper
-    tyre_damping: Number = parameter("N s/m", "vertical tyre damping", nonnegative, default=0.0)
+    tyre_damping: Number = parameter("N s/m", "vertical tyre damping", nonnegative, default=0.0, adjustable=False)
     extra_spring: AbstractDamper | None = None
     bump_stop: AbstractDamper | None = None
     friction: AbstractDamper | None = None

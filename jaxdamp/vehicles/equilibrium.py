@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._matrices import solve
+from jaxdamp._sharded import varying_as
 from jaxdamp.dampers import coverage
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.port_form import PortForm
@@ -68,6 +69,7 @@ def _newton(form: PortForm, ports: Ports, road: Float[Array, " wheels"]) -> Floa
         return tries[best], sizes[best] / scale, count + 1
 
     start = jnp.zeros_like(form.mass[0]), jnp.full_like(scale, jnp.inf), jnp.zeros((), int)
+    start = varying_as(start, *eqx.filter((form, ports, road), eqx.is_array))
     position, size, _ = jax.lax.while_loop(lambda now: (now[1] > tolerance) & (now[2] < STEPS), step, start)
     return jnp.where(size < 1e3 * tolerance, position, jnp.nan)
 

@@ -36,11 +36,11 @@ class FullCar(AbstractVehicle):
     ('front_left', 'front_right', 'rear_left', 'rear_right')
     """
 
-    sprung_mass: Number = parameter("kg", "mass of the body", positive)
-    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the body in pitch", positive)
-    roll_inertia: Number = parameter("kg m²", "moment of inertia of the body in roll", positive)
-    front_distance: Number = parameter("m", "front axle ahead of the centre of gravity", positive)
-    rear_distance: Number = parameter("m", "rear axle behind the centre of gravity", positive)
+    sprung_mass: Number = parameter("kg", "mass of the body", positive, adjustable=False)
+    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the body in pitch", positive, adjustable=False)
+    roll_inertia: Number = parameter("kg m²", "moment of inertia of the body in roll", positive, adjustable=False)
+    front_distance: Number = parameter("m", "front axle ahead of the centre of gravity", positive, adjustable=False)
+    rear_distance: Number = parameter("m", "rear axle behind the centre of gravity", positive, adjustable=False)
     front: Axle
     rear: Axle
     places: tuple[Place, ...] = ()

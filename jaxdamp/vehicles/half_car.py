@@ -40,10 +40,10 @@ class HalfCar(AbstractVehicle):
     Array([3805. , 2667.4], dtype=float64)
     """
 
-    sprung_mass: Number = parameter("kg", "mass of the body", positive)
-    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the body in pitch", positive)
-    front_distance: Number = parameter("m", "front axle ahead of the centre of gravity", positive)
-    rear_distance: Number = parameter("m", "rear axle behind the centre of gravity", positive)
+    sprung_mass: Number = parameter("kg", "mass of the body", positive, adjustable=False)
+    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the body in pitch", positive, adjustable=False)
+    front_distance: Number = parameter("m", "front axle ahead of the centre of gravity", positive, adjustable=False)
+    rear_distance: Number = parameter("m", "rear axle behind the centre of gravity", positive, adjustable=False)
     front: Corner
     rear: Corner
     places: tuple[Place, ...] = ()

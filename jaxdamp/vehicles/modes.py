@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Complex, Float
 
+from jaxdamp import _checks
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear
@@ -119,6 +120,8 @@ def modes(vehicle: AbstractVehicle | LinearVehicle) -> Modes:
     undamped frequencies [Hz]: 1.15663, 1.43125, 11.6348, 11.6387
     """
     linear = as_linear(vehicle)
+    remedy = "In compiled or differentiated code take the eigenvalues of `linearise(vehicle).state_matrix`."
+    _checks.untraced("vehicle", linear.state_matrix, remedy)
     a, n = np.asarray(linear.state_matrix), len(linear.coordinates)
     squares, shapes = np.linalg.eig(-a[n : 2 * n, :n])
     order = np.argsort(np.real(squares))

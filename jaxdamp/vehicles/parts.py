@@ -44,7 +44,7 @@ class Inertia(AbstractPart):
     """A rotation of a body, pitch (nose up) or roll (left side up), and its moment of inertia."""
 
     axis: str = eqx.field(static=True)
-    moment: Number = parameter("kg m²", "moment of inertia about the centre of gravity", positive)
+    moment: Number = parameter("kg m²", "moment of inertia about the centre of gravity", positive, adjustable=False)
 
     @property
     def sense(self) -> str:
@@ -71,7 +71,7 @@ class Body(AbstractPart):
     """
 
     name: str = eqx.field(static=True)
-    mass: Number = parameter("kg", "mass of the body", positive)
+    mass: Number = parameter("kg", "mass of the body", positive, adjustable=False)
     turns: tuple[Inertia, ...]
 
     def __init__(self, name: str, mass: Any, *, pitch_inertia: Any = None, roll_inertia: Any = None) -> None:
@@ -188,10 +188,10 @@ class Wheel(AbstractPart):
 
     name: str = eqx.field(static=True)
     point: Point
-    stiffness: Number = parameter("N/m", "vertical tyre stiffness", positive)
-    damping: Number = parameter("N s/m", "vertical tyre damping", nonnegative, default=0.0)
-    behind: Number = parameter("m", "distance behind the front axle", nonnegative, default=0.0)
-    left: Number = parameter("m", "distance to the left of the middle", default=0.0)
+    stiffness: Number = parameter("N/m", "vertical tyre stiffness", positive, adjustable=False)
+    damping: Number = parameter("N s/m", "vertical tyre damping", nonnegative, default=0.0, adjustable=False)
+    behind: Number = parameter("m", "distance behind the front axle", nonnegative, default=0.0, adjustable=False)
+    left: Number = parameter("m", "distance to the left of the middle", default=0.0, adjustable=False)
     elements: tuple[Element, ...] = ()
     lifts: bool = eqx.field(static=True, default=False)
     beside: bool = eqx.field(static=True, default=False)

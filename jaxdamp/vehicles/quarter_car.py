@@ -14,7 +14,7 @@ from jaxdamp.vehicles.seat import Seat, seat_parts
 
 
 class _SprungMass(AbstractVehicle):
-    sprung_mass: Number = parameter("kg", "mass of the body on this corner", positive)
+    sprung_mass: Number = parameter("kg", "mass of the body on this corner", positive, adjustable=False)
 
 
 @final

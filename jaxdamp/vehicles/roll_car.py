@@ -35,8 +35,8 @@ class RollCar(AbstractVehicle):
     ('z_sprung', 'roll', 'z_left_unsprung', 'z_right_unsprung')
     """
 
-    sprung_mass: Number = parameter("kg", "mass of the body on this axle", positive)
-    roll_inertia: Number = parameter("kg m²", "moment of inertia of the body in roll", positive)
+    sprung_mass: Number = parameter("kg", "mass of the body on this axle", positive, adjustable=False)
+    roll_inertia: Number = parameter("kg m²", "moment of inertia of the body in roll", positive, adjustable=False)
     axle: Axle
     places: tuple[Place, ...] = ()
     seats: tuple[Seat, ...] = ()

@@ -27,7 +27,7 @@ class SeatMass(AbstractPart):
         friction: law such as `dampers.CoulombFriction`.
     """
 
-    mass: Number = parameter("kg", "mass on the spring", positive)
+    mass: Number = parameter("kg", "mass on the spring", positive, adjustable=False)
     spring_rate: Number = parameter("N/m", "spring rate under the mass", positive)
     damper: AbstractDamper
     extra_spring: AbstractDamper | None = None

@@ -1,43 +1,19 @@
 """Stationary response of the linearised vehicle to a road whose rate is white noise."""
 
+from typing import NamedTuple
+
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, root
-from jaxdamp._matrices import phi_functions, solve
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.vehicles.base import AbstractVehicle
-from jaxdamp.vehicles.linear import LinearVehicle, as_linear
-
-
-_DOUBLINGS = 50  # of the first interval, until nothing is left of the start
-
-
-def lyapunov(a: Float[Array, "n n"], q: Float[Array, "n n"]) -> Float[Array, "n n"]:
-    """The solution P = ∫ e^{At} Q e^{Aᵀt} dt of A P + P Aᵀ + Q = 0 for a stable A, by doubling of the interval.
-
-    The first interval h ends where the exponential of the matrix [[−A, Q], [0, Aᵀ]] h is a short series; then
-    P(2h) = P(h) + F P(h) Fᵀ and F(2h) = F(h)², F = e^{Ah}. F is stored as E = F − 1, which is small at first: F itself
-    would lose the slow motions to rounding. Differentiable; n³ operations a step.
-    """
-    n = a.shape[0]
-    first, scale = (0.5 / at_least(jax.lax.stop_gradient(jnp.max(jnp.sum(jnp.abs(m), axis=0))), 1e-30) for m in (a, q))
-    whole = jnp.block([[-a * first, q * scale], [jnp.zeros_like(a), a.T * first]])
-    grown = whole @ phi_functions(whole)[1]  # its exponential, minus one
-    change = grown[n:, n:].T
-
-    def double(now: tuple[Array, Array], _: None) -> tuple[tuple[Array, Array], None]:
-        p, e = now
-        moved = p + e @ p
-        return (p + moved + moved @ e.T, 2.0 * e + e @ e), None
-
-    begun = grown[:n, n:] * (first / scale)
-    (found, _), _ = jax.lax.scan(double, (begun + change @ begun, change), None, length=_DOUBLINGS)
-    return found
+from jaxdamp.vehicles.covariance import channel_covariance
+from jaxdamp.vehicles.linear import LinearVehicle, linearise
+from jaxdamp.vehicles.statistical import nonlinear_variables
 
 
 def stationary_rms(
@@ -47,7 +23,11 @@ def stationary_rms(
     speed: ScalarLike | int | None = None,
     in_phase: bool = False,
 ) -> dict[str, Scalar]:
-    """RMS of every channel of the linearised vehicle on a road whose rate is white noise.
+    """RMS of every channel on a road whose rate is Gaussian white noise, with linear laws equivalent to the vehicle's.
+
+    The laws are linearised statistically in the motion that results (`linearise(vehicle, velocity_psd=...)`, which says
+    how accurate that is); a vehicle with linear laws is exact. For another linearisation, such as that at rest, pass
+    `linearise(vehicle)`. RMS values are those about the mean: laws that differ in both directions shift it.
 
     All wheels run on the same road: with a `speed` one axle after the other, so that their motions are correlated, or
     `in_phase`. A channel is y(t) = ∫ k(s) u(t − s) ds with the white rate u of the road, and its mean square S ∫ k² ds
@@ -60,7 +40,7 @@ def stationary_rms(
     front axle.
 
     Arguments:
-        vehicle: a vehicle, linearised about rest, or what `linearise` made of it.
+        vehicle: a vehicle, or what `linearise` made of it.
         velocity_psd: two-sided power spectral density S of the rate of the height [(m/s)²/Hz]; for an ISO 8608 road of
             waviness 2 it is 2π² G_d(n₀) n₀² V (`roads.white`).
         speed: of the vehicle [m/s]; not needed for a single axle.
@@ -80,39 +60,88 @@ def stationary_rms(
     853.472
     """
     _checks.positive("velocity_psd", velocity_psd)
-    linear = as_linear(vehicle)
+    linear = _in_motion(vehicle, velocity_psd, speed, in_phase)
     matrix = _checks.concrete(linear.state_matrix)
     if matrix is not None and np.max(np.linalg.eigvals(matrix).real) > -1e-9 * np.abs(matrix).max():
         remedy = (
-            "Friction models such as Dahl, LuGre and Bouc-Wen have an undamped state for small motion: pass "
-            "`linearise(vehicle, amplitude=0.02, frequency=1.2)`."
+            "Friction models such as Dahl, LuGre and Bouc-Wen have an undamped state for small motion: pass the "
+            "vehicle itself, or `linearise(vehicle, velocity_psd=...)`."
         )
         _checks.refuse("vehicle", "come to rest when linearised", "one that does not", remedy)
-    rms = root(velocity_psd * _mean_squares(linear, linear.delays(speed, in_phase)))
+    everything = tuple(range(len(linear.channels)))
+    squares = jnp.diagonal(_covariance(linear, linear.delays(speed, in_phase), everything))
+    noisy = jnp.any(linear.feed_through != 0, axis=1)
+    rms = root(velocity_psd * jnp.where(noisy, jnp.inf, at_least(squares, 0.0)))
     return {name: rms[i] for i, name in enumerate(linear.channels)}
 
 
+class EquivalentDamper(NamedTuple):
+    """The linear damper that stands for a law in the stationary motion on a white road.
+
+    Attributes:
+        slope: E[v F]/E[v²] [N s/m]: it dissipates the same power.
+        velocity_rms: σ of the velocity [m/s], normally distributed.
+        linear: whether the law is linear, so that nothing is approximated.
+    """
+
+    slope: Scalar
+    velocity_rms: Scalar
+    linear: bool
+
+    def words(self) -> str:
+        """As in "Gaussian, equivalent slope 2006 N s/m at 0.21 m/s RMS"."""
+        kind = "linear, slope" if self.linear else "Gaussian, equivalent slope"
+        return f"{kind} {self.slope:.0f} N s/m at {self.velocity_rms:.2g} m/s RMS"
+
+
+def equivalent_dampers(
+    vehicle: AbstractVehicle,
+    velocity_psd: ScalarLike = 1.0,
+    *,
+    speed: ScalarLike | int | None = None,
+    in_phase: bool = False,
+) -> dict[str, EquivalentDamper]:
+    """What `stationary_rms` takes in place of each damper, by name; arguments as there.
+
+    >>> from jaxdamp.dampers import CoulombFriction, Linear
+    >>> from jaxdamp.vehicles.presets import quarter_car_000
+    >>> car = quarter_car_000(Linear(1500.0) + CoulombFriction(150.0, 1e-3))
+    >>> equivalent_dampers(car, 1e-3)["damper"].words()
+    'Gaussian, equivalent slope 2012 N s/m at 0.23 m/s RMS'
+    """
+    _checks.positive("velocity_psd", velocity_psd)
+    linear = _in_motion(vehicle, velocity_psd, speed, in_phase)
+    numbers = {name: i for i, name in enumerate(linear.channels)}
+    laws = dict(zip(vehicle.layout.ports, vehicle.elements(), strict=True))
+    names = [name for name in laws if f"{name}_velocity" in numbers]
+    pairs = {name: (numbers[f"{name}_force"], numbers[f"{name}_velocity"]) for name in names}
+    chosen = tuple(number for pair in pairs.values() for number in pair)
+    if not chosen:
+        return {}
+    covariance = velocity_psd * _covariance(linear, linear.delays(speed, in_phase), chosen)
+    found = {}
+    for i, (name, (_, rate)) in enumerate(pairs.items()):
+        power, square = covariance[2 * i, 2 * i + 1], at_least(covariance[2 * i + 1, 2 * i + 1], 1e-30)
+        noisy = jnp.any(linear.feed_through[rate] != 0)
+        velocity = jnp.where(noisy, jnp.inf, root(square))
+        found[name] = EquivalentDamper(power / square, velocity, not nonlinear_variables(laws[name]))
+    return found
+
+
+def _in_motion(
+    vehicle: AbstractVehicle | LinearVehicle, velocity_psd: ScalarLike, speed: ScalarLike | int | None, in_phase: bool
+) -> LinearVehicle:
+    if isinstance(vehicle, LinearVehicle):
+        return vehicle
+    return linearise(vehicle, velocity_psd=velocity_psd, speed=speed, in_phase=in_phase)
+
+
 @eqx.filter_jit
-def _mean_squares(linear: LinearVehicle, delays: Float[Array, " wheels"]) -> Float[Array, " channels"]:
-    """∫ k² ds of every channel, `inf` if it contains the white noise."""
-    a, c, settled = linear.state_matrix, linear.output, linear.settled()
+def _covariance(
+    linear: LinearVehicle, delays: Float[Array, " wheels"], chosen: tuple[int, ...]
+) -> Float[Array, "channels channels"]:
+    """∫ k kᵀ ds of some channels."""
+    c, settled = linear.output[np.array(chosen)], linear.settled()
     # ξ = x − settled z_r obeys ξ̇ = A ξ + (E − settled) ż_r; channels are C ξ + (C settled + D) z_r + F ż_r
-    order = jnp.argsort(delays)
-    times, pushes = delays[order], (linear.road_rate_input - settled)[:, order]
-    static = (c @ settled + linear.road_feed)[:, order]
-
-    def of_channels(covariance: Float[Array, "n n"]) -> Float[Array, " channels"]:
-        return jnp.sum((c @ covariance) * c, axis=1)
-
-    state, total = pushes[:, 0], jnp.zeros(c.shape[0])
-    for i in range(1, times.size):
-        gap = times[i] - times[i - 1]
-        after = phi_functions(a * gap)[0] @ state
-        # ∫ ξξᵀ over the interval: the integral from its start minus that from its end
-        covariance = lyapunov(a, jnp.outer(state, state) - jnp.outer(after, after))
-        mean = c @ solve(a, after - state)
-        offset = -jnp.sum(static[:, i:], axis=1)  # later wheels are still on the road before the impulse
-        total = total + of_channels(covariance) + 2.0 * offset * mean + offset**2 * gap
-        state = after + pushes[:, i]
-    total = at_least(total + of_channels(lyapunov(a, jnp.outer(state, state))), 0.0)
-    return jnp.where(jnp.any(linear.feed_through != 0, axis=1), jnp.inf, total)
+    static = c @ settled + linear.road_feed[np.array(chosen)]
+    return channel_covariance(linear.state_matrix, c, linear.road_rate_input - settled, static, delays)

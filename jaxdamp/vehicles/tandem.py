@@ -34,13 +34,15 @@ class WalkingBeam(AbstractPart):
         friction: law at the middle, such as that of the leaves, both sides together.
     """
 
-    mass: Number = parameter("kg", "mass of beam, axles and wheels", positive)
-    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the beam in pitch", positive)
-    spread: Number = parameter("m", "distance between the two axles", positive)
+    mass: Number = parameter("kg", "mass of beam, axles and wheels", positive, adjustable=False)
+    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the beam in pitch", positive, adjustable=False)
+    spread: Number = parameter("m", "distance between the two axles", positive, adjustable=False)
     spring_rate: Number = parameter("N/m", "rate of the leaf spring", positive)
-    tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness of an axle", positive)
+    tyre_stiffness: Number = parameter("N/m", "vertical tyre stiffness of an axle", positive, adjustable=False)
     damper: AbstractDamper
-    tyre_damping: Number = parameter("N s/m", "vertical tyre damping of an axle", nonnegative, default=0.0)
+    tyre_damping: Number = parameter(
+        "N s/m", "vertical tyre damping of an axle", nonnegative, default=0.0, adjustable=False
+    )
     tyre_lifts: bool = eqx.field(static=True, default=False)
     extra_spring: AbstractDamper | None = None
     bump_stop: AbstractDamper | None = None
@@ -76,7 +78,7 @@ class IndependentTandem(AbstractPart):
     """
 
     axle: Corner
-    spread: Number = parameter("m", "distance between the two axles", positive)
+    spread: Number = parameter("m", "distance between the two axles", positive, adjustable=False)
 
     def parts(self, body: Body, ahead: Any, behind: Any) -> Parts:
         """The axles about a point `ahead` of the centre of gravity, `behind` the front axle [m]."""

@@ -38,10 +38,14 @@ class TandemTruck(AbstractVehicle):
     ('z_sprung', 'pitch', 'z_front_unsprung', 'z_beam', 'beam_pitch')
     """
 
-    sprung_mass: Number = parameter("kg", "sprung mass", positive)
-    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the sprung mass in pitch", positive)
-    front_distance: Number = parameter("m", "front axle ahead of the centre of gravity", positive)
-    tandem_distance: Number = parameter("m", "middle of the tandem behind the centre of gravity", positive)
+    sprung_mass: Number = parameter("kg", "sprung mass", positive, adjustable=False)
+    pitch_inertia: Number = parameter(
+        "kg m²", "moment of inertia of the sprung mass in pitch", positive, adjustable=False
+    )
+    front_distance: Number = parameter("m", "front axle ahead of the centre of gravity", positive, adjustable=False)
+    tandem_distance: Number = parameter(
+        "m", "middle of the tandem behind the centre of gravity", positive, adjustable=False
+    )
     front: Corner
     tandem: WalkingBeam | IndependentTandem
     cab: Cab | None = None

@@ -66,9 +66,11 @@ class TrackedHull(AbstractVehicle):
     (6.86, 15.13)
     """
 
-    sprung_mass: Number = parameter("kg", "mass of the hull", positive)
-    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the hull in pitch", positive)
-    wheel_positions: Vector = parameter("m", "road wheels ahead of the centre of gravity, first to last")
+    sprung_mass: Number = parameter("kg", "mass of the hull", positive, adjustable=False)
+    pitch_inertia: Number = parameter("kg m²", "moment of inertia of the hull in pitch", positive, adjustable=False)
+    wheel_positions: Vector = parameter(
+        "m", "road wheels ahead of the centre of gravity, first to last", adjustable=False
+    )
     wheel_rate: Number = parameter("N/m", "spring rate of one road wheel", positive)
     damper: AbstractDamper
     damped: tuple[int, ...] = eqx.field(static=True)

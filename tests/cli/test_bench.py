@@ -42,10 +42,10 @@ def test_bench_prints_and_writes_preflight_evaluation_and_limits(folder: Path, t
     words = ["--limits", limits, "--baseline", tmp_path / "softer.json", "--cycles", "last:4"]
     text = jaxdamp("bench", folder, *words, "--out", out, code=1).output
     flat = " ".join(text.split())
+    assert "rest before" not in flat  # it is cut off
     for said in (
         "2 errors",
         "error, force clipped: clipped",
-        "rest before",
         "rest cut off",
         "Limits: not all passed",
         "Forces beside the baseline",
@@ -67,15 +67,36 @@ def test_bench_prints_and_writes_preflight_evaluation_and_limits(folder: Path, t
     assert change == pytest.approx(100.0, abs=2.0)
 
 
-def test_fit_leaves_out_records_with_an_error(folder: Path, tmp_path: Path) -> None:
-    text = " ".join(jaxdamp("fit", folder, "--law", "bilinear", "--out", tmp_path / "out").output.split())
-    assert "error, force clipped: clipped" in text and "left out, with an error: clipped" in text
+def test_fit_refuses_records_with_an_error_or_leaves_them_out(folder: Path, tmp_path: Path) -> None:
+    said = refused(tmp_path, "fit", folder, "--law", "bilinear", "--out", tmp_path / "none")
+    assert "clipped: the force is clipped" in said and "With --skip-bad" in said and not (tmp_path / "none").exists()
+    text = jaxdamp("fit", folder, "--skip-bad", "--law", "bilinear", "--out", tmp_path / "out").output
+    text = " ".join(text.split())
+    assert "error, force clipped" in text and "left out, with an error: clipped" in text
     assert "note, run-up" not in text
     assert [row["record"] for row in rows(tmp_path / "out/tables/records.csv")] == ["10mm_1Hz", "10mm_2Hz", "10mm_4Hz"]
     assert rows(tmp_path / "out/tables/preflight.csv")[0]["finding"] == "force clipped"
     assert "force clipped" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
     only = refused(tmp_path, "fit", folder / "clipped.csv", "--law", "linear", "--out", tmp_path / "none")
     assert "the force is clipped at -150 N" in only
+
+
+def test_settings_in_names_are_not_pooled(tmp_path: Path) -> None:
+    """Two settings in the names of four records: a column each, the last word of the name as its heading."""
+    runs = []
+    for name, rate in (("0A", 1000.0), ("0.5A", 3000.0)):
+        tests = [SineTest(0.01, f, cycles=5, name=f"10mm_{f:g}Hz_{name}") for f in (1.0, 2.0)]
+        runs += VirtualDyno(Bilinear(rate, 0.5 * rate), sampling_rate=500.0, force_noise=2.0).run(tests)
+    BenchSet(runs).write(tmp_path / "records")
+    text = jaxdamp("bench", tmp_path / "records", "--velocities", "0.1", "--out", tmp_path / "out").output
+    assert "they are taken as settings 0A, 0.5A, by a word of their names" in " ".join(text.split())
+    (header, *_) = (tmp_path / "out" / "tables" / "velocities.csv").read_text().splitlines()
+    assert header == "quantity,unit,0A,0.5A,change [%]"
+    for number, run in enumerate(runs):
+        run.to_csv(tmp_path / f"{'abcd'[number]}.csv")
+    other = [tmp_path / f"{letter}.csv" for letter in "abcd"]
+    flat = " ".join(jaxdamp("bench", *other, "--out", tmp_path / "other").output.split())
+    assert "they are not pooled but stand one by one" in flat
 
 
 def test_settings_stated_on_the_command_line(folder: Path, tmp_path: Path) -> None:

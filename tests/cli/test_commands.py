@@ -72,7 +72,8 @@ def test_fit_writes_laws_that_load_again(records: Path, tmp_path: Path) -> None:
     assert isinstance(law, Bilinear)
     assert (float(law.rebound_rate), float(law.compression_rate)) == pytest.approx((2600.0, 1200.0), rel=2e-3)
     assert from_json(out / "laws" / "bilinear.json") == law
-    for said in ("Records", "stroke from 'stroke [m]'", "RMSE [N]", "linear", "Smallest error", "Written to"):
+    assert text.index("Recommended: bilinear") < text.index("Laws (shape") < text.index("Written to")
+    for said in ("Records", "stroke from 'stroke [m]'", "RMSE [N]", "linear", "Recommended: bilinear", "Written to"):
         assert said in text
 
 
@@ -123,7 +124,7 @@ def test_what_the_machine_adds_is_fitted_and_shown(records: Path, tmp_path: Path
 def test_one_law_is_fitted_without_a_ladder(records: Path, tmp_path: Path) -> None:
     text = " ".join(jaxdamp("fit", records, "--law", "linear", "--out", tmp_path / "fit").output.split())
     assert "Fitting 1 law to 3 records" in text
-    assert "linear, RMSE" in text and "law of velocity alone" in text
+    assert "Error of linear, held-out fit" in text and "law of velocity alone" in text
     assert not (tmp_path / "fit" / "ladder.png").exists()
 
 

@@ -50,10 +50,10 @@ def test_the_demo_goes_through_the_whole_chain(tmp_path: Path, capsys: pytest.Ca
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.count("data:image/png") == 9
     verdict = page.partition('<div class="verdict">')[2].partition("</div>")[0]
-    assert "standard errors off" in verdict and "fresh roads the body shakes less" in verdict
+    assert "standard errors off" in verdict and "on 2 fresh roads" in verdict
     for said in (
         "standard errors off",
-        "of 2 fresh roads",
+        "on 2 fresh roads",
         "all coefficients lie inside their bounds",
         "Tuning for comfort: done",
         "Times",

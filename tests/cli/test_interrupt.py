@@ -16,8 +16,8 @@ LIMIT = 300  # s, for a process that hangs
 AS_FROM_A_TERMINAL = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
 
 
-def _interrupted(words: Sequence[str | Path], *marks: str) -> tuple[int, str]:
-    """Exit code and output of a Python program that gets Ctrl-C as soon as each of the marks was printed."""
+def _interrupted(words: Sequence[str | Path], *marks: str, number: signal.Signals = signal.SIGINT) -> tuple[int, str]:
+    """Exit code and output of a Python program that gets a signal as soon as each of the marks was printed."""
     program, *arguments = map(str, words)
     process = subprocess.Popen(
         [sys.executable, "-u", "-c", AS_FROM_A_TERMINAL + program, *arguments],
@@ -32,7 +32,7 @@ def _interrupted(words: Sequence[str | Path], *marks: str) -> tuple[int, str]:
             output += line
             if mark in line:
                 break
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
     rest, _ = process.communicate(timeout=LIMIT)
     output += rest
     assert "Traceback" not in output, output
@@ -55,7 +55,7 @@ def _script(folder: Path, body: str) -> list[str]:
                     work(results)
             except interrupt.Interrupted as stop:
                 print(stop)
-                sys.exit(interrupt.EXIT_CODE)
+                sys.exit(interrupt.exit_code())
     """
     body = textwrap.indent(textwrap.dedent(body), "    ").strip()
     return [textwrap.dedent(text).format(body="    " + body, folder=str(folder))]
@@ -75,10 +75,11 @@ FINISHED = """
 """
 
 
-def test_what_is_finished_is_kept_and_the_work_stops_at_the_next_check(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_is_finished_is_kept_and_the_work_stops_at_the_next_check(tmp_path: Path, number: signal.Signals) -> None:
     wait = "    while True:\n        interrupt.check()\n        time.sleep(0.01)\n"
-    code, output = _interrupted(_script(tmp_path / "out", FINISHED + wait), "ready")
-    assert code == 130 and "Stopping as soon as this computation is done" in output
+    code, output = _interrupted(_script(tmp_path / "out", FINISHED + wait), "ready", number=number)
+    assert code == 128 + number and "Stopping as soon as this computation is done" in output
     assert "holds what was finished: law.json. Not written: the pictures" in output
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["UNFINISHED.txt", "law.json", "manifest.json"]
 

@@ -154,6 +154,119 @@ def test_a_manifest_cannot_point_outside_the_folder(tmp_path: Path) -> None:
     _write(target, "a.txt")
     (tmp_path / "precious.txt").write_text("mine")
     files = ["../precious.txt", str(tmp_path / "precious.txt"), "a.txt"]
-    (target / "manifest.json").write_text(json.dumps({"format": "jaxdamp results", "files": files}))
+    (target / "manifest.json").write_text(json.dumps({"format": "jaxdamp results", "command": "test", "files": files}))
     _write(target, "b.txt", replace=True)
     assert (tmp_path / "precious.txt").exists() and not (target / "a.txt").exists()
+
+
+def _texts(folder: Path) -> dict[str, str]:
+    return {file.relative_to(folder).as_posix(): file.read_text() for file in folder.rglob("*") if file.is_file()}
+
+
+def test_the_results_before_are_kept(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    for run in ("one", "two", "three"):
+        with results_folder(target, "test", replace=True) as results:
+            for name in ("law.json", f"{run}/table.csv"):
+                (results.draft / name).parent.mkdir(exist_ok=True)
+                (results.draft / name).write_text(run)
+    texts = {name: text for name, text in _texts(target).items() if not name.endswith("manifest.json")}
+    assert texts == {
+        "law.json": "three",
+        "three/table.csv": "three",
+        ".previous/law.json": "two",
+        ".previous/two/table.csv": "two",
+    }
+
+
+def test_results_of_another_command_are_never_replaced(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    _write(target, "best_law.json", "laws/linear.json")
+    with (
+        pytest.raises(ValueError, match="results of jaxdamp test, which jaxdamp ride does not replace"),
+        results_folder(target, "ride", replace=True),
+    ):
+        pass
+    assert written(target) == ["best_law.json", "laws/linear.json", "manifest.json"]
+
+
+def test_a_link_in_the_folder_leads_nowhere_else(tmp_path: Path) -> None:
+    target, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    _write(target, "a.txt", "laws/b.txt")
+    (target / "laws").rename(elsewhere)
+    (target / "laws").symlink_to(elsewhere)
+    (elsewhere / "mine.txt").write_text("mine")
+    _write(target, "c.txt", replace=True)
+    assert written(elsewhere) == ["b.txt", "mine.txt"]
+
+
+def test_a_file_that_was_changed_stays(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    _write(target, "law.json", "table.csv")
+    (target / "law.json").write_text("corrected by hand")
+    (target / "table.csv").write_text("too")
+    _write(target, "law.json", replace=True)
+    assert (target / "table.csv").read_text() == "too"
+    _write(target, "law.json", replace=True)
+    assert "law.json" in _texts(target).values()
+
+
+@pytest.mark.parametrize("staged", [False, True])
+def test_a_sudden_end_while_files_are_moved_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, staged: bool
+) -> None:
+    """Whenever it comes: all old files are somewhere, and none stands beside a new one unless a note says so."""
+
+    class Killed(BaseException):
+        pass
+
+    replace, ended, steps = os.replace, False, 0
+    while not ended:
+        target = tmp_path / str(steps) / "out"
+        with results_folder(target, "test") as results:
+            for name in ("law.json", "report.html"):
+                (results.draft / name).write_text(f"old {name}")
+        left = steps
+
+        def interrupted(source: Path, place: Path) -> None:
+            nonlocal left
+            if left == 0:
+                raise Killed
+            left -= 1
+            replace(source, place)
+
+        monkeypatch.setattr(os, "replace", interrupted)
+        ended = True
+        try:
+            with results_folder(target, "test", replace=True) as results:
+                (results.draft / "law.json").write_text("new law.json")
+                if staged:
+                    results.publish("the report")
+                (results.draft / "report.html").write_text("new report.html")
+        except Killed:
+            ended = False
+        monkeypatch.setattr(os, "replace", replace)
+        texts = _texts(target)
+        assert {"old law.json", "old report.html"} <= set(texts.values())
+        ages = {text[:3] for name, text in texts.items() if name in ("law.json", "report.html")}
+        assert ended or ages <= {"old"} or "UNFINISHED.txt" in texts
+        with results_folder(target, "test", replace=True) as results:
+            (results.draft / "law.json").write_text("new law.json")
+        assert written(target) == ["law.json", "manifest.json"]
+        steps += 1
+    assert steps > 5
+
+
+def test_a_second_writer_is_refused(tmp_path: Path) -> None:
+    with (
+        results_folder(tmp_path / "out", "test"),
+        pytest.raises(ValueError, match="Another command is writing"),
+        results_folder(tmp_path / "out", "test"),
+    ):
+        pass
+
+
+def test_what_a_killed_run_left_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / ".out.x1.draft").mkdir()
+    _write(tmp_path / "out", "a.txt")
+    assert ".out.x1.draft' was left by a run that was killed" in capsys.readouterr().err

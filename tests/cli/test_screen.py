@@ -65,3 +65,11 @@ def test_brackets_are_not_taken_for_markup() -> None:
     file = screen.console.file
     assert isinstance(file, io.StringIO)
     assert all(text in file.getvalue() for text in ("Title [m]", "velocity [m/s]", "[red]", "[bold]"))
+
+
+def test_names_out_of_files_do_not_command_the_terminal() -> None:
+    screen, out = Screen(), io.StringIO()
+    screen.console = Console(file=out, force_terminal=True, width=100)
+    screen.say("record \x1b[2J\x9b31m of 3\u00a0Hz")
+    screen.points(["\x1b]0;title\x07"])
+    assert "record \\x1b[2J\\x9b31m of 3\u00a0Hz" in out.getvalue() and "\x1b]0" not in out.getvalue()

@@ -110,7 +110,7 @@ WRONG = [
     (["ride", "LAW", "--baseline", "CSV"], "Option --baseline must be a law as JSON, but is {CSV}"),
     (["tune", "quarter_car_000", "white:C", "--start", "CSV"], "`jaxdamp fit` writes best_law.json"),
     (["tune", "quarter_car_000", "white:C", "--start", "CAR"], "Option --start must be a law as JSON, but is a Quart"),
-    (["tune", "quarter_car_000", "white:C", "--baseline", "CSV"], "Option --baseline must be a law or a QuarterCar as"),
+    (["tune", "quarter_car_000", "white:C", "--baseline", "CSV"], "Option --baseline must be a law or a vehicle as"),
     (["export", "CSV", "--to", "c"], "LAW must be a law or a vehicle as JSON, but is {CSV}"),
     (["tune", "LAW", "white:C"], "VEHICLE must be a vehicle as JSON, but is a Linear"),
     (["tune", "BAD", "white:C"], "VEHICLE must be TOML, but is {BAD}"),

@@ -21,6 +21,8 @@ from jaxdamp.simulation.exponential import ExponentialStepper
 from jaxdamp.simulation.observer import MetricObserver
 
 
+pytestmark = pytest.mark.users_flags
+
 STEP, COUNT = 1e-3, 150
 VALVE = Besinger(1600.0, 4200.0, 900.0, limit_velocity=0.13, transition_velocity=0.05)
 QUARTER = vehicles.presets.quarter_car_000

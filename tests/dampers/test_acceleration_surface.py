@@ -98,7 +98,7 @@ def test_follows_loops_that_a_surface_over_the_stroke_cannot(lagging, moving):
     assert moving.rmse < 0.5 * still.rmse
     assert moving.score(others)[1] < 0.45 * still.score(others)[1]
     loops = [r for r in runs if r.name == "4mm_12Hz"]
-    (force,) = moving.predict(loops)
+    (force,) = moving.respond(loops)
     measured = loops[0].force
     np.testing.assert_allclose(np.mean(force * loops[0].velocity), np.mean(measured * loops[0].velocity), rtol=0.05)
 

@@ -56,6 +56,9 @@ from jaxdamp.testing import CHECKS, check_alike_ports, check_inside_wrappers, ch
 from jaxdamp.testing.places import SLOTS
 
 
+pytestmark = pytest.mark.users_flags
+
+
 def degressive(knee_width=1e-3, offset=0.0):
     return PowerLaw(1800.0, 0.4, 900.0, 0.5, offset, 0.7 * offset, knee_width=knee_width)
 
@@ -158,6 +161,9 @@ LAWS = {
     "hybrid": lambda: Hybrid(PiecewiseLinear([-0.1, 0.1], [700.0, 2000.0, 900.0], 0.02), network(1)),
     "spring": lambda: Linear(900.0) + Spring(2000.0),
     "scheduled": lambda: Scheduled((BoucWen(400.0, 0.0, 50.0, 1e-3), BoucWen(900.0, 0.0, 600.0, 2e-3)), [0, 2], 0.7),
+    "schedule of forces": lambda: Scheduled(
+        (Linear(900.0), BoucWen(900.0, 0.0, 600.0, 2e-3)), [0, 2], 0.7, blend="force"
+    ),
     "lag of a schedule": lambda: Lag(Scheduled((slopes(0.02), slopes(0.02)), [0, 1], 0.3), 0.003),
     "spline table": lambda: SplineTable(
         [-1.1, -0.4, -0.1, 0.0, 0.05, 0.3, 1.0], [-1400.0, -1350.0, -450.0, 0.0, 300.0, 1500.0, 2900.0]

@@ -144,7 +144,7 @@ def test_a_gradient_does_not_notice_a_range():
     gradient = eqx.filter_grad(lambda law: law.force_velocity(0.3) ** 2)
     plain, ranged = gradient(law), gradient(with_fitted_range(law, SLOW))
     assert eqx.tree_equal(without_fitted_ranges(ranged), plain)
-    assert not np.any(ranged.fitted_to.limits)
+    assert jax.tree.structure(ranged) == jax.tree.structure(plain)
 
 
 def test_laws_made_and_mapped_by_vmap_keep_a_range():
@@ -155,7 +155,46 @@ def test_laws_made_and_mapped_by_vmap_keep_a_range():
     assert jax.tree.map(lambda leaf: leaf[1], many).fitted_to.velocity == (-0.1, 0.2)
 
 
-def test_another_range_compiles_nothing_anew():
+@pytest.mark.parametrize("law", LAWS, ids=name)
+def test_a_law_with_a_range_and_one_without_have_one_structure(law):
+    fitted = with_fitted_range(law, SLOW)
+    assert jax.tree.structure(fitted) == jax.tree.structure(law)
+    assert hash(jax.tree.structure(fitted)) == hash(jax.tree.structure(law))
+    assert [leaf.shape for leaf in jax.tree.leaves(fitted)] == [leaf.shape for leaf in jax.tree.leaves(law)]
+    assert eqx.tree_equal(jax.tree.map(lambda one, other: 0.5 * (one + other), law, fitted), law)
+    # as every `jax.tree.map`, it returns the structure of the first
+    assert jax.tree.map(lambda one, other: one, fitted, law).fitted_to == SLOW
+    assert jax.tree.map(lambda one, other: one, law, fitted).fitted_to is None
+
+
+def twice(law):
+    return jax.tree.map(lambda leaf: 2.0 * leaf, law)
+
+
+@pytest.mark.parametrize(
+    "compiled",
+    [
+        jax.jit(twice),
+        eqx.filter_jit(twice),
+        jax.jit(jax.vmap(twice, axis_size=3, in_axes=None, out_axes=None)),
+        lambda law: jax.lax.cond(True, twice, lambda law: law, law),
+        lambda law: jax.lax.scan(lambda law, _: (twice(law), None), law, None, length=1)[0],
+        jax.jit(lambda law: jax.tree.map(lambda leaf: leaf, with_fitted_range(law, SLOW))),
+    ],
+    ids=["jit", "filter_jit", "vmap", "cond", "scan", "set inside"],
+)
+def test_the_range_of_one_law_never_appears_on_another_that_runs_the_same_program(compiled):
+    laws = [with_fitted_range(Linear(1.0), SLOW), with_fitted_range(Linear(2.0), FAST), Linear(3.0)]
+    rates = []
+    for law, covered in zip(laws, (SLOW, FAST, None), strict=True):
+        result = compiled(law)
+        rates.append(float(result.rate))
+        assert result.fitted_to is None and law.fitted_to == covered
+        assert jax.vmap(twice, axis_size=3, in_axes=None)(law).fitted_to == covered  # each call is a trace of its own
+    assert rates in ([1.0, 2.0, 3.0], [2.0, 4.0, 6.0])
+
+
+def test_another_range_and_none_compile_nothing_anew():
     traced = []
 
     @eqx.filter_jit
@@ -163,8 +202,9 @@ def test_another_range_compiles_nothing_anew():
         traced.append(law)
         return law.force_velocity(0.1)
 
-    forces = [force(with_fitted_range(Linear(1500.0), covered)) for covered in (SLOW, FAST)]
-    assert len(traced) == 1 and forces[0] == forces[1]
+    laws = [with_fitted_range(Linear(1500.0), covered) for covered in (SLOW, FAST)]
+    forces = [force(law) for law in [*laws, Linear(1500.0)]]
+    assert len(traced) == 1 and len(set(map(float, forces))) == 1
 
 
 def test_alike_ports_are_one_batch_whatever_their_ranges():

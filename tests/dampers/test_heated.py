@@ -31,7 +31,7 @@ def test_a_damper_that_loses_a_twentieth_of_its_force_within_a_record_is_fitted_
     for name, law, freeze in (("cold", start.law, []), ("heated", start, ["initial_rise"])):
         result = fit(law, run, rig=Rig(gas_force=-50.0), freeze=freeze, samples_per_cycle=40, starts=1)
         late = run.time > run.time[-1] - 5.0
-        whole[name] = fit_percent([run.force[late]], [np.asarray(result.predict([run])[0])[late]])
+        whole[name] = fit_percent([run.force[late]], [np.asarray(result.respond(run))[late]])
     assert whole["heated"] > 98.0 > whole["cold"]
 
 

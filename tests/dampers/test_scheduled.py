@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxdamp import identify, respond
+from jaxdamp import export, identify, respond
 from jaxdamp.bench import BenchRun, BenchSet, SineTest, VirtualDyno, read
 from jaxdamp.dampers import (
     Bilinear,
@@ -50,6 +50,19 @@ def test_a_table_over_velocity_and_command_interpolates_the_force():
     np.testing.assert_allclose(law.force(0.0, 0.2, law.initial_state()), 0.75 * 300.0 + 0.25 * 1500.0)
 
 
+def test_blended_forces_are_the_weighted_sum_of_laws_with_their_own_states():
+    # other numbers of equal meaning in other places, and laws of other structure
+    laws = (bouc_wen(0.0), Lag(Linear(900.0), 0.01), bouc_wen(2.0))
+    law = Scheduled(laws, [0.0, 1.0, 2.0], 0.25, blend="force")
+    own = [np.asarray(respond(inner, *motion())) for inner in laws]
+    for command, weights in ((0.25, (0.75, 0.25, 0.0)), (1.0, (0.0, 1.0, 0.0)), (1.5, (0.0, 0.5, 0.5))):
+        expected = sum(w * force for w, force in zip(weights, own, strict=True))
+        found = respond(with_command(law, command), *motion())
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-8)
+    again = export.from_json(export.to_json(law))
+    assert jax.tree.structure(again) == jax.tree.structure(law) and repr(law).endswith("blend='force')")
+
+
 def test_the_command_reaches_laws_inside_others():
     law = Lag(2.0 * Scheduled((Linear(1000.0), Linear(3000.0)), [0.0, 1.0], 0.0), 0.002)
     assert takes_command(law) and takes_command(ModifiedBoucWen.prototype()) and not takes_command(Linear(1.0))
@@ -73,6 +86,8 @@ def test_refusals():
         with_command(Lag(Scheduled((Linear(1.0), Linear(2.0)), [0.0, 1.0], 0.0), 0.01), -0.1)
     with pytest.raises(ValueError, match="`laws` must be of equal structure"):
         Scheduled((Linear(1.0), Bilinear(2.0, 1.0)), [0.0, 1.0], 0.0)
+    with pytest.raises(ValueError, match="`blend` must be one of"):
+        Scheduled((Linear(1.0), Linear(2.0)), [0.0, 1.0], 0.0, blend="forces")
     with pytest.raises(ValueError, match="`laws` must contain two or more laws"):
         Scheduled((Linear(1.0), Linear(2.0)), [0.0, 0.5, 1.0], 0.0)
     with pytest.raises(ValueError, match="`law` must take a command"):

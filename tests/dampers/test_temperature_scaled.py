@@ -89,7 +89,7 @@ def test_fits_take_the_temperature_channel_of_the_records(inner, freeze):
     found = [result[name].value for name in ("rebound_rate", "compression_rate", "sensitivity")]
     np.testing.assert_allclose(found, [2600.0, 1200.0, 0.003], rtol=3e-3)
     later = records(1)[1]
-    np.testing.assert_allclose(result.predict([later])[0][200:-200], later.force[200:-200], atol=20.0)
+    np.testing.assert_allclose(result.respond(later)[200:-200], later.force[200:-200], atol=20.0)
 
 
 def test_records_of_which_some_lack_the_channel_are_refused_by_name():

@@ -160,7 +160,8 @@ def test_co_simulation_in_the_master_of_fmpy(files, name, rates):
         response = expected(name, step)
         errors.append([worst(done[channel][3:], np.asarray(response[channel])[3:]) for channel in shown(name)])
     one, two, three = np.array(errors)
-    assert np.all(three < 0.05) and np.all(two < 0.65 * one + 1e-6) and np.all(three < 0.16 * one + 1e-6), errors
+    first = 0.65 if name in ("half", "truck") else 0.4  # the longest step is coarse for their friction
+    assert np.all(three < 0.05) and np.all(two < first * one + 1e-6) and np.all(three < 0.4 * two + 1e-6), errors
 
 
 @pytest.mark.slow

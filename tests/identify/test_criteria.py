@@ -24,7 +24,7 @@ def spiky(sines) -> list[BenchRun]:
 
 @pytest.mark.parametrize("loss", ["huber", "soft_l1", "student_t"])
 def test_spikes_hardly_move_a_robust_fit(spiky, loss):
-    squares, robust = fit(Bilinear, spiky), fit(Bilinear, spiky, loss=loss)
+    squares, robust = fit(Bilinear, spiky, bad_records="keep"), fit(Bilinear, spiky, loss=loss)
     away = [abs(r["rebound_rate"].value - 2600.0) for r in (squares, robust)]
     assert away[1] < 3.0 * robust["rebound_rate"].standard_error < 0.25 * squares["rebound_rate"].standard_error
     assert away[1] < 0.2 * away[0]

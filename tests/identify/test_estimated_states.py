@@ -56,7 +56,7 @@ def test_a_new_record_begins_with_the_mean_force_of_its_first_second_of_rest(res
     left_out = runs[2]
     window = round(REST_WINDOW * left_out.sampling_rate)
     changed = dataclasses.replace(left_out, force=np.where(np.arange(len(left_out)) < window, left_out.force, 7e3))
-    first, other = (result.predict([run])[0] for run in (left_out, changed))
+    first, other = (result.respond(run) for run in (left_out, changed))
     np.testing.assert_array_equal(first, other)
     assert np.abs(first - left_out.force).max() < 5.0
     first_second = dataclasses.replace(left_out, force=left_out.force + 1e-3 * np.r_[[1, -1] * 100, [0] * 700])

@@ -89,6 +89,11 @@ def test_shared_parameters_follow_the_setting(clicks):
     apart = fit_many(Bilinear, some, rig="gas", settings=settings)
     assert np.all(many.standard_errors[:, 1] < 0.6 * apart.standard_errors[:, 1])
     assert float(get(apart.law_at(4.0), "rebound_rate")) == pytest.approx(np.mean(apart.values[[1, 2], 0]))
+    blended = apart.law_at(3.0, blend="force")  # between the dampers of 2 and 6 clicks
+    ends = [float(law.force(0.0, 0.2, law.initial_state())) for law in (apart.laws[1], apart.laws[2])]
+    assert float(blended.force(0.0, 0.2, blended.initial_state())) == pytest.approx(0.75 * ends[0] + 0.25 * ends[1])
+    unsure = dataclasses.replace(apart, standard_errors=apart.values * 0.6)
+    assert isinstance(unsure.law_at(3.0), Scheduled) and isinstance(unsure.law_at(2.0), Bilinear)
     with pytest.raises(ValueError, match="`setting` must be from 0 to 10"):
         many.law_at(11.0)
 

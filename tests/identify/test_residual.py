@@ -56,10 +56,11 @@ def test_the_verdict_names_the_law_that_has_what_the_static_one_lacks() -> None:
     runs = tuple(_runs(Lag(Linear(2000.0), 0.008), 5.0))
     starts = {"linear": Linear, "lagging": Lag(Linear(1800.0), 0.005)}
     comparison = identify.compare(starts, runs[:2], held_out=runs[2:])
-    first, second, third = comparison.verdict
+    first, why, second, third = comparison.verdict
     largest = float(np.abs(runs[2].force).max())
-    assert first.startswith("Smallest error on the held-out records: lagging, RMSE 4.9 N, ")
-    assert f"of their largest force of {largest:.0f} N" in first
+    assert first.startswith("Recommended: lagging, held-out fit 99.") and "RMSE 4.9 N" in first
+    assert why.startswith("No other law predicts as well: the next error is ")
+    assert f"of the largest force of {largest:.0f} N" in first
     assert second.startswith("The best law of velocity alone is linear: ") and "is hysteresis" in second
     rungs = {rung.name: rung for rung in comparison.rungs}
     assert third == f"lagging has a {rungs['linear'].error / rungs['lagging'].error:.1f} times smaller error."

@@ -8,7 +8,17 @@ import pytest
 
 from jaxdamp import identify
 from jaxdamp.bench import BenchRun, BenchSet, SineTest, VirtualDyno
-from jaxdamp.dampers import AbstractDamper, Besinger, Bilinear, CoulombFriction, Linear, SeriesSpring, Spring
+from jaxdamp.dampers import (
+    AbstractDamper,
+    Besinger,
+    Bilinear,
+    BoucWen,
+    CoulombFriction,
+    Linear,
+    SeriesSpring,
+    Spring,
+    Table,
+)
 from jaxdamp.export import from_json, to_json
 from jaxdamp.rig import Rig
 
@@ -64,7 +74,7 @@ def test_a_fit_without_the_machine_is_wrong_and_says_so(result):
 
 def test_predictions_are_those_of_the_machine(result):
     new = VirtualDyno(LAW, rig=RIG, sampling_rate=500.0).run(SineTest(0.015, 3.0))[0]
-    (force,) = result.predict(new)
+    force = result.respond(new)
     used = slice(len(new) // 6, -3)
     np.testing.assert_allclose(force[used], new.force[used], atol=4.0)  # of 730 N
     np.testing.assert_allclose(result.score([new])[1], np.std(force[used] - new.force[used]), rtol=0.5)
@@ -132,10 +142,31 @@ def test_a_bare_law_in_a_comparison_is_fitted_beside_an_offset():
     rate = found["besinger"]["rebound_rate"]
     assert rate.name == "law.rebound_rate" and rate.value == pytest.approx(float(damper.rebound_rate), rel=0.05)
     assert found["besinger"]["force_offset"].value == pytest.approx(-230.0, abs=3.0)
-    assert found["spring"].rig is None  # its preload is an offset
+    # the preload of a spring is a static force too: it is the machine's, as beside every law
+    assert found["spring"]["force_offset"].value < -100.0 and float(found["spring"].law.terms[1].preload) == 0.0
+    assert any("The static force of -1" in warning for warning in found["spring"].warnings)
     without = identify.fit(Besinger, runs)
     assert abs(without["rebound_rate"].value - rate.value) > 0.5 * rate.value
     assert any("look like a constant force of -" in warning for warning in without.warnings)
+
+
+def test_every_law_is_without_the_static_force_that_the_machine_has():
+    runs = records(Linear(1800.0), Rig(gas_force=-90.0), tests=[SineTest(0.01, 1.0, cycles=3)], rate=250.0)
+    starts = {"table": Table, "bouc_wen": BoucWen, "sum": Bilinear(2000.0, 1000.0) + Spring(1000.0)}
+    for name, start in starts.items():
+        found = identify.fit(start, runs, rig="offset", starts=1)
+        static = float(found.rig.force_offset)
+        assert static == pytest.approx(-90.0, abs=15.0), name
+        assert abs(float(found.law.force(0.0, 0.0, found.law.initial_state()))) < 2.0, name
+        assert found.fit_percent == pytest.approx(found.score(runs)[0])  # the machine adds it again
+        assert any(f"The static force of {static:.0f} N is gas force or zero error" in said for said in found.warnings)
+    # what the call gives a value keeps it
+    stated = identify.fit(Bilinear(2000.0, 1000.0) + Spring(1000.0, -50.0), runs, rig="offset")
+    assert stated.rig is None and stated["preload"].value == pytest.approx(-90.0, abs=15.0)
+    named = identify.fit(
+        Bilinear(2000.0, 1000.0) + Spring(1000.0), runs, rig="offset", bounds={"preload": (-99.0, 9.0)}
+    )
+    assert named.rig is None and named["preload"].value == pytest.approx(-90.0, abs=15.0)
 
 
 def test_names_of_effects_get_their_starts_from_the_records():

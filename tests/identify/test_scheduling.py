@@ -7,8 +7,9 @@ import pytest
 
 from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
-from jaxdamp.dampers import Bilinear, ModifiedBoucWen, Scheduled, with_command
-from jaxdamp.identify.verdict import cannot_choose, not_worse
+from jaxdamp.dampers import Bilinear, Linear, ModifiedBoucWen, Scaled, Scheduled, with_command
+from jaxdamp.identify.recommending import not_worse
+from jaxdamp.identify.verdict import cannot_choose
 from jaxdamp.parameters import get
 
 
@@ -31,7 +32,9 @@ def test_a_setting_between_others_is_predicted_without_its_records(runs):
     assert float(law.force(0.0, 1.0, law.initial_state())) == pytest.approx(1500.0, rel=0.01)
     assert (left.fit_percent, left.rmse) == left.result.score(left.runs)[:2]
     assert 1.0 <= left.rmse / left.own_rmse < 1.1
-    assert "interpolated to 1, whose records" in found.verdict[1]
+    assert found.choice.blend == found.law.blend == "parameters"  # both are as good, and this is one law
+    assert found.verdict[1].startswith("Parameters are interpolated") and found.verdict[1] == found.choice.reason
+    assert "interpolated to 1, whose records" in found.verdict[2]
     row = found.table().records()[1]
     assert row["setting"] == 1.0 and row["interpolated"] == pytest.approx(left.fit_percent)
     json.dumps(found.to_dict(), allow_nan=False)
@@ -40,6 +43,42 @@ def test_a_setting_between_others_is_predicted_without_its_records(runs):
         identify.fit_scheduled(Bilinear, [dataclasses.replace(runs[0], command=None), *runs[1:]])
     with pytest.raises(ValueError, match="two commands or more"):
         identify.fit_scheduled(Bilinear, runs[:1])
+
+
+FACTORS = {0.0: 4.0, 1.0: 1.0, 2.0: 0.25}
+
+
+def of_arbitrary_numbers(runs):
+    """A start whose rate times factor is the damping: the rate means something else at every setting."""
+    factor = FACTORS[runs[0].command]
+    return Scaled(Linear(800.0 / factor), factor)
+
+
+@pytest.mark.parametrize("settings", [(0.0, 2.0), (0.0, 1.0, 2.0)])
+def test_forces_are_blended_where_the_numbers_of_the_settings_do_not_belong_together(runs, settings):
+    some = [run for run in runs if run.command in settings]
+    found = identify.fit_scheduled(of_arbitrary_numbers, some, freeze=["factor"])
+    assert found.choice.blend == found.law.blend == "force" and found.choice.reason in found.verdict
+    low, half, high = (with_command(found.law, u).force(0.0, 0.1, found.law.initial_state()) for u in (0.0, 0.5, 1.0))
+    assert float(half) == pytest.approx(0.5 * float(low + high))
+    # the forces at the settings are those of the common fit, whose evidence has the blended law too
+    with_parameters = identify.fit_scheduled(of_arbitrary_numbers, some, freeze=["factor"], blend="parameters")
+    assert found.result.fit_percent == pytest.approx(with_parameters.result.fit_percent, abs=1e-9)
+    at_half = found.result.propagate(lambda law: with_command(law, 0.5).force(0.0, 0.1, law.initial_state()))
+    assert float(at_half.value) == pytest.approx(float(half))
+    said = [warning for warning in with_parameters.result.warnings if "leaves the span" in warning]
+    assert len(said) == len(settings) - 1 and not any("leaves the span" in w for w in found.result.warnings)
+    if found.between:
+        assert found.between[0].fit_percent > 60.0 > with_parameters.between[0].fit_percent
+
+
+def test_laws_of_different_structure_are_blended(runs):
+    def start(runs):
+        return Linear(1000.0) if runs[0].command == 0.0 else Bilinear(1500.0, 600.0)
+
+    found = identify.fit_scheduled(start, [run for run in runs if run.command != 2.0])
+    assert found.law.blend == "force" and "different structures" in found.choice.reason
+    assert [type(law) for law in found.law.laws] == [Linear, Bilinear]
 
 
 @pytest.mark.slow
@@ -71,6 +110,5 @@ def test_laws_that_the_records_cannot_tell_apart_are_named():
 def test_a_comparison_says_that_its_records_cannot_choose(sines):
     runs = sines(Bilinear(2000.0, 1000.0), noise=20.0)
     laws = identify.default_ladder(runs, ["linear", "bilinear", "piecewise_linear"])
-    said = identify.compare(laws, runs).verdict[-1]
-    assert "cannot choose between" in said and "The simplest of them is bilinear, with 3 numbers" in said
-    assert "between linear" not in said and ", linear" not in said
+    said = identify.compare(laws, runs).verdict[1]
+    assert said.startswith("With 3 numbers it is the simplest of bilinear and piecewise_linear, which predict alike")

@@ -43,7 +43,7 @@ def test_training_keeps_ties(maxwell_runs):
     law = Lag(Bilinear(1500.0, 1500.0), 0.002)
     trained = train(law, maxwell_runs[0], held_out=maxwell_runs[1], steps=25, tie=BOTH)
     assert get(trained.law, "law.rebound_rate") == get(trained.law, "law.compression_rate") != 1500.0
-    assert trained.status is Status.ALL_STEPS and trained.predict(maxwell_runs[2])[0].shape == (1200,)
+    assert trained.status is Status.ALL_STEPS and trained.respond(maxwell_runs[2]).shape == (1200,)
 
 
 def test_a_tuning_moves_both_axles_together():

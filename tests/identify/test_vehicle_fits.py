@@ -61,10 +61,20 @@ def test_a_result_shows_itself(motions, record):
     assert "vehicle.damper.rate" in repr(motions) and "Channels" in str(motions.scores_table())
 
 
+def test_a_fitted_vehicle_predicts_a_record_that_it_was_not_fitted_to(motions, record):
+    rows = {score.channel: score.rmse for score in motions.scores}
+    assert {s.channel: s.rmse for s in motions.score(record)} == pytest.approx(rows, rel=1e-6)
+    how = {"sampling_rate": 250.0, "finer": 4, "sensors": SENSORS, "name": "new", "seed": 3}
+    new = identify.virtual_ride(CAR, SWEEP, NOISE, **how)
+    assert {s.channel: s.rmse for s in motions.score([new])} == pytest.approx(rows, rel=0.1)
+    with pytest.warns(DeprecationWarning, match="write `respond"):
+        np.testing.assert_array_equal(motions.predict()["sweep"]["stroke"], motions.respond(record)["stroke"])
+
+
 @pytest.mark.exhaustive
 def test_a_result_is_drawn_and_predicts_its_records(motions, record):
     assert len(motions.plot().axes) == 4
-    predicted = motions.predict()["sweep"]["stroke"]
+    predicted = motions.respond(record)["stroke"]
     assert np.std(predicted - record["stroke"]) == pytest.approx(2e-4, rel=0.05)
 
 

@@ -117,7 +117,7 @@ FRONT = {"front.damper.*": "rear.damper.*"}
 
 
 def test_a_group_of_tied_parameters_is_one_free_value():
-    free = free_parameters(half_car(), over=["damper*"], tie=FRONT)
+    free = free_parameters(half_car(), over=["damper.**"], tie=FRONT)
     assert free.names == ["rear.damper.rebound_rate", "rear.damper.compression_rate"]
     assert free.followers == [("front.damper.rebound_rate",), ("front.damper.compression_rate",)]
     for tree in (free.build(jnp.array([3000.0, 1000.0])), free.started_at(np.array([3000.0, 1000.0])).tree):
@@ -136,7 +136,7 @@ def test_the_derivative_of_a_group_is_the_sum():
 def test_over_freeze_and_bounds_of_one_hold_for_its_group():
     car = half_car()
     assert free_parameters(car, over=["front.damper.*"], tie=FRONT).names[0] == "rear.damper.rebound_rate"
-    frozen = free_parameters(car, over=["damper*"], freeze=["front.damper.rebound_rate"], tie=FRONT)
+    frozen = free_parameters(car, over=["damper.**"], freeze=["front.damper.rebound_rate"], tie=FRONT)
     assert frozen.names == ["rear.damper.compression_rate"] and len(frozen.ties) == 1
     bounded = free_parameters(car, over=["rebound_rate"], tie=FRONT, bounds={"front.*.rebound_rate": (1e3, 9e3)})
     assert bounded.limits() == (1e3, 9e3)

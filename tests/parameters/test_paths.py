@@ -17,6 +17,7 @@ from jaxdamp.parameters import (
     checked,
     get,
     match_paths,
+    matched_in_words,
     parameters,
     replace,
     with_values,
@@ -59,7 +60,11 @@ def test_get_follows_a_path():
         ("lag_time", ["lag_time"]),
         (["slopes", "knots"], PATHS[:2]),
         (["friction_*"], PATHS[2:4]),
-        (["law.terms.1.*"], PATHS[2:5]),
+        (["law.terms.1.*"], PATHS[4:5]),  # not those of the law inside: a `*` crosses no dot
+        (["law.terms.1.**"], PATHS[2:5]),
+        (["law.terms.*.law.*", "**.friction_force"], PATHS[2:4]),
+        (["terms.**.friction_force", "terms.1.**.factor"], [PATHS[2], PATHS[4]]),
+        (["law.**_force"], PATHS[2:3]),
         (["*"], PATHS),
         (["lag_time", "lag_time"], ["lag_time"]),
         ([], []),
@@ -74,6 +79,21 @@ def test_an_unknown_name_is_answered_with_the_nearest():
         match_paths(PATHS, ["lagtime"])
     with pytest.raises(ValueError, match=r"No parameter is named 'qqq': The parameters are law\.terms\.0\.knots, "):
         match_paths(PATHS, ["qqq"])
+
+
+def test_a_pattern_that_fits_nothing_is_answered_with_what_would():
+    with pytest.raises(
+        ValueError, match=r"named 'terms\.\*_force': a `\*` .* 'terms\.\*\*_force' would be law\.terms\.1"
+    ):
+        match_paths(PATHS, ["terms.*_force"])
+    with pytest.raises(ValueError, match=r"named 'lag_tme\*': the nearest are lag_time.* The parameters are"):
+        match_paths(PATHS, ["lag_tme*"])
+
+
+def test_what_patterns_stand_for_is_said():
+    words = matched_in_words(PATHS, freeze=["law.terms.1.*", "lag_time"], bounds={"friction_*": (0.0, 1.0)})
+    friction = "law.terms.1.law.friction_force, law.terms.1.law.friction_velocity"
+    assert words == f"freeze 'law.terms.1.*' = law.terms.1.factor; bounds 'friction_*' = {friction}"
 
 
 def test_replace():

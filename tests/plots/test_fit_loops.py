@@ -25,7 +25,7 @@ def test_lines_are_the_measured_and_the_fitted_last_steady_cycle(runs: BenchSet,
     figure = plots.fit_loops(result, run)
     loops, football, over_velocity, over_time = figure.axes
     part = last_steady_cycle(run)
-    fitted = result.predict(run)[0]
+    fitted = result.respond(run)
     measured_line, fitted_line = loops.get_lines()[:2]
     np.testing.assert_array_equal(measured_line.get_xydata(), np.stack([run.velocity[part], run.force[part]], axis=1))
     np.testing.assert_array_equal(fitted_line.get_xydata(), np.stack([run.velocity[part], fitted[part]], axis=1))
@@ -47,7 +47,7 @@ def test_the_residual_of_a_slow_record_is_drawn_in_means_over_the_cycle(comparis
         np.random.default_rng(0).normal(size=8000),
     )
     part, every = last_steady_cycle(slow), 6
-    residual = result.predict(slow)[0][part] - slow.force[part]
+    residual = result.respond(slow)[part] - slow.force[part]
     over_time = np.asarray(plots.fit_loops(result, slow).axes[3].get_lines()[0].get_ydata())
     assert len(over_time) == len(residual) // every
     assert over_time[5] == pytest.approx(residual[30:36].mean())

@@ -64,7 +64,7 @@ def test_a_page_on_fits(comparison: Comparison, tmp_path: Path) -> None:
         ">Records</h2>",
         "<li>positive stroke is rebound",
         ">How good the laws are",
-        ">The best law: bilinear",
+        ">The recommended law: bilinear",
         ">linear</h2>",
     ]
     places = [body.index(text) for text in order]
@@ -112,7 +112,7 @@ def test_a_page_on_the_whole_chain(comparison: Comparison, rides: dict[str, Resp
     sections = re.findall(r'<h2 id="\d+">(.*?)</h2>', html)
     assert sections == [
         *(("Records", "Preflight") if found.findings else ("Records",)),
-        *("Evaluation", "How good the laws are", "The best law: bilinear"),
+        *("Evaluation", "How good the laws are", "The recommended law: bilinear"),
         *("Ride: a bump", "A better damper", "linear"),
     ]
 

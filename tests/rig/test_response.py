@@ -1,3 +1,5 @@
+import warnings
+
 import diffrax
 import equinox as eqx
 import jax
@@ -8,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from jaxdamp import respond
 from jaxdamp.dampers import AbstractStateful, Bilinear, Dahl, Lag, Linear, PiecewiseLinear, SeriesSpring
-from jaxdamp.rig import quasi_static
+from jaxdamp.rig import StartsInMotionWarning, quasi_static
 from jaxdamp.simulation import Adaptive, Exponential
 
 
@@ -71,6 +73,53 @@ def test_substeps_change_nothing_without_states():
 def test_short_records(length):
     t, x, v = (a[:length] for a in sine(1e-3))
     assert respond(Lag(Linear(2000.0), 0.004), t, x, v, substeps=3).shape == (length,)
+
+
+HYSTERETIC = Lag(Bilinear(2600.0, 1200.0), 0.004) + Dahl(4e4, 40.0)
+
+
+def test_a_record_in_pieces_is_the_whole_record():
+    t, x, v = sine(1e-3)
+    whole, last = respond(HYSTERETIC, t, x, v, return_state=True)
+    first, state = respond(HYSTERETIC, t[:101], x[:101], v[:101], return_state=True)
+    second, end = respond(HYSTERETIC, t[100:], x[100:], v[100:], state=state, return_state=True)
+    size = np.max(np.abs(whole))
+    np.testing.assert_allclose(np.concatenate([first, second[1:]]), whole, rtol=0, atol=1e-12 * size)
+    np.testing.assert_allclose(end, last, rtol=1e-10)
+    force, none = respond(Linear(2.0), t, x, v, return_state=True)
+    assert none.shape == (0,) and force.shape == t.shape
+
+
+def test_a_record_that_begins_in_motion_is_named_and_two_starts_mend_it():
+    t, x, v = sine(1e-3)
+    settled = respond(HYSTERETIC, t, x, v)[125 + 30 :]  # in the second cycle
+    moving = t[30:126] - t[30], x[30:126], v[30:126]
+    with pytest.warns(StartsInMotionWarning, match=r"begins at 0.5\d* m/s, but the states of Sum start at rest"):
+        at_rest = respond(HYSTERETIC, *moving)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        respond(Linear(2.0), *moving)  # has no states
+        respond(HYSTERETIC, t, x, v)  # begins at rest
+        np.testing.assert_array_equal(respond(HYSTERETIC, *moving, state=HYSTERETIC.initial_state()), at_rest)
+        held = quasi_static(HYSTERETIC, moving[2][:1])
+        _, after = respond(HYSTERETIC, t[:156], x[:156], v[:156], return_state=True)
+        forces = [respond(HYSTERETIC, *moving, state=state) for state in (after, held.states[0])]
+    cycle, held, rest = (np.max(np.abs(force - settled)) / np.max(settled) for force in (*forces, at_rest))
+    assert cycle < 1e-9 and held < 0.2 and rest > 0.5
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"state": np.zeros(3)}, r"`state` must have the shape \(2,\) for Sum, but is of shape \(3,\)"),
+        ({"state": np.array([np.nan, 0.0])}, "`state` must be finite"),
+        ({"state": np.zeros(2), "engine": Exponential()}, "`state` must be left out beside an engine"),
+        ({"return_state": True, "engine": Exponential()}, "`return_state` must be left out beside an engine"),
+    ],
+)
+def test_states_that_cannot_be_are_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        respond(HYSTERETIC, *sine(1e-3), **options)
 
 
 def test_inside_compiled_and_batched_functions():

@@ -103,3 +103,8 @@ def test_errors(arguments, message):
 def test_duration_needs_a_known_speed():
     with pytest.raises(ValueError, match=r"`duration` must be left out where `speed` is traced.*give `length`"):
         jax.grad(lambda v: jnp.sum(iso8608_filtered("C", v, 10.0, seed=0).height(jnp.zeros(1))))(20.0)
+
+
+def test_a_filtered_road_is_drawn_again_as_with_that_seed():
+    road = iso8608_filtered("C", speed=20.0, duration=5.0, seed=1)
+    assert road.reseeded(2) == iso8608_filtered("C", speed=20.0, duration=5.0, seed=2)

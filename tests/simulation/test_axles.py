@@ -132,7 +132,7 @@ def test_ride_means_the_same_and_follows_axles_that_move():
             assert float(value) == pytest.approx(float(expected[name]), rel=1e-9), (point, name)
     fixed = Ride(HALF, roads.delayed(GROUND, positions=HALF.axle_positions), metrics=NAMES, duration=0.5, dt=0.002)
     np.testing.assert_array_equal(fixed.heights, ride.heights)
-    np.testing.assert_array_equal(fixed.on_axles_of(replace(HALF, {"rear_distance": 2.4})).heights, ride.heights)
+    np.testing.assert_array_equal(fixed.of_vehicle(replace(HALF, {"rear_distance": 2.4})).heights, ride.heights)
 
 
 def test_a_tuning_follows_axles_that_move():

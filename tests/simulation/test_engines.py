@@ -14,6 +14,8 @@ from jaxdamp.simulation import AbstractFixedStep, AbstractStepper, Adaptive, Equ
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
 
 
+pytestmark = pytest.mark.users_flags
+
 BUMP = roads.cosine_bump(0.05, start=0.02, duration=0.1)
 CAR = quarter_car_000(dampers.Lag(dampers.Linear(2500.0), 0.004))
 RMS = "rms_sprung_acceleration"

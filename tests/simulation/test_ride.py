@@ -17,6 +17,8 @@ from jaxdamp.vehicles import Body, Frame, Link, LumpedVehicle, Wheel
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
 
 
+pytestmark = pytest.mark.users_flags
+
 BESINGER = dampers.Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05)
 ROUGH = roads.iso8608("F", speed=20.0, seed=3)
 

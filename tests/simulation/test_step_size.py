@@ -12,7 +12,7 @@ import pytest
 from jaxdamp import Ride, dampers, roads, simulate
 from jaxdamp._types import Number
 from jaxdamp.parameters import parameter, positive, replace
-from jaxdamp.simulation import Adaptive, CoarseStepWarning
+from jaxdamp.simulation import Adaptive, CoarseStepWarning, TracedStepWarning
 from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.step_size import fastest_mode
 from jaxdamp.vehicles import modes, presets
@@ -177,8 +177,10 @@ def test_a_stretch_without_motion_and_a_start_of_its_own():
         simulate(quarter_car_000(), flat, duration=2.0, dt=0.02, start={"z_unsprung": 0.02})
 
 
-def test_traced_parameters_are_not_judged():
-    def run(rate):
-        return simulate(quarter_car_000(dampers.Linear(rate)), BUMP, duration=1.0, dt=0.02)["stroke"][-1]
+def test_parameters_of_a_compiled_function_are_not_judged_but_that_is_said():
+    def run(rate, **steps):
+        return simulate(quarter_car_000(dampers.Linear(rate)), BUMP, duration=0.4, dt=0.02, **steps)["stroke"][-1]
 
-    assert np.isfinite(jax.jit(run)(1500.0))
+    with pytest.warns(TracedStepWarning, match=r"one step .*dt = 0.02 s\) is assumed.*Pass `substeps=`"):
+        assumed = jax.jit(run)(1500.0)
+    assert assumed == jax.jit(lambda rate: run(rate, substeps=1))(1500.0)

@@ -9,6 +9,9 @@ from jaxdamp.sweeps import SweepFunction
 from jaxdamp.sweeps.function import HasDerivatives, HasDomain, HasLanes, HasSideBySide, HasUnits
 
 
+pytestmark = pytest.mark.users_flags
+
+
 @pytest.mark.slow
 def test_a_simulated_quarter_car(tmp_path):
     car, road = vehicles.presets.quarter_car_000(), roads.step(0.02, start=0.05)

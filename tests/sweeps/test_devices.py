@@ -14,6 +14,9 @@ import jaxdamp
 from .cases import AXES, decay, failing
 
 
+pytestmark = pytest.mark.users_flags
+
+
 @pytest.fixture(scope="module")
 def expected():
     return jaxdamp.sweep(decay(), AXES, gradients=True, devices=1)

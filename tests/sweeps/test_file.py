@@ -127,3 +127,16 @@ def test_a_full_disk_stops_no_sweep(tmp_path, monkeypatch):
     with pytest.warns(UserWarning, match="No space left"):
         data = jaxdamp.sweep(lambda p: {"y": 2.0 * p["a"]}, {"a": [1.0]}, file=tmp_path / "s.nc")
     assert data["y"] == 2.0
+
+
+def test_damaged_points_are_computed_anew(tmp_path):
+    file = tmp_path / "sweep.nc"
+    over = {"a": np.linspace(0.0, 1.0, 10_000)}
+    whole = jaxdamp.sweep(lambda p: {"y": p["a"] ** 2}, over, file=file)
+    raw = bytearray(file.read_bytes())
+    at = raw.find(np.asarray(whole["y"].values[5000:5003], ">f8").tobytes())
+    raw[at : at + 8] = np.array(7.0, ">f8").tobytes()
+    file.write_bytes(raw)
+    with pytest.warns(UserWarning, match="4096 of 10000 points in .* were damaged on the disk"):
+        again = jaxdamp.sweep(lambda p: {"y": p["a"] ** 2}, over, file=file)
+    np.testing.assert_array_equal(again["y"], whole["y"])

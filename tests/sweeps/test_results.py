@@ -8,7 +8,8 @@ import pytest
 import xarray
 
 import jaxdamp
-from jaxdamp.sweeps import points, random, running, sobol
+from jaxdamp.report.sweeps import best_points
+from jaxdamp.sweeps import points, random, running, sobol, without_effect
 
 from .cases import AXES, Decay, decay, failing
 
@@ -323,3 +324,14 @@ def test_a_dataset_draws_itself():
     data = jaxdamp.sweep(product, {"a": [1.0, 2.0], "b": [3.0, 4.0, 5.0]})
     (axes,) = data.jaxdamp.plot("product", over="b").axes
     assert axes.get_xlabel() == "b" and len(axes.get_lines()) == 2
+
+
+def test_an_axis_without_effect_is_named_and_no_value_of_it_is_called_the_best():
+    data = jaxdamp.sweep(lambda p: {"area": p["a"] ** 2 + 0.0 * p["b"], "level": 0.0 * p["a"] + 3.0}, AXES)
+    assert without_effect(data) == {"area": ["b"], "level": ["a", "b"]}
+    assert "no effect of b on area" in str(data.jaxdamp.table())
+    sentences = best_points(data)
+    assert "b has no effect on area: no value of it is better than another." in sentences
+    (smallest,) = [sentence for sentence in sentences if sentence.startswith("Smallest")]
+    assert smallest.startswith("Smallest area") and "b =" not in smallest
+    assert without_effect(jaxdamp.sweep(product, {"a": [1.0], "b": [2.0, 3.0]})) == {}

@@ -155,7 +155,7 @@ def test_default_bounds_follow_the_domain_of_each_number():
     law = dampers.PiecewiseLinear(jnp.array([-0.2, 0.0, 0.3]), jnp.array([900.0, 2500.0, 2600.0, 1500.0]))
     spring = dampers.Spring(1500.0, -90.0)
     car = vehicles.presets.quarter_car_000(law + dampers.BoucWen(1000.0, 500.0, 2e5, 300.0) + spring)
-    space = search_range(car, ["damper.*"], [], None)
+    space = search_range(car, ["damper.**"], [], None)
     found = dict(zip(space.free.names, zip(space.lower, space.upper, strict=True), strict=True))
     assert found["damper.terms.0.slopes[1]"] == pytest.approx((2500 / 3, 7500.0))
     assert found["damper.terms.0.knots[0]"] == pytest.approx((-0.6, -0.2 / 3))
@@ -163,7 +163,7 @@ def test_default_bounds_follow_the_domain_of_each_number():
     assert found["damper.terms.1.exponent"] == pytest.approx((1.0, 6.0), abs=1e-5)
     preload = next(p.path for p in parameters.parameters(car) if p.unit == "N" and float(np.max(p.value)) < 0)
     assert found[preload] == pytest.approx((-270.0, 90.0))
-    free = search_range(car, ["damper.*"], [], {"*": None})
+    free = search_range(car, ["damper.**"], [], {"*": None})
     assert np.isinf(free.upper[:7]).all() and (free.lower[3:7] > 0.0).all()
 
 
@@ -312,3 +312,16 @@ def test_a_tuned_vehicle_that_the_step_does_not_suit_is_noted():
     assert "does not bear the step" in notes[2][0]
     (coarse,) = step_notes(start, start, lambda car: ride_of(car, 0.02))
     assert "coarse" in coarse
+
+
+def test_a_parameter_without_effect_is_named_and_not_called_optimal():
+    car = vehicles.presets.quarter_car_000(dampers.Linear(1500.0) + dampers.Spring(1e3, 50.0))
+    both = ["damper.terms.0.rate", "damper.terms.1.preload"]
+    result = tune.minimise("rms_sprung_acceleration", car, roads.white("C", 20.0), over=both)
+    assert result.without_effect == ("damper.terms.1.preload",) and result.converged
+    assert "no effect of damper.terms.1.preload" in result.summary
+    assert any(
+        note.startswith("No effect on rms_sprung_acceleration: damper.terms.1.preload") for note in result.warnings
+    )
+    alone = tune.minimise("rms_sprung_acceleration", car, roads.white("C", 20.0), over=both[1:])
+    assert alone.summary.endswith("no free parameter has an effect on it.") and "optimum" not in alone.summary

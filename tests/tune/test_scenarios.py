@@ -16,7 +16,7 @@ LAW = dampers.TemperatureScaled(dampers.Bilinear(2500.0, 1500.0), temperature=29
 CAR = vehicles.presets.quarter_car_000(LAW)
 ACCELERATION, TYRE = "rms_sprung_acceleration", "dynamic_load_coefficient"
 DRIVEN = {"C": roads.iso8608("C", 20.0, seed=1), "bump": roads.cosine_bump(0.05, start=0.1, duration=0.2)}
-HOT = tune.Condition({"temperature": 350.0, "sprung_mass": 1500.0}, {"damper.*_rate": 0.8}, weight=3.0)
+HOT = tune.Condition({"temperature": 350.0, "sprung_mass": 1500.0}, {"damper.**_rate": 0.8}, weight=3.0)
 WHITE = {"C": roads.white("C", 20.0), "D": roads.white("D", 10.0)}
 LINEAR = vehicles.presets.quarter_car_000()
 

@@ -42,7 +42,7 @@ def ridden(vehicle, behind, right):
 
     def run(shares):
         changed = replace(vehicle, {p.path: v for p, v in zip(known, values * jnp.exp(shares), strict=True)})
-        return simulate(changed, road, dt=DT)
+        return simulate(changed, road, dt=DT, substeps=1)
 
     return [p.path for p in known], run
 

@@ -17,6 +17,7 @@ from jaxdamp.bench.evaluation.measurements import Measurement, measured
 from jaxdamp.bench.evaluation.record import record_measurements
 from jaxdamp.bench.evaluation.separation import GasAndFriction, separate_gas_and_friction
 from jaxdamp.bench.runs import BenchRun
+from jaxdamp.bench.settings import by_number, settings_apart
 
 
 if TYPE_CHECKING:
@@ -196,7 +197,9 @@ def evaluate(
             within `window` of the stated one; "loop": on the continuous loop of the fastest record. Interpolation
             where every setting has two records or more of different peak velocity, the loop elsewhere, if left out.
         window: share of the stated velocity.
-        by: gives the setting of a record; its command, if left out.
+        by: gives the setting of a record; its command, if left out. Where records without a command contradict one
+            another again and again, they are told apart by what they state or by their names, or not pooled at all,
+            and the notes say so.
 
     Raises:
         ValueError: no record, none with a full cycle, a velocity that is not positive.
@@ -225,6 +228,10 @@ def evaluate(
     ]
     if not whole:
         _checks.refuse("runs", "hold a record with a full cycle", ", ".join(run.name for run in chosen))
+    if by is None and all(run.command is None for run in whole):
+        apart, sentence = settings_apart(whole)
+        notes, by = [sentence, *notes] if sentence else notes, (lambda run: apart[run.name]) if apart else None
+        whole = sorted(whole, key=lambda run: by_number(apart[run.name])) if apart else whole
     settings: dict[str, tuple[BenchRun, ...]] = {}
     for run in sorted(whole, key=_command) if by is None else whole:
         name = _setting(run, by)

@@ -82,3 +82,18 @@ def hysteresis_or_delay(findings: Sequence[Finding]) -> list[Finding]:
         for f in late
     }
     return [judged.get(id(finding), finding) for finding in findings]
+
+
+def gas_of_the_slowest(findings: Sequence[Finding], runs: Sequence[BenchRun]) -> list[Finding]:
+    """The findings without static forces of fast records that the slowest one of their command does not have.
+
+    Gas and the offset of a load cell are there at every velocity; the hysteresis of fast records is not.
+    """
+    names = ("gas force", "static force against gas")
+    having = {finding.record for finding in findings if finding.name in names}
+    slowest: dict[float | None, BenchRun] = {}
+    for run in runs:
+        other = slowest.get(run.command)
+        slowest[run.command] = run if other is None or run.peak_velocity < other.peak_velocity else other
+    without = {run.name for run in runs if slowest[run.command].name not in having}
+    return [finding for finding in findings if finding.name not in names or finding.record not in without]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, final
 from jaxdamp import _checks
 from jaxdamp._tables import Cell, Column, Table, plain
 from jaxdamp.bench.analysis import as_records
-from jaxdamp.bench.preflight import bench_checks, channel_checks, consistency, motion_checks
+from jaxdamp.bench.preflight import bench_checks, changes, channel_checks, consistency, motion_checks, sample_checks
 from jaxdamp.bench.preflight.finding import SEVERITIES, Examined, Finding
 from jaxdamp.bench.runs import BenchRun
 
@@ -19,10 +19,22 @@ if TYPE_CHECKING:
 # In this order; where one family finds an error in a record, the later ones are left out for it.
 FAMILIES = (
     (motion_checks.magnitudes, motion_checks.few_samples, motion_checks.few_cycles, motion_checks.integrated),
-    (channel_checks.stuck, channel_checks.clipping, motion_checks.rest, motion_checks.run_up),
-    (channel_checks.spikes, channel_checks.quantisation, channel_checks.ripple, consistency.velocity, consistency.sign),
-    (motion_checks.jitter, consistency.gas_force, consistency.delay, consistency.breakaway, consistency.drift),
+    (sample_checks.repeated, sample_checks.edges, channel_checks.clipping, motion_checks.rest, motion_checks.run_up),
+    (channel_checks.quantisation, channel_checks.ripple, consistency.velocity, consistency.sign),
+    (
+        motion_checks.jitter,
+        changes.changes,
+        consistency.gas_force,
+        consistency.delay,
+        consistency.breakaway,
+        consistency.drift,
+    ),
 )
+# The checks that find errors, which are quick.
+ERRORS = (sample_checks.repeated, sample_checks.edges, channel_checks.clipping, consistency.velocity, consistency.sign)
+# What is in the names of warnings, by what it does to results; all others come behind.
+CONSEQUENCE = ("unusual", "changes", "jump", "dropout", "held", "spikes", "velocity", "contradiction", "sign", "delay")
+BAD_RECORDS = ("refuse", "leave_out", "keep")
 BENCH = ((bench_checks.turned_by_the_reader, bench_checks.turned_motion), (bench_checks.mixed_settings,))
 
 
@@ -71,19 +83,22 @@ class Preflight:
         return f"Preflight of {records}: {words or 'nothing odd'}"
 
     def sentences(self) -> list[str]:
-        """Each kind of finding once, with the records that it is about and the largest of its sizes."""
+        """Each kind of finding once, worst first: in how many records, and that with the largest size in words."""
         kinds: dict[tuple[str, str], list[Finding]] = {}
         for finding in self.findings:
             kinds.setdefault((finding.severity, finding.name), []).append(finding)
         said = []
         for (severity, name), members in kinds.items():
             worst = max(members, key=lambda finding: abs(finding.size or 0.0))
-            others = [f.record for f in members if f is not worst]
-            more = f" Also {', '.join(others[:3])}" + (f" and {len(others) - 3} more" if len(others) > 3 else "") + "."
-            said.append(
-                f"{severity}, {name}: {worst.record}: {worst.message}.{more * bool(others)} {worst.remedy}".rstrip()
-            )
+            count = len({record for finding in members for record in finding.records})
+            where = f"{name} in {count} records, most in" if count > 1 else f"{name}:"
+            said.append(f"{severity}, {where} {worst.record}: {worst.message}. {worst.remedy}".rstrip())
         return said
+
+    def without(self, names: Iterable[str]) -> "Preflight":
+        """The same without the findings of these names."""
+        left_out = tuple(names)
+        return Preflight(tuple(f for f in self.findings if f.name not in left_out), self.records)
 
     def to_dict(self) -> dict[str, Any]:
         """All findings as plain data."""
@@ -124,8 +139,8 @@ def preflight(runs: BenchRun | Iterable[BenchRun]) -> Preflight:
         wrong = {name for finding in findings if finding.severity == "error" for name in finding.records}
         sound = [run for run in chosen if run.name not in wrong]
         findings += [finding for check in family for finding in check(sound)]
-    findings = bench_checks.hysteresis_or_delay(findings)
-    findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
+    findings = bench_checks.gas_of_the_slowest(bench_checks.hysteresis_or_delay(findings), chosen)
+    findings.sort(key=_consequence)
     return Preflight(tuple(findings), tuple(run.name for run in chosen))
 
 
@@ -137,3 +152,53 @@ def _of_record(run: BenchRun) -> list[Finding]:
         if any(finding.severity == "error" for finding in findings):
             break
     return findings
+
+
+def _consequence(finding: Finding) -> tuple[int, int]:
+    """The rank of a finding: by severity, then by what it does to results."""
+    kinds = (number for number, kind in enumerate(CONSEQUENCE) if kind in finding.name)
+    return SEVERITIES.index(finding.severity), next(kinds, len(CONSEQUENCE))
+
+
+def usable(
+    runs: Iterable[BenchRun], bad_records: str = "refuse", *, robust: bool = False, argument: str = "runs"
+) -> tuple[BenchRun, ...]:
+    """The records that something may be computed from: checks for errors only, in milliseconds a record.
+
+    Arguments:
+        runs: the records.
+        bad_records: what is done with records that have an error: "refuse" all, "leave_out" these, or "keep" them.
+        robust: whether what follows gives spikes little weight, so that they are no error.
+        argument: what the caller calls the records.
+
+    Raises:
+        ValueError: a record with an error, or, where these are left out, none without one.
+
+    >>> from jaxdamp import bench
+    >>> from jaxdamp.dampers import Linear
+    >>> test = bench.SineTest(0.02, 2.0, cycles=6)
+    >>> good, bad = (bench.VirtualDyno(Linear(1500.0), force_limit=limit).run(test)[0] for limit in (None, 300.0))
+    >>> len(bench.usable([good, bad], "leave_out"))
+    1
+    """
+    _checks.one_of("bad_records", bad_records, BAD_RECORDS)
+    runs = tuple(runs)
+    if bad_records == "keep":
+        return runs
+    errors = [_first_error(run, robust) for run in runs]
+    sound = tuple(run for run, error in zip(runs, errors, strict=True) if error is None)
+    found = [error for error in errors if error is not None]
+    if found and (bad_records == "refuse" or not sound):
+        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+        error = found[0]
+        ways = '`bad_records="leave_out"` fits the others, `bad_records="keep"` fits them as they are.'
+        is_ = f"{error.record}{more}: {error.message}"
+        _checks.refuse(argument, "be records without errors", is_, f"{error.remedy} {ways}")
+    return sound
+
+
+def _first_error(run: BenchRun, robust: bool) -> Finding | None:
+    """The first finding of a record that is an error."""
+    examined = Examined(run)
+    findings = (finding for check in ERRORS for finding in check(examined) if finding.severity == "error")
+    return next((finding for finding in findings if not (robust and finding.name.endswith("spikes"))), None)

@@ -8,35 +8,57 @@ from jaxdamp.bench.analysis import FoldedCycles
 from jaxdamp.bench.evaluation import separate_gas_and_friction
 from jaxdamp.bench.evaluation.measurements import measured
 from jaxdamp.bench.evaluation.record import cycle_figures
-from jaxdamp.bench.preflight.finding import Examined, Finding
-from jaxdamp.bench.sign import LEAST_LOSS, loss_fraction
-from jaxdamp.bench.velocity import estimate_velocity
+from jaxdamp.bench.motion import Samples
+from jaxdamp.bench.preflight.finding import CLEAR, Examined, Finding
+from jaxdamp.bench.sign import LEAST_LOSS
 
 
-CLEAR = 6.0  # standard errors from which an effect is there
 SMALL = 0.005  # of the force range, below which a drift or a gas force is of no concern
+_NO_DAMPER = 30.0  # N s/m: less is no damper of a vehicle
+_SMOOTHER = 0.99  # ratio of the relative rates of change of force and stroke
 _LEAST_DELAY = 0.1  # sampling steps
 _HARMONICS = 9
 
 
 def sign(e: Examined) -> list[Finding]:
-    """A force that drives the motion: the work of a cycle is negative."""
-    work, loss = loss_fraction(e.run.time, e.run.stroke, e.run.force)
-    if loss > -LEAST_LOSS:
+    """A force that drives the motion, since the work of a cycle is negative, or that is the stroke.
+
+    A machine moves smoothly and a damper answers with corners, so that the stroke is the smoother one of the two. Where
+    it is the other way round and the work is negative, or the force small as of no damper, they are exchanged.
+    """
+    work, force, stroke = e.run.work_per_cycle, e.run.force[e.moving], e.run.stroke[e.moving]
+    drives = work < -LEAST_LOSS * 2 * np.pi * float(np.std(force) * np.std(stroke))
+    small = float(np.std(force)) < _NO_DAMPER * float(np.std(e.run.velocity[e.moving]))
+    if (drives or small) and _rate(e, e.run.force) < _SMOOTHER * _rate(e, e.run.stroke):
+        message = "stroke and force look exchanged: the force moves as smoothly as a machine, the stroke has corners"
+        remedy = 'Name the columns: `read(columns={"stroke": ..., "force": ...})`.'
+        return e.finding("error", "channels exchanged", message, None, "", None, remedy)
+    if not drives:
         return []
     message = f"the force drives the motion: work per cycle {work:+.3g} J, but a damper takes in energy"
     remedy = 'The force counts the other way: read the file with force_sign="opposite".'
     return e.finding("error", "force sign", message, work, "J", None, remedy)
 
 
+def _rate(e: Examined, values: Samples) -> float:
+    """RMS of the change per sample relative to that of the values, smoothed over a thirtieth of a period."""
+    width = max(int(e.samples_per_cycle / 30), 1)
+    sums = np.concatenate([[0.0], np.cumsum(values[e.moving] - np.mean(values[e.moving]))])
+    smooth = (sums[width:] - sums[:-width]) / width
+    return float(np.sqrt(np.mean(np.diff(smooth) ** 2)) / np.std(smooth))
+
+
 def velocity(e: Examined) -> list[Finding]:
-    """A velocity that is not the derivative of the stroke."""
-    derived, _ = estimate_velocity(e.run.time, e.run.stroke)
-    measured = e.run.velocity
-    power = float(np.dot(measured, measured) * np.dot(derived, derived))
-    likeness = float(np.dot(measured, derived)) / np.sqrt(power) if power > 0 else 0.0
-    scale = float(np.dot(measured, derived) / np.dot(derived, derived))
-    if likeness > 0.99 and 0.97 < scale < 1.03:
+    """A velocity that is not the derivative of the stroke, both over a twelfth of a period, so that noise is small."""
+    width = max(int(e.samples_per_cycle / 12), 1)
+    covered = np.concatenate([[0.0], np.cumsum(0.5 * (e.run.velocity[1:] + e.run.velocity[:-1]))]) / e.run.sampling_rate
+    measured, derived = (values[width:] - values[:-width] for values in (covered, e.run.stroke))
+    # Sums rather than np.dot: threads of BLAS would take longer to start than this takes.
+    both, own, squares = (
+        float(np.sum(a * b)) for a, b in ((measured, derived), (measured, measured), (derived, derived))
+    )
+    likeness, scale = both / np.sqrt(own * squares) if own * squares > 0 else 0.0, both / squares
+    if likeness > 0.99 and 0.93 < scale < 1.07:
         return []
     severity = "error" if likeness < 0.8 or not 0.8 < scale < 1.25 else "warning"
     message = f"the velocity is {scale:.4g} times the derivative of the stroke, correlation {likeness:.3f}"
@@ -128,6 +150,9 @@ def breakaway(e: Examined) -> list[Finding]:
             drops.append(float(f[top] - f[top:stop].min()))
     if len(drops) < 2 or min(drops) < max(CLEAR * noise + e.noise["force"], 2 * SMALL * np.ptp(force)):
         return []
+    hum = sum(size for lines in e.mains["force"].values() for _, size in lines)
+    if min(drops) < 2.0 * hum + CLEAR * noise:
+        return []  # the waves of the mains are seen, not the damper
     size = float(np.mean(drops))
     message = f"behind each reversal the force falls by {size:.3g} N although the velocity grows: stick-slip"
     remedy = "Seals or bearings hold more at rest: add `StribeckFriction` to the law, or lubricate and align."

@@ -9,10 +9,14 @@ from jaxdamp import _checks
 from jaxdamp.bench.analysis import FoldedCycles, fold_cycles, steady_cycles
 from jaxdamp.bench.contradictions import ALIKE, SAME_SHAPE
 from jaxdamp.bench.motion import Samples, moving_span, white_noise
+from jaxdamp.bench.preflight.gaps import gaps
+from jaxdamp.bench.preflight.mains import mains_lines
 from jaxdamp.bench.runs import BenchRun
 
 
 SEVERITIES = ("error", "warning", "note")
+CLEAR = 6.0  # standard errors from which an effect is there
+BINS = 60  # of the velocity, for the mean curve of the force
 FEWEST_CYCLES = 3  # from which a scatter over cycles can be told
 
 
@@ -96,6 +100,54 @@ class Examined:
         """Standard deviation of the white noise of each channel over the motion, and at least its rounding."""
         return {name: max(white_noise(values), step(values) / np.sqrt(12)) for name, values in self.channels.items()}
 
+    @cached_property
+    def jitter(self) -> float:
+        """Standard deviation by which the instants of sampling differ from those written [s]; 0 where it is not clear.
+
+        The variance of the fifth differences of the stroke, σ² + τ² v², is compared between the fast and the slow half.
+        Few large differences, of spikes or lost samples, count no more than ten times the median.
+        """
+        stroke = self.channels["stroke"]
+        if len(stroke) < 200 or step(stroke) > 0:
+            return 0.0
+        squares = np.diff(stroke, 5) ** 2 / 252.0
+        speed = np.abs(self.run.velocity[self.moving])[2:-3]
+        low, high = np.quantile(speed, (0.3, 0.7))
+        fast, slow = (
+            np.minimum(part, 10.0 * np.median(part)) for part in (squares[speed > high], squares[speed < low])
+        )
+        more, less = float(fast.mean()), float(slow.mean())
+        # Differences are correlated over some five samples, so that a fifth of them counts.
+        uncertain = np.sqrt(2 * 5 * (more**2 / len(fast) + less**2 / len(slow)))
+        if more - less < CLEAR * uncertain or more < 1.5 * less or more < (1e-6 * np.ptp(stroke)) ** 2:
+            return 0.0
+        difference = np.mean(speed[speed > high] ** 2) - np.mean(speed[speed < low] ** 2)
+        return float(np.sqrt((more - less) / difference))
+
+    @cached_property
+    def gaps(self) -> dict[str, np.ndarray]:
+        """First and last sample of the stretches in which each channel repeats one value, shape (stretches, 2)."""
+        run = self.run
+        return {name: gaps(getattr(run, name), run.velocity, self.moving, run.cycles) for name in self.channels}
+
+    @cached_property
+    def mains(self) -> dict[str, dict[float, list[tuple[float, float]]]]:
+        """Frequency [Hz] and amplitude of the lines of the mains in each channel, by mains frequency [Hz]."""
+        rate, motion = self.run.sampling_rate, self.run.frequency
+        return {name: mains_lines(values, rate, motion) for name, values in self.channels.items()}
+
+    @cached_property
+    def above_curve(self) -> Samples:
+        """The force less its mean at the velocity of each sample [N], over the motion: what is not a curve of it."""
+        velocity, force = self.run.velocity[self.moving], self.run.force[self.moving]
+        low, high = float(velocity.min()), float(velocity.max())
+        bins = np.minimum(((velocity - low) / (high - low) * BINS).astype(int), BINS - 1)
+        count = np.bincount(bins, minlength=BINS)
+        there = count > 0
+        means = np.bincount(bins, force, minlength=BINS)[there] / count[there]
+        centres = low + (np.flatnonzero(there) + 0.5) / BINS * (high - low)
+        return force - np.interp(velocity, centres, means)
+
     @property
     def channels(self) -> dict[str, Samples]:
         """Stroke and force over the motion."""
@@ -137,9 +189,3 @@ def step(values: Samples) -> float:
     multiples = gaps / smallest
     regular = np.abs(multiples - np.round(multiples)) < 0.1
     return smallest if len(gaps) and np.mean(regular) > 0.95 else 0.0
-
-
-def runs_of(mask: np.ndarray) -> list[tuple[int, int]]:
-    """First and last index of each stretch where a mask is true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]

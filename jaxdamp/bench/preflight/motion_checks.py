@@ -3,19 +3,19 @@
 import numpy as np
 
 from jaxdamp.bench.analysis import steady_cycles
-from jaxdamp.bench.motion import cycle_instants
-from jaxdamp.bench.preflight.finding import FEWEST_CYCLES, Examined, Finding, step
+from jaxdamp.bench.preflight.finding import FEWEST_CYCLES, Examined, Finding
 
 
 FEWEST_SAMPLES = 30  # a cycle, as the reader recommends
 _ALIVE = 0.3  # share of the force's deviation in motion by which it moves when it is not at rest
-_CLEAR = 6.0  # standard errors from which an effect is there
 # What machines and dampers do: beyond it, a unit, the clock or a column is wrong more often than right.
 _USUAL = (
-    ("peak velocity", "m/s", 1e-4, 6.0, "Are stroke and force exchanged, is time in ms, or the stroke in mm?"),
-    ("amplitude", "m", 1e-5, 0.5, "Are stroke and force exchanged, or is the stroke in mm?"),
+    ("sampling rate", "Hz", 5.0, 2e5, "Is time in ms or in minutes?"),
+    ("peak velocity", "m/s", 1e-4, 6.0, "Are stroke and force exchanged, is time in ms, or the stroke in m or mm?"),
+    ("amplitude", "m", 1e-4, 0.5, "Are stroke and force exchanged, or is the stroke in m or mm?"),
     ("frequency", "Hz", 1e-3, 200.0, "Is time in ms or in minutes?"),
     ("largest force", "N", 1.0, 2e5, "Is the force in kN, or stroke and force exchanged?"),
+    ("ratio of force and velocity", "N s/m", 20.0, 1e6, "Is one of the units of time, stroke and force another one?"),
 )
 
 
@@ -64,7 +64,7 @@ def integrated(e: Examined) -> list[Finding]:
 
 def few_cycles(e: Examined) -> list[Finding]:
     """Too few full cycles to know the scatter, of a motion that repeats."""
-    count = max(len(cycle_instants(e.run.time, e.run.stroke)) - 1, 0)
+    count = e.run.cycles
     if count >= FEWEST_CYCLES or not e.repeats:
         return []
     message = f"{count} full cycle{'s' * (count != 1)}, so the scatter from cycle to cycle is not known"
@@ -83,7 +83,16 @@ def few_samples(e: Examined) -> list[Finding]:
 
 def magnitudes(e: Examined) -> list[Finding]:
     """Numbers that no damper test has."""
-    values = (e.run.peak_velocity, e.run.amplitude, e.run.frequency, float(np.max(np.abs(e.run.force))))
+    run = e.run
+    ratio = float(np.std(run.force) / np.std(run.velocity))
+    values = (
+        run.sampling_rate,
+        run.peak_velocity,
+        run.amplitude,
+        run.frequency,
+        float(np.max(np.abs(run.force))),
+        ratio,
+    )
     found = []
     for value, (what, unit, low, high, question) in zip(values, _USUAL, strict=True):
         if not low <= value <= high:
@@ -93,22 +102,10 @@ def magnitudes(e: Examined) -> list[Finding]:
 
 
 def jitter(e: Examined) -> list[Finding]:
-    """A clock whose instants are not those written: the noise of the stroke grows with its velocity.
-
-    The variance of the fifth differences of the stroke, σ² + τ² v², is compared between the fast and the slow half.
-    """
-    stroke = e.channels["stroke"]
-    if len(stroke) < 200 or step(stroke) > 0:
+    """A clock whose instants are not those written: the noise of the stroke grows with its velocity."""
+    size = e.jitter
+    if not size:
         return []
-    noise = np.diff(stroke, 5) / np.sqrt(252.0)
-    speed = np.abs(np.gradient(stroke)[2:-3]) * e.run.sampling_rate
-    fast, slow = speed > np.quantile(speed, 0.7), speed < np.quantile(speed, 0.3)
-    more, less = np.mean(noise[fast] ** 2), np.mean(noise[slow] ** 2)
-    # Differences are correlated over some five samples, so that a fifth of them counts.
-    uncertain = np.sqrt(2 * 5 * (more**2 / fast.sum() + less**2 / slow.sum()))
-    if more - less < _CLEAR * uncertain or more < 1.5 * less or more < (1e-6 * np.ptp(stroke)) ** 2:
-        return []
-    size = float(np.sqrt((more - less) / (np.mean(speed[fast] ** 2) - np.mean(speed[slow] ** 2))))
     share = 100 * size * e.run.sampling_rate
     message = f"the clock jitters by {1e6 * size:.3g} µs, {share:.2g} % of a step: the faster the stroke, the noisier"
     remedy = "Take the clock of the hardware, not of the computer."

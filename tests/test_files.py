@@ -1,8 +1,10 @@
+import os
 from pathlib import Path
 
 import pytest
 
-from jaxdamp.bench.files import find_files, natural_key
+from jaxdamp._files import RECORD_SUFFIXES, find_files, natural_key
+from jaxdamp.bench import READERS
 
 
 def _touch(folder: Path, *names: str) -> None:
@@ -55,3 +57,13 @@ def test_the_same_file_twice(tmp_path):
     _touch(tmp_path, "a.csv")
     with pytest.raises(ValueError, match="there 2 times"):
         find_files([tmp_path / "a.csv", tmp_path])
+
+
+def test_a_pipe_is_no_record(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(ValueError, match="a pipe or a device"):
+        find_files(tmp_path / "pipe.csv")
+
+
+def test_every_reader_has_its_suffix():
+    assert set(READERS) == set(RECORD_SUFFIXES)

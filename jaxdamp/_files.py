@@ -12,6 +12,8 @@ from jaxdamp import _checks
 
 MAYBE_NOTES = (".txt", ".dat", ".asc")  # of a folder these are not read: they may be notes
 TEXT_SUFFIXES = (".csv", ".tsv", *MAYBE_NOTES)
+RECORD_SUFFIXES = (*TEXT_SUFFIXES, ".xlsx", ".xlsm", ".mat", ".tdms", ".mf4", ".mdf", ".parquet")
+FOLDER_SUFFIXES = frozenset(RECORD_SUFFIXES) - set(MAYBE_NOTES)  # of the files that a folder stands for
 
 
 def find_files(
@@ -56,8 +58,10 @@ def _expand(path: str | os.PathLike[str], suffixes: Collection[str]) -> Iterator
             )
             raise FileNotFoundError(f"Folder {file} holds no *.csv or other file of records.{hint}")
         yield from sorted(inside, key=lambda f: natural_key(f.name))
-    elif file.exists():
+    elif file.is_file():
         yield file
+    elif file.exists():
+        _checks.refuse("paths", "name files or folders", f"{text!r}, a pipe or a device", "Save the records to a file.")
     elif glob.has_magic(text):
         found = [Path(name) for name in glob.glob(str(file), recursive=True) if Path(name).is_file()]
         if not found:

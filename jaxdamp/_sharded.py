@@ -1,0 +1,28 @@
+"""Beginnings of loops inside `jax.shard_map`, which tells values that differ between devices from those that do not."""
+
+from typing import Any, TypeVar
+
+import jax
+
+
+Tree = TypeVar("Tree")
+
+
+def varying_as(tree: Tree, *others: Any) -> Tree:
+    """The tree, its arrays taken for different on the devices on which any of these arrays, or its own, differ.
+
+    A loop whose beginning is a constant, and whose end is not, is refused there otherwise.
+    """
+    axes = frozenset().union(*map(_axes, jax.tree.leaves((tree, others))))
+    return jax.tree.map(lambda leaf: _cast(leaf, axes - _axes(leaf)), tree) if axes else tree
+
+
+def _axes(leaf: Any) -> frozenset[Any]:
+    if not isinstance(leaf, jax.Array):
+        return frozenset()
+    kind: Any = jax.typeof(leaf)
+    return kind.mat.varying if hasattr(kind, "mat") else kind.vma  # the latter before jax 0.10
+
+
+def _cast(leaf: Any, axes: frozenset[Any]) -> Any:
+    return jax.lax.pcast(leaf, tuple(axes), to="varying") if axes else leaf

@@ -1,0 +1,107 @@
+"""The numbers behind those that JAX traces, for checks and for what is decided before a program runs.
+
+Under `jax.grad`, `jax.jvp`, `jax.linearize` and `jax.vmap` a number is traced, but its value is known; inside
+`jax.jit`, `jax.lax.scan` and the like it is not. Nothing here may enter a result: derivatives would not pass.
+"""
+
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, NamedTuple, TypeVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+
+Tree = TypeVar("Tree")
+
+
+class Behind(NamedTuple):
+    """A value behind a tracer, with an axis for each `jax.vmap` in front, the outermost first."""
+
+    value: np.ndarray
+    batch_axes: int
+
+
+def look_behind(value: Any) -> Behind | None:
+    """The value behind derivatives and batches; None where no value is known yet."""
+    if not isinstance(value, Tracer):
+        return Behind(np.asarray(value), 0)
+    if (primal := getattr(value, "primal", None)) is not None:
+        return look_behind(primal)
+    axis = getattr(value, "batch_dim", ...)
+    if not isinstance(axis, int | None):
+        return None
+    whole = look_behind(value.val)  # pyright: ignore[reportAttributeAccessIssue]
+    if whole is None or axis is None:
+        return whole
+    return Behind(np.moveaxis(whole.value, whole.batch_axes + axis, whole.batch_axes), whole.batch_axes + 1)
+
+
+def behind(value: Any) -> np.ndarray | None:
+    """The value, or all values of a batch with the batch in front; None where no value is known yet."""
+    found = look_behind(value)
+    return None if found is None else found.value
+
+
+def is_traced(tree: Any) -> bool:
+    """Whether JAX traces any leaf."""
+    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
+
+
+def at_compile_time() -> AbstractContextManager[None]:
+    """Inside `jax.jit`: compute with known numbers now, rather than in the program."""
+    return jax.ensure_compile_time_eval() if is_traced(jnp.zeros(())) else nullcontext()
+
+
+def is_batched(tree: Any) -> bool:
+    """Whether any leaf stands for a batch of `jax.vmap`, also below derivatives or a compiled function around it."""
+    return any(map(_is_batched, jax.tree.leaves(tree)))
+
+
+def _is_batched(value: Any) -> bool:
+    while isinstance(value, Tracer):
+        if isinstance(getattr(value, "batch_dim", None), int):
+            return True
+        value = getattr(value, "primal", getattr(value, "val", None))
+    return False
+
+
+def known(tree: Tree) -> Tree | None:
+    """The tree with the values behind its arrays; None where one of them is a batch or not known yet."""
+    if not is_traced(tree):
+        return tree
+    arrays, rest = eqx.partition(tree, eqx.is_array)
+    found = [look_behind(leaf) for leaf in jax.tree.leaves(arrays)]
+    if any(leaf is None or leaf.batch_axes for leaf in found):
+        return None
+    with at_compile_time():
+        values = [jnp.asarray(leaf.value) for leaf in found if leaf is not None]
+    return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), values), rest)
+
+
+def rows(tree: Any) -> list[np.ndarray] | None:
+    """The values of all arrays of a tree for each car of a batch, shape (cars, ...); None where one is not known.
+
+    One car if nothing is a batch. Batches within batches are laid out one after the other.
+    """
+    leaves = jax.tree.leaves(eqx.filter(tree, eqx.is_array))
+    if not leaves:
+        return []
+    if not is_batched(leaves):
+        values = [behind(leaf) for leaf in leaves]
+        return None if any(value is None for value in values) else [np.asarray(value)[None] for value in values]
+    found = look_behind(jnp.concatenate([jnp.ravel(jax.lax.stop_gradient(leaf)) for leaf in leaves]))
+    if found is None:
+        return None
+    flat = found.value.reshape(-1, found.value.shape[-1])
+    parts = np.split(flat, np.cumsum([leaf.size for leaf in leaves])[:-1], axis=1)
+    return [part.reshape(-1, *leaf.shape).astype(leaf.dtype) for part, leaf in zip(parts, leaves, strict=True)]
+
+
+def row(tree: Tree, values: list[np.ndarray], index: int) -> Tree:
+    """The tree of one car of `rows`, with arrays of NumPy."""
+    arrays, rest = eqx.partition(tree, eqx.is_array)
+    chosen = [value[index] for value in values]
+    return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), chosen), rest)

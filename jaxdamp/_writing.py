@@ -1,0 +1,41 @@
+"""Writing of files, completely or not at all, and until they are on the disk."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from jaxdamp import _checks
+
+
+def write_whole(path: str | os.PathLike[str], content: str | bytes) -> Path:
+    """Write a file so that a reader, or a machine that is switched on again, finds it whole or as it was before."""
+    target = Path(path).expanduser()
+    if not target.parent.is_dir():
+        _checks.refuse("path", "lie in a folder that exists", target, "Make the folder first.")
+    with whole(target) as draft:
+        draft.write_bytes(content.encode() if isinstance(content, str) else content)
+    return target
+
+
+@contextmanager
+def whole(target: Path) -> Iterator[Path]:
+    """A temporary name in the same folder to write to; it becomes the target when all is written."""
+    draft = target.with_name(f".{target.name}.{os.getpid()}.draft")
+    try:
+        yield draft
+        sync(draft)
+        os.replace(draft, target)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def sync(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk; Windows keeps the names by itself."""
+    if path.is_dir() and os.name == "nt":
+        return
+    handle = os.open(path, os.O_RDWR if path.is_file() and os.name == "nt" else os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

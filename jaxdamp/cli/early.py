@@ -1,0 +1,80 @@
+"""What can be told from the words and the files alone, before JAX is loaded: a mistyped path is answered at once."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+from jaxdamp import _checks
+from jaxdamp._files import FOLDER_SUFFIXES, find_files
+from jaxdamp.cli.results import refuse_target
+
+
+FROM_FIT = "`jaxdamp fit` writes best_law.json from records."
+FROM_BOTH = "Give the JSON of a law or of a vehicle."
+FROM_LIST = 'Or give a name, see "jaxdamp vehicles".'
+ROADS = ("iso", "white", "bump")
+
+
+def check(command: str, given: Mapping[str, Any]) -> None:
+    """Refuse paths that lead nowhere, files that are not JSON, and a folder that may not be written.
+
+    Arguments:
+        command: its name.
+        given: its arguments and options by name, which mean the same in all commands.
+
+    Raises:
+        ValueError: such a path, file or folder.
+    """
+    if isinstance(given.get("out"), Path) and command not in ("export", "explore"):  # which write a file
+        refuse_target(given["out"], command, replace=given.get("replace", False))
+    if given.get("files"):
+        find_files(given["files"], FOLDER_SUFFIXES)
+    for name in ("law", "start", "baseline"):
+        path = given.get(name)
+        if not isinstance(path, Path):
+            continue
+        if command == "bench" and path.suffix != ".json":  # other records
+            find_files(path, FOLDER_SUFFIXES)
+        else:
+            either = command == "export" or (name == "baseline" and command in ("tune", "sweep"))
+            words, remedy = ("a law or a vehicle", FROM_BOTH) if either else ("a law", FROM_FIT)
+            read_json(name, path, words, remedy)
+    vehicle, road = given.get("vehicle"), given.get("road")
+    if vehicle is not None and Path(vehicle).suffix == ".json":
+        read_json("vehicle", Path(vehicle).expanduser(), "a vehicle", FROM_LIST)
+    elif vehicle is not None and Path(vehicle).suffix == ".toml":
+        require_file("vehicle", Path(vehicle).expanduser(), FROM_LIST)
+    if isinstance(road, str) and road.partition(":")[0] not in ROADS and not Path(road).is_file():
+        refuse_road(road)
+    for name in ("manifest", "limits"):
+        if isinstance(given.get(name), Path):
+            require_file(name, given[name])
+
+
+def require_file(argument: str, path: Path, remedy: str = "") -> None:
+    """Refuse a path where no file is."""
+    if not path.is_file():
+        _checks.refuse(argument, "be a file that is there", path, remedy)
+
+
+def read_json(argument: str, path: Path, words: str, remedy: str = "") -> None:
+    """Refuse a path where no JSON file is.
+
+    Arguments:
+        argument: that gives the file, for messages.
+        path: of the file.
+        words: what it should hold.
+        remedy: where such a file comes from.
+    """
+    require_file(argument, path, remedy)
+    try:
+        json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:  # also of bytes that are no text, and of what is nested too deeply
+        _checks.refuse(argument, f"be {words} as JSON", f"{path}: {error}", remedy)
+
+
+def refuse_road(text: str) -> NoReturn:
+    """Refuse a word that means no road."""
+    remedy = 'Examples: "iso:C", "bump:0.06:5", "profile.csv", "course.crg".'
+    _checks.refuse("road", "be iso:CLASS, bump:HEIGHT:LENGTH or a file that is there", repr(text), remedy)

@@ -1,0 +1,196 @@
+"""How well a fit predicts motion that it was not fitted to: parts of its own records are left out in turn.
+
+The samples left out get weight zero and the others are fitted again from the minimum of all, so that the compiled
+programs of the fit are used again: a few steps for each part.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jaxdamp.bench import BenchRun
+from jaxdamp.identify._blas import one_thread
+from jaxdamp.identify.fitting import solve
+from jaxdamp.identify.initial_states import moving_samples
+from jaxdamp.identify.judging import fitted_models
+from jaxdamp.identify.model import Model, is_memoryless
+from jaxdamp.identify.predicting import predict_by_record, used_samples
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.result import FitResult
+from jaxdamp.identify.scoring import Score, score_of
+
+
+PARTS = 4  # into which records, or the time of each record, are divided
+FEWEST_MOTIONS = 3  # that differ, for whole records to be left out
+ALIKE = 0.02  # relative difference of frequency and largest velocity of records of the same motion
+SLICES = 5  # in which a part of a record of few cycles is spread over it
+REFIT_STEPS = 12  # of each refit at most, from the minimum of all records
+
+Part = tuple[Bool[np.ndarray, " _"], ...]  # the samples of each record that are left out
+
+
+class HeldOut(NamedTuple):
+    """The errors on motion that a fit did not know.
+
+    Attributes:
+        fit_percent: over all samples that were predicted [%].
+        rmse: over the same [N].
+        scores: on each record, or each part of a record, one by one.
+        words: what was predicted from what.
+    """
+
+    fit_percent: float
+    rmse: float  # N
+    scores: tuple[Score, ...]
+    words: str
+
+
+def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None:
+    """The errors of a fit on parts of its own records, each predicted by a fit to the others.
+
+    Records of three motions or more are left out in up to four groups, records of the same motion together. Otherwise
+    the quarters of the records in time are left out; of records shorter than four cycles, every fourth of 20 slices.
+
+    Arguments:
+        result: of `fit`.
+        in_time: never leave whole records out, since the fit has numbers that only one record determines.
+
+    Returns:
+        The errors; None where no part can be left out.
+    """
+    evidence = result.evidence
+    assert evidence is not None
+    problem, start = evidence.problem, evidence.problem.started_at(evidence.minimum.values)
+    fitted = np.flatnonzero(np.isfinite(problem.sigma))
+    runs = [problem.runs[i] for i in fitted]
+    groups = motions(runs)
+    whole = len(groups) >= FEWEST_MOTIONS and not (in_time or problem.per_record)
+    errors = _Errors([], [], [])
+    for number, part in enumerate(_by_record(runs, groups) if whole else _by_time(runs), 1):
+        factor = _kept(problem, fitted, part)
+        if np.all(factor) or not np.any(problem.used & (factor > 0)):
+            continue
+        models, forces = _refitted(start, factor)
+        for i, run, left in zip(fitted, runs, part, strict=True):
+            name = run.name if whole else f"{run.name}, part {number} of {PARTS}"
+            errors.add(name, models[i], run, forces[i], left, problem.initial_state)
+    records = f"each of {len(runs)} records" if whole else f"each quarter of the record{'s' * (len(runs) > 1)}"
+    same = ", all of one motion" * (len(groups) == 1)
+    return errors.together(f"{records} predicted by fits without it{same}")
+
+
+def on_records(result: FitResult, runs: Sequence[BenchRun]) -> HeldOut | None:
+    """The errors of a fit on other records, in four parts of each if they are fewer than three.
+
+    Arguments:
+        result: of `fit`.
+        runs: records that were not fitted.
+    """
+    errors, few = _Errors([], [], []), len(runs) < FEWEST_MOTIONS
+    models, forces = predict_by_record(result.model_of(runs), runs, result.initial_state)
+    for model, run, force in zip(models, runs, forces, strict=True):
+        for number, part in enumerate(in_time_parts(run) if few else [np.ones(len(run), bool)], 1):
+            name = f"{run.name}, part {number} of {PARTS}" if few else run.name
+            errors.add(name, model, run, force, part, result.initial_state)
+    return errors.together(f"{len(runs)} record{'s' * (len(runs) > 1)} held out")
+
+
+class _Errors(NamedTuple):
+    """Measured and predicted forces, part by part."""
+
+    scores: list[Score]
+    measured: list[np.ndarray]
+    predicted: list[np.ndarray]
+
+    def add(
+        self,
+        name: str,
+        model: Model,
+        run: BenchRun,
+        force: np.ndarray,
+        part: Bool[np.ndarray, " samples"],
+        initial_state: str,
+    ) -> None:
+        """Compare the predicted force with the measured one over the samples of a part that count."""
+        compared = np.zeros(len(run), bool)
+        compared[used_samples(model, run, is_memoryless(model), initial_state)] = True
+        compared &= part
+        if np.any(compared):
+            self.measured.append(run.force[compared])
+            self.predicted.append(force[compared])
+            self.scores.append(score_of(name, self.measured[-1], self.predicted[-1]))
+
+    def together(self, words: str) -> HeldOut | None:
+        """All parts; None if nothing was compared."""
+        if not self.scores:
+            return None
+        both = np.concatenate(self.measured), np.concatenate(self.predicted)
+        all_of_them = score_of("", *both)
+        return HeldOut(all_of_them.fit_percent, all_of_them.rmse, tuple(self.scores), words)
+
+
+def motions(runs: Sequence[BenchRun]) -> list[list[int]]:
+    """The records in groups of the same motion, by frequency and largest velocity, from slow to fast.
+
+    Arguments:
+        runs: the records.
+
+    >>> from jaxdamp import bench, dampers
+    >>> tests = [bench.SineTest(amplitude=0.01, frequency=f, name=n) for f, n in ((3.0, "a"), (1.0, "b"), (3.0, "c"))]
+    >>> motions(tuple(bench.VirtualDyno(dampers.Linear(1500.0)).run(tests)))
+    [[1], [0, 2]]
+    """
+    groups: list[list[int]] = []
+    for i in sorted(range(len(runs)), key=lambda i: runs[i].peak_velocity):
+        for group in groups:
+            pairs = [(f(runs[i]), f(runs[group[0]])) for f in (lambda r: r.peak_velocity, lambda r: r.frequency)]
+            if all(abs(a - b) <= ALIKE * max(abs(a), abs(b)) for a, b in pairs):
+                group.append(i)
+                break
+        else:
+            groups.append([i])
+    return groups
+
+
+def in_time_parts(run: BenchRun) -> Iterator[Bool[np.ndarray, " samples"]]:
+    """The samples of each of four parts of a record: its quarters, or slices in turn where it has few cycles.
+
+    Arguments:
+        run: the record; rest before and after the motion belongs to the nearest part.
+    """
+    moving = moving_samples(run)
+    count = moving.stop - moving.start
+    slices = PARTS if count / run.sampling_rate * run.frequency >= PARTS else PARTS * SLICES
+    number = ((np.arange(len(run)) - moving.start) * slices // max(count, 1)).clip(0, slices - 1) % PARTS
+    return (number == part for part in range(PARTS))
+
+
+def _by_record(runs: Sequence[BenchRun], groups: Sequence[Sequence[int]]) -> list[Part]:
+    """Whole records, so that each part has slow and fast ones."""
+    count = min(PARTS, len(groups))
+    part_of = {i: k % count for k, group in enumerate(groups) for i in group}
+    return [tuple(np.full(len(run), part_of[i] == k) for i, run in enumerate(runs)) for k in range(count)]
+
+
+def _by_time(runs: Sequence[BenchRun]) -> list[Part]:
+    return list(zip(*(in_time_parts(run) for run in runs), strict=True))
+
+
+def _kept(problem: Problem, fitted: Sequence[int] | np.ndarray, part: Part) -> Float[np.ndarray, " samples"]:
+    """Factor on the weight of each sample of the residuals: zero for blocks with a sample that is left out."""
+    factor = np.ones(problem.owner.size)
+    for i, left in zip(fitted, part, strict=True):
+        place, block = problem.places[i], round(problem.sample_steps[i] * problem.runs[i].sampling_rate)
+        count = place.stop - place.start
+        factor[place] = ~np.any(left[: count * block].reshape(count, block), axis=1)
+    return factor
+
+
+@one_thread()
+def _refitted(problem: Problem, factor: Float[np.ndarray, " samples"]) -> tuple[list[Model], list[np.ndarray]]:
+    """The models of the records fitted with these weights, and their forces."""
+    solution = solve(problem.reweighted(factor), starts=1, max_steps=REFIT_STEPS)
+    models, model = fitted_models(problem, solution.best.values)
+    return predict_by_record(models or model, problem.runs, problem.initial_state)

@@ -1,0 +1,335 @@
+"""Statistical (equivalent) linearisation: the linear laws nearest to those of a vehicle in its random motion.
+
+On a road whose rate is Gaussian white noise, deflection x, rate v and states s of each law are taken as normally
+distributed, and force and state rates y(x, v, s) are replaced by ȳ + J (z − z̄), z = (v, x, s), with the least mean
+square error: ȳ = E[y], J = E[y (z − z̄)ᵀ] P⁻¹. For a law of the velocity alone J = E[v F]/σ². Means and covariance P are
+those of the vehicle with these linear laws, a fixed point.
+
+Sources: Roberts and Spanos, Random Vibration and Statistical Linearization (1990); for hysteresis Wen, Journal of
+Applied Mechanics 47 (1980).
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from jaxdamp._dependence import depends
+from jaxdamp._limits import at_least, within
+from jaxdamp._matrices import solve
+from jaxdamp._types import Scalar, State
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.vehicles.covariance import channel_covariance
+from jaxdamp.vehicles.equilibrium import rest_position
+from jaxdamp.vehicles.gaussian_points import gaussian_points
+from jaxdamp.vehicles.linear_laws import LinearLaws, motions_of, with_linear_laws
+from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.system import System
+
+
+BODY, WHEEL = 1.5, 10.0  # Hz, of a vehicle, to start the search from
+MOST_STEPS = 60
+LONGEST_STEP = 0.5  # of the search, in logarithms of standard deviations
+_SMALLEST = 1e-6  # of the first standard deviation
+_STRAIGHT = 1.0 - 1e-6  # largest correlation
+_NARROWEST = 1e-6  # squared: least share of a variance that the variables before it do not explain
+
+
+class Spread(NamedTuple):
+    """Distribution of the variables of each law of one kind in which it is not linear.
+
+    Attributes:
+        log_deviation: logarithm of the standard deviations, shape (laws, variables).
+        tilt: artanh of the correlation of each variable with those before it, shape (laws, pairs).
+        mean: in multiples of the first standard deviations, shape (laws, variables).
+    """
+
+    log_deviation: Float[Array, "laws variables"]
+    tilt: Float[Array, "laws pairs"]
+    mean: Float[Array, "laws variables"]
+
+
+class _Kind(NamedTuple):
+    """Laws that differ in their numbers only."""
+
+    law: AbstractDamper  # stacked if there are several
+    curved: tuple[int, ...]  # the variables among (v, x, s) in which they are not linear
+    motions: np.ndarray  # of each law, the places of (v, x, s) among all motions
+    answers: np.ndarray  # of each law, the places of (f, ṡ) among all answers
+    scale: Float[Array, "laws variables"]  # first standard deviations
+
+
+def statistical_laws(
+    system: System,
+    velocity_psd: Scalar,
+    delays: Float[Array, " wheels"],
+    on_road: Sequence[bool],
+    lifts: Sequence[bool],
+) -> tuple[LinearLaws, Scalar]:
+    """The linear laws, and whether they were found: one, or zero.
+
+    Differentiable: derivatives are those of the fixed point (implicit function theorem), first and second.
+
+    Arguments:
+        system: the vehicle.
+        velocity_psd: of the road, two-sided [(m/s)²/Hz].
+        delays: of each wheel behind the first [s].
+        on_road: whether each port is between a wheel and the road, where the rate contains the white noise.
+        lifts: whether it is the lift-off of a tyre: linear in its rate.
+    """
+    arrays, rest = eqx.partition((system, velocity_psd, delays), eqx.is_array)
+    parts = [_side_by_side(law) for law in system.laws]
+    owners = tuple(port for port, laws in enumerate(parts) for _ in laws)
+    laws = [law for of_port in parts for law in of_port]
+    curved = []
+    for law, port in zip(laws, owners, strict=True):
+        found = nonlinear_variables(law)
+        if on_road[port] and found[:1] == (0,):
+            if not lifts[port]:
+                raise NoiseAtLaw(port)
+            found = found[1:]
+        curved.append(found)
+
+    def settings(arrays: Any) -> tuple[System, list[_Kind], Scalar, Array]:
+        system, psd, delays = eqx.combine(arrays, rest)
+        return system, _kinds([law for law in system.laws for law in _side_by_side(law)], curved, psd), psd, delays
+
+    kinds = settings(arrays)[1]
+    begun = _first(system, kinds, owners)
+    if not any(kind.curved for kind in kinds):
+        return _nearest(kinds, begun, owners), jnp.ones(())
+    start, unravel = jax.flatten_util.ravel_pytree(begun)
+
+    def again(y: Array, arrays: Any) -> Array:
+        """The distributions of the vehicle with the laws nearest to given ones."""
+        system, kinds, psd, delays = settings(arrays)
+        spreads = _distributions(system, kinds, _nearest(kinds, unravel(y), owners), psd, delays)
+        return jax.flatten_util.ravel_pytree(spreads)[0]
+
+    solution, found = _fixed_point(again, jax.lax.stop_gradient(start), arrays)
+    return _nearest(kinds, unravel(solution), owners), found
+
+
+class NoiseAtLaw(Exception):
+    """A law that is not linear in a rate that contains white noise, at this port."""
+
+    def __init__(self, port: int) -> None:
+        super().__init__(port)
+        self.port = port
+
+
+def nonlinear_variables(law: AbstractDamper) -> tuple[int, ...]:
+    """The variables among (v, x, s…) in which force and state rates are not linear, with constant slopes."""
+    count = 2 + law.initial_state().size
+    still = [jnp.zeros(()) for _ in range(count)]
+
+    def slope(number: int) -> Any:
+        def along(values: list[Scalar]) -> Array:
+            def one(value: Scalar) -> Array:
+                return _answers(law, [*values[:number], value, *values[number + 1 :]])
+
+            return jax.jvp(one, (values[number],), (jnp.ones_like(values[number]),))[1]
+
+        return along
+
+    return tuple(number for number in range(count) if depends(slope(number), still))
+
+
+def _answers(law: AbstractDamper, values: Sequence[Scalar]) -> Float[Array, " answers"]:
+    """(f, ṡ) at (v, x, s)."""
+    v, x, *states = values
+    state = jnp.stack(states) if states else jnp.zeros(0)
+    return jnp.concatenate([jnp.reshape(law.force(x, v, state), 1), law.state_rate(x, v, state)])
+
+
+def _side_by_side(law: AbstractDamper) -> tuple[AbstractDamper, ...]:
+    """The terms of a sum: the linear law nearest to a sum is the sum of those nearest to its terms."""
+    terms = law.side_by_side()
+    together = sum(term.initial_state().size for term in terms)
+    return terms if together == law.initial_state().size else (law,)
+
+
+def _kinds(laws: Sequence[AbstractDamper], curved: Sequence[tuple[int, ...]], psd: Scalar) -> list[_Kind]:
+    ports, kinds, begun = Ports(laws), [], 0
+    fast = jnp.sqrt(psd * 2.0 * jnp.pi * WHEEL)
+    for law, members in zip(ports.laws, ports.members, strict=True):
+        count = laws[members[0]].initial_state().size
+        inner = begun + np.arange(len(members) * count).reshape(len(members), count)
+        begun += inner.size
+        own = np.array(members)[:, None]
+        motions = np.concatenate([len(laws) + own, own, 2 * len(laws) + inner], axis=1)
+        answers = np.concatenate([own, len(laws) + inner], axis=1)
+        scale = _scales(law, len(members), curved[members[0]], fast)
+        kinds.append(_Kind(law, curved[members[0]], motions, answers, scale))
+    return kinds
+
+
+def _each(function: Any, law: AbstractDamper, count: int, *rows: Any) -> Any:
+    """The function of each law, with its row of each array."""
+    if count == 1:
+        return jax.tree.map(lambda leaf: leaf[None], function(law, *jax.tree.map(lambda leaf: leaf[0], rows)))
+    arrays, rest = eqx.partition(law, eqx.is_array)
+    return jax.vmap(lambda arrays, *rows: function(eqx.combine(arrays, rest), *rows))(arrays, *rows)
+
+
+def _scales(law: AbstractDamper, count: int, curved: tuple[int, ...], fast: Scalar) -> Float[Array, "laws variables"]:
+    """Typical size of each variable: that of a state after a stroke at constant velocity."""
+
+    def of_one(law: AbstractDamper, fast: Scalar) -> Array:
+        duration = 1.0 / (2.0 * jnp.pi * BODY)
+        state = law.initial_state()
+        if state.size and max(curved, default=0) > 1:
+            dt = duration / 64
+
+            def move(i: Array, state: State) -> State:
+                return law.advance(i * dt * fast, fast, (i + 1) * dt * fast, fast, state, dt)
+
+            moved = jnp.abs(jax.lax.fori_loop(0, 64, move, state) - state)
+            state = jnp.where(jnp.isfinite(moved), moved, 0.0)
+        sizes = jnp.concatenate([jnp.stack([fast, fast * duration]), 0.7 * state])
+        return jax.lax.stop_gradient(at_least(sizes[np.array(curved, dtype=int)], 1e-9))
+
+    return _each(of_one, law, count, jnp.broadcast_to(fast, (count,)))
+
+
+def _still(kind: _Kind) -> Spread:
+    """The first distribution: no correlations, no means."""
+    laws, variables = kind.scale.shape
+    pairs = variables * (variables - 1) // 2
+    return Spread(jnp.log(kind.scale), jnp.zeros((laws, pairs)), jnp.zeros((laws, variables)))
+
+
+def _first(system: System, kinds: Sequence[_Kind], owners: Sequence[int]) -> list[Spread]:
+    """Where the search begins: with the vehicle at rest."""
+    rest = rest_position(system, jnp.zeros(system.form.road_stiffness.shape[1]))
+    rest = jnp.where(jnp.isfinite(rest), rest, 0.0)
+    states = sum(kind.answers.shape[1] - 1 for kind in kinds for _ in kind.answers)
+    place = jnp.concatenate([rest, jnp.zeros(rest.size + states)])
+    means = motions_of(system, owners, states).state @ place
+    return [_still(kind)._replace(mean=means[_chosen(kind)] / kind.scale) for kind in kinds]
+
+
+def _chosen(kind: _Kind) -> np.ndarray:
+    return kind.motions[:, np.array(kind.curved, dtype=int)]
+
+
+def _nearest(kinds: Sequence[_Kind], spreads: Sequence[Spread], owners: tuple[int, ...]) -> LinearLaws:
+    """The linear laws with the least mean square error for these distributions."""
+    answers = sum(kind.answers.size for kind in kinds)
+    constant, slopes = jnp.zeros(answers), jnp.zeros((answers, answers + len(owners)))
+    for kind, spread in zip(kinds, spreads, strict=True):
+
+        def of_one(law: AbstractDamper, spread: Spread, scale: Array, curved: Any = kind.curved) -> tuple[Array, Array]:
+            return _nearest_of_one(law, curved, spread, scale)
+
+        own, own_slopes = _each(of_one, kind.law, len(kind.answers), spread, kind.scale)
+        constant = constant.at[kind.answers].set(own)
+        slopes = slopes.at[kind.answers[:, :, None], kind.motions[:, None, :]].set(own_slopes)
+    return LinearLaws(constant, slopes, owners)
+
+
+def _nearest_of_one(
+    law: AbstractDamper, curved: tuple[int, ...], spread: Spread, scale: Float[Array, " variables"]
+) -> tuple[Array, Array]:
+    """Constant and slopes by (v, x, s) of one law: E[y tᵀ] L⁻¹ for z = z̄ + L t with uncorrelated t of variance one."""
+    count, places = 2 + law.initial_state().size, np.array(curved, dtype=int)
+    mean = spread.mean * scale
+
+    def at(curved_values: Array) -> Array:
+        values = jnp.zeros(count).at[places].set(curved_values)
+        return values
+
+    def answers(values: Array) -> Array:
+        return _answers(law, list(values))
+
+    slopes = jax.jacfwd(answers)(at(mean))  # in the other variables they are the same everywhere
+    if not curved:
+        return answers(at(mean)), slopes
+    points, weights = (jnp.asarray(part, mean.dtype) for part in gaussian_points(len(curved)))
+    lower = jnp.exp(spread.log_deviation)[:, None] * _triangle(jnp.tanh(spread.tilt), len(curved))
+    values = jax.vmap(lambda t: answers(at(mean + lower @ t)))(points)
+    average = weights @ values
+    secant = ((values - average[None]) * weights[:, None]).T @ points
+    own = solve(lower.T, secant.T).T
+    return average - own @ mean, slopes.at[:, places].set(own)
+
+
+def _triangle(correlation: Float[Array, " pairs"], size: int) -> Float[Array, "size size"]:
+    """The lower triangle L with L Lᵀ = the matrix of these correlations, or the nearest that is regular."""
+    rows: list[list[Any]] = []
+    pairs = iter(range(correlation.size))
+    for i in range(size):
+        row: list[Any] = []
+        for j in range(i):
+            known = sum((row[k] * rows[j][k] for k in range(j)), jnp.zeros_like(correlation[0]))
+            row.append((correlation[next(pairs)] - known) / rows[j][j])
+        left = 1.0 - sum((value * value for value in row), jnp.zeros(()))
+        rows.append([*row, jnp.sqrt(at_least(left, _NARROWEST))])
+    none = jnp.zeros(())
+    return jnp.stack([jnp.stack([*row, *[none] * (size - len(row))]) for row in rows])
+
+
+def _distributions(
+    system: System, kinds: Sequence[_Kind], laws: LinearLaws, psd: Scalar, delays: Float[Array, " wheels"]
+) -> list[Spread]:
+    """How the variables of each kind are distributed in the vehicle with linear laws."""
+    linear = with_linear_laws(system, laws)
+    moved = motions_of(system, laws.ports, laws.constant.size - laws.count)
+    settled = -solve(linear.a, jnp.concatenate([linear.b, linear.constant[:, None]], axis=1))
+    settled, rest = settled[:, :-1], settled[:, -1]
+    static = moved.state @ settled + moved.road
+    covariance = psd * channel_covariance(linear.a, moved.state, linear.e - settled, static, delays)
+    means, spreads = moved.state @ rest, []
+    for kind in kinds:
+        chosen, size = _chosen(kind), len(kind.curved)
+        own = covariance[chosen[:, :, None], chosen[:, None, :]]
+        variance = jnp.diagonal(own, axis1=1, axis2=2) + (_SMALLEST * kind.scale) ** 2
+        log_deviation = 0.5 * jnp.log(at_least(variance, (_SMALLEST * kind.scale) ** 2))
+        deviation = jnp.exp(log_deviation)
+        row, column = np.tril_indices(size, -1)
+        correlation = own[:, row, column] / (deviation[:, row] * deviation[:, column])
+        tilt = jnp.arctanh(within(correlation, -_STRAIGHT, _STRAIGHT))
+        spreads.append(Spread(log_deviation, tilt, means[chosen] / kind.scale))
+    return spreads
+
+
+def _fixed_point(function: Callable[[Array, Any], Array], start: Array, arguments: Any) -> tuple[Array, Scalar]:
+    """The solution of y = function(y, arguments) by Newton's method with limited steps, and whether it was found.
+
+    Derivatives by the arguments follow from the implicit function theorem, of any order and in both modes.
+    """
+    differentiable, rest = eqx.partition(arguments, eqx.is_inexact_array)
+
+    def slope(y: Array, differentiable: Any) -> tuple[Array, Array]:
+        """1 − ∂function/∂y, and what is missing."""
+
+        def at(y: Array) -> tuple[Array, Array]:
+            value = function(y, eqx.combine(differentiable, rest))
+            return value, value
+
+        slopes, value = jax.jacfwd(at, has_aux=True)(y)
+        return jnp.eye(y.size, dtype=y.dtype) - slopes, value - y
+
+    def step(y: Array, differentiable: Any) -> Array:
+        return y + within(solve(*slope(y, differentiable)), -LONGEST_STEP, LONGEST_STEP)
+
+    @jax.custom_jvp
+    def solution(start: Array, differentiable: Any) -> tuple[Array, Scalar]:
+        accuracy = 1e-4 if start.dtype == jnp.float32 else 1e-9
+        solver = optx.FixedPointIteration(rtol=accuracy, atol=accuracy)
+        found = optx.fixed_point(step, solver, start, differentiable, max_steps=MOST_STEPS, throw=False)
+        return found.value, jnp.where(found.result == optx.RESULTS.successful, 1.0, 0.0).astype(start.dtype)
+
+    def rule(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[tuple[Array, Scalar], tuple[Array, Scalar]]:
+        y, found = solution(*primals)
+        (_, now), (_, moved) = primals, tangents
+        _, change = jax.jvp(lambda d: function(y, eqx.combine(d, rest)), (now,), (moved,))
+        return (y, found), (solve(slope(y, now)[0], change), jnp.zeros_like(found))
+
+    solution.defjvp(rule)
+    return solution(start, differentiable)

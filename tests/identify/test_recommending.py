@@ -1,0 +1,114 @@
+"""The recommended law: judged on motion held out, as simple as it may be, and believable."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from jaxdamp import identify
+from jaxdamp.bench import SineTest, VirtualDyno
+from jaxdamp.dampers import Bilinear, Lag, Linear, PiecewiseLinear, Polynomial
+from jaxdamp.identify import compare, cross_validate
+from jaxdamp.identify.held_out import motions
+from jaxdamp.identify.recommending import recommendation
+
+
+TRUTH = Bilinear(2600.0, 1200.0)
+LAWS = {"linear": Linear, "bilinear": Bilinear, "polynomial": Polynomial, "piecewise_linear": PiecewiseLinear}
+
+
+@pytest.fixture(scope="module")
+def comparison(sines):
+    return compare(LAWS, sines(TRUTH, noise=20.0))
+
+
+def test_the_simplest_law_within_the_noise_is_recommended(comparison):
+    assert comparison.best.name == "bilinear" and comparison.best_fit.name == "piecewise_linear"
+    assert comparison.best.judged_on == "each of 3 records predicted by fits without it"
+    assert comparison.best.rmse > comparison.best_fit.rmse
+    assert comparison["linear"].fit_percent < comparison.best.held_out_fit_percent
+
+
+@pytest.mark.parametrize("law", [Bilinear, Lag(Bilinear(2000.0, 1000.0), 0.002)], ids=["closed form", "search"])
+def test_refits_from_the_common_optimum_are_those_from_the_start(law):
+    dyno = VirtualDyno(Lag(TRUTH, 0.004), sampling_rate=400.0, force_noise=10.0)
+    runs = list(dyno.run([SineTest(0.01, f, cycles=3) for f in (1.0, 3.0, 5.0)]))
+    folds = {fold.held_out: fold.rmse for fold in cross_validate({"law": law}, runs).folds}
+    (rung,) = compare({"law": law}, runs).rungs
+    assert {score.name: score.rmse for score in rung.scores} == pytest.approx(folds, rel=1e-3)
+
+
+def test_a_single_record_is_judged_quarter_by_quarter(sines):
+    (run,) = sines(TRUTH, noise=20.0, tests=[(0.02, 2.0)])
+    run = dataclasses.replace(run, time=run.time / 4, velocity=4 * run.velocity)  # eight cycles a second, two of them
+    (rung,) = compare({"linear": Linear}, [run], rig=None).rungs
+    slices = np.arange(800) * 20 // 800 % 4  # of two cycles only: each quarter is spread over the record
+    for number, score in enumerate(rung.scores):
+        out = slices == number
+        rate = run.velocity[~out] @ run.force[~out] / (run.velocity[~out] @ run.velocity[~out])
+        assert score.rmse == pytest.approx(np.sqrt(np.mean((rate * run.velocity[out] - run.force[out]) ** 2)), rel=1e-6)
+        assert score.name == f"{run.name}, part {number + 1} of 4"
+
+
+def test_repeated_motions_are_left_out_together(sines):
+    once = sines(TRUTH, noise=20.0)
+    again = [dataclasses.replace(run, name=f"{run.name} again") for run in sines(TRUTH, noise=20.0, seed=1)]
+    assert motions([*once, *again]) == [[0, 3], [1, 2, 4, 5]] or motions([*once, *again]) == [[0, 3], [1, 4], [2, 5]]
+    (rung,) = compare({"bilinear": Bilinear}, [*once[:2], *again[:2]]).rungs
+    assert rung.judged_on == "each quarter of the records predicted by fits without it" and len(rung.scores) == 16
+
+
+def test_a_law_with_doubtful_numbers_is_left_aside_where_another_is_as_good(comparison):
+    rungs = {rung.name: rung for rung in comparison.rungs}
+    bilinear, curve = rungs["bilinear"], rungs["piecewise_linear"]
+    weak = [e._replace(note="not identifiable") for e in bilinear.result.parameters]
+    doubted = bilinear._replace(result=dataclasses.replace(bilinear.result, parameters=tuple(weak)))
+    choice = recommendation([rungs["linear"], doubted, curve])
+    assert choice.rung is curve and choice.doubted == (doubted,)
+    assert recommendation([rungs["linear"], doubted]).rung is doubted  # no other is nearly as good
+    unfinished = bilinear._replace(
+        result=dataclasses.replace(bilinear.result, status=identify.Status.STEP_LIMIT), held_out_rmse=0.5
+    )
+    assert recommendation([unfinished, bilinear]).rung is unfinished  # far better, and nothing else is near
+    assert recommendation([unfinished._replace(held_out_rmse=bilinear.error), bilinear]).rung is bilinear
+
+
+def test_a_law_that_was_not_judged_is_recommended_only_alone(comparison):
+    linear, bilinear, *_ = comparison.rungs
+    unjudged = bilinear._replace(held_out_rmse=None, held_out_fit_percent=None, judged_on="")
+    assert recommendation([linear, unjudged]).rung is linear and recommendation([unjudged]).rung is unjudged
+
+
+def test_numbers_of_one_record_are_never_judged_without_it(sines):
+    runs = sines(TRUTH, noise=20.0)
+    (rung,) = compare({"bilinear": Bilinear}, runs, per_record=["force_offset"], rig=["offset"]).rungs
+    assert rung.judged_on.startswith("each quarter") and rung.held_out_rmse == pytest.approx(20.0, rel=0.1)
+
+
+def test_a_curve_that_the_error_asks_for_is_proposed_by_name(sines, comparison):
+    kinked = PiecewiseLinear([-0.2, -0.05, 0.05, 0.2], [2000.0, 9000.0, 3000.0, 12000.0, 1500.0])
+    said = " ".join(compare({"linear": Linear}, sines(kinked, noise=5.0)).verdict)
+    assert "is shape, of the curve: try piecewise_linear or table, which follow any curve." in said
+    assert "of the curve" not in " ".join(comparison.verdict)
+
+
+def test_a_fit_responds_with_what_the_machine_adds(sines):
+    runs = [dataclasses.replace(run, force=run.force + 100.0) for run in sines(TRUTH, noise=5.0)]
+    result = identify.fit(Bilinear, runs[:2], rig="offset")
+    new = runs[2]
+    force = result.respond(new)
+    alone = np.asarray([result.law.force(0.0, v, result.law.initial_state()) for v in new.velocity[:3]])
+    np.testing.assert_allclose(force[:3] - alone, 100.0, atol=2.0)
+    np.testing.assert_array_equal(force, result.respond([new])[0])
+    assert result.score(new)[1] == pytest.approx(5.0, rel=0.1)
+    with pytest.warns(DeprecationWarning, match="`predict` is deprecated"):
+        np.testing.assert_array_equal(result.predict(new)[0], force)
+
+
+def test_main_warnings_name_groups_once(sines):
+    runs = sines(TRUTH, noise=200.0, tests=[(0.02, 2.0)])
+    result = identify.fit(PiecewiseLinear, runs)
+    weak = [e for e in result.parameters if e.note == "not identifiable"]
+    (line,) = [warning for warning in result.main_warnings if "cannot be told" in warning]
+    assert weak and line.startswith(f"{len(weak)} of {len(result.parameters)} numbers") and "[" not in line
+    assert len(result.main_warnings) <= 5 < len(result.warnings)

@@ -1,0 +1,146 @@
+"""The first sentence of a tuning: better or not, by how much, at what price, within which limits."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxdamp import dampers, roads, tune
+from jaxdamp.tune import Outcome, Rescore, Status, TuneResult
+from jaxdamp.tune.limits import limit_ranges
+from jaxdamp.tune.verdict import decided, half_interval
+from jaxdamp.vehicles import presets
+
+
+CAR = presets.quarter_car_000()
+COMFORT, TYRE, TRAVEL = "rms_sprung_acceleration", "rms_dynamic_tyre_load", "working_space_peak_to_peak"
+WHITE = roads.white("C", 20.0)
+
+
+def made_up(comfort: list[float], tyre: list[float], travel: list[float], **more) -> TuneResult:
+    """A tuning whose metrics were 1 before, and these on the fresh roads after."""
+    after = {COMFORT: np.array(comfort), TYRE: np.array(tyre), TRAVEL: np.array(travel)}
+    units = {COMFORT: "m/s^2", TYRE: "N", TRAVEL: "m"}
+    before = dict.fromkeys(after, 1.0)
+    fresh = Rescore({name: np.ones(len(comfort)) for name in after}, after, units, COMFORT)
+    values = {name: float(x.mean()) for name, x in after.items()}
+    words = dict(warnings=(), status=Status.CONVERGED, history=(1.0,), fresh=fresh, active_limits=())
+    limits = dict(limits={TYRE: 1.1}, allowed=limit_ranges({TYRE: "+10%"}, [TYRE]))
+    return TuneResult(CAR, CAR, COMFORT, (), before, values, units, **(limits | words | more))
+
+
+CASES = [
+    (
+        ([0.89, 0.90, 0.91], [1.05] * 3, [1.02, 1.03, 1.04]),
+        Outcome.BETTER,
+        f"Better: {COMFORT} -10.0 ± 2.5 % on 3 fresh",
+    ),
+    (([0.95, 0.96, 0.97], [1.05] * 3, [1.29, 1.3, 1.31]), Outcome.TRADE, f"price: {TRAVEL} +30.0 %"),
+    (([0.80, 0.99, 1.15], [1.05] * 3, [1.0] * 3), Outcome.NOT_SHOWN, "Not shown to be better"),
+    (([1.04, 1.05, 1.06], [1.05] * 3, [1.0] * 3), Outcome.NOT_BETTER, "Not better"),
+    (([0.89, 0.90, 0.91], [1.14, 1.15, 1.16], [1.0] * 3), Outcome.LIMIT_LOST, f"{TYRE} is 4.5 % beyond its limit"),
+]
+
+
+@pytest.mark.parametrize(("metrics", "outcome", "words"), CASES, ids=[case[1].name for case in CASES])
+def test_the_verdict_is_that_of_the_fresh_roads(metrics, outcome, words):
+    result = made_up(*metrics)
+    assert result.verdict.outcome is outcome and words in result.verdict.sentence
+    assert result.summary.startswith(result.verdict.sentence) and result.verdict.better == (outcome is Outcome.BETTER)
+    data = result.to_dict()
+    assert data["verdict"] == outcome.name
+
+
+def test_outside_its_records_a_damper_is_not_called_better():
+    result = made_up([0.89, 0.90, 0.91], [1.05] * 3, [1.0] * 3, extrapolated=("damper: velocity 2 times",))
+    assert result.verdict.outcome is Outcome.EXTRAPOLATED and "2 times" in result.verdict.sentence
+    law = dampers.with_fitted_range(dampers.Linear(2500.0), velocity=(-0.02, 0.02))
+    tuned = tune.minimise(COMFORT, presets.quarter_car_000(law), WHITE)
+    assert tuned.verdict.outcome is Outcome.EXTRAPOLATED and tuned.after[COMFORT] < tuned.before[COMFORT]
+
+
+def test_a_violated_limit_is_said_first_with_its_number():
+    result = tune.minimise(COMFORT, CAR, WHITE, limits={"working_space_rms": 1e-3})
+    assert list(result.violated) == ["working_space_rms"] and result.active_limits == ()
+    value = f"{result.after['working_space_rms']:.4g}"
+    assert result.summary.startswith(f"Limit not met: working_space_rms is {value}, and must be <= 0.001 m")
+    (row,) = [row for row in result.table().records() if row["metric"] == "working_space_rms"]
+    assert row["note"] == "limit 0.001, violated" and result.verdict.outcome is Outcome.LIMIT_NOT_MET
+    labels = [label.get_text() for axes in result.plot().axes for label in axes.get_yticklabels()]
+    assert "working space rms (LIMIT VIOLATED)" in labels
+
+
+def test_relative_limits_follow_the_start():
+    soft = presets.quarter_car_000(dampers.Linear(6000.0))
+    result = tune.minimise("working_space_rms", soft, WHITE, limits={TYRE: "+1%"})
+    assert result.after[TYRE] == pytest.approx(1.01 * result.before[TYRE], rel=1e-5) and result.converged
+    assert result.limits[TYRE] == pytest.approx(1.01 * result.before[TYRE]) and result.active_limits == (TYRE,)
+    front = tune.pareto([COMFORT, "working_space_rms"], soft, WHITE, limits={TYRE: "+1%"}, points=3)
+    assert front.values[TYRE].max() == pytest.approx(1.01 * front.before[TYRE], rel=1e-4)
+    spans = tune.limit_spans({"a": ("-5%", "+10%"), "b": (-1.0, None)}, ["a", "b"], {"a": -2.0, "b": 0.0})
+    assert spans == {"a": pytest.approx((-2.1, -1.8)), "b": (-1.0, np.inf)}
+
+
+WRONG = [
+    (dict(limits={TYRE: -5.0}), "not be negative, as the metric never is"),
+    (dict(limits={TYRE: np.inf}), "be finite"),
+    (dict(limits={TYRE: "10"}), "be the largest allowed value"),
+    (dict(metric=lambda m: m[COMFORT] * 0.0 + 3.0), "must depend on what is free"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), WRONG, ids=[message for _, message in WRONG])
+def test_what_cannot_be_meant_is_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        tune.minimise(**{"metric": COMFORT, "vehicle": CAR, "road": WHITE} | change)
+    with pytest.raises(ValueError, match="be a number here"):
+        tune.limit_spans({TYRE: "+10%"}, [TYRE])
+
+
+def test_left_alone_a_tuning_moves_what_a_workshop_can_change():
+    car = presets.quarter_car_000(dampers.Lag(dampers.Besinger(1000.0, 2000.0, 500.0, 0.2, 0.05), 0.004))
+    road = roads.cosine_bump(0.05, start=0.1, duration=0.2)
+    run = dict(duration=0.4, dt=2e-3, max_steps=1)
+    result = tune.minimise(COMFORT, car, road, **run)
+    names = ["compression_rate", "rebound_rate", "blow_off_rate", "limit_velocity"]
+    assert [change.name for change in result.parameters] == [f"damper.law.{name}" for name in names]
+    assert not any("workshop" in warning for warning in result.warnings)
+    named = tune.minimise(COMFORT, car, road, over=["damper.law.rebound_rate", "damper.lag_time"], **run)
+    assert any("No workshop can change damper.lag_time:" in warning for warning in named.warnings)
+    friction = presets.quarter_car_000(dampers.CoulombFriction(100.0, 0.01))
+    with pytest.raises(ValueError, match=r"no workshop can change.*friction_force"):
+        tune.minimise(COMFORT, friction, road, **run)
+
+
+def test_roads_are_added_until_the_interval_decides():
+    fresh = made_up([0.89, 0.90, 0.91], [1.0] * 3, [1.0] * 3).fresh
+    assert fresh is not None and decided(fresh, {})
+    wide = dataclasses.replace(fresh, after=fresh.after | {COMFORT: np.array([0.8, 0.99, 1.1])})
+    assert not decided(wide, {}) and wide.half_width(COMFORT) == half_interval(wide.after[COMFORT])
+    tyre = limit_ranges({TYRE: "+10%"}, [TYRE])
+    open_limit = dataclasses.replace(fresh, after=fresh.after | {TYRE: np.array([1.0, 1.1, 1.25])})
+    assert decided(fresh, tyre) and not decided(open_limit, tyre)
+
+
+def test_an_optimum_at_a_kink_is_an_optimum():
+    def worse(m):
+        return jnp.maximum(m[COMFORT] / 1.15, m["working_space_rms"] / 0.0125)
+
+    car, bounds = presets.quarter_car_000(dampers.Linear(1500.0)), {"rate": None}
+    result = tune.minimise(worse, car, WHITE, bounds=bounds)
+    left, right = (result.after[name] / size for name, size in ((COMFORT, 1.15), ("working_space_rms", 0.0125)))
+    assert left == pytest.approx(right, rel=1e-6) and result.converged and not result.warnings
+    stopped = tune.minimise(worse, car, WHITE, bounds=bounds, max_steps=2)
+    assert stopped.status is Status.STEP_LIMIT
+
+
+@pytest.mark.slow
+def test_limits_that_other_roads_break_are_tightened():
+    road = roads.iso8608_filtered("C", speed=20.0, duration=2.2, seed=3)
+    run = dict(duration=2.0, dt=4e-3, limits={TYRE: "+5%"}, bounds={"rate": (500.0, 9000.0)})
+    once = tune.minimise("weighted_rms_sprung_acceleration", CAR, road, fresh_roads=0, **run)
+    result = tune.minimise("weighted_rms_sprung_acceleration", CAR, road, **run)
+    assert once.fresh is None and "tried on no other" in once.verdict.sentence
+    assert result.fresh is not None and result.fresh.roads >= 4
+    assert result.verdict.outcome is not Outcome.LIMIT_LOST
