@@ -102,7 +102,8 @@ from jaxdamp import Ride, dampers, respond, roads, simulate
 from jaxdamp.vehicles.presets import quarter_car_000
 
 bump = roads.cosine_bump(0.05, start=0.02, duration=0.1)
-ride = Ride(quarter_car_000(dampers.Lag(dampers.Linear(1500.0), 0.004)), bump, metrics=["rms_sprung_acceleration"], duration=0.1)
+car = quarter_car_000(dampers.Lag(dampers.Linear(1500.0), 0.004))
+ride = Ride(car, bump, metrics=["rms_sprung_acceleration"], duration=0.1)
 time = np.linspace(0.0, 0.05, 51)
 
 def numbers(rate):
