@@ -58,8 +58,8 @@ def step_of_optax(seconds: float) -> list[Any]:
         return optax.apply_updates(rates, changes), after  # pyright: ignore[reportReturnType]
 
     first, warm = first_and_warm(lambda: step(rates, state), 3)
-    memory = step.lower(rates, state).compile().memory_analysis().temp_size_in_bytes / 2**20
-    return [f"optax step through {seconds:g} s", 1, first, warm, memory]
+    needed: Any = step.lower(rates, state).compile().memory_analysis()
+    return [f"optax step through {seconds:g} s", 1, first, warm, needed.temp_size_in_bytes / 2**20]
 
 
 def main() -> None:

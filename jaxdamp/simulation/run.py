@@ -107,9 +107,9 @@ def simulate(
     engine = engine.prepared(run_check(vehicle, road, heights, dt, begin))
     with engine.naming_derivatives():
         saved, status = recorded(engine, system, heights, jnp.asarray(dt, dtype=float), begin, every)
-    last = behind(saved.motion[-1])
-    if last is not None and not np.all(np.isfinite(last)):
-        if not np.all(np.isfinite(behind(saved.motion[0]))):
+    first, last = behind(saved.motion[0]), behind(saved.motion[-1])
+    if first is not None and last is not None and not np.all(np.isfinite(last)):
+        if not np.all(np.isfinite(first)):
             refuse_restless(vehicle)
         remedy = " ".join([*filter(None, map(coverage, system.laws)), engine.remedy(status, dt)])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
