@@ -11,6 +11,7 @@ QUESTIONS = (
     ["one_car", "--plain"],
     ["throughput"],
     ["gradients"],
+    ["from_jax"],
     ["scaling"],
     ["memory"],
     ["work_precision"],

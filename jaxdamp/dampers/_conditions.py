@@ -20,7 +20,9 @@ class Condition(NamedTuple):
 def check_conditions(law: Any) -> None:
     """Refuse parameters that violate a condition between them (inside `jax.jit` they are not known)."""
     values = rows(law) if law.has_conditions() else None
-    for index in range(len(values[0]) if values else 0):
+    if not values:
+        return
+    for index in range(len(values[0])):
         one = row(law, values, index)
         for condition in one.conditions():
             value = np.asarray(getattr(one, condition.parameter))

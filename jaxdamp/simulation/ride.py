@@ -65,6 +65,7 @@ class Ride(eqx.Module):
         dt: as in `simulate`; it is checked here, with the numbers of this vehicle. Points far from it, of a sweep for
             instance, are driven with the same steps unchecked.
         substeps: of the exponential engine between two instants; as many as the laws of this vehicle need if left out.
+            For a ride made inside `jax.jit` see `simulate`.
         engine: as in `simulate`. One that is not `Exponential` may save the whole run.
 
     Raises:

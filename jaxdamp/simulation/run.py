@@ -65,7 +65,9 @@ def simulate(
         start: coordinates [m, rad] at time zero that differ from the equilibrium, such as `{"pitch": 0.05}`; at rest.
         substeps: of the exponential engine between two instants; as many as the steepest law needs (friction at
             standstill, a bristle, oil) if left out, so that every step is stable. The road stays straight between
-            instants.
+            instants. Under `jax.grad`, `jax.jvp` and `jax.vmap` they are those of the numbers that are differentiated,
+            the most of a batch. Inside `jax.jit` the numbers of a vehicle that is an argument are not known: pass
+            `substeps` (`simulation.substeps_needed`), or a `TracedStepWarning` says what is assumed.
         every: save every so many-th instant only, of long runs. The motion is the same, but metrics and the energy
             balance then know no more than what is saved; `Ride` gathers metrics at every instant and saves none.
         method: deprecated: `"exponential"`, `"diffrax"` or a solver of diffrax. Pass `engine`.
@@ -105,9 +107,9 @@ def simulate(
     engine = engine.prepared(run_check(vehicle, road, heights, dt, begin))
     with engine.naming_derivatives():
         saved, status = recorded(engine, system, heights, jnp.asarray(dt, dtype=float), begin, every)
-    last = behind(saved.motion[-1])
-    if last is not None and not np.all(np.isfinite(last)):
-        if not np.all(np.isfinite(behind(saved.motion[0]))):
+    first, last = behind(saved.motion[0]), behind(saved.motion[-1])
+    if first is not None and last is not None and not np.all(np.isfinite(last)):
+        if not np.all(np.isfinite(first)):
             refuse_restless(vehicle)
         remedy = " ".join([*filter(None, map(coverage, system.laws)), engine.remedy(status, dt)])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)

@@ -92,6 +92,7 @@ def test_another_vehicle_has_the_road_under_its_own_axles():
     np.testing.assert_allclose((value, slope), expected, rtol=1e-9)
     with pytest.warns(DeprecationWarning, match="use `of_vehicle`"):
         old = ride.on_axles_of(replace(car, {"rear_distance": 2.0}))
+    assert old.heights is not None and ride.heights is not None
     assert not np.array_equal(old.heights, ride.heights)
 
 
