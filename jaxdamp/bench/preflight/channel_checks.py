@@ -40,6 +40,8 @@ def _goes_on(values: Samples, first: int, last: int, noise: float) -> bool:
     if len(before) < 2:
         return False
     slope = abs(values[first] - before[0]) / len(before)
+    if abs(values[first] - values[max(first - 3, 0)]) / 3.0 < 0.05 * slope:
+        return False  # it bends into the flat stretch smoothly, as a friction without noise does
     return bool(slope * length / 2 > max(6.0 * step(values), 3.0 * noise, 1e-6 * np.ptp(values)))
 
 

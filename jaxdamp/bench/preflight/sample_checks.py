@@ -133,7 +133,7 @@ def _spikes(
 def _spike_finding(
     e: Examined, name: str, values: Samples, first: np.ndarray, last: np.ndarray, height: Samples
 ) -> list[Finding]:
-    size, noise = float(np.median(np.abs(height))), e.noise[name]
+    size, noise = float(np.median(np.abs(height))), max(e.noise[name], 1e-9 * float(np.ptp(values)))
     counts = last - first + 1
     number = f"{len(first)} spike{'s' * (len(first) > 1)}"
     width = f" of up to {counts.max()} samples" if counts.max() > 1 else ""
