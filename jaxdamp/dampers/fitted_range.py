@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, TypeVar, final
 
 import jax
 import numpy as np
-from jax.extend.core import unsafe_am_i_under_a_jit_DO_NOT_USE
+from jax.extend.core import unsafe_am_i_under_a_jit_DO_NOT_USE  # pyright: ignore[reportPrivateImportUsage]
 
 from jaxdamp import _checks
 

@@ -39,7 +39,7 @@ class AbstractResiduals(eqx.Module):
 
 
 class Problem(NamedTuple):
-    """A fit to be solved.
+    """A fit to be solved, and its residuals for a program of your own (`docs/from_jax.md`).
 
     Attributes:
         free: the free parameters of the model, with their start.
@@ -78,6 +78,16 @@ class Problem(NamedTuple):
     noise_factor: float = 1.0
     share_left_out: float = 0.0
     anchor: tuple[Float[np.ndarray, " free"], Float[np.ndarray, " free"]] | None = None
+
+    def residual(self, values: Float[Array, " free"]) -> Float[Array, " samples"]:
+        """All weighted residuals at these physical values of the free numbers (`free.values` at the start).
+
+        They are what `fit` squares: from the initial states that the problem says, with the test machine and without
+        the samples before a law with states has settled, whose residuals are zero. A pure function for `jax.jit`,
+        `jax.vmap` and derivatives, forward and reverse.
+        """
+        model = self.free.build(values)
+        return jnp.concatenate([part(model) for part in self.residuals])
 
     @property
     def coordinates(self) -> Coordinates:

@@ -67,7 +67,17 @@ def march(
     temperature: Signal | None = None,
     state: State | None = None,
 ) -> Signal:
-    """The forces of `march_states`."""
+    """`respond` without its checks, for use inside compiled functions, from this state if one is given.
+
+    Arguments:
+        law: the damper law.
+        dt: step [s].
+        stroke: [m], positive in extension, shape (time,).
+        velocity: [m/s], shape (time,).
+        substeps: steps from one instant to the next.
+        temperature: [K], shape (time,), for laws that depend on one; within a step it is the mean of both ends.
+        state: of the law at the first instant; its own initial state if left out.
+    """
     return march_states(law, dt, stroke, velocity, substeps, temperature, state)[0]
 
 
@@ -81,20 +91,7 @@ def march_states(
     temperature: Signal | None = None,
     state: State | None = None,
 ) -> tuple[Signal, State]:
-    """`respond` without its checks, for use inside compiled functions, from this state if one is given.
-
-    Arguments:
-        law: the damper law.
-        dt: step [s].
-        stroke: [m], positive in extension, shape (time,).
-        velocity: [m/s], shape (time,).
-        substeps: steps from one instant to the next.
-        temperature: [K], shape (time,), for laws that depend on one; within a step it is the mean of both ends.
-        state: of the law at the first instant; its own initial state if left out.
-
-    Returns:
-        The forces [N], shape (time,), and the states at the last instant.
-    """
+    """Forces [N] and the states at the last instant, as `march`."""
     warm = None if temperature is None or not law.traits().temperature_dependent else temperature
 
     def at(temperature: Array | None) -> AbstractDamper:

@@ -51,8 +51,14 @@ def respond(
     stroke: SignalLike,
     velocity: SignalLike | None = ...,
     *,
+    state: Float[ArrayLike, " states"] | None = ...,
     return_state: Literal[False] = ...,
-    **options: Any,
+    temperature: Float[ArrayLike, "..."] | None = ...,
+    substeps: int = ...,
+    engine: AbstractLawEngine | None = ...,
+    method: "str | diffrax.AbstractSolver | None" = ...,
+    rtol: float = ...,
+    atol: float = ...,
 ) -> Signal: ...
 
 
@@ -63,8 +69,10 @@ def respond(
     stroke: SignalLike,
     velocity: SignalLike | None = ...,
     *,
+    state: Float[ArrayLike, " states"] | None = ...,
     return_state: Literal[True],
-    **options: Any,
+    temperature: Float[ArrayLike, "..."] | None = ...,
+    substeps: int = ...,
 ) -> tuple[Signal, State]: ...
 
 

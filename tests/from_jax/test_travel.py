@@ -114,8 +114,8 @@ def test_statistics_and_bounds_are_the_same_object_or_equal_after_the_journey():
 def test_what_has_travelled_compiles_nothing_anew():
     compiled: list[str] = []
 
-    def note(event: str, duration: float, **_: Any) -> None:
-        del duration
+    def note(event: str, duration_secs: float, **kwargs: str | int) -> None:
+        del duration_secs, kwargs
         compiled.extend([event] * (event == "/jax/core/compile/backend_compile_duration"))
 
     home, law = ride(), with_fitted_range(Linear(1000.0) + Spring(10.0), velocity=(-1.0, 1.0))
