@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import within
+from jaxdamp._traced import behind
 from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.roads._crossing import given_in_time
 from jaxdamp.roads._fade import quintic_step
@@ -41,8 +42,8 @@ class Bump(AbstractRoad):
 
     @property
     def shortest_event(self) -> float | None:
-        """Its own width T [s]; `None` where it is traced, or of height zero."""
-        width, peak = _checks.concrete(self.width), _checks.concrete(self.peak)
+        """Its own width T [s]; `None` where it is not known yet, or of height zero."""
+        width, peak = behind(self.width), behind(self.peak)
         return None if width is None or peak is None or not np.any(peak) else float(np.min(width))
 
     @eqx.filter_jit

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most, largest, within
+from jaxdamp._traced import behind
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.roads._composed import AbstractOnOneRoad, agreed_speed
 from jaxdamp.roads.base import AbstractRoad
@@ -37,7 +38,7 @@ class ContactPatch(AbstractOnOneRoad):
     @property
     def shortest_event(self) -> float | None:
         """That of the road [s], longer by the time in which the patch passes."""
-        own, passing = self.road.shortest_event, _checks.concrete(self.passing_time)
+        own, passing = self.road.shortest_event, behind(self.passing_time)
         return None if own is None or passing is None else own + float(np.min(passing))
 
     @property

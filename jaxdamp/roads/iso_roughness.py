@@ -5,10 +5,12 @@ from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._random import rayleigh, uniform
+from jaxdamp._traced import behind
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.roads._cosine_sum import cosine_sum
 from jaxdamp.roads._fade import fade_in
@@ -82,8 +84,9 @@ class Iso8608(AbstractRoad):
 
     @property
     def longest_run(self) -> float | None:
-        """The time [s] after which the road repeats."""
-        return self.duration
+        """The time [s] after which the road repeats, at the highest of several speeds."""
+        speed = behind(self.speed)
+        return None if speed is None else self.length / float(np.max(speed))
 
     def reseeded(self, seed: int) -> "Iso8608":
         """Another realisation: the probabilities of phases and amplitudes are shifted, alike for equal roads.

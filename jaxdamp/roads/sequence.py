@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most
+from jaxdamp._traced import behind
 from jaxdamp._types import Scalar, ScalarLike, SignalLike
 from jaxdamp.roads._composed import common_speed, least, same_columns
 from jaxdamp.roads.base import AbstractRoad, Columns
@@ -57,12 +58,12 @@ class Joined(AbstractRoad):
     @property
     def longest_run(self) -> float | None:
         """Until the second road repeats, or the first one before it does [s]."""
-        at, own, rest = _checks.concrete(self.at), self.first.longest_run, self.second.longest_run
+        at, own, rest = behind(self.at), self.first.longest_run, self.second.longest_run
         if at is None:
             return None
-        if own is not None and own < float(at) * (1.0 - 1e-9):
+        if own is not None and own < np.max(at) * (1.0 - 1e-9):
             return own
-        return None if rest is None else float(at) + rest
+        return None if rest is None else float(np.min(at)) + rest
 
     @property
     def shortest_event(self) -> float | None:

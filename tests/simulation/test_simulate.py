@@ -9,6 +9,7 @@ from jaxdamp import dampers, metrics, roads, simulate
 from jaxdamp.parameters import replace
 from jaxdamp.simulation import Adaptive, Exponential
 from jaxdamp.simulation.recorder import recorded
+from jaxdamp.simulation.run import sampled
 from jaxdamp.vehicles.presets import quarter_car_000
 
 
@@ -263,6 +264,21 @@ def test_refuses_runs_that_make_no_sense(change, message):
     arguments = {"road": sampled, "duration": 1.0, "dt": 5e-3} | change
     with pytest.raises(ValueError, match=message):
         simulate(quarter_car_000(), **arguments)
+
+
+def test_a_traced_road_that_would_repeat_or_be_skipped_is_refused():
+    """Speeds of a derivative or a batch are known, so that its roads are checked as others are."""
+
+    def at(speed):
+        return sampled(quarter_car_000(), roads.iso8608("C", speed, seed=1, length=100.0), 5.0, 1e-2)[1][-1, 0]
+
+    def over(width):
+        return sampled(quarter_car_000(), roads.cosine_bump(0.1, start=0.1, duration=width), 1.0, 1e-2)[1][-1, 0]
+
+    with pytest.raises(ValueError, match=r"`duration` must not be longer than the random road.* after 4 s"):
+        jax.vmap(at)(jnp.array([10.0, 25.0]))
+    with pytest.raises(ValueError, match=r"`dt` must be at most half the time over the shortest bump, 0.01 s"):
+        jax.grad(over)(0.01)
 
 
 @pytest.mark.parametrize("engine", [Exponential(), Adaptive()], ids=["exponential", "adaptive"])
