@@ -16,6 +16,7 @@ from jaxdamp.vehicles import (
     LinearVehicle,
     equivalent_dampers,
     linearise,
+    nonlinear_variables,
     stationary_rms,
     with_weightings,
 )
@@ -70,6 +71,8 @@ def stationary_notes(vehicle: AbstractVehicle, road: WhiteRoad) -> list[str]:
         vehicle: with its laws; empty if all of them are linear.
         road: a white one.
     """
+    if not any(nonlinear_variables(law) for law in vehicle.elements()):
+        return []
     found = stationary_dampers(vehicle, road)
     words = [f"{name.replace('_', ' ')} {one.words()}" for name, one in found.items() if not one.linear]
     return [f"On a white road: {'; '.join(words)}. {TRUSTED}"] if words else []

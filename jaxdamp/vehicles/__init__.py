@@ -35,6 +35,7 @@ from jaxdamp.vehicles.ride_metrics import is_stationary
 from jaxdamp.vehicles.roll_car import RollCar
 from jaxdamp.vehicles.seat import Seat, SeatMass
 from jaxdamp.vehicles.stationary import EquivalentDamper, equivalent_dampers, stationary_rms
+from jaxdamp.vehicles.statistical import nonlinear_variables
 from jaxdamp.vehicles.suspension import Suspension
 from jaxdamp.vehicles.system import Layout, System
 from jaxdamp.vehicles.tandem import IndependentTandem, WalkingBeam
@@ -90,6 +91,7 @@ __all__ = [
     "is_stationary",
     "linearise",
     "modes",
+    "nonlinear_variables",
     "oscillations",
     "prefixed",
     "presets",

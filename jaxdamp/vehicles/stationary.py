@@ -101,7 +101,16 @@ def equivalent_dampers(
     speed: ScalarLike | int | None = None,
     in_phase: bool = False,
 ) -> dict[str, EquivalentDamper]:
-    """What `stationary_rms` takes in place of each damper, by name; arguments as there.
+    """What `stationary_rms` takes in place of each damper, by name.
+
+    Arguments:
+        vehicle: a vehicle.
+        velocity_psd: two-sided power spectral density of the rate of the height [(m/s)²/Hz].
+        speed: of the vehicle [m/s]; not needed for a single axle.
+        in_phase: the road is under all axles at once, instead of a speed.
+
+    Raises:
+        ValueError: as `stationary_rms`.
 
     >>> from jaxdamp.dampers import CoulombFriction, Linear
     >>> from jaxdamp.vehicles.presets import quarter_car_000

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
+import jax.flatten_util
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
@@ -124,7 +125,11 @@ class NoiseAtLaw(Exception):
 
 
 def nonlinear_variables(law: AbstractDamper) -> tuple[int, ...]:
-    """The variables among (v, x, s…) in which force and state rates are not linear, with constant slopes."""
+    """The variables among (v, x, s…), by number, in which force and state rates are not linear with constant slopes.
+
+    Arguments:
+        law: the damper law.
+    """
     count = 2 + law.initial_state().size
     still = [jnp.zeros(()) for _ in range(count)]
 
