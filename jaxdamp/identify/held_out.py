@@ -26,7 +26,7 @@ from jaxdamp.identify.scoring import Score, score_of
 PARTS = 4  # into which records, or the time of each record, are divided
 FEWEST_MOTIONS = 3  # that differ, for whole records to be left out
 ALIKE = 0.02  # relative difference of frequency and largest velocity of records of the same motion
-LEAST_CHANGE = 0.1  # of what changes the force by its RMS: numbers are never held more firmly
+LEAST_CHANGE = 0.5  # of what changes the force by its RMS: numbers are never held more firmly
 SLICES = 5  # in which a part of a record of few cycles is spread over it
 REFIT_STEPS = 12  # of each refit at most, from the minimum of all records
 
@@ -198,13 +198,13 @@ def _kept(problem: Problem, fitted: Sequence[int] | np.ndarray, part: Part) -> F
 def _anchored_at(evidence: Evidence) -> Problem:
     """The problem at its minimum, where numbers are weakly held: a large change counts as one standard deviation.
 
-    It is a change by the value itself, if that is between a tenth and all of what changes the force by its RMS.
+    It is a change by the value itself, if that is between half and all of what changes the force by its RMS.
     """
     problem, minimum = evidence.problem, evidence.minimum
     sensitivity = np.linalg.norm(minimum.jacobian, axis=0) / problem.level
     by_force = np.divide(1.0, sensitivity, out=np.ones(sensitivity.shape), where=sensitivity > 0)
     large = np.clip(np.abs(minimum.values), LEAST_CHANGE * by_force, by_force)
-    weight = float(np.mean(evidence.noise.sigma[problem.used])) / large
+    weight = np.sqrt(minimum.squares / np.count_nonzero(problem.used)) / large
     return problem.started_at(minimum.values)._replace(anchor=(minimum.values, weight))
 
 
