@@ -98,7 +98,7 @@ def _tuned(
     screen: Screen, car: AbstractVehicle, fit: FitResult, on: RoadOptions, options: TuneOptions
 ) -> tuple[TuneResult | None, list[str]]:
     """The tuning of what can be built and was identified, unless the options name other parameters; and remarks."""
-    unknown, sentences = _not_identified(fit), []
+    unknown, sentences = not_identified(fit), []
     adjustable = [p.path for p in parameters(fit.law) if p.adjustable]
     if not options.over and not set(adjustable) - set(unknown):
         sentence = (
@@ -115,7 +115,7 @@ def _tuned(
     return tuned(screen, call), [*more, *sentences]
 
 
-def _not_identified(fit: FitResult) -> list[str]:
+def not_identified(fit: FitResult) -> list[str]:
     """The parameters of the law of which the records determine no number."""
     inside = "law." if fit.rig is not None or fit.record_starts else ""
     notes: dict[str, list[bool]] = {}

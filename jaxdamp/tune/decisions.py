@@ -146,9 +146,10 @@ def _check(dampers: Any, vehicle: Any, roads: Any) -> None:
     if not isinstance(roads, WhiteRoad) and (not isinstance(roads, Sequence) or len(roads) < 2):
         remedy = "Take a road class with several seeds: one road says nothing about the next one."
         _checks.refuse("roads", "be two or more roads, or a white one", _checks.described(roads), remedy)
-    for i, road in enumerate([] if isinstance(roads, WhiteRoad) else roads):
+    listed = [] if isinstance(roads, WhiteRoad) else list(roads)
+    for i, road in enumerate(listed):
         check_module(f"roads[{i}]", road, (AbstractRoad,), call)
-        again = next((j for j in range(i) if bool(eqx.tree_equal(roads[j], road))), None)
+        again = next((j for j in range(i) if bool(eqx.tree_equal(listed[j], road))), None)
         if again is not None:
             remedy = "Take several seeds: a road that counts twice makes the error of the mean too small."
             _checks.refuse(f"roads[{i}]", "be another road than the others", f"roads[{again}] again", remedy)

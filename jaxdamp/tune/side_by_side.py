@@ -109,6 +109,11 @@ class BatchEvaluator:
         ]
         return dict(zip(self.task.names, np.concatenate(parts)[: len(designs)].T, strict=True))
 
+    def rows_at(self, designs: Float[np.ndarray, "points free"]) -> Float[np.ndarray, "points rows"]:
+        """The rows of designs given by their physical values, without derivatives."""
+        numbers = self.numbers_at(designs, self.ride)
+        return np.stack([sign * numbers[name] for name, sign in self._rows], axis=1)
+
     def _in_lanes(self, designs: Float[np.ndarray, "points free"]) -> list[np.ndarray]:
         """Designs in groups of `LANES`, the last one filled up."""
         rest = np.repeat(designs[:1], -len(designs) % LANES, axis=0)

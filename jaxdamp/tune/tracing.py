@@ -9,10 +9,14 @@ import numpy as np
 from jaxdamp.tune.limits import Limit, limit_ends
 from jaxdamp.tune.ranges import SearchRange
 from jaxdamp.tune.side_by_side import LANES, RADIUS, BatchEvaluator, Computed, Lane, Scaling, solve_together
+from jaxdamp.tune.starts import start_points
+from jaxdamp.tune.task import DesignTask
 
 
 FAR = 1e3  # aim of an objective that does not count, in units of its start
 NO_CONFLICT = 1e-4  # range of an objective between the ends, relative to its size, below which there is no front
+SCANNED = 128  # designs all over the bounds, simulated where peaks make many minima
+ELSEWHERE = 0.3  # least distance of another start, relative to the coordinate of the start
 ROUNDS = 3  # of comparing each search with the results of the others
 
 
@@ -90,12 +94,42 @@ def trace_front(
         solve(opened, scaling)
         lanes, places = lanes + opened, places + new
         report(len(lanes), total)
+    if _has_peaks(evaluator.task):
+        others = _from_elsewhere(lanes, evaluator, scaling)
+        solve(others, scaling)
+        for lane, other in zip(lanes, others, strict=True):
+            if scaling.merit(other.now.rows, lane.aim) < scaling.merit(lane.now.rows, lane.aim) - evaluator.improvement:
+                lane.at, lane.now, lane.curvature = other.at, other.now, other.curvature
+                lane.converged = other.converged
     for _ in range(ROUNDS):
         improved = _restarted(lanes, scaling, 10.0 * evaluator.improvement)
         if not improved:
             break
         solve(improved, scaling)
     return lanes
+
+
+def _has_peaks(task: DesignTask) -> bool:
+    """Whether an objective or a limit is the largest or smallest value over time, so that there are many minima."""
+    by_name = {metric.name: metric for metric in task.objective.metrics}
+    followed = [by_name[name] for name in (*task.objective.names, *task.allowed) if name in by_name]
+    return any(term.reduction.value in ("largest", "smallest") for m in followed for term in m.statistic.terms)
+
+
+def _from_elsewhere(lanes: Sequence[Lane], evaluator: BatchEvaluator, scaling: Scaling) -> list[Lane]:
+    """For each search another one with its aim, from the best of designs all over the bounds that is not near it."""
+    space = evaluator.task.space
+    points = start_points(space, SCANNED + 1, 0)[1:]
+    rows = evaluator.rows_at(points)
+    points = points[np.all(np.isfinite(rows), axis=1)] / space.unit
+    rows = rows[np.all(np.isfinite(rows), axis=1)]
+    begun = []
+    for lane in lanes:
+        merits = np.array([scaling.merit(row, lane.aim) for row in rows])
+        merits[np.abs(points - lane.at).max(axis=1) < ELSEWHERE] = np.inf
+        begun.append(points[int(np.argmin(merits))] if np.isfinite(merits).any() else lane.at)
+    computed = evaluator.at(np.stack(begun))
+    return [Lane.begin(lane.aim, at, now) for lane, at, now in zip(lanes, begun, computed, strict=True)]
 
 
 def range_of(lanes: Sequence[Lane], objectives: int) -> np.ndarray:

@@ -73,7 +73,7 @@ def verdict_of(result: "TuneResult[Any]") -> Verdict:
         outcome, first = Outcome.NOT_SHOWN, f"Not shown to be better: {words}"
     elif result.extrapolated:
         outcome, first = Outcome.EXTRAPOLATED, f"Not known to be better: {words} by the law, but outside its records"
-        held = f"{held}; {'; '.join(result.extrapolated).rstrip('.')}"
+        held += "".join(f"; {sentence.rstrip('.')}" for sentence in result.extrapolated)
     elif name and price > -gain:
         outcome, first = Outcome.TRADE, f"A trade: {words}"
     else:

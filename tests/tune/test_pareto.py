@@ -218,3 +218,23 @@ def test_simulated_front_is_better_than_a_grid():
     beats = np.all(grid[:, None] < front.objectives[None] - 1e-5 * np.ptp(front.objectives, axis=0), axis=2)
     assert not beats.any()
     assert front.hypervolume > 0.9 * tune.hypervolume(grid, reference)
+
+
+@pytest.mark.slow
+def test_a_front_of_a_peak_has_no_design_that_another_valley_beats():
+    """Rebound rates near 2500 and 7000 N s/m are valleys of their own; a search stays in the one it begins in."""
+    peak = "peak_sprung_acceleration"
+    run: dict[str, Any] = {"duration": 2.5, "dt": 4e-3}
+    car = vehicles.presets.quarter_car_000(dampers.Bilinear(2600.0, 1400.0))
+    road = roads.iso8608("D", speed=20.0, seed=3, duration=3.0)
+    span = (300.0, 9000.0)
+    over = {"rebound_rate": span, "compression_rate": span}
+    front = tune.pareto([peak, TYRE], car, road, over=over, points=9, fresh_roads=0, **run)
+    axis = np.geomspace(*span, 61)
+    grid = jaxdamp.sweep(
+        jaxdamp.Ride(car, road, metrics=[peak, TYRE], **run),
+        {"damper.rebound_rate": axis, "damper.compression_rate": axis},
+    )
+    others = np.stack([grid[name].values.ravel() for name in front.names], axis=1)
+    gains = [np.min((point - others) / np.ptp(front.objectives, axis=0), axis=1).max() for point in front.objectives]
+    assert max(gains) < 0.005

@@ -1,6 +1,7 @@
 """The first sentence of a tuning: better or not, by how much, at what price, within which limits."""
 
 import dataclasses
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,15 +19,15 @@ COMFORT, TYRE, TRAVEL = "rms_sprung_acceleration", "rms_dynamic_tyre_load", "wor
 WHITE = roads.white("C", 20.0)
 
 
-def made_up(comfort: list[float], tyre: list[float], travel: list[float], **more) -> TuneResult:
+def made_up(comfort: list[float], tyre: list[float], travel: list[float], **more: Any) -> TuneResult:
     """A tuning whose metrics were 1 before, and these on the fresh roads after."""
     after = {COMFORT: np.array(comfort), TYRE: np.array(tyre), TRAVEL: np.array(travel)}
     units = {COMFORT: "m/s^2", TYRE: "N", TRAVEL: "m"}
     before = dict.fromkeys(after, 1.0)
     fresh = Rescore({name: np.ones(len(comfort)) for name in after}, after, units, COMFORT)
     values = {name: float(x.mean()) for name, x in after.items()}
-    words = dict(warnings=(), status=Status.CONVERGED, history=(1.0,), fresh=fresh, active_limits=())
-    limits = dict(limits={TYRE: 1.1}, allowed=limit_ranges({TYRE: "+10%"}, [TYRE]))
+    words: dict[str, Any] = dict(warnings=(), status=Status.CONVERGED, history=(1.0,), fresh=fresh, active_limits=())
+    limits: dict[str, Any] = dict(limits={TYRE: 1.1}, allowed=limit_ranges({TYRE: "+10%"}, [TYRE]))
     return TuneResult(CAR, CAR, COMFORT, (), before, values, units, **(limits | words | more))
 
 
@@ -82,7 +83,7 @@ def test_relative_limits_follow_the_start():
     assert spans == {"a": pytest.approx((-2.1, -1.8)), "b": (-1.0, np.inf)}
 
 
-WRONG = [
+WRONG: list[tuple[dict[str, Any], str]] = [
     (dict(limits={TYRE: -5.0}), "not be negative, as the metric never is"),
     (dict(limits={TYRE: np.inf}), "be finite"),
     (dict(limits={TYRE: "10"}), "be the largest allowed value"),
@@ -93,7 +94,7 @@ WRONG = [
 @pytest.mark.parametrize(("change", "message"), WRONG, ids=[message for _, message in WRONG])
 def test_what_cannot_be_meant_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
-        tune.minimise(**{"metric": COMFORT, "vehicle": CAR, "road": WHITE} | change)
+        tune.minimise(**({"metric": COMFORT, "vehicle": CAR, "road": WHITE} | change))
     with pytest.raises(ValueError, match="be a number here"):
         tune.limit_spans({TYRE: "+10%"}, [TYRE])
 
@@ -101,7 +102,7 @@ def test_what_cannot_be_meant_is_refused(change, message):
 def test_left_alone_a_tuning_moves_what_a_workshop_can_change():
     car = presets.quarter_car_000(dampers.Lag(dampers.Besinger(1000.0, 2000.0, 500.0, 0.2, 0.05), 0.004))
     road = roads.cosine_bump(0.05, start=0.1, duration=0.2)
-    run = dict(duration=0.4, dt=2e-3, max_steps=1)
+    run: dict[str, Any] = dict(duration=0.4, dt=2e-3, max_steps=1)
     result = tune.minimise(COMFORT, car, road, **run)
     names = ["compression_rate", "rebound_rate", "blow_off_rate", "limit_velocity"]
     assert [change.name for change in result.parameters] == [f"damper.law.{name}" for name in names]
@@ -138,7 +139,7 @@ def test_an_optimum_at_a_kink_is_an_optimum():
 @pytest.mark.slow
 def test_limits_that_other_roads_break_are_tightened():
     road = roads.iso8608_filtered("C", speed=20.0, duration=2.2, seed=3)
-    run = dict(duration=2.0, dt=4e-3, limits={TYRE: "+5%"}, bounds={"rate": (500.0, 9000.0)})
+    run: dict[str, Any] = dict(duration=2.0, dt=2.5e-3, limits={TYRE: "+5%"}, bounds={"rate": (500.0, 9000.0)})
     once = tune.minimise("weighted_rms_sprung_acceleration", CAR, road, fresh_roads=0, **run)
     result = tune.minimise("weighted_rms_sprung_acceleration", CAR, road, **run)
     assert once.fresh is None and "tried on no other" in once.verdict.sentence

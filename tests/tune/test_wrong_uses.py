@@ -106,6 +106,7 @@ CASES = [
     (lambda: compare(dampers=PAIR | {"B": 3.0}), "dampers['B']", "the number 3.0", "dampers.Linear"),
     (lambda: compare(vehicle=CAR), "vehicle", "a QuarterCar", "Write `lambda law"),
     (lambda: compare(roads=[BUMP]), "roads", "a list of 1", "several seeds"),
+    (lambda: compare(roads=[BUMP, BUMP]), "roads[1]", "roads[0] again", "several seeds"),
     (lambda: compare(roads=[WHITE, WHITE]), "roads[0]", "a WhiteRoad", "roads.iso8608"),
     (lambda: tune.hypervolume(np.zeros((2, 2)), np.zeros(3)), "reference", "(3,)", "front.reference"),
 ]
