@@ -114,7 +114,7 @@ class Ride(eqx.Module):
         engine, self.dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
         _, self.heights = sampled(vehicle, road, duration, self.dt)
         self.road = road if delays_by_itself(vehicle, road) else None
-        self.engine = engine.prepared(run_check(vehicle, road, self.heights, self.dt))
+        self.engine = engine.prepared(run_check(vehicle, vehicle.system(), road, self.heights, self.dt))
         self.layout = self.engine.layout(2 * len(vehicle.coordinates), side_by_side=False)
         self.metrics = tuple(chosen)
         for metric in self.metrics:

@@ -25,7 +25,7 @@ from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.stability import known_system, rounded_down
 from jaxdamp.simulation.step_size import RunCheck
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
-from jaxdamp.vehicles import AbstractVehicle, refuse_restless, static_equilibrium
+from jaxdamp.vehicles import AbstractVehicle, System, refuse_restless, static_equilibrium
 
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def simulate(
     time, heights = sampled(vehicle, road, duration, dt)
     _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)
-    engine = engine.prepared(run_check(vehicle, road, heights, dt, begin))
+    engine = engine.prepared(run_check(vehicle, system, road, heights, dt, begin))
     with engine.naming_derivatives():
         saved, status = recorded(engine, system, heights, jnp.asarray(dt, dtype=float), begin, every)
     first, last = behind(saved.motion[0]), behind(saved.motion[-1])
@@ -186,6 +186,7 @@ def refuse_stacked(vehicle: AbstractVehicle) -> None:
 
 def run_check(
     vehicle: AbstractVehicle,
+    system: System,
     road: AbstractRoad,
     heights: Float[Array, "time wheels"],
     dt: float,
@@ -197,7 +198,8 @@ def run_check(
         with at_compile_time():
             heights = sampled(vehicle, road, count * dt, dt)[1]
     half = functools.partial(half_sampled, vehicle, road, count, dt)
-    return RunCheck(known_system(vehicle), heights, half, dt, start, road.grid)
+    system = known_system(vehicle) if is_traced(system) else system
+    return RunCheck(system, heights, half, dt, start, road.grid)
 
 
 def half_sampled(vehicle: AbstractVehicle, road: AbstractRoad, count: int, dt: float) -> Float[Array, "fine wheels"]:

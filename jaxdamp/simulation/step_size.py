@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -139,7 +140,8 @@ class RunCheck(NamedTuple):
             if len(runs[0]) != cars:  # the road is a batch of its own
                 roughness = [np.sum(np.diff(row(run, runs, i)[1], axis=0) ** 2) for i in range(len(runs[0]))]
                 suspects = {int(np.argmax(roughness))}
-            chosen = [jax.tree.map(jnp.asarray, row(run, runs, i)) for i in suspects]
+            arrays = [eqx.partition(row(run, runs, i), lambda leaf: isinstance(leaf, np.ndarray)) for i in suspects]
+            chosen = [eqx.combine(jax.tree.map(jnp.asarray, values), rest) for values, rest in arrays]
             estimates = [
                 step_error(system, np.asarray(heights), lambda fine=fine: fine, self.dt, count, start)
                 for system, heights, fine, start in chosen
