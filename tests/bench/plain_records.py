@@ -71,7 +71,7 @@ def clean(seed: int, kind: str | None = None, noise: float | None = None) -> Ben
 
 def changed(run: BenchRun, **channels: np.ndarray) -> BenchRun:
     """The record with other channels, and the velocity of its stroke."""
-    given = {"time": run.time, "stroke": run.stroke, "force": run.force, **channels}
+    given: dict[str, Any] = {"time": run.time, "stroke": run.stroke, "force": run.force, **channels}
     return BenchRun.from_arrays(run.name, **given)
 
 

@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
 
+import numpy as np
+
 from jaxdamp import _checks
 from jaxdamp._tables import Cell, Column, Table, plain
 from jaxdamp.bench.analysis import as_records
@@ -183,8 +185,8 @@ def usable(
     """
     _checks.one_of("bad_records", bad_records, BAD_RECORDS)
     runs = tuple(runs)
-    if bad_records == "keep":
-        return runs
+    if bad_records == "keep" or not any(np.ptp(run.force) > 0.0 for run in runs):
+        return runs  # a fit says itself that no force varies
     errors = [_first_error(run, robust) for run in runs]
     sound = tuple(run for run, error in zip(runs, errors, strict=True) if error is None)
     found = [error for error in errors if error is not None]
