@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from jaxdamp.tune.result import TuneResult
 
 
-KEPT = 0.01  # relative excess over a limit on fresh roads up to which it counts as kept
-FELT = (  # kinds of channels that people, tyres or bump stops feel; not the speed and power of the damper
+WITHIN = 0.01  # relative excess over a limit on fresh roads up to which it counts as met
+PRICED = (  # kinds of channels whose rise is a price: of body, travel and tyres, not the speed and power of the damper
     ChannelKind.HEIGHT, ChannelKind.ANGLE, ChannelKind.ACCELERATION, ChannelKind.ANGULAR_ACCELERATION,
     ChannelKind.STROKE, ChannelKind.TYRE_LOAD, ChannelKind.RELATIVE_TYRE_LOAD,
 )  # fmt: skip
@@ -112,7 +112,7 @@ def _price(result: "TuneResult[Any]") -> tuple[float, str]:
             continue
         if metric is not None:
             kind = result.start.layout.by_name[metric.channel].kind
-            if metric.channel in limited or metric.statistic.signed or kind not in FELT:
+            if metric.channel in limited or metric.statistic.signed or kind not in PRICED:
                 continue
         worst = max(worst, (change, name))
     return worst
@@ -134,7 +134,7 @@ def _limits_in_words(result: "TuneResult[Any]") -> str:
         share = f"{after:.4g} {typeset_unit(result.units[name])}".rstrip() if change is None else f"{change:+.1f} %"
         text = f"{name} {share}{', at its limit' * (name in result.active_limits)}"
         if result.fresh is not None and name in result.allowed:
-            beyond = int(np.sum(excess(result.fresh, name, result.allowed[name]) > KEPT))
+            beyond = int(np.sum(excess(result.fresh, name, result.allowed[name]) > WITHIN))
             text += f", beyond it on {beyond} of {result.fresh.roads} fresh roads" * bool(beyond)
         texts.append(text)
     return f"; limits: {'; '.join(texts)}" if texts else ""
@@ -145,7 +145,7 @@ def lost_limits(result: "TuneResult[Any]") -> dict[str, float]:
     if result.fresh is None or result.fresh.roads < 2:
         return {}
     over = {name: excess(result.fresh, name, allowed) for name, allowed in result.allowed.items()}
-    return {name: float(np.mean(x)) for name, x in over.items() if np.mean(x) - half_interval(x) > KEPT}
+    return {name: float(np.mean(x)) for name, x in over.items() if np.mean(x) - half_interval(x) > WITHIN}
 
 
 def excess(fresh: "Rescore", name: str, allowed: LimitRange) -> Float[np.ndarray, " roads"]:
@@ -172,6 +172,6 @@ def decided(fresh: "Rescore", allowed: Mapping[str, LimitRange]) -> bool:
 
     It is asked again as roads are added, hence at 99 %.
     """
-    offsets = [fresh.change(fresh.metric), *(excess(fresh, name, limit) - KEPT for name, limit in allowed.items())]
+    offsets = [fresh.change(fresh.metric), *(excess(fresh, name, limit) - WITHIN for name, limit in allowed.items())]
     halves = [half_interval(offset, 0.99) for offset in offsets]
-    return all(abs(np.mean(offset)) > half or half < KEPT for offset, half in zip(offsets, halves, strict=True))
+    return all(abs(np.mean(offset)) > half or half < WITHIN for offset, half in zip(offsets, halves, strict=True))
