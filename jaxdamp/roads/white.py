@@ -39,7 +39,7 @@ def white(road_class: str | ScalarLike, speed: ScalarLike) -> WhiteRoad:
     It cannot be used in simulations over time, only for stationary responses, in which heights are relative. There,
     each law of a vehicle is replaced by the linear one that is equivalent in the Gaussian motion that results
     (statistical linearisation, `vehicles.linearise`). In `benchmarks/white_road.py`, RMS values of a car with one of
-    twelve laws, on classes A to D, are within 5 % of simulations, with hysteresis within 8 %, save the stroke where
+    twelve laws, on classes A to D, are within 5 % of simulations, with hysteresis within 12 %, save the stroke where
     friction mostly sticks.
 
     Arguments:

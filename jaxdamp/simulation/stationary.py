@@ -23,7 +23,7 @@ from jaxdamp.vehicles import (
 
 
 TRUSTED = (
-    "RMS values are within 5 % of simulations, with hysteresis within 8 %, but for friction that mostly sticks (stroke "
+    "RMS values are within 5 % of simulations, with hysteresis within 12 %, save friction that mostly sticks (stroke "
     "up to 17 % low). Laws of the velocity act by this slope alone: designs of equal slope count as equal."
 )
 DEVIATIONS = 3.0  # standard deviations of a stationary velocity that count as its reach

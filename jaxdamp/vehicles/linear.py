@@ -88,7 +88,7 @@ def linearise(
     (statistical linearisation), for a law of the velocity alone F ≈ E[v F]/E[v²] v. Differentiable in every parameter.
 
     Statistical linearisation takes stroke, velocity and states as normally distributed. RMS values are within 5 % of
-    simulations, with hysteresis (`Dahl`, `BoucWen`) within 8 %; where friction mostly sticks, the stroke is up to 17 %
+    simulations, with hysteresis (`Dahl`, `BoucWen`) within 12 %; where friction mostly sticks, the stroke is up to 17 %
     low (`benchmarks/white_road.py`).
 
     Where no stationary motion is found in code that JAX traces, which cannot raise an error, F and with it every RMS is
