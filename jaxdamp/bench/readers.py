@@ -31,7 +31,7 @@ def with_own(readers: Mapping[str, Reader] | None) -> dict[str, Reader]:
 
 def folder_suffixes(own: Mapping[str, Reader] | None) -> set[str]:
     """The suffixes of the files that a folder stands for: all but those of text files that may be notes."""
-    return FOLDER_SUFFIXES | set(own or {})
+    return {*FOLDER_SUFFIXES, *(own or {})}
 
 
 def read_tables(file: Path, readers: Mapping[str, Reader], delimiter: str | None = None) -> list[RawTable]:

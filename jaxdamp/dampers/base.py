@@ -44,7 +44,7 @@ class AbstractDamper(Module):
         check_conditions(self)
 
     # By identity, whatever is equal, as JAX asks of a function: `jax.jit(law.force)`.
-    __hash__ = object.__hash__
+    __hash__ = object.__hash__  # pyright: ignore[reportAssignmentType]
 
     def __repr__(self) -> str:
         return readable(self)

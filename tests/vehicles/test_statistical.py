@@ -137,7 +137,7 @@ def test_a_sweep_and_vmap_give_the_numbers_of_single_rides():
 def test_single_precision_is_finite_and_near_double():
     single = jax.tree.map(lambda a: a.astype(jnp.float32), quarter_car_000(HYSTERESIS["Dahl"]))
     with jax.enable_x64(False):
-        found = float(stationary_rms(single, np.float32(ROAD.velocity_psd))["sprung_acceleration"])
+        found = float(stationary_rms(single, float(ROAD.velocity_psd))["sprung_acceleration"])
     assert found == pytest.approx(acceleration(HYSTERESIS["Dahl"]), rel=1e-3)
 
 
