@@ -23,7 +23,7 @@ from jaxdamp.parameters import (
 Pair = tuple[float, float]
 FACTOR = 3.0  # default factor by which a number may decrease or increase
 INSIDE = 1e-6  # distance from the open ends of a domain, relative to the unit of the coordinate
-DAMPERS = ("damper*",)  # what is tuned by default, as far as it is adjustable
+DAMPERS = ("**damper.**",)  # what is tuned by default, as far as it is adjustable
 NO_BOUND = (-math.inf, math.inf)
 
 

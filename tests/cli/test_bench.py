@@ -44,7 +44,7 @@ def test_bench_prints_and_writes_preflight_evaluation_and_limits(folder: Path, t
     flat = " ".join(text.split())
     assert "rest before" not in flat  # it is cut off
     for said in (
-        "2 errors",
+        "1 error,",
         "error, force clipped: clipped",
         "rest cut off",
         "Limits: not all passed",
@@ -78,7 +78,7 @@ def test_fit_refuses_records_with_an_error_or_leaves_them_out(folder: Path, tmp_
     assert rows(tmp_path / "out/tables/preflight.csv")[0]["finding"] == "force clipped"
     assert "force clipped" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
     only = refused(tmp_path, "fit", folder / "clipped.csv", "--law", "linear", "--out", tmp_path / "none")
-    assert "the force is clipped at -150 N" in only
+    assert "the force is clipped at 150 N" in only
 
 
 def test_settings_in_names_are_not_pooled(tmp_path: Path) -> None:

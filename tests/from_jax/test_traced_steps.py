@@ -15,7 +15,7 @@ from jaxdamp.simulation import TracedStepWarning, substeps_needed
 from jaxdamp.vehicles.presets import quarter_car_000
 
 
-ROAD = roads.iso8608("C", 20.0, 1.0, seed=1)
+ROAD = roads.iso8608("C", 20.0, 1.0, seed=1, amplitudes="fixed")
 RMS = "rms_sprung_acceleration"
 
 

@@ -29,7 +29,7 @@ def stiff_car():
     return replace(quarter_car_000(), {"tyre_stiffness": 1e9})
 
 
-@pytest.mark.parametrize("dt", [0.1, 1.0])
+@pytest.mark.parametrize("dt", [0.1, 0.12])
 @pytest.mark.parametrize("drive", [simulate, Ride], ids=["simulate", "Ride"])
 def test_instants_too_few_for_wheel_hop_are_refused_with_the_step_to_write(drive, dt):
     car = quarter_car_000(LUGRE)

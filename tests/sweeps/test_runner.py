@@ -32,6 +32,7 @@ def program(monkeypatch):
         return made, of[id(made)][1]
 
     monkeypatch.setattr(Program, "start", timed)
+    monkeypatch.setattr(runner, "LONG", 30.0)
     return program
 
 
