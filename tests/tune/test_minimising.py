@@ -323,5 +323,5 @@ def test_a_parameter_without_effect_is_named_and_not_called_optimal():
     assert any(
         note.startswith("No effect on rms_sprung_acceleration: damper.terms.1.preload") for note in result.warnings
     )
-    alone = tune.minimise("rms_sprung_acceleration", car, roads.white("C", 20.0), over=both[1:])
-    assert alone.summary.endswith("no free parameter has an effect on it.") and "optimum" not in alone.summary
+    with pytest.raises(ValueError, match="must depend on what is free, but is rms_sprung_acceleration = "):
+        tune.minimise("rms_sprung_acceleration", car, roads.white("C", 20.0), over=both[1:])
