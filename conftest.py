@@ -16,7 +16,9 @@ def _prepare(namespace: dict) -> None:
 
     namespace["configure, as it is"] = jaxdamp.configure
     jaxdamp.configure = lambda **_: None
+    namespace["promotion, as it is"] = jax.config.jax_numpy_dtype_promotion
     jax.config.update("jax_enable_x64", True)
+    jax.config.update("jax_numpy_dtype_promotion", "standard")  # as readers have it; optax needs it
     np.set_printoptions(precision=6, suppress=True)
 
 
@@ -24,6 +26,7 @@ def _tidy(namespace: dict) -> None:
     import jaxdamp
 
     jaxdamp.configure = namespace["configure, as it is"]
+    jax.config.update("jax_numpy_dtype_promotion", namespace["promotion, as it is"])
 
 
 pytest_collect_file = (
