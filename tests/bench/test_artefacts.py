@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from jaxdamp import bench
 from jaxdamp.bench import BenchRun, preflight, usable
 from jaxdamp.bench.preflight.check import ERRORS
 from jaxdamp.bench.preflight.finding import Examined
@@ -119,3 +120,10 @@ def test_findings_are_said_once_worst_first() -> None:
     assert sentences[0].startswith("error, channels exchanged: qct 7") and len(sentences) == len(set(sentences))
     assert any("force spikes in 2 records, most in qct" in text for text in sentences)
     assert not found.without(["force spikes"]).named("force spikes")
+
+
+def test_measured_records_and_parts_of_them_have_no_error(data):
+    """At the ends of its stroke a real machine stands still for some samples, which is no clipping."""
+    runs = bench.read(data / "mr_damper" / "*.csv", sign="rebound-positive")
+    for some in (runs, bench.BenchSet(run.last_cycles(4) for run in runs), runs.process(moving=True, low_pass=50.0)):
+        assert not bench.preflight(some).of("error")

@@ -9,6 +9,7 @@ from jaxdamp.bench.preflight.mains import MAINS
 from jaxdamp.bench.preflight.sample_checks import STUCK, UNITS
 
 
+LEAST_LOST = 5e-3  # of the range: less is a machine that turns slowly, or rounding
 COARSE = 1000  # levels over the range, below which rounding is seen in loops
 
 
@@ -42,7 +43,7 @@ def _goes_on(values: Samples, first: int, last: int, noise: float) -> bool:
     slope = abs(values[first] - before[0]) / len(before)
     if abs(values[first] - values[max(first - 3, 0)]) / 3.0 < 0.05 * slope:
         return False  # it bends into the flat stretch smoothly, as a friction without noise does
-    return bool(slope * length / 2 > max(6.0 * step(values), 3.0 * noise, 1e-6 * np.ptp(values)))
+    return bool(slope * length / 2 > max(6.0 * step(values), 3.0 * noise, LEAST_LOST * np.ptp(values)))
 
 
 def quantisation(e: Examined) -> list[Finding]:

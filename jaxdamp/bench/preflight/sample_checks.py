@@ -10,6 +10,7 @@ from jaxdamp.bench.preflight.gaps import SHARE, runs_of
 UNITS = {"stroke": "m", "force": "N"}
 STUCK = 0.75  # of a period; a clipped half wave is shorter
 _LONG = 0.1  # of a period, from which a gap is an error
+_FEW = 4  # samples: so short a gap is none, in however short a period
 _EDGE = 9.0  # times the median of the third differences: six of their standard deviations
 _WIDEST = 5  # samples of a spike
 _RETURNS = 0.4  # of its height, within which a spike comes back
@@ -57,7 +58,7 @@ def _stuck_finding(e: Examined, name: str, first: int, last: int) -> list[Findin
 def _gap_finding(e: Examined, name: str, kind: str, gaps: np.ndarray) -> list[Finding]:
     counts = gaps[:, 1] - gaps[:, 0] + 1
     longest = int(counts.max())
-    severity = "error" if longest > _LONG * e.samples_per_cycle else "warning"
+    severity = "error" if longest > max(_LONG * e.samples_per_cycle, _FEW) else "warning"
     times = f"{len(counts)} times, at most " if len(counts) > 1 else ""
     verb = "drops to zero" if kind == "dropout" else "repeats its value"
     seconds = longest / e.run.sampling_rate
