@@ -103,5 +103,5 @@ def rows(tree: Any) -> list[np.ndarray] | None:
 def row(tree: Tree, values: list[np.ndarray], index: int) -> Tree:
     """The tree of one car of `rows`, with arrays of NumPy."""
     arrays, rest = eqx.partition(tree, eqx.is_array)
-    chosen = [value[index] for value in values]
+    chosen = [np.asarray(value[index]) for value in values]
     return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), chosen), rest)

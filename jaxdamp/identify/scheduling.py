@@ -12,7 +12,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._tables import Column, Table, plain
-from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import AbstractDamper, Scheduled, takes_command
 from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
 from jaxdamp.identify.estimating import undetermined
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 CALL = "fit_scheduled(law, runs)"
-OF_THE_RESULT = ("loss", "force_noise", "input_noise")  # options of `fit` without a part in starts
+OF_THE_RESULT = ("loss", "force_noise", "input_noise", "bad_records")  # options of `fit` without a part in starts
 
 
 Alone = dict[float, AtSetting]
@@ -184,7 +184,8 @@ def fit_scheduled(
     >>> identify.fit_scheduled(dampers.Linear, runs).between[0].fit_percent > 95.0
     True
     """
-    runs = settings_stated(as_runs(runs, call=CALL))
+    robust = options.get("loss", "squares") != "squares"
+    runs = usable(settings_stated(as_runs(runs, call=CALL)), options.get("bad_records", "refuse"), robust=robust)
     _checks.one_of("weighting", weighting, ("samples", "runs"))
     if blend is not None:
         _checks.one_of("blend", blend, ("parameters", "force"))
@@ -192,7 +193,7 @@ def fit_scheduled(
     if options.get("initial_state") == "estimated":
         remedy = 'Estimate states in fits of one setting: `fit(law, runs, initial_state="estimated")`.'
         _checks.refuse("initial_state", "be the same at every fit of a chain of settings", "'estimated'", remedy)
-    chain = Chain(law, runs, common, rig, options | {"weighting": weighting, "freeze": frozen})
+    chain = Chain(law, runs, common, rig, options | {"weighting": weighting, "freeze": frozen, "bad_records": "keep"})
     with Progress("Fitting by setting") as line:
         shown = progress or line
         alone = chain.alone(chain.settings, shown)

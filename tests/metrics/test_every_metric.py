@@ -77,6 +77,7 @@ OTHERS = {
     "Metric",
     "MetricValues",
     "Reduction",
+    "rainflow_cycles",  # neither compiled nor differentiated
     "RoughnessBySegment",
     "STATISTICS",
     "ShockRatios",
