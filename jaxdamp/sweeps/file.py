@@ -167,7 +167,8 @@ def _checksums(table: Table) -> list[int]:
     for start in range(0, count, BLOCK):
         part = slice(start, start + BLOCK)
         total = zlib.crc32("\n".join(texts[part]).encode())
-        for values in (*table.values.values(), table.done):
+        results = [table.values[name] for name in sorted(table.values)]  # other processes send them in another order
+        for values in (*results, table.done.astype(bool)):
             total = zlib.crc32(np.ascontiguousarray(values[part]).tobytes(), total)
         sums.append(total)
     return sums

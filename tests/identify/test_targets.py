@@ -38,7 +38,8 @@ def test_the_linear_column_of_paper_002():
     """The damping, the delay of the rear axle and the window that the paper does not give."""
     start = {"rate": 1300.0, "delay": 0.09, "window": 2.2}
     result = identify.fit_targets(paper_002, start, TABLES_2_AND_3, tolerance=0.04)
-    assert result.converged and not result.warnings  # all six within 4 %
+    assert result.converged  # all six within 4 %, from more than one start
+    assert all("starts ended at the best minimum" in warning for warning in result.warnings)
     assert result["rate"] == pytest.approx(1554.0, rel=0.01)
     assert result["delay"] == pytest.approx(0.0988, rel=0.01)
     assert result["window"] == pytest.approx(1.945, rel=0.01)
