@@ -15,7 +15,7 @@ from jaxdamp.cli.results import results_folder
 from jaxdamp.cli.riding import USUAL, parse_road
 from jaxdamp.cli.unusual import unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
-from jaxdamp.cli.wording import message
+from jaxdamp.cli.wording import in_command_line, message
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.report import Attempts, sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
@@ -132,7 +132,7 @@ def tuned(screen: Screen, call: Mapping[str, Any]) -> TuneResult[Any]:
     screen.say(result.summary)
     for table in (result.parameter_table(), result.table()):
         screen.table(table)
-    screen.points([*result.active, *result.warnings], style="yellow")
+    screen.points([in_command_line(warning) for warning in result.warnings], style="yellow")
     return result
 
 

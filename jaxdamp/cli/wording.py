@@ -84,6 +84,7 @@ CALLS = {
     r"`process\(moving=True\)` cuts it off": "it is cut off without --keep-rest",
     r"`process\(skip_cycles=[^)]*\)`": "--cycles skip:1",
     r"subtract it, `process\(without=[^`]*`": "fit it beside the law, --rig gas",
+    r"`bounds=\{[^`]*`": "--bound",
     r"`process\(delay=[^)]*\)`": "fit with --rig delay",
 }
 """Calls of Python in the sentences of the library, as patterns, and what the command line says instead."""

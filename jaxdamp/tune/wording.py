@@ -30,22 +30,19 @@ def changes_of(space: SearchRange, values: np.ndarray) -> tuple[Change, ...]:
 
 
 def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
-    """A sentence for each number at a bound: which bound, and the remedy."""
-    notes = []
+    """A sentence on the numbers at bounds for each origin of these, and the remedy."""
+    reasons = {
+        "default": f"by default 1/{FACTOR:g} of the start or {FACTOR:g} times it; other bounds: `bounds={{...}}`",
+        "given": "as given",
+        "domain": "the end of the values it may take",
+    }
+    groups: dict[str, list[str]] = {}
     for change, origin in zip(changes, space.origin, strict=True):
-        if not change.note:
-            continue
-        upper = "upper" in change.note
-        widen = f"`bounds={{{change.name.partition('[')[0]!r}: (lower, upper)}}`"
-        default = f"{FACTOR:g} times" if abs(change.after) > abs(change.before) else f"1/{FACTOR:g} of"
-        reason = {
-            "default": f"by default {default} its start; other bounds: {widen}",
-            "given": "as given",
-            "domain": "the end of the values it may take",
-        }[origin[upper]]
-        value = f"{change.after:.5g} {change.unit}".rstrip()
-        notes.append(f"{change.name} ended {change.note}, {value} ({reason}). A better value may be beyond.")
-    return notes
+        if change.note:
+            value = f"{change.after:.5g} {change.unit}".rstrip()
+            said = f"{change.name} ended {change.note}, {value}"
+            groups.setdefault(reasons[origin["upper" in change.note]], []).append(said)
+    return [f"{'; '.join(said)} ({reason}). A better value may be beyond." for reason, said in groups.items()]
 
 
 def early_end(ended: Ended, max_steps: int) -> str:
