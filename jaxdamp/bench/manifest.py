@@ -1,12 +1,12 @@
 """How to read the records of a folder, written beside them: `jaxdamp.toml`."""
 
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from jaxdamp import _checks
+from jaxdamp._documents import read_toml
 
 
 NAME = "jaxdamp.toml"
@@ -53,10 +53,7 @@ def read_manifest(file: Path) -> dict[str, Any]:
     Raises:
         ValueError: no TOML, an unknown key, or a value of the wrong kind, naming file and key.
     """
-    try:
-        given = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{file} is no valid TOML: {error}.") from error
+    given = read_toml(file)
     for key, value in given.items():
         if key not in KEYS:
             near = _checks.nearest(key, KEYS)

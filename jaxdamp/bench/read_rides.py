@@ -2,7 +2,6 @@
 
 import json
 import os
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._documents import read_toml
 from jaxdamp._files import find_files
 from jaxdamp.bench import sampling, stamps
 from jaxdamp.bench.columns import split_header
@@ -94,10 +94,7 @@ def read_rides(
 
 def _manifest(file: Path, known: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments that a manifest states."""
-    try:
-        stated = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{file} is no valid TOML: {error}.") from error
+    stated = read_toml(file)
     for key in stated:
         _checks.one_of(f"manifest {file}", key, known)
     return stated

@@ -1,17 +1,18 @@
 """What can be told from the words and the files alone, before JAX is loaded: a mistyped path is answered at once."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
 from jaxdamp import _checks
+from jaxdamp._documents import parse_json, read_text, read_toml
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
 from jaxdamp.cli.results import refuse_target
 
 
 FROM_FIT = "`jaxdamp fit` writes best_law.json from records."
 FROM_BOTH = "Give the JSON of a law or of a vehicle."
+EXAMPLE = 'Write for example preset = "quarter_car_000" and, below [parameters], sprung_mass = 1300.0.'
 FROM_LIST = 'Or give a name, see "jaxdamp vehicles".'
 ROADS = ("iso", "white", "bump")
 
@@ -44,7 +45,7 @@ def check(command: str, given: Mapping[str, Any]) -> None:
     if vehicle is not None and Path(vehicle).suffix == ".json":
         read_json("vehicle", Path(vehicle).expanduser(), "a vehicle", FROM_LIST)
     elif vehicle is not None and Path(vehicle).suffix == ".toml":
-        require_file("vehicle", Path(vehicle).expanduser(), FROM_LIST)
+        read_vehicle(Path(vehicle).expanduser())
     if isinstance(road, str) and road.partition(":")[0] not in ROADS and not Path(road).is_file():
         refuse_road(road)
     for name in ("manifest", "limits"):
@@ -58,6 +59,15 @@ def require_file(argument: str, path: Path, remedy: str = "") -> None:
         _checks.refuse(argument, "be a file that is there", path, remedy)
 
 
+def read_vehicle(path: Path) -> dict[str, Any]:
+    """What the TOML file of a vehicle says."""
+    require_file("vehicle", path, FROM_LIST)
+    try:
+        return read_toml(path)
+    except ValueError as error:
+        _checks.refuse("vehicle", "be TOML", error, EXAMPLE)
+
+
 def read_json(argument: str, path: Path, words: str, remedy: str = "") -> None:
     """Refuse a path where no JSON file is.
 
@@ -69,8 +79,8 @@ def read_json(argument: str, path: Path, words: str, remedy: str = "") -> None:
     """
     require_file(argument, path, remedy)
     try:
-        json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:  # also of bytes that are no text, and of what is nested too deeply
+        parse_json(read_text(path, "JSON"))
+    except ValueError as error:
         _checks.refuse(argument, f"be {words} as JSON", f"{path}: {error}", remedy)
 
 

@@ -1,7 +1,6 @@
 """What a vehicle is called on the command line: a published one, or a file of one's own."""
 
 import inspect
-import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ from typing import Any
 import equinox as eqx
 
 from jaxdamp import _checks, export, vehicles
-from jaxdamp.cli.early import FROM_FIT, FROM_LIST, read_json, require_file
+from jaxdamp.cli.early import EXAMPLE, FROM_FIT, FROM_LIST, read_json, read_vehicle
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import get, matching, replace
 from jaxdamp.report import Column, Table
@@ -18,7 +17,6 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 MakeCar = Callable[[AbstractDamper | None], AbstractVehicle]
-EXAMPLE = 'Write for example preset = "quarter_car_000" and, below [parameters], sprung_mass = 1300.0.'
 
 
 def presets() -> dict[str, Callable[..., AbstractVehicle]]:
@@ -53,12 +51,7 @@ def parse_vehicle(word: str) -> MakeCar:
     if path.suffix == ".json":
         car = read_module("vehicle", path, AbstractVehicle, "a vehicle", FROM_LIST)
         return lambda law: car if law is None else with_law(car, law)
-    require_file("vehicle", path, FROM_LIST)
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        _checks.refuse("vehicle", "be TOML", f"{word}: {error}", EXAMPLE)
-    return _preset(word, document)
+    return _preset(word, read_vehicle(path))
 
 
 def read_law(argument: str, path: Path) -> AbstractDamper:

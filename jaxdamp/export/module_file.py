@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 import equinox as eqx
 
 from jaxdamp import _checks
+from jaxdamp._documents import parse_json, read_text
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper, has_fitted_range
 from jaxdamp.export._plain import FITTED_TO, plain_module
@@ -92,10 +93,10 @@ def from_json(path_or_text: str | os.PathLike[str]) -> Any:
         file = Path(path_or_text).expanduser()
         if not file.is_file():
             raise FileNotFoundError(f"There is no file {str(file)!r} (text would have to begin with '{{').")
-        source, text = str(file), file.read_text(encoding="utf-8")
+        source, text = str(file), read_text(file, "JSON")
     try:
-        document = json.loads(text, parse_constant=_no_constant)
-    except json.JSONDecodeError as error:
+        document = parse_json(text, parse_constant=_no_constant)
+    except ValueError as error:
         raise ValueError(f"It must be written in JSON, but {source} is not: {error}.") from error
     kind = FORMATS.get(str(document.get("format"))) if isinstance(document, dict) else None
     if kind is None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._documents import read_text
 from jaxdamp._types import ScalarLike
 from jaxdamp.roads._sampled import SampledRoad
 from jaxdamp.roads.profile import from_profile
@@ -70,7 +71,7 @@ def read_profile(
 
 def _table(path: Path) -> tuple[list[str], np.ndarray]:
     """The names of the columns (their numbers where there are none) and the numbers of a file."""
-    text = path.read_text(encoding="utf-8-sig")
+    text = read_text(path, "text")
     lines = [line.strip() for line in text.splitlines() if line.strip() and line.strip()[0] not in "#%"]
     if not lines:
         _checks.refuse("path", "name a file with numbers", f"{path}, which is empty")

@@ -11,6 +11,7 @@ from typing import Any, final
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._documents import read_text
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp.bench.evaluation.measurements import Measurement, at_velocity
 
@@ -121,7 +122,7 @@ def read_limits(path: str | os.PathLike[str]) -> tuple[Limit, ...]:
         ValueError: naming file, line and column.
     """
     path = Path(path)
-    rows = csv.DictReader(path.read_text(encoding="utf-8-sig").splitlines(), skipinitialspace=True)
+    rows = csv.DictReader(read_text(path, "text").splitlines(), skipinitialspace=True)
     headers = {header: header.split("[")[0].strip().lower() for header in rows.fieldnames or ()}
     if "quantity" not in headers.values():
         raise ValueError(f"{path}, line 1: there is no column 'quantity'. The columns are {', '.join(COLUMNS)}.")
