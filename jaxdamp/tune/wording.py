@@ -31,18 +31,21 @@ def changes_of(space: SearchRange, values: np.ndarray) -> tuple[Change, ...]:
 
 def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
     """A sentence on the numbers at bounds for each origin of these, and the remedy."""
-    reasons = {
-        "default": f"by default 1/{FACTOR:g} of the start or {FACTOR:g} times it; other bounds: `bounds={{...}}`",
-        "given": "as given",
-        "domain": "the end of the values it may take",
-    }
-    groups: dict[str, list[str]] = {}
+    groups: dict[str, list[Change]] = {}
     for change, origin in zip(changes, space.origin, strict=True):
         if change.note:
-            value = f"{change.after:.5g} {change.unit}".rstrip()
-            said = f"{change.name} ended {change.note}, {value}"
-            groups.setdefault(reasons[origin["upper" in change.note]], []).append(said)
-    return [f"{'; '.join(said)} ({reason}). A better value may be beyond." for reason, said in groups.items()]
+            groups.setdefault(origin["upper" in change.note], []).append(change)
+    notes = []
+    for origin, group in groups.items():
+        ends = [f"{c.name} ended {c.note}, {c.after:.5g} {c.unit}".rstrip() for c in group]
+        widen = f"`bounds={{{group[0].name.partition('[')[0]!r}: (lower, upper)}}`"
+        reason = {
+            "default": f"by default 1/{FACTOR:g} of the start or {FACTOR:g} times it; other bounds: {widen}",
+            "given": "as given",
+            "domain": "the end of the values it may take",
+        }[origin]
+        notes.append(f"{'; '.join(ends)} ({reason}). A better value may be beyond.")
+    return notes
 
 
 def early_end(ended: Ended, max_steps: int) -> str:
