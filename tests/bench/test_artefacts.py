@@ -71,8 +71,9 @@ def test_an_artefact_of_a_sine_record_is_found(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARTEFACTS)
-def test_an_artefact_of_a_sine_record_is_found_in_28_of_30(name: str) -> None:
-    assert sum(found_in(name, seed) for seed in range(30)) >= 28
+def test_an_artefact_of_a_sine_record_is_found_in_29_of_30(name: str) -> None:
+    """Five samples of 200 N beside each other are hardly told from the motion: 28."""
+    assert sum(found_in(name, seed) for seed in range(30)) >= (28 if name == "spike 5" else 29)
 
 
 def alarms(seed: int) -> set[str]:
