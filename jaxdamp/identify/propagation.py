@@ -12,6 +12,8 @@ import scipy.special
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
+from jaxdamp._tables import Column, Table, plain
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, keeps_conditions, without_fitted_ranges
 from jaxdamp.identify.model import law_of
@@ -140,8 +142,8 @@ def standard_error(slopes: Float[np.ndarray, "... free"], covariance: Float[np.n
     return np.where(np.any((slopes != 0.0) & lost, axis=-1), np.inf, np.sqrt(np.maximum(variance, 0.0)))
 
 
-@dataclasses.dataclass(frozen=True)
-class Band:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Band(AbstractResult):
     """95 % intervals of the force of a fitted law, each for its own velocity.
 
     Attributes:
@@ -159,6 +161,27 @@ class Band:
     lower: Float[np.ndarray, " points"]
     upper: Float[np.ndarray, " points"]
     runs: tuple[BenchRun, ...] = ()
+
+    @property
+    def summary(self) -> str:
+        """The widest interval."""
+        width = 0.5 * (self.upper - self.lower)
+        if not np.any(np.isfinite(width)):
+            return "The force has no finite interval at any of these velocities."
+        i = int(np.nanargmax(np.where(np.isfinite(width), width, np.nan)))
+        return f"The force is known to ±{width[i]:.3g} N or better (95 %), least at {self.velocity[i]:.3g} m/s."
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Velocities at which the force has no finite interval."""
+        open_ended = int(np.count_nonzero(~np.isfinite(self.upper - self.lower)))
+        return (f"At {open_ended} velocities the force or its interval is not finite.",) * bool(open_ended)
+
+    def table(self) -> Table:
+        """Force with its interval at each velocity."""
+        columns = Column("velocity", "m/s"), *(Column(name, "N", ".1f") for name in ("force", "from", "to"))
+        rows = zip(*map(plain, (self.velocity, self.force, self.lower, self.upper)), strict=True)
+        return Table("Force at constant velocity with its 95 % interval", columns, tuple(rows))
 
     def plot(self) -> "Figure":
         """The curve with its band, over the records."""

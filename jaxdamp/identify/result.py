@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Table, plain, with_unit
 from jaxdamp._types import VectorLike
@@ -48,7 +49,7 @@ def describe(minima: Sequence[Minimum], starts: int) -> str:
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class AbstractFitted:
+class AbstractFitted(AbstractResult):
     """A law fitted to records or trained on them, and how good it is.
 
     Attributes:
@@ -76,9 +77,10 @@ class AbstractFitted:
     record_starts: tuple[RecordStart | None, ...] = dataclasses.field(default=(), kw_only=True)
 
     @property
-    def converged(self) -> bool:
-        """Whether the search ended by its tolerance."""
-        return self.status is Status.CONVERGED
+    def summary(self) -> str:
+        """Law, number of records and errors."""
+        percent = f"{self.fit_percent:.1f} %"
+        return f"{type(self.law).__name__} on {len(self.runs)} records: {percent}, RMSE {self.rmse:.4g} N"
 
     @property
     def model(self) -> Model:
@@ -119,8 +121,8 @@ class AbstractFitted:
         runs = as_runs(runs)
         return score(self.model_of(runs), runs, initial_state=self.initial_state)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The result as numbers with units and words, ready for JSON; numbers that are not finite are None.
+    def content(self) -> dict[str, Any]:
+        """Law, errors and scores as plain data.
 
         The law itself is written by `export.to_json`.
         """
@@ -130,9 +132,6 @@ class AbstractFitted:
             "fit": with_unit(self.fit_percent, "%"),
             "rmse": with_unit(self.rmse, "N"),
             "scores": [score.to_dict() for score in self.scores],
-            "status": self.status.name.lower(),
-            "converged": self.converged,
-            "warnings": list(self.warnings),
         }
 
 
@@ -275,9 +274,9 @@ class FitResult(AbstractFitted):
             raise ValueError("This result was made without `evidence`: only those of `fit` and `judge` hold it.")
         return self.evidence
 
-    def to_dict(self) -> dict[str, Any]:
-        """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
-        return super().to_dict() | {
+    def content(self) -> dict[str, Any]:
+        """Law, errors, scores and parameters as plain data."""
+        return super().content() | {
             **{name: words for name in ("criterion", "patterns") if (words := getattr(self, name))},
             "error_shares": plain(self.error_shares._asdict()),
             "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
@@ -293,9 +292,7 @@ class FitResult(AbstractFitted):
     def __repr__(self) -> str:
         width = max(len(e.name) for e in self.parameters)
         texts = [rounded(e.value, e.standard_error) for e in self.parameters]
-        lines = [
-            f"{type(self.law).__name__} on {len(self.runs)} records: {self.fit_percent:.1f} %, RMSE {self.rmse:.4g} N"
-        ]
+        lines = [self.summary]
         for e, (value, error) in zip(self.parameters, texts, strict=True):
             note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
             lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")

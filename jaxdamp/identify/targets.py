@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp.dampers import Reach, without_fitted_ranges
@@ -54,7 +55,7 @@ class Met(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class TargetFit:
+class TargetFit(AbstractResult):
     """Parameters that meet targets as well as they can.
 
     Attributes:
@@ -72,11 +73,6 @@ class TargetFit:
     warnings: tuple[str, ...]
     status: Status
     steps: int
-
-    @property
-    def converged(self) -> bool:
-        """Whether the search ended by its tolerance."""
-        return self.status is Status.CONVERGED
 
     def __getitem__(self, name: str) -> float:
         """The fitted value of a parameter."""
@@ -103,12 +99,18 @@ class TargetFit:
         """The fitted numbers with units and standard errors."""
         return parameter_table("Parameters", self.parameters)
 
-    def to_dict(self) -> dict[str, Any]:
+    @property
+    def summary(self) -> str:
+        """How many targets are met."""
+        return f"{sum(t.met for t in self.targets)} of {len(self.targets)} targets are met."
+
+    def tables(self) -> dict[str, Table]:
+        """Targets, and parameters."""
+        return {"targets": self.table(), "parameters": self.parameters_table()}
+
+    def content(self) -> dict[str, Any]:
         """The result as plain numbers and words, ready for JSON."""
         return {
-            "status": self.status.name.lower(),
-            "converged": self.converged,
-            "warnings": list(self.warnings),
             "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
             "targets": [plain({**t._asdict(), "met": t.met}) for t in self.targets],
         }

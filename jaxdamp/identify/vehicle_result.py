@@ -9,6 +9,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.bench import BenchRun, RideRecord
@@ -49,7 +50,7 @@ class ChannelScore(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class VehicleFit:
+class VehicleFit(AbstractResult):
     """A vehicle fitted to records of its motion, with the uncertainty of its parameters.
 
     Attributes:
@@ -89,9 +90,9 @@ class VehicleFit:
     patterns: str = ""
 
     @property
-    def converged(self) -> bool:
-        """Whether the search ended by its tolerance."""
-        return self.status is Status.CONVERGED
+    def summary(self) -> str:
+        """Vehicle, number of records, and the channel that is predicted worst."""
+        return f"{type(self.vehicle).__name__} on {len(self.records)} record(s): {self.worst}"
 
     @property
     def worst(self) -> str:
@@ -183,15 +184,16 @@ class VehicleFit:
         columns += [Column("fit", "%", ".1f"), Column("largest error", spec=".3g")]
         return Table("Channels", tuple(columns), tuple(tuple(score)[:-1] for score in self.scores))
 
-    def to_dict(self) -> dict[str, Any]:
+    def tables(self) -> dict[str, Table]:
+        """Parameters, and the errors of the channels."""
+        return {"parameters": self.table(), "scores": self.scores_table()}
+
+    def content(self) -> dict[str, Any]:
         """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         return {
             "vehicle": repr(self.vehicle),
             "sensors": {name: repr(sensor) for name, sensor in self.sensors.items()},
             **({} if self.rig is None else {"rig": repr(self.rig)}),
-            "status": self.status.name.lower(),
-            "converged": self.converged,
-            "warnings": list(self.warnings),
             "held": list(self.held),
             "scale_free": list(self.scale_free),
             **({"patterns": self.patterns} if self.patterns else {}),
@@ -218,7 +220,7 @@ class VehicleFit:
     def __repr__(self) -> str:
         width = max(len(e.name) for e in self.parameters)
         texts = [rounded(e.value, e.standard_error) for e in self.parameters]
-        lines = [f"{type(self.vehicle).__name__} on {len(self.records)} record(s): {self.worst}"]
+        lines = [self.summary]
         for e, (value, error) in zip(self.parameters, texts, strict=True):
             note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
             lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
