@@ -75,7 +75,7 @@ class Posterior(AbstractResult):
         """A function of the law over the samples, as `FitResult.propagate`."""
 
         def of(values: Array) -> Array:
-            return jnp.asarray(function(self.evidence.law(values)), float)
+            return jnp.asarray(function(self.evidence.model(values)), float)
 
         drawn = np.asarray(eqx.filter_jit(jax.vmap(of))(jnp.asarray(self.samples)), float)
         lower, upper = np.quantile(drawn, [0.025, 0.975], axis=0)

@@ -14,9 +14,9 @@ from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import fit
+from jaxdamp.identify.law_result import AbstractFitted
 from jaxdamp.identify.machine import OFFSET, Machine
 from jaxdamp.identify.preparing import weights
-from jaxdamp.identify.result import AbstractFitted
 from jaxdamp.identify.starting import Start, check_starts
 from jaxdamp.identify.verdict import cannot_choose
 from jaxdamp.parameters import parameters

@@ -1,6 +1,7 @@
 """`fit`: weighted nonlinear least squares of a damper law over many bench records."""
 
 import dataclasses
+import functools
 from collections.abc import Iterable, Mapping, Sequence
 
 import equinox as eqx
@@ -17,11 +18,12 @@ from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
 from jaxdamp.identify.front_door import also_of_vehicles
 from jaxdamp.identify.input_noise import input_noise_bias, on_bias
 from jaxdamp.identify.judging import MOST_WARNINGS, judge
+from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine
 from jaxdamp.identify.model import rig_of
+from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.preparing import prepare, records_in_words
 from jaxdamp.identify.problem import Problem, linearised
-from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
@@ -151,7 +153,8 @@ def fit(
     def by_squares(problem: Problem, starts: int | None) -> Solution:
         return solve(problem, starts=starts, max_steps=max_steps)
 
-    problem, solution = solve_by(problem, by_squares, loss=loss, force_noise=force_noise, starts=starts)
+    noise = functools.partial(noise_of, force_noise=force_noise)
+    problem, solution = solve_by(problem, by_squares, loss=loss, noise=noise, starts=starts)
     on_machine = holds_static_force(rig)
     if on_machine:
         problem, solution = with_static_force_on_machine(problem, solution)

@@ -4,7 +4,7 @@ import functools
 from collections.abc import Callable
 from typing import Any, ParamSpec, Protocol, cast, overload, runtime_checkable
 
-from jaxdamp.identify.result import FitResult
+from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
 from jaxdamp.identify.vehicle_result import VehicleFit
 from jaxdamp.vehicles import AbstractVehicle

@@ -15,8 +15,8 @@ from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper, keeps_conditions, without_fitted_ranges
-from jaxdamp.identify.model import law_of
+from jaxdamp.dampers import AbstractDamper, keeps_conditions, laws_inside, without_fitted_ranges
+from jaxdamp.identify.model import fitted_part
 from jaxdamp.identify.noise import Noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
@@ -48,11 +48,11 @@ class Evidence(NamedTuple):
     noise: Noise
     covariance: Float[np.ndarray, "free free"]
 
-    def law(self, values: Float[Array, " free"]) -> AbstractDamper:
-        """The law with these values, without its fitted range; where each record has a value, with their mean."""
+    def model(self, values: Float[Array, " free"]) -> Any:
+        """The law, vehicle or model with these values, without fitted range; where each record has one, their mean."""
         model = self.problem.free.build(values)
         means = {path: jnp.mean(get(model, path)) for path in self.problem.per_record}
-        return without_fitted_ranges(law_of(with_values(model, means)))
+        return without_fitted_ranges(fitted_part(with_values(model, means) if means else model))
 
     @property
     def quantile(self) -> float:
@@ -67,7 +67,7 @@ class Evidence(NamedTuple):
         rng, free = np.random.default_rng(seed), self.problem.free
         half = _root(self.covariance)
         lower, upper = free.limits()
-        limited = any(law.has_conditions() for law in [self.law(free.values)])
+        limited = any(law.has_conditions() for _, law in laws_inside(free.tree))
         kept: list[np.ndarray] = []
         for _ in range(MOST_DRAWS):
             spread = np.sqrt(rng.chisquare(self.noise.dof, (count, 1)) / self.noise.dof)
@@ -112,7 +112,7 @@ def propagate(
     """`FitResult.propagate`."""
 
     def of(values: Array) -> Array:
-        return jnp.asarray(function(evidence.law(values)), float)
+        return jnp.asarray(function(evidence.model(values)), float)
 
     centre = jnp.asarray(evidence.minimum.values, evidence.problem.free.values.dtype)
     if samples is not None:

@@ -223,7 +223,7 @@ def _function(
     names: list[str] = []
 
     def stacked(values: Array) -> tuple[Array, Array]:
-        results = function(evidence.law(values))
+        results = function(evidence.model(values))
         by_name = dict(results) if isinstance(results, Mapping) else {"value": results}
         for name, value in by_name.items():
             if jnp.shape(value) != ():
