@@ -61,7 +61,7 @@ class Fit(AbstractModelResult):
         return self.estimate(name)
 
     def estimate(self, name: str) -> Estimate:
-        """The same."""
+        """The estimate of that name, or of the only one whose name ends with it: "sprung_mass", "stroke.offset"."""
         named = [e for e in self.parameters if e.name == name]
         named = named or [e for e in self.parameters if e.name.endswith(f".{name}")]
         if len(named) == 1:
@@ -91,7 +91,7 @@ class Fit(AbstractModelResult):
         Arguments:
             name: as in `parameters`.
         """
-        return profile_curve(self._evidence, name, self[name].interval)
+        return profile_curve(self._evidence, name, self.estimate(name).interval)
 
     def posterior(self, *, samples: int = 1000, warm_up: int = 500, chains: int = 2, seed: int = 0) -> Posterior:
         """The full posterior of the parameters, by the no-U-turn sampler of numpyro (`pip install 'jaxdamp[bayes]'`).

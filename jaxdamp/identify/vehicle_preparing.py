@@ -16,6 +16,7 @@ from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.machine import Machine, absent_paths
 from jaxdamp.identify.model import InitialMotion, VehicleTest
+from jaxdamp.identify.preparing import not_chosen
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.vehicle_residuals import Drive, bench_parts, driven, finer_heights, ride_batches
@@ -152,10 +153,7 @@ def vehicle_test(
 
 def frozen_paths(model: VehicleTest, over: Sequence[str] | None, freeze: Sequence[str]) -> list[str]:
     """Paths that are held: those asked for, what `over` leaves out, what sensors and test machine do not have."""
-    known = [p.path for p in parameters(model)]
-    of_vehicle = [path for path in known if path.startswith("vehicle.")]
-    kept = of_vehicle if over is None else match_paths(of_vehicle, name_patterns("over", over))
-    held = [path for path in of_vehicle if path not in kept]
+    known, held = [p.path for p in parameters(model)], not_chosen(model, over, "sensors.", "starts.", "rig.")
     for name, sensor in model.sensors.items():
         held += [f"sensors.{name}.{p.path}" for p in parameters(sensor) if p.path not in sensor.given]
     held += absent_paths(model.rig)
