@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
@@ -35,7 +36,7 @@ FIRST_SEED = 4711  # of fresh roads, which are thereby others than those of usua
 
 @final
 @dataclasses.dataclass(frozen=True, repr=False)
-class Rescore:
+class Rescore(AbstractResult):
     """The ride metrics of a vehicle before and after its tuning, on each of several roads.
 
     Attributes:
@@ -101,16 +102,13 @@ class Rescore:
 
         return plots.rescore(self)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """All metrics on each road with units, ready for JSON; numbers that are not finite are None."""
         metrics = {
             name: {"before": plain(before), "after": plain(self.after[name]), "unit": self.units[name]}
             for name, before in self.before.items()
         }
-        return {"summary": self.summary, "metric": self.metric, "roads": self.roads, "metrics": metrics}
-
-    def __repr__(self) -> str:
-        return f"{self.summary}\n{self.table().to_text()}"
+        return {"metric": self.metric, "roads": self.roads, "metrics": metrics}
 
 
 def rescore(

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, Generic, Unpack, final
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._results import AbstractResult
+from jaxdamp._status import Status
 from jaxdamp._tables import Table, plain
 from jaxdamp.metrics import Metric
 from jaxdamp.tune.minimising import minimise
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 
 @final
 @dataclasses.dataclass(frozen=True, repr=False)
-class RobustResult(Generic[V]):
+class RobustResult(AbstractResult, Generic[V]):
     """A tuning over scenarios with the effects of tolerances.
 
     Attributes:
@@ -39,6 +41,16 @@ class RobustResult(Generic[V]):
     def vehicle(self) -> V:
         """The tuned vehicle."""
         return self.tuning.vehicle
+
+    @property
+    def status(self) -> Status:
+        """How the search of the tuning ended."""
+        return self.tuning.status
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The doubts about the tuning."""
+        return self.tuning.warnings
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -62,14 +74,18 @@ class RobustResult(Generic[V]):
         """The effects of the tolerances."""
         return tolerance_table(self.tolerances, self.tuning.metric)
 
+    def tables(self) -> dict[str, Table]:
+        """Metrics in every scenario, parameters, tolerances."""
+        tolerances = {"tolerances": self.tolerance_table()} if self.tolerances else {}
+        return {"scenarios": self.table(), "parameters": self.tuning.parameter_table()} | tolerances
+
     def plot(self, **options: Any) -> "Figure":
         """The tuning, as of `minimise`."""
         return self.tuning.plot(**options)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """The tuning and the tolerances as plain data, ready for JSON."""
-        effects = [plain(effect._asdict()) for effect in self.tolerances]
-        return self.tuning.to_dict() | {"summary": self.summary, "tolerances": effects}
+        return self.tuning.content() | {"tolerances": [plain(effect._asdict()) for effect in self.tolerances]}
 
     def __repr__(self) -> str:
         return "\n".join([self.summary, repr(self.tuning), *self.sentences])
