@@ -122,7 +122,6 @@ def _tunings() -> list[AbstractResult]:
     )  # fmt: skip
     return [
         tuning,
-        tune.RobustResult(tuning, ()),
         tune.Rescore({name: np.array([2.0, 1.0])}, {name: np.array([1.0, 0.9])}, units, name),
         front,
         sensitivity,
@@ -158,7 +157,7 @@ def test_a_result_keeps_the_contract(kind, samples, tmp_path) -> None:
     assert data["converged"] is result.converged and set(data) > {"summary", "status", "converged", "warnings"}
 
 
-@pytest.mark.parametrize("kind", ["ProfileCurve", "RobustResult"])
+@pytest.mark.parametrize("kind", ["ProfileCurve", "Rescore"])
 def test_a_result_writes_its_page(kind, samples, tmp_path) -> None:
     result = next(each for each in samples.values() if type(each).__name__ == kind)
     page = result.report(tmp_path / "page.html", title="A page").read_text(encoding="utf-8")

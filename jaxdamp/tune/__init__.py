@@ -20,17 +20,15 @@ from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Targets, smooth_peak, smooth_settling
 from jaxdamp.tune.pareto_search import pareto
 from jaxdamp.tune.rescoring import Rescore, rescore
-from jaxdamp.tune.result import Attempt, Change, ScenarioValues, TuneResult
-from jaxdamp.tune.risk import CVaR
-from jaxdamp.tune.robust_tuning import RobustResult, robust
-from jaxdamp.tune.scenario_ride import ScenarioRide
+from jaxdamp.tune.result import Attempt, Change, ScenarioValues, ToleranceEffect, TuneResult
+from jaxdamp.tune.robust_tuning import robust, tolerance_effects
+from jaxdamp.tune.scenario_ride import CVaR, ScenarioRide
 from jaxdamp.tune.scenarios import Condition, Scenario, Scenarios, samples, tolerances
 from jaxdamp.tune.sensitivities import sensitivity
 from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
 from jaxdamp.tune.settings import Design, Run, Search
 from jaxdamp.tune.shape import Shape, damper_paths, knee, monotone, ratio, slope
 from jaxdamp.tune.spectra import Spectrum
-from jaxdamp.tune.tolerance import ToleranceEffect, tolerance_effects
 from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
 from jaxdamp.tune.valving_search import valving
 from jaxdamp.tune.verdict import Outcome
@@ -50,7 +48,6 @@ __all__ = [
     "Outcome",
     "ParetoFront",
     "Rescore",
-    "RobustResult",
     "Run",
     "Scenario",
     "ScenarioRide",

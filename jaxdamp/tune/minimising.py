@@ -16,8 +16,7 @@ from jaxdamp.tune.objective import Function, check_objective
 from jaxdamp.tune.ranges import start_points
 from jaxdamp.tune.rescoring import on_fresh_roads
 from jaxdamp.tune.result import Attempt, Drive, ScenarioValues, TuneResult, V
-from jaxdamp.tune.risk import exact
-from jaxdamp.tune.scenario_ride import ScenarioRide
+from jaxdamp.tune.scenario_ride import ScenarioRide, exact
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import DEFAULTS, Settings, completed
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call, is_white

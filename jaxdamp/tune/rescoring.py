@@ -18,7 +18,7 @@ from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.limits import LimitRange
 from jaxdamp.tune.objective import Objective
-from jaxdamp.tune.risk import exact
+from jaxdamp.tune.scenario_ride import exact
 from jaxdamp.tune.scenarios import Scenarios
 from jaxdamp.tune.settings import RUN, Run, completed
 from jaxdamp.tune.verdict import decided, half_interval

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
@@ -96,6 +97,28 @@ class Attempt(NamedTuple):
     converged: bool
 
 
+class ToleranceEffect(NamedTuple):
+    """The effect of the scatter of one parameter on a metric, to second order.
+
+    Attributes:
+        parameter: its name.
+        scatter: its standard deviation relative to its value.
+        mean: mean change of the metric, relative: half the second derivative times the variance.
+        deviation: standard deviation of the metric, relative: slope times deviation, and the part of the curvature.
+    """
+
+    parameter: str
+    scatter: float
+    mean: float
+    deviation: float
+
+    def sentence(self, metric: str) -> str:
+        """In words, such as "A 10 % scatter of damper.blow_off_rate costs 1.4 % of rms_sprung_acceleration"."""
+        verb = "costs" if self.mean >= 0.0 else "gains"
+        cost = f"{verb} {100 * abs(self.mean):.2g} % of {metric} on average, and scatters it by"
+        return f"A {100 * self.scatter:g} % scatter of {self.parameter} {cost} {100 * self.deviation:.2g} %."
+
+
 @dataclasses.dataclass(frozen=True, repr=False)
 class TuneResult(AbstractResult, Generic[V]):
     """A tuned vehicle and the vehicle before the tuning.
@@ -124,6 +147,7 @@ class TuneResult(AbstractResult, Generic[V]):
         extrapolated: each damper that the tuned vehicle takes out of its fitted range for 1 % of the time or more.
         allowed: the limits as they are written, which may be relative to the start on each road.
         elsewhere: where the numbers hold if there are no fresh roads, in words.
+        tolerances: the effect of the scatter of each parameter on the metric, at the tuned vehicle, of `robust`.
     """
 
     vehicle: V
@@ -149,6 +173,7 @@ class TuneResult(AbstractResult, Generic[V]):
     extrapolated: tuple[str, ...] = ()
     allowed: dict[str, LimitRange] = dataclasses.field(default_factory=dict)
     elsewhere: str = ""
+    tolerances: tuple[ToleranceEffect, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -163,7 +188,7 @@ class TuneResult(AbstractResult, Generic[V]):
 
     @property
     def summary(self) -> str:
-        """The verdict, then the change on the road of the tuning, and the bounds and limits that are active."""
+        """The verdict, the change on the road of the tuning, active bounds and limits, and the extreme scenarios."""
         before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
         share = f" ({100 * (after / before - 1):+.1f} %)" if before else ""
         stops = [f"{name} at its limit" for name in self.active_limits]
@@ -173,7 +198,29 @@ class TuneResult(AbstractResult, Generic[V]):
         state = "an optimum" if self.converged else "not an optimum"
         stops += [f"no effect of {name}" for name in self.without_effect]
         parts = [f"{state} after {len(self.history)} steps", *stops, *[inside] * bool(inside)]
-        return f"{self.verdict.sentence} {self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
+        text = f"{self.verdict.sentence} {self.metric} {before:.4g} -> {after:.4g} {unit}{share}: {', '.join(parts)}."
+        return f"{text}{self._extremes}"
+
+    @property
+    def _extremes(self) -> str:
+        """The scenarios in which the metric is largest and smallest, in a sentence; nothing for one road."""
+        if self.scenarios is None or len(self.scenarios.names) < 2:
+            return ""
+        values = self.scenarios.after[self.metric]
+        largest = f"{self.scenarios.names[int(values.argmax())]!r}, {values.max():.4g}"
+        return f" Largest in {largest}; smallest {values.min():.4g}."
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The effects of the tolerances in words, the largest first."""
+        return tuple(effect.sentence(self.metric) for effect in self.tolerances)
+
+    @property
+    def tuning(self) -> "TuneResult[V]":
+        """Deprecated: the result of `robust` is that of `minimise` with `tolerances`."""
+        text = "`tuning` is deprecated: the result of `robust` is itself a tuning."
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return self
 
     def table(self) -> Table:
         """The ride metrics before and after, with notes on the minimised metric and on limits."""
@@ -246,10 +293,22 @@ class TuneResult(AbstractResult, Generic[V]):
             "Parameters, with the bounds of the search", "parameter", ("before", "after"), rows, more
         )
 
+    def tolerance_table(self) -> Table:
+        """What the scatter of parameters costs: a row for each, the most effective first."""
+        columns = (
+            Column("parameter"),
+            Column("scatter", "%", ".3g"),
+            Column(f"{self.metric}, mean", "%", "+.3f"),
+            Column("scatter of it", "%", ".3f"),
+        )
+        rows = ((e.parameter, 100 * e.scatter, 100 * e.mean, 100 * e.deviation) for e in self.tolerances)
+        return Table(f"What the scatter of parameters costs {self.metric}", columns, tuple(rows))
+
     def tables(self) -> dict[str, Table]:
-        """Metrics and parameters before and after; metrics in every scenario if there are several."""
+        """Metrics and parameters before and after; metrics in every scenario, and effects of tolerances, if any."""
         several = {} if self.scenarios is None else {"scenarios": self.scenario_table()}
-        return {"metrics": self.table(), "parameters": self.parameter_table()} | several
+        tolerances = {"tolerances": self.tolerance_table()} if self.tolerances else {}
+        return {"metrics": self.table(), "parameters": self.parameter_table()} | several | tolerances
 
     def content(self) -> dict[str, Any]:
         """The tuning as numbers with units and words, ready for JSON; numbers that are not finite are None."""
@@ -270,6 +329,7 @@ class TuneResult(AbstractResult, Generic[V]):
             "fresh": None if self.fresh is None else self.fresh.to_dict(),
             "scenarios": None if self.scenarios is None else plain(self.scenarios._asdict()),
             "starts": [plain(attempt._asdict()) for attempt in self.starts],
+            "tolerances": [plain(effect._asdict()) for effect in self.tolerances],
             "history": plain(self.history),
         }
 

@@ -1,94 +1,23 @@
 """`robust`: a tuning over scenarios, and what the scatter of its parameters costs."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Generic, Unpack, final
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Unpack
+
+import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._results import AbstractResult
-from jaxdamp._status import Status
-from jaxdamp._tables import Table, plain
 from jaxdamp.metrics import Metric
+from jaxdamp.parameters import match_paths
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Function
-from jaxdamp.tune.result import TuneResult, V
-from jaxdamp.tune.risk import Risk
+from jaxdamp.tune.result import ToleranceEffect, TuneResult, V
+from jaxdamp.tune.scenario_ride import Risk
 from jaxdamp.tune.scenarios import Scenarios
-from jaxdamp.tune.settings import RUN, Settings
-from jaxdamp.tune.tolerance import ToleranceEffect, check_scatter, tolerance_effects, tolerance_table
+from jaxdamp.tune.sensitivities import sensitivity
+from jaxdamp.tune.settings import RUN, Run, Settings, completed
 from jaxdamp.vehicles import AbstractVehicle
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-
-@final
-@dataclasses.dataclass(frozen=True, repr=False)
-class RobustResult(AbstractResult, Generic[V]):
-    """A tuning over scenarios with the effects of tolerances.
-
-    Attributes:
-        tuning: the result of `minimise` over the scenarios.
-        tolerances: the effect of the scatter of each parameter on the metric, at the tuned vehicle.
-    """
-
-    tuning: TuneResult[V]
-    tolerances: tuple[ToleranceEffect, ...]
-
-    @property
-    def vehicle(self) -> V:
-        """The tuned vehicle."""
-        return self.tuning.vehicle
-
-    @property
-    def status(self) -> Status:
-        """How the search of the tuning ended."""
-        return self.tuning.status
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """The doubts about the tuning."""
-        return self.tuning.warnings
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """The effects of the tolerances in words, the largest first."""
-        return tuple(effect.sentence(self.tuning.metric) for effect in self.tolerances)
-
-    @property
-    def summary(self) -> str:
-        """The improvement, and the scenario in which the metric is largest, in a sentence."""
-        each = self.tuning.scenarios
-        assert each is not None
-        values = each.after[self.tuning.metric]
-        worst = f"Largest in {each.names[int(values.argmax())]!r}, {values.max():.4g}; smallest {values.min():.4g}."
-        return f"{self.tuning.summary} {worst}"
-
-    def table(self) -> Table:
-        """Metrics in every scenario, before and after."""
-        return self.tuning.scenario_table()
-
-    def tolerance_table(self) -> Table:
-        """The effects of the tolerances."""
-        return tolerance_table(self.tolerances, self.tuning.metric)
-
-    def tables(self) -> dict[str, Table]:
-        """Metrics in every scenario, parameters, tolerances."""
-        tolerances = {"tolerances": self.tolerance_table()} if self.tolerances else {}
-        return {"scenarios": self.table(), "parameters": self.tuning.parameter_table()} | tolerances
-
-    def plot(self, **options: Any) -> "Figure":
-        """The tuning, as of `minimise`."""
-        return self.tuning.plot(**options)
-
-    def content(self) -> dict[str, Any]:
-        """The tuning and the tolerances as plain data, ready for JSON."""
-        return self.tuning.content() | {"tolerances": [plain(effect._asdict()) for effect in self.tolerances]}
-
-    def __repr__(self) -> str:
-        return "\n".join([self.summary, repr(self.tuning), *self.sentences])
 
 
 def robust(
@@ -100,7 +29,7 @@ def robust(
     scatter: Mapping[str, float] | None = None,
     progress: Callable[[int, float], None] | None = None,
     **settings: Unpack[Settings],
-) -> RobustResult[V]:
+) -> TuneResult[V]:
     """Minimise a metric over scenarios by its mean, its worst case or the mean of its worst share.
 
     Arguments:
@@ -121,7 +50,7 @@ def robust(
     >>> loads = {"empty": Condition(), "laden": Condition({"sprung_mass": 1500.0})}
     >>> scenarios = Scenarios([roads.white("C", 20.0)], loads)
     >>> result = robust("rms_dynamic_tyre_load", vehicles.presets.quarter_car_000(), scenarios, risk="worst")
-    >>> result.tuning.converged
+    >>> result.converged
     True
     """
     call = "robust(metric, vehicle, scenarios)"
@@ -132,8 +61,64 @@ def robust(
     if scatter is not None:
         check_scatter(scatter)
     tuning = minimise(metric, vehicle, scenarios, progress=progress, **settings)
-    effects: tuple[ToleranceEffect, ...] = ()
-    if scatter:
-        run: dict[str, Any] = {name: value for name, value in settings.items() if name in RUN}
-        effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, **run)
-    return RobustResult(tuning, effects)
+    if not scatter:
+        return tuning
+    run: dict[str, Any] = {name: value for name, value in settings.items() if name in RUN}
+    effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, **run)
+    return dataclasses.replace(tuning, tolerances=effects)
+
+
+def tolerance_effects(
+    metric: Any,
+    vehicle: AbstractVehicle,
+    road: Any,
+    scatter: Mapping[str, float],
+    **run: Unpack[Run],
+) -> tuple[ToleranceEffect, ...]:
+    """The effect of the scatter of each parameter on a metric, from its first and second derivatives.
+
+    For a parameter p with standard deviation s p, normally distributed, the metric m changes on average by
+    m'' (s p)²/2 and has the variance (m' s p)² + (m'' (s p)²)²/2.
+
+    Arguments:
+        metric: as in `sensitivity`, a single one.
+        vehicle: with all parameters at their nominal values.
+        road: as in `sensitivity`.
+        scatter: standard deviation of each parameter relative to its value, by path, last part or pattern.
+        run: `duration`, `dt` and `engine`, as in `simulate` (see `Run`).
+
+    Raises:
+        ValueError: scatters that are not positive; what `sensitivity` refuses.
+
+    >>> from jaxdamp import roads, vehicles
+    >>> car = vehicles.presets.quarter_car_000()
+    >>> effect, = tolerance_effects("rms_sprung_acceleration", car, roads.white("C", 20.0), {"damper.rate": 0.1})
+    >>> print(effect.sentence("comfort"))
+    A 10 % scatter of damper.rate costs 0.35 % of comfort on average, and scatters it by 2.8 %.
+    """
+    check_scatter(scatter)
+    if isinstance(metric, Sequence) and not isinstance(metric, str):
+        remedy = "Call it once for each metric."
+        _checks.refuse("metric", "be a single one", _checks.described(metric), remedy)
+    completed("tolerance_effects", run, RUN)
+    result = sensitivity(metric, vehicle, road, over=list(scatter), dampers=None, second_order=True, **run)
+    ((name, value),) = result.values.items()
+    assert result.hessian is not None
+    paths = [parameter.partition("[")[0] for parameter in result.parameters]
+    by_path = {path: s for pattern, s in scatter.items() for path in match_paths(paths, [pattern])}
+    effects = []
+    for i, parameter in enumerate(result.parameters):
+        s = by_path[paths[i]]
+        first = result.gradient[name][i] * result.point[i] * s / value
+        second = result.hessian[name][i, i] * (result.point[i] * s) ** 2 / value
+        effects.append(ToleranceEffect(parameter, s, 0.5 * second, float(np.hypot(first, second / np.sqrt(2.0)))))
+    return tuple(sorted(effects, key=lambda effect: -effect.deviation))
+
+
+def check_scatter(scatter: Any) -> None:
+    """Refuse what is no mapping of parameters to positive standard deviations."""
+    remedy = "Write `{'damper.**_rate': 0.1}`: 0.1 is a standard deviation of 10 %."
+    if not isinstance(scatter, Mapping) or not scatter:
+        _checks.refuse("scatter", "be a mapping of one or more parameters", _checks.described(scatter), remedy)
+    for name, deviation in scatter.items():
+        _checks.positive(f"scatter[{name!r}]", deviation, remedy)

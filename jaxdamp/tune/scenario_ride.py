@@ -1,7 +1,8 @@
-"""The ride metrics of a vehicle in all scenarios, driven side by side."""
+"""The ride metrics of a vehicle in all scenarios, driven side by side, and how they become one number."""
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, TypeAlias, final
 
 import equinox as eqx
 import jax
@@ -12,17 +13,87 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import Mode
+from jaxdamp._limits import largest
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.parameters import checked, get, match_paths, modules_inside, replace, with_values
 from jaxdamp.roads import WhiteRoad
-from jaxdamp.simulation import AbstractEngine, Ride, moves_axles
-from jaxdamp.tune.risk import Risk
+from jaxdamp.simulation import Ride, moves_axles
 from jaxdamp.vehicles import AbstractVehicle
 
 
 if TYPE_CHECKING:
     from jaxdamp.tune.scenarios import Condition, Scenario
+
+
+Values: TypeAlias = Float[Array, " scenarios"]
+Risk: TypeAlias = Callable[[Values, Values], Scalar]  # of the values and their weights, which add up to one
+SHARPNESS = 100.0  # of the smooth maximum
+
+
+def mean(values: Values, weights: Values) -> Scalar:
+    """The weighted mean."""
+    return jnp.sum(weights * values)
+
+
+def worst(values: Values, weights: Values) -> Scalar:
+    """A smooth maximum, whatever the weights: never below the largest value, and above it by ln(n)/100 at most.
+
+    ln Σ exp(b x)/b with b = 100/|x|_max, so that all scenarios near the worst one take part in the derivative.
+    """
+    del weights
+    size = jax.lax.stop_gradient(largest(jnp.abs(values)))
+    scale = jnp.where(size > 0, size, 1.0) / SHARPNESS
+    return scale * jax.scipy.special.logsumexp(values / scale)
+
+
+def exact(risk: Risk) -> Risk:
+    """The risk as it is printed: the true largest value in place of the smooth one of a search."""
+    return (lambda values, weights: largest(values)) if risk is worst else risk
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class CVaR:
+    """Conditional value at risk: the mean of the worst share of the scenarios, by weight.
+
+    Arguments:
+        share: of all scenarios, above 0 and up to 1, which is the mean.
+
+    >>> float(CVaR(0.5)(jnp.array([1.0, 4.0, 2.0, 3.0]), jnp.full(4, 0.25)))
+    3.5
+    """
+
+    share: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.share <= 1.0:
+            _checks.refuse("share", "be above 0 and up to 1", self.share, "0.1 is the worst tenth of the scenarios.")
+
+    def __call__(self, values: Values, weights: Values) -> Scalar:
+        """The mean of the worst share."""
+        order = jnp.argsort(-jax.lax.stop_gradient(values))
+        values, weights = values[order], weights[order]
+        before = jnp.cumsum(weights) - weights
+        return jnp.sum(jnp.clip(self.share - before, 0.0, weights) * values) / self.share
+
+
+RISKS: dict[str, Risk] = {"mean": mean, "worst": worst}
+
+
+def risk_of(risk: str | Risk) -> Risk:
+    """The risk of a name, or the function itself.
+
+    Raises:
+        ValueError: an unknown name.
+    """
+    if not isinstance(risk, str):
+        if not callable(risk):
+            must = "be 'mean', 'worst', `tune.CVaR(share)`, or a function of values and weights"
+            _checks.refuse("risk", must, _checks.described(risk), "Write `risk='worst'`.")
+        return risk
+    _checks.one_of("risk", risk, RISKS)
+    return RISKS[risk]
 
 
 @final
@@ -123,76 +194,89 @@ class ScenarioRide(eqx.Module):
 
 
 def scenario_ride(
-    vehicle: AbstractVehicle,
-    scenarios: Sequence["Scenario"],
-    risk: Risk,
-    *,
-    metrics: Sequence[str | Metric] | None,
-    duration: float | None,
-    dt: float | None,
-    engine: AbstractEngine | None,
+    vehicle: AbstractVehicle, scenarios: Sequence["Scenario"], risk: Risk, options: Mapping[str, Any]
 ) -> ScenarioRide:
-    """The ride of a vehicle in scenarios, after the checks of a `Ride` on each road and in each condition."""
+    """The ride of a vehicle in scenarios, after the checks of a `Ride` on each road and in each condition.
+
+    Arguments:
+        vehicle: without conditions.
+        scenarios: each road with each condition.
+        risk: how a metric becomes one number.
+        options: of a `Ride`.
+    """
     check_module("vehicle", vehicle, (AbstractVehicle,), "scenarios.ride(vehicle)")
-    factors, offsets = _changes(vehicle, [scenario.condition for scenario in scenarios])
+    changes = _changes(vehicle, [scenario.condition for scenario in scenarios])
+    first, rides = _checked_rides(vehicle, scenarios, changes, options)
     white = isinstance(scenarios[0].road, WhiteRoad)
-    checked_rides: dict[int, Ride] = {}
-    steps, first = 0, None
-    for i, scenario in enumerate(scenarios):
-        values = {path: np.asarray(factors[path][i] * get(vehicle, path) + offsets[path][i]) for path in factors}
-        changed = checked(with_values(vehicle, {path: jnp.asarray(value) for path, value in values.items()}))
-        new_road, new_condition = id(scenario.road) not in checked_rides, scenario.road is scenarios[0].road
-        if not (new_road or new_condition):
-            continue  # each road and each condition is checked once
-        ride = Ride(changed, scenario.road, metrics=metrics, duration=duration, dt=dt, engine=engine)
-        checked_rides.setdefault(id(scenario.road), ride)
-        if first is None or ride.substeps > steps:
-            first, steps = ride, ride.substeps
-    assert first is not None
-    rides = [checked_rides[id(scenario.road)] for scenario in scenarios]
-    counts = {0 if ride.heights is None else ride.heights.shape[0] for ride in rides}
-    if len(counts) > 1:
-        lengths = ", ".join(sorted(f"{(count - 1) * first.dt:g} s" for count in counts))
-        _checks.refuse("roads", "be driven for the same time", lengths, "Pass `duration`.")
     inputs: Any = [ride.road if white else ride.heights for ride in rides]
     common = eqx.tree_at(lambda r: (r.vehicle, r.road), first, (vehicle, inputs[0] if white else None), is_leaf=_none)
-    weights = jnp.asarray([scenario.weight for scenario in scenarios])
-    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *inputs)
-    changes = [{path: jnp.stack(change) for path, change in side.items()} for side in (factors, offsets)]
-    names = tuple(scenario.name for scenario in scenarios)
-    delays = not white and any(ride.road is not None for ride in rides)
-    ride = ScenarioRide(common.side_by_side(), stacked, changes[0], changes[1], weights, names, delays, risk)
-    paths = {path: get(vehicle, path) for path in factors}
-    if paths:
+    stacked = {path: [jnp.stack(side) for side in zip(*pairs, strict=True)] for path, pairs in changes.items()}
+    ride = ScenarioRide(
+        ride=common.side_by_side(),
+        roads=jax.tree.map(lambda *leaves: jnp.stack(leaves), *inputs),
+        factors={path: factors for path, (factors, _) in stacked.items()},
+        offsets={path: offsets for path, (_, offsets) in stacked.items()},
+        weights=jnp.asarray([scenario.weight for scenario in scenarios]),
+        names=tuple(scenario.name for scenario in scenarios),
+        delays_axles=not white and any(ride.road is not None for ride in rides),
+        risk=risk,
+    )
+    if changes:
+        paths = {path: get(vehicle, path) for path in changes}
         ride.refuse_moved_axles("conditions", lambda values: with_values(vehicle, values), paths)
     return ride
+
+
+def _checked_rides(
+    vehicle: AbstractVehicle,
+    scenarios: Sequence["Scenario"],
+    changes: Mapping[str, Sequence[tuple[Array, Array]]],
+    options: Mapping[str, Any],
+) -> tuple[Ride, list[Ride]]:
+    """The ride with the most substeps, and one on the road of each scenario; roads and conditions are checked once."""
+    by_road: dict[int, Ride] = {}
+    most: Ride | None = None
+    for i, scenario in enumerate(scenarios):
+        if id(scenario.road) in by_road and scenario.road is not scenarios[0].road:
+            continue
+        changed = {path: pairs[i][0] * get(vehicle, path) + pairs[i][1] for path, pairs in changes.items()}
+        ride = Ride(checked(with_values(vehicle, changed)), scenario.road, **options)
+        by_road.setdefault(id(scenario.road), ride)
+        if most is None or ride.substeps > most.substeps:
+            most = ride
+    assert most is not None
+    rides = [by_road[id(scenario.road)] for scenario in scenarios]
+    counts = {0 if ride.heights is None else ride.heights.shape[0] for ride in rides}
+    if len(counts) > 1:
+        lengths = ", ".join(sorted(f"{(count - 1) * most.dt:g} s" for count in counts))
+        _checks.refuse("roads", "be driven for the same time", lengths, "Pass `duration`.")
+    return most, rides
 
 
 def _none(leaf: Any) -> bool:
     return leaf is None
 
 
-def _changes(
-    vehicle: AbstractVehicle, conditions: Sequence["Condition"]
-) -> tuple[dict[str, list[Any]], dict[str, list[Any]]]:
+def _changes(vehicle: AbstractVehicle, conditions: Sequence["Condition"]) -> dict[str, list[tuple[Array, Array]]]:
     """Factor and offset of every number that a condition changes, by path, in each scenario."""
-    known = numbers(vehicle)
-    changes = [(_by_path(known, c.values, "values"), _by_path(known, c.factors, "factors")) for c in conditions]
-    factors: dict[str, list[Any]] = {}
-    offsets: dict[str, list[Any]] = {}
-    for path in dict.fromkeys(path for values, shares in changes for path in (*values, *shares)):
-        shape = np.shape(known[path])
-        for values, shares in changes:
-            if path in values and path in shares:
-                remedy = "Multiply the value by the factor."
-                _checks.refuse("Condition", f"have a value or a factor for {path}", "both", remedy)
-            set_to, factor = values.get(path, 0.0), 0.0 if path in values else shares.get(path, 1.0)
-            for number in (set_to, factor):
-                if np.shape(number) not in ((), shape) or not np.all(np.isfinite(number)):
-                    _checks.refuse(f"Condition of {path!r}", f"be finite numbers in shape {shape}", number)
-            factors.setdefault(path, []).append(jnp.broadcast_to(jnp.asarray(factor, float), shape))
-            offsets.setdefault(path, []).append(jnp.broadcast_to(jnp.asarray(set_to, float), shape))
-    return factors, offsets
+    before = numbers(vehicle)
+    each = [(_by_path(before, c.values, "values"), _by_path(before, c.factors, "factors")) for c in conditions]
+    paths = dict.fromkeys(path for values, factors in each for path in (*values, *factors))
+    return {path: [_change(path, np.shape(before[path]), *pair) for pair in each] for path in paths}
+
+
+def _change(
+    path: str, shape: tuple[int, ...], values: Mapping[str, Any], factors: Mapping[str, Any]
+) -> tuple[Array, Array]:
+    """Factor and offset of a number: one and zero where the condition leaves it as it is."""
+    if path in values and path in factors:
+        _checks.refuse("Condition", f"have a value or a factor for {path}", "both", "Multiply the value by the factor.")
+    offset, factor = values.get(path, 0.0), 0.0 if path in values else factors.get(path, 1.0)
+    for number in (offset, factor):
+        if np.shape(number) not in ((), shape) or not np.all(np.isfinite(number)):
+            _checks.refuse(f"Condition of {path!r}", f"be finite numbers in shape {shape}", number)
+    broadcast = (jnp.broadcast_to(jnp.asarray(number, float), shape) for number in (factor, offset))
+    return tuple(broadcast)  # type: ignore[return-value]
 
 
 def numbers(tree: Any) -> dict[str, Any]:

@@ -12,8 +12,7 @@ from jaxdamp._field_types import check_module
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import AbstractEngine
-from jaxdamp.tune.risk import Risk, risk_of
-from jaxdamp.tune.scenario_ride import ScenarioRide, scenario_ride
+from jaxdamp.tune.scenario_ride import Risk, ScenarioRide, risk_of, scenario_ride
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -167,9 +166,8 @@ class Scenarios:
         Raises:
             ValueError: what `Ride` refuses on one of the roads, and paths that the vehicle does not have.
         """
-        return scenario_ride(
-            vehicle, self.scenarios, self.risk, metrics=metrics, duration=duration, dt=dt, engine=engine
-        )
+        options = {"metrics": metrics, "duration": duration, "dt": dt, "engine": engine}
+        return scenario_ride(vehicle, self.scenarios, self.risk, options)
 
 
 def tolerances(scatter: Mapping[str, float], count: int, *, seed: int = 0) -> dict[str, Condition]:

@@ -138,7 +138,7 @@ def test_a_robust_tuning_meets_the_worst_case_better() -> None:
         tune.robust("rms_dynamic_tyre_load", LINEAR, scenarios, risk=risk, scatter={"rate": 0.1})
         for risk in ("mean", "worst")
     ]
-    largest = [max(each.after["rms_dynamic_tyre_load"]) for r in results if (each := r.tuning.scenarios)]
+    largest = [max(each.after["rms_dynamic_tyre_load"]) for r in results if (each := r.scenarios)]
     assert largest[1] <= largest[0] * (1 + 1e-9)
     assert "Largest in 'road 1, laden'" in results[1].summary
     assert results[1].sentences[0].startswith("A 10 % scatter of damper.rate costs")
