@@ -15,8 +15,11 @@ from jaxdamp._results import AbstractResult, worst_status
 from jaxdamp._status import Status
 from jaxdamp._tables import Table
 from jaxdamp.parameters import free_parameters
+from jaxdamp.tune.comparison import Difference
 from jaxdamp.tune.front import FrontParameter
 from jaxdamp.tune.measuring import Measurement
+from jaxdamp.tune.result import Change, ScenarioValues
+from jaxdamp.tune.valving_result import OutOfReach, ValveParameter
 
 
 CAR = vehicles.presets.quarter_car_000()
@@ -94,10 +97,10 @@ def _vehicle_results() -> list[AbstractResult]:
 def _tunings() -> list[AbstractResult]:
     name, units, one = "rms_sprung_acceleration", {"rms_sprung_acceleration": "m/s^2"}, np.array([1.0])
     tuning = tune.TuneResult(
-        vehicle=CAR, start=CAR, metric=name, parameters=(tune.Change("damper.rate", 2.0, 1.0, "N", "", 0.0, 5.0),),
+        vehicle=CAR, start=CAR, metric=name, parameters=(Change("damper.rate", 2.0, 1.0, "N", "", 0.0, 5.0),),
         before={name: 2.0}, after={name: 1.5}, units=units, limits={}, active_limits=(), warnings=("Mind the kink.",),
         status=Status.STEP_LIMIT, history=(1.8, 1.5),
-        scenarios=tune.ScenarioValues(("laden",), {name: one}, {name: one}),
+        scenarios=ScenarioValues(("laden",), {name: one}, {name: one}),
     )  # fmt: skip
     free = free_parameters(CAR, over=["damper.rate"])
     front = tune.ParetoFront(
@@ -111,10 +114,10 @@ def _tunings() -> list[AbstractResult]:
     )  # fmt: skip
     sensitivity = tune.Sensitivity({name: 2.0}, units, ("damper.rate",), ("N s/m",), np.array([1500.0]),
                                    {name: np.array([0.0])}, {})  # fmt: skip
-    difference = tune.Difference("new", name, -10.0, 2.0, 3.0, 8.0)
+    difference = Difference("new", name, -10.0, 2.0, 3.0, 8.0)
     law, speed = dampers.MonoTube.reference(), np.array([-0.1, 0.1])
-    valve = tune.ValveParameter("bleed", "m^2", 1e-6, 2e-6, 0.0, 2e-6, "at its upper bound", "area")
-    part = tune.OutOfReach("rebound", 0.05, 0.1, -20.0, 0.1, ("bleed",))
+    valve = ValveParameter("bleed", "m^2", 1e-6, 2e-6, 0.0, 2e-6, "at its upper bound", "area")
+    part = OutOfReach("rebound", 0.05, 0.1, -20.0, 0.1, ("bleed",))
     valving = tune.ValvingResult(
         law=law, start=law, parameters=(valve,), velocity=speed, target_force=1000.0 * speed, force=900.0 * speed,
         curve_points=2, loop_lengths=(), rmse=10.0, error_percent=10.0, tolerance=0.02, out_of_reach=(part,),

@@ -1,7 +1,7 @@
 """A tuning: laws and spectra before and after, the change of every ride metric, and the course of the search."""
 
 import textwrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import numpy as np
@@ -13,7 +13,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.plots.rides import default_channels
 from jaxdamp.rig import quasi_static
-from jaxdamp.tune import Spectrum, TuneResult
+from jaxdamp.tune import TuneResult
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -117,7 +117,7 @@ def _bars(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
     _style.cross(axes, horizontal=False)
 
 
-def _spectrum(axes: "matplotlib.axes.Axes", channel: str, unit: str, pair: tuple[Spectrum, Spectrum]) -> None:
+def _spectrum(axes: "matplotlib.axes.Axes", channel: str, unit: str, pair: tuple[Any, Any]) -> None:
     """The power spectral density of a channel before and after."""
     styles = ({"linestyle": "--", "color": _style.BLACK}, {"color": _style.COLOURS[0], "linewidth": 1.8})
     for spectrum, style, label in zip(pair, styles, ("before", "after"), strict=True):

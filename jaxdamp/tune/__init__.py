@@ -3,6 +3,7 @@
 - `minimise`: the best free parameters, within bounds, limits and shape constraints; `rescore` on other roads.
 - `robust`: a tuning over scenarios, with the cost of tolerances; `tolerance_effects` of any vehicle.
 - `sensitivity`: which parameters, and which velocities of the damper curve, a metric comes from.
+- `Design`, `Run`, `Search`: keywords of all of them, to be kept for several calls.
 - `Scenarios`: roads and conditions of the vehicle, in place of one road.
 - `Targets`, `smooth_peak`, `smooth_settling`: objectives.
 - `slope`, `monotone`, `ratio`, `knee`: constraints on the shape of the force-velocity curve.
@@ -11,57 +12,44 @@
 - `compare_dampers`: differences between dampers with error bars; `valving`: a mono-tube damper for a wanted force.
 """
 
+from jaxdamp._deprecated import old_names
 from jaxdamp._status import Status
-from jaxdamp.tune.comparison import DamperComparison, Difference
-from jaxdamp.tune.decisions import FittedLaw, compare_dampers
+from jaxdamp.tune.comparison import DamperComparison
+from jaxdamp.tune.decisions import compare_dampers
 from jaxdamp.tune.front import ParetoFront, hypervolume
 from jaxdamp.tune.limits import limit_spans
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Targets, smooth_peak, smooth_settling
 from jaxdamp.tune.pareto_search import pareto
 from jaxdamp.tune.rescoring import Rescore, rescore
-from jaxdamp.tune.result import Attempt, Change, ScenarioValues, ToleranceEffect, TuneResult
+from jaxdamp.tune.result import TuneResult
 from jaxdamp.tune.robust_tuning import robust, tolerance_effects
-from jaxdamp.tune.scenario_ride import CVaR, ScenarioRide
-from jaxdamp.tune.scenarios import Condition, Scenario, Scenarios, samples, tolerances
+from jaxdamp.tune.scenario_ride import CVaR
+from jaxdamp.tune.scenarios import Condition, Scenarios, samples, tolerances
 from jaxdamp.tune.sensitivities import sensitivity
-from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
+from jaxdamp.tune.sensitivity_result import Sensitivity
 from jaxdamp.tune.settings import Design, Run, Search
-from jaxdamp.tune.shape import Shape, damper_paths, knee, monotone, ratio, slope
-from jaxdamp.tune.spectra import Spectrum
-from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
+from jaxdamp.tune.shape import damper_paths, knee, monotone, ratio, slope
+from jaxdamp.tune.valving_result import ValvingResult
 from jaxdamp.tune.valving_search import valving
 from jaxdamp.tune.verdict import Outcome
 
 
 __all__ = [
-    "Attempt",
     "CVaR",
-    "Change",
     "Condition",
-    "CurveSensitivity",
     "DamperComparison",
     "Design",
-    "Difference",
-    "FittedLaw",
-    "OutOfReach",
     "Outcome",
     "ParetoFront",
     "Rescore",
     "Run",
-    "Scenario",
-    "ScenarioRide",
-    "ScenarioValues",
     "Scenarios",
     "Search",
     "Sensitivity",
-    "Shape",
-    "Spectrum",
     "Status",
     "Targets",
-    "ToleranceEffect",
     "TuneResult",
-    "ValveParameter",
     "ValvingResult",
     "compare_dampers",
     "damper_paths",
@@ -83,3 +71,22 @@ __all__ = [
     "tolerances",
     "valving",
 ]
+
+__getattr__ = old_names(
+    "jaxdamp.tune",
+    {
+        "Attempt": "result",
+        "Change": "result",
+        "CurveSensitivity": "sensitivity_result",
+        "Difference": "comparison",
+        "FittedLaw": "decisions",
+        "OutOfReach": "valving_result",
+        "Scenario": "scenarios",
+        "ScenarioRide": "scenario_ride",
+        "ScenarioValues": "result",
+        "Shape": "shape",
+        "Spectrum": "spectra",
+        "ToleranceEffect": "result",
+        "ValveParameter": "valving_result",
+    },
+)

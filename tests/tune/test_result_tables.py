@@ -5,7 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from jaxdamp.tune import Change, Rescore, Status, TuneResult
+from jaxdamp import tune
+from jaxdamp.tune import Rescore, Status, TuneResult
+from jaxdamp.tune.result import Change
 from jaxdamp.vehicles import presets
 
 
@@ -66,3 +68,12 @@ def test_other_roads_stand_in_a_table_but_for_what_has_no_change() -> None:
     assert repr(FRESH).startswith(FRESH.summary)
     data = json.loads(json.dumps(FRESH.to_dict(), allow_nan=False))
     assert data["metrics"]["lift_off_fraction"] == {"before": [0.0, 0.1], "after": [0.1, 0.1], "unit": ""}
+
+
+def test_old_public_names_still_work_with_a_warning() -> None:
+    with pytest.warns(DeprecationWarning, match="no public name any more"):
+        assert tune.Change is Change
+    with pytest.raises(AttributeError, match="no attribute 'Chance'"):
+        _ = tune.Chance
+    with pytest.warns(DeprecationWarning, match="itself a tuning"):
+        assert RESULT.tuning is RESULT
