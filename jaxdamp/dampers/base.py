@@ -7,9 +7,11 @@ extension: a passive law dissipates energy, ∮ F v dt ≥ 0. One instance is on
 import dataclasses
 from abc import abstractmethod
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 
 from jaxdamp import _checks
@@ -23,6 +25,30 @@ from jaxdamp.parameters import Module, check_parameters, readable
 
 
 START = "Start from `law.initial_state()`."
+
+
+@dataclasses.dataclass(frozen=True)
+class _FunctionOfJax:
+    """A function in a file, by its name."""
+
+    module: str
+    name: str
+
+
+def _by_name(leaf: Any) -> Any:
+    """A public function of JAX as its name; anything else as it is."""
+    name = getattr(leaf, "__name__", "") if callable(leaf) else ""
+    places = [place for place in (jax.nn, jnp, jax.lax) if name and getattr(place, name, None) is leaf]
+    return _FunctionOfJax(places[0].__name__, name) if places else leaf
+
+
+def _with_functions(law: "AbstractDamper") -> "AbstractDamper":
+    """The law with functions in place of their names."""
+
+    def function(leaf: Any) -> Any:
+        return getattr(import_module(leaf.module), leaf.name) if isinstance(leaf, _FunctionOfJax) else leaf
+
+    return jax.tree.map(function, law)
 
 
 class AbstractDamper(Module):
@@ -45,6 +71,13 @@ class AbstractDamper(Module):
 
     # By identity, whatever is equal, as JAX asks of a function: `jax.jit(law.force)`.
     __hash__ = object.__hash__  # pyright: ignore[reportAssignmentType]
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        """Functions of JAX, such as the activation of a network, travel by their names: JAX pickles few of them."""
+        named = jax.tree.map(_by_name, self)
+        if any(new is not old for new, old in zip(*map(jax.tree.leaves, (named, self)), strict=True)):
+            return _with_functions, (named,)
+        return super().__reduce_ex__(protocol)
 
     def __repr__(self) -> str:
         return readable(self)
