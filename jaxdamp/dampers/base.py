@@ -5,6 +5,7 @@ extension: a passive law dissipates energy, ∮ F v dt ≥ 0. One instance is on
 """
 
 import dataclasses
+import inspect
 from abc import abstractmethod
 from collections.abc import Sequence
 from importlib import import_module
@@ -28,27 +29,34 @@ START = "Start from `law.initial_state()`."
 
 
 @dataclasses.dataclass(frozen=True)
-class _FunctionOfJax:
-    """A function in a file, by its name."""
+class _NamedFunction:
+    """A public function of JAX, or the default of an argument of a class of equinox, in a file."""
 
     module: str
     name: str
+    argument: str = ""
+
+    def function(self) -> Any:
+        """The function itself."""
+        there = getattr(import_module(self.module), self.name)
+        return inspect.signature(there).parameters[self.argument].default if self.argument else there
+
+
+_PLACES = [_NamedFunction("equinox.nn", "MLP", argument) for argument in ("activation", "final_activation")]
 
 
 def _by_name(leaf: Any) -> Any:
-    """A public function of JAX as its name; anything else as it is."""
-    name = getattr(leaf, "__name__", "") if callable(leaf) else ""
-    places = [place for place in (jax.nn, jnp, jax.lax) if name and getattr(place, name, None) is leaf]
-    return _FunctionOfJax(places[0].__name__, name) if places else leaf
+    """A public function of JAX or a default of equinox as its name; anything else as it is."""
+    if not callable(leaf):
+        return leaf
+    of_jax = [_NamedFunction(place, getattr(leaf, "__name__", "")) for place in ("jax.nn", "jax.numpy", "jax.lax")]
+    known = [place for place in of_jax if hasattr(import_module(place.module), place.name)]
+    return next((place for place in (*known, *_PLACES) if place.function() is leaf), leaf)
 
 
 def _with_functions(law: "AbstractDamper") -> "AbstractDamper":
     """The law with functions in place of their names."""
-
-    def function(leaf: Any) -> Any:
-        return getattr(import_module(leaf.module), leaf.name) if isinstance(leaf, _FunctionOfJax) else leaf
-
-    return jax.tree.map(function, law)
+    return jax.tree.map(lambda leaf: leaf.function() if isinstance(leaf, _NamedFunction) else leaf, law)
 
 
 class AbstractDamper(Module):

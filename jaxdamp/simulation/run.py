@@ -200,12 +200,10 @@ def _edges(
 
     def at(beyond: Scalar, straight: Float[Array, " wheels"]) -> Float[Array, " wheels"]:
         instant = behind(beyond)
-        known = [
-            np.inf if end is None or instant is None else side * (instant - end)
-            for side, end in zip((1, -1), span, strict=True)
-        ]
-        if np.any(np.less(known, -slack)):
-            return straight
+        if instant is not None:
+            inside = [side * (instant - end) for side, end in zip((1, -1), span, strict=True) if end is not None]
+            if any(np.any(length < -slack) for length in inside):
+                return straight
         there = heights_under_wheels(vehicle, road, beyond[None])[0]
         return jnp.where(jnp.isfinite(there), there, straight)
 

@@ -1,6 +1,7 @@
 """A run that goes on where an earlier one stopped: parts are the whole."""
 
 import pickle
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +11,8 @@ import pytest
 from jaxdamp import dampers, roads, simulate
 from jaxdamp.dampers import BoucWen, Lag, Linear
 from jaxdamp.parameters import replace
-from jaxdamp.simulation import Adaptive, Exponential, Outcome
+from jaxdamp.simulation import AbstractEngine, Adaptive, Exponential, Outcome
+from jaxdamp.simulation.equations import STRAIGHT
 from jaxdamp.vehicles import QuarterCar, presets
 
 
@@ -90,25 +92,28 @@ def test_the_rest_of_a_road_is_driven_to_its_end():
     np.testing.assert_array_equal(first.motion[-1], second.motion[0])
 
 
-class Silent(Adaptive.__base__):
+class Silent(AbstractEngine):
     """An engine that does not say where it stopped."""
 
-    derivatives = ("forward",)
+    @property
+    def derivatives(self):
+        return ("forward",)
 
-    def run(self, equations, heights, dt, start, observer, *edges):
-        outcome = Exponential().run(equations, heights, dt, start, observer, *edges)
+    def run(self, equations, heights, dt, start, observer, edges=STRAIGHT):
+        outcome = Exponential().run(equations, heights, dt, start, observer, edges)
         return Outcome(outcome.gathered, outcome.records, outcome.states)
 
 
 def test_what_cannot_go_on_is_refused():
     _, state = simulate(LAG, ROAD, duration=0.02, return_state=True)
-    for options, said in (
+    cases: list[tuple[dict[str, Any], str]] = [
         ({"start": {"z_sprung": 0.1}}, r"`start` must be left out"),
         ({"engine": Adaptive()}, r"`state` must be of a run by Adaptive, but is of one by Exponential"),
         ({"duration": ROAD.longest_run}, r"`duration` must not be longer than the random road"),
-    ):
+    ]
+    for options, said in cases:
         with pytest.raises(ValueError, match=said):
-            simulate(LAG, ROAD, **{"duration": 0.02, "state": state} | options)
+            simulate(LAG, ROAD, **({"duration": 0.02, "state": state} | options))
     with pytest.raises(ValueError, match=r"`state` must have motion and states of the shapes"):
         simulate(CARS["states and two axles"], ROAD, duration=0.02, state=state)
     with pytest.raises(ValueError, match=r"`return_state` must be left out beside a Silent"):
