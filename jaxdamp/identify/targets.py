@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._one_thread import one_thread
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp.dampers import Reach, without_fitted_ranges
-from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.ends import at_ends
 from jaxdamp.identify.estimates import Estimate, parameter_table
 from jaxdamp.identify.noise import independent

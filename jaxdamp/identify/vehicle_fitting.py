@@ -8,8 +8,8 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._one_thread import one_thread
 from jaxdamp.bench import BenchRun, RideRecord
-from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.machine import Machine, started_machine
 from jaxdamp.identify.noise import independent
