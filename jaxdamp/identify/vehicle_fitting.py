@@ -8,8 +8,8 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._one_thread import one_thread
 from jaxdamp.bench import BenchRun, RideRecord
-from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.criteria import LOSSES, Priors, criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
