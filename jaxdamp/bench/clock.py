@@ -241,21 +241,25 @@ def on_one_clock(tables: Sequence[RawTable], choice: Choice) -> list[RawTable]:
     Raises:
         ValueError: several tables could belong together, a clock has gaps, or both do not run at the same time.
     """
-    roles = ("velocity" if choice.stroke_from_velocity else "stroke", "force")
-    groups = {role: [table for table in tables if is_record(table, choice, (role,))] for role in roles}
-    apart = [table for group in groups.values() for table in group]
-    has_both = len({id(table) for table in apart}) < len(apart)
-    clocks = [np.asarray(c.values) for table in apart for c in table.columns if (c.name, c.unit) == ("time", "s")]
-    if has_both or not all(groups.values()) or len(clocks) < len(apart):
+    motion = "velocity" if choice.stroke_from_velocity else "stroke"
+    moved, loaded = ([table for table in tables if is_record(table, choice, (role,))] for role in (motion, "force"))
+    if not moved or not loaded or any(table in loaded for table in moved):
         return list(tables)
-    names = " and ".join(f"the {role} in {', '.join(repr(t.record) for t in group)}" for role, group in groups.items())
-    if len(apart) > len(groups):
+    apart = [*moved, *loaded]
+    clocks = [clock for table in apart for clock in _clocks(table)]
+    if len(clocks) < len(apart):
+        return list(tables)
+    places = [", ".join(repr(table.record) for table in group) for group in (moved, loaded)]
+    names = f"the {motion} in {places[0]} and the force in {places[1]}"
+    if len(apart) > 2:
         raise ArgumentError(
             f"{apart[0].file}: which groups of different clocks belong together is not clear: {names}. {_ONE_GROUP}"
         )
     instants, note = _common_instants(apart, clocks, names)
-    columns = [_at(instants, clock, c) for t, clock in zip(apart, clocks, strict=True) for c in _numbers(t)]
-    together = RawTable(apart[0].file, (RawColumn("time", instants, "s"), *columns), notes=(note,))
+    columns = [RawColumn("time", instants, "s")]
+    for table, clock in zip(apart, clocks, strict=True):
+        columns += [_at(instants, clock, column) for column in _numbers(table)]
+    together = RawTable(apart[0].file, tuple(columns), notes=(note,))
     return [together, *(table for table in tables if table not in apart)]
 
 
@@ -274,6 +278,10 @@ def _common_instants(tables: Sequence[RawTable], clocks: Sequence[Samples], name
         f"{names}, on different clocks: brought onto that of {1 / np.median(np.diff(finest)):.4g} Hz by cubics, "
         f"from {start:.4g} to {stop:.4g} s, which both cover"
     )
+
+
+def _clocks(table: RawTable) -> list[Samples]:
+    return [np.asarray(column.values) for column in table.columns if (column.name, column.unit) == ("time", "s")]
 
 
 def _numbers(table: RawTable) -> list[RawColumn]:

@@ -83,11 +83,7 @@ def to_explorer(
     if file.suffix != ".html":
         _checks.refuse("path", "be a file NAME.html", str(file))
     vehicle = presets.quarter_car_000(law) if vehicle is None else vehicle
-    check_module("vehicle", vehicle, (AbstractVehicle,), "to_explorer(law, path, vehicle=QuarterCar(..., damper=law))")
-    wheels = len(vehicle.wheel_names)
-    if wheels != 1:
-        must = "be a vehicle with one wheel"
-        _checks.refuse("vehicle", must, f"a {type(vehicle).__name__} with {wheels}", "Take a `QuarterCar`.")
+    _check_vehicle(vehicle)
     _checks.positive("speed", speed)
     profile = road if isinstance(road, AbstractRoad) else None
     duration = (profile and profile.duration) or 10.0 if duration is None else duration
@@ -115,21 +111,38 @@ def to_explorer(
         "file": file.stem,
         "law": about | {"document": json.loads(to_json(law)), "conditions": program.conditions},
         "baseline": compared,
-        "vehicle": {"title": type(vehicle).__name__, "numbers": [_of_number(n) for n in car.numbers]},
-        "metrics": [_of_metric(m, vehicle) for m in car.metrics],
-        "channels": [
-            {"name": name, "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]} for name in car.needed
-        ],
+        **_of_car(car),
         "dt": _STEP,
         "count": count,
         "substeps": substeps,
         "road": roads,
         "records": [_of_record(run) for run in records],
     }
-    programs = "".join(closed(name, own) for name, own in functions.items()) + closed("ROAD", {"bump": bump_function()})
-    return write_whole(
-        file, _assembled(data, programs if baseline is not None else f"{programs}const BASELINE = LAW;\n")
-    )
+    programs = "".join(closed(name, texts) for name, texts in functions.items())
+    programs += closed("ROAD", {"bump": bump_function()})
+    programs += "const BASELINE = LAW;\n" if baseline is None else ""
+    return write_whole(file, _assembled(data, programs))
+
+
+def _check_vehicle(vehicle: AbstractVehicle) -> None:
+    check_module("vehicle", vehicle, (AbstractVehicle,), "to_explorer(law, path, vehicle=QuarterCar(..., damper=law))")
+    wheels = len(vehicle.wheel_names)
+    if wheels != 1:
+        must = "be a vehicle with one wheel"
+        _checks.refuse("vehicle", must, f"a {type(vehicle).__name__} with {wheels}", "Take a `QuarterCar`.")
+
+
+def _of_car(car: RideProgram) -> dict[str, Any]:
+    """The vehicle with its numbers, metrics and the channels that these need."""
+    vehicle = car.vehicle
+    channels = [
+        {"name": name, "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]} for name in car.needed
+    ]
+    return {
+        "vehicle": {"title": type(vehicle).__name__, "numbers": [_of_number(number) for number in car.numbers]},
+        "metrics": [_of_metric(metric, vehicle) for metric in car.metrics],
+        "channels": channels,
+    }
 
 
 def _assembled(data: dict[str, Any], programs: str) -> str:
