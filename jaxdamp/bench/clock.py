@@ -1,8 +1,8 @@
 """The instants of a record: order, gaps, rounding, jitter; and channels that have clocks of their own."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NoReturn
 
 import numpy as np
@@ -206,7 +206,7 @@ def regular_parts(time: Samples, where: str, lines: Sequence[int] | None = None)
         refuse_gaps(time, missing, where, lines)
     edges = [0, *(int(gap) + 1 for gap in missing), len(time)]
     parts = []
-    for number, (start, stop) in enumerate(pairwise(edges), 1):
+    for number, (start, stop) in enumerate(itertools.pairwise(edges), 1):
         cut = f"part {number} of {len(missing) + 1} between gaps in time, {time[start]:.6g} to {time[stop - 1]:.6g} s"
         parts.append(_part(time, slice(start, stop), (*notes, cut) if len(missing) else notes))
     return parts
@@ -242,25 +242,28 @@ def on_one_clock(tables: Sequence[RawTable], choice: Choice) -> list[RawTable]:
         ValueError: several tables could belong together, a clock has gaps, or both do not run at the same time.
     """
     motion = "velocity" if choice.stroke_from_velocity else "stroke"
-    moved, loaded = ([table for table in tables if is_record(table, choice, (role,))] for role in (motion, "force"))
-    if not moved or not loaded or any(table in loaded for table in moved):
-        return list(tables)
+    moved = [table for table in tables if is_record(table, choice, (motion,))]
+    loaded = [table for table in tables if is_record(table, choice, ("force",))]
     apart = [*moved, *loaded]
-    clocks = [clock for table in apart for clock in _clocks(table)]
-    if len(clocks) < len(apart):
+    clocks = list(itertools.chain.from_iterable(map(_clocks, apart)))
+    have_both = any(table in loaded for table in moved)
+    if not moved or not loaded or have_both or len(clocks) < len(apart):
         return list(tables)
-    places = [", ".join(repr(table.record) for table in group) for group in (moved, loaded)]
-    names = f"the {motion} in {places[0]} and the force in {places[1]}"
+    names = f"the {motion} in {_records(moved)} and the force in {_records(loaded)}"
     if len(apart) > 2:
         raise ArgumentError(
             f"{apart[0].file}: which groups of different clocks belong together is not clear: {names}. {_ONE_GROUP}"
         )
     instants, note = _common_instants(apart, clocks, names)
+    return [_together(apart, clocks, instants, note), *(table for table in tables if table not in apart)]
+
+
+def _together(tables: Sequence[RawTable], clocks: Sequence[Samples], instants: Samples, note: str) -> RawTable:
+    """The channels of tables at the same instants."""
     columns = [RawColumn("time", instants, "s")]
-    for table, clock in zip(apart, clocks, strict=True):
+    for table, clock in zip(tables, clocks, strict=True):
         columns += [_at(instants, clock, column) for column in _numbers(table)]
-    together = RawTable(apart[0].file, tuple(columns), notes=(note,))
-    return [together, *(table for table in tables if table not in apart)]
+    return RawTable(tables[0].file, tuple(columns), notes=(note,))
 
 
 def _common_instants(tables: Sequence[RawTable], clocks: Sequence[Samples], names: str) -> tuple[Samples, str]:
@@ -278,6 +281,10 @@ def _common_instants(tables: Sequence[RawTable], clocks: Sequence[Samples], name
         f"{names}, on different clocks: brought onto that of {1 / np.median(np.diff(finest)):.4g} Hz by cubics, "
         f"from {start:.4g} to {stop:.4g} s, which both cover"
     )
+
+
+def _records(tables: Sequence[RawTable]) -> str:
+    return ", ".join(repr(table.record) for table in tables)
 
 
 def _clocks(table: RawTable) -> list[Samples]:

@@ -31,18 +31,23 @@ def rebuilt(plain: Any, where: str) -> Any:
     is_law = issubclass(kind, AbstractDamper)
     given = {key: value for key, value in plain.items() if not (is_law and key == FITTED_TO)}
     _same_names(name, ["class", *(f.name for f in fields)], {f.name: None for f in later} | given)
-    module = object.__new__(kind)
+    return _filled(object.__new__(kind), given, plain.get(FITTED_TO) if is_law else None)
+
+
+def _filled(module: Any, given: dict[str, Any], fitted_to: Any) -> Any:
+    """An empty module with the values of a file; fields that it does not give have their default."""
+    name, fields = type(module).__name__, own_fields(type(module))
     for field in fields:
         here = f"{name}.{field.name}"
         value: Any = _of_field(field, given[field.name], here) if field.name in given else field.default
         if field.type is Number and np.ndim(value):
             _checks.refuse(here, "be one number", value)
         object.__setattr__(module, field.name, value)
-    if is_law:
-        object.__setattr__(module, "range_note", kind.range_note)
-        covered = _fitted_to(plain.get(FITTED_TO), name)
-        return module if covered is None else with_fitted_range(module, covered)
-    return module
+    if not isinstance(module, AbstractDamper):
+        return module
+    object.__setattr__(module, "range_note", type(module).range_note)
+    covered = _fitted_to(fitted_to, name)
+    return module if covered is None else with_fitted_range(module, covered)
 
 
 def _class_named(name: str, where: str) -> type:

@@ -87,11 +87,12 @@ def to_explorer(
     _checks.positive("speed", speed)
     profile = road if isinstance(road, AbstractRoad) else None
     duration = (profile and profile.duration) or 10.0 if duration is None else duration
-    drawn = iso8608("C" if profile else str(road), speed, duration, seed=seed)
+    road_class = "C" if profile else str(road)
+    profile = profile or iso8608(road_class, speed, duration, seed=seed)
     count = round(duration / _STEP) + 1
     program = LawProgram(law, member=".")
     car = RideProgram(program, vehicle, _STEP, count)
-    ride = Ride(vehicle, profile or drawn, metrics=car.metrics[:1], duration=duration, dt=_STEP)
+    ride = Ride(vehicle, profile, metrics=car.metrics[:1], duration=duration, dt=_STEP)
     functions = {"LAW": law_functions(program) | vehicle_functions(car)}
     about = _of_law(program, car, "as loaded")
     compared, substeps = about, ride.substeps
@@ -99,13 +100,9 @@ def to_explorer(
         check_module("baseline", baseline, (AbstractDamper,), "to_explorer(law, path, baseline=law)")
         other = LawProgram(baseline, member=".")
         other_car = RideProgram(other, car.with_law(other.law), _STEP, count)
-        other_ride = Ride(other_car.vehicle, profile or drawn, metrics=car.metrics[:1], duration=duration, dt=_STEP)
+        other_ride = Ride(other_car.vehicle, profile, metrics=car.metrics[:1], duration=duration, dt=_STEP)
         functions["BASELINE"] = law_functions(other) | vehicle_functions(other_car)
         compared, substeps = _of_law(other, other_car, "baseline"), max(substeps, other_ride.substeps)
-    roads = _of_roads(speed, duration, seed, "C" if profile else str(road))
-    if profile is not None:
-        assert ride.heights is not None
-        roads["profile"] = {"title": f"given road ({type(profile).__name__})", "heights": _packed(ride.heights[:, 0])}
     data = {
         "title": " › ".join(dict.fromkeys(type(each).__name__ for _, each in laws_inside(law))),
         "file": file.stem,
@@ -115,13 +112,21 @@ def to_explorer(
         "dt": _STEP,
         "count": count,
         "substeps": substeps,
-        "road": roads,
+        "road": _of_roads(speed, duration, seed, road_class) | _of_profile(road, ride),
         "records": [_of_record(run) for run in records],
     }
     programs = "".join(closed(name, texts) for name, texts in functions.items())
     programs += closed("ROAD", {"bump": bump_function()})
     programs += "const BASELINE = LAW;\n" if baseline is None else ""
     return write_whole(file, _assembled(data, programs))
+
+
+def _of_profile(road: AbstractRoad | str, ride: Ride) -> dict[str, Any]:
+    """The heights of a road that was given."""
+    if isinstance(road, str):
+        return {}
+    assert ride.heights is not None
+    return {"profile": {"title": f"given road ({type(road).__name__})", "heights": _packed(ride.heights[:, 0])}}
 
 
 def _check_vehicle(vehicle: AbstractVehicle) -> None:

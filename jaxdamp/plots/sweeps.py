@@ -51,14 +51,7 @@ def sweep(
     2
     """
     axes = _grid_axes(data, metric)
-    chosen = axes if over is None else [over] if isinstance(over, str) else list(over)
-    for name in chosen:
-        _checks.one_of("over", name, axes)
-    others = [name for name in axes if name not in chosen]
-    curves = len(chosen) == 1 and len(others) <= 1 and data[metric].size <= MOST_CURVES * data.sizes[chosen[0]]
-    if not curves and (len(chosen) != 2 or others):
-        remedy = "Choose one or two by `over`, and fix the others by `data.sel`."
-        _checks.refuse("over", f"leave one or two axes, the others fixed (of {axes})", chosen, remedy)
+    chosen, others = _chosen_axes(data, metric, axes, over)
     names = [str(name) for name in data.data_vars]
     spans = limit_spans(limits, names)
     for name in spans:
@@ -69,11 +62,26 @@ def sweep(
     idle = without_effect(data).get(metric, [])
     flat = f" (no effect of {' and '.join(_words(data, name) for name in idle)})" if idle else ""
     plot.set_title(f"{_words(data, metric)} over {over_axes}{flat}", loc="left", fontsize="medium")
-    if curves:
+    if len(chosen) == 1:
         _curves(figure, plot, data, metric, chosen[0], others, _ends(data, spans))
     else:
         _map(figure, plot, data, metric, chosen, _ends(data, spans))
     return figure
+
+
+def _chosen_axes(
+    data: "xarray.Dataset", metric: str, axes: list[str], over: Sequence[str] | None
+) -> tuple[list[str], list[str]]:
+    """The axes to draw over, and the other ones: of a few values of one of them, each gets a curve."""
+    chosen = axes if over is None else [over] if isinstance(over, str) else list(over)
+    for name in chosen:
+        _checks.one_of("over", name, axes)
+    others = [name for name in axes if name not in chosen]
+    curves = len(chosen) == 1 and len(others) <= 1 and data[metric].size <= MOST_CURVES * data.sizes[chosen[0]]
+    if not curves and (len(chosen) != 2 or others):
+        remedy = "Choose one or two by `over`, and fix the others by `data.sel`."
+        _checks.refuse("over", f"leave one or two axes, the others fixed (of {axes})", chosen, remedy)
+    return chosen, others
 
 
 def _grid_axes(data: "xarray.Dataset", metric: str) -> list[str]:

@@ -121,9 +121,7 @@ class SweepFile:
             return [*differences, f"its results are {names[0]}, not {names[1]}"]
         differences += [text for name in new.data_vars if (text := _other_result(name, stored[name], new[name]))]
         if not differences and stored.attrs[MARK] != self._fingerprint:
-            version = stored.attrs.get("jax_version")
-            other = f", which JAX {version} traced, and now JAX {jax.__version__}" if version != jax.__version__ else ""
-            differences.append(f"the function computes something else, or from other numbers{other}")
+            differences.append(_other_function(stored.attrs.get("jax_version")))
         return differences
 
     def save(self, *, now: bool = False) -> None:
@@ -150,6 +148,12 @@ class SweepFile:
         }
         with whole(self.path) as draft:
             data.to_netcdf(draft, engine="scipy", format="NETCDF3_64BIT")
+
+
+def _other_function(version: str | None) -> str:
+    """In what the function differs, which that version of JAX has traced."""
+    other = f", which JAX {version} traced, and now JAX {jax.__version__}" if version != jax.__version__ else ""
+    return f"the function computes something else, or from other numbers{other}"
 
 
 def _other_axis(name: str, stored: np.ndarray, new: np.ndarray) -> str:
