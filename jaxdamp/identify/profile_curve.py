@@ -1,11 +1,13 @@
 """The likelihood of one parameter, all others fitted again at each of its values: intervals without linearisation."""
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp._results import AbstractResult
+from jaxdamp._tables import Column, Table, plain
 from jaxdamp.identify.profile import moved_to
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.search import SearchEnd, search
@@ -26,8 +28,8 @@ MOST_SECANTS = 12  # to find an end
 LEAST_SHARE = 0.05  # of the bracket, by which a secant stays away from its ends
 
 
-@dataclasses.dataclass(frozen=True)
-class ProfileCurve:
+@dataclasses.dataclass(frozen=True, repr=False)
+class ProfileCurve(AbstractResult):
     """How much worse the records fit with other values of a parameter, the best of all others given.
 
     Attributes:
@@ -47,6 +49,31 @@ class ProfileCurve:
     interval: tuple[float, float]
     level: float
     linear_interval: tuple[float, float]
+
+    @property
+    def summary(self) -> str:
+        """The interval, and the one from the standard error."""
+        (low, high), (lower, upper) = self.interval, self.linear_interval
+        unit = f" {self.unit}".rstrip()
+        return (
+            f"{self.name} lies between {low:.4g} and {high:.4g}{unit} (95 %); its standard error alone says"
+            f" {lower:.4g} to {upper:.4g}."
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """An interval without an end."""
+        open_ended = not np.all(np.isfinite(self.interval))
+        return (f"The records do not bound {self.name} on both sides.",) * open_ended
+
+    def table(self) -> Table:
+        """The values tried with their cost."""
+        columns = Column(self.name, self.unit, ".5g"), Column("cost in squared standard errors", spec=".3g")
+        return Table(f"Profile of {self.name}", columns, tuple(zip(*map(plain, (self.values, self.cost)), strict=True)))
+
+    def content(self) -> dict[str, Any]:
+        """The curve and its intervals as plain data."""
+        return plain({field.name: getattr(self, field.name) for field in dataclasses.fields(self)})
 
     def plot(self) -> "Figure":
         """Cost over value, with the interval and the parabola of the standard error."""

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Table, with_unit
 from jaxdamp._types import Scalar, Signal
 from jaxdamp.dampers import RangeUse
@@ -56,7 +57,7 @@ def _channel(
 
 
 @final
-class Response(eqx.Module):
+class Response(eqx.Module, AbstractResult):
     """The response of a vehicle to a road, at uniformly spaced instants.
 
     The road's rate is the mean of its slopes before and after an instant. `axle_timing`, printed with the response,
@@ -104,6 +105,16 @@ class Response(eqx.Module):
             begins = "over" if self.whole is None else f"from {time[0]:g} to"
             length = f" {begins} {time[-1]:g} s, {time.size} instants"
         return f"Response of a {name}{length}, {len(self.units)} channels{several}"
+
+    @property
+    def summary(self) -> str:
+        """Vehicle, length and number of channels."""
+        return repr(self)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """`notes`."""
+        return self.notes
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -210,10 +221,11 @@ class Response(eqx.Module):
         """Comfort by ISO 2631-1 of every acceleration, with units."""
         return comfort_table({"value": self})
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """Metrics, comfort, energies and notes of the run, ready for JSON; numbers that are not finite are None."""
         values, comfort = self.metrics(), self.comfort()
         return {
+            "notes": list(self.notes),
             "vehicle": type(self.vehicle).__name__,
             "start": with_unit(self.time[0], "s"),
             "end": with_unit(self.time[-1], "s"),
@@ -227,7 +239,6 @@ class Response(eqx.Module):
                 for channel, numbers in comfort.items()
             },
             "energy_balance": {name: with_unit(value, "J") for name, value in self.energy_balance().items()},
-            "notes": list(self.notes),
         }
 
     def plot(self, **options: Any) -> "Figure":

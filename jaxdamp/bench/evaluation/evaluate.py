@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, percent_change, plain
 from jaxdamp.bench.analysis import FoldedCycles, as_records, fold_cycles
 from jaxdamp.bench.contradictions import same_motion
@@ -32,7 +33,7 @@ TABLES = {"peak_forces": (*_PEAKS, *_MIDDLE), "loops": _LOOPS}
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Evaluation:
+class Evaluation(AbstractResult):
     """What records say of a damper at one setting or several.
 
     Attributes:
@@ -52,6 +53,16 @@ class Evaluation:
     velocities: tuple[float, ...]
     method: str
     notes: tuple[str, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """`notes`: what could not be evaluated, and why."""
+        return self.notes
+
+    @property
+    def summary(self) -> str:
+        """Numbers of records and of settings."""
+        return f"{len(self.runs)} records at {len(self.settings)} settings, forces by {self.method}."
 
     @property
     def runs(self) -> tuple[BenchRun, ...]:
@@ -160,7 +171,7 @@ class Evaluation:
         """Which measurements lie within limits; see `bench.read_limits`."""
         return LimitCheck.of(self.measurements, limits)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """All measurements as plain data."""
         return {"method": self.method, "notes": list(self.notes), "measurements": plain(self._list().records())}
 

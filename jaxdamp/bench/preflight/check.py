@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult, CallableText
 from jaxdamp._tables import Cell, Column, Table, plain
 from jaxdamp.bench.analysis import as_records
 from jaxdamp.bench.preflight import bench_checks, changes, consistency, motion_checks, sample_checks
@@ -42,7 +43,7 @@ BENCH = ((bench_checks.turned_by_the_reader, bench_checks.turned_motion), (bench
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Preflight:
+class Preflight(AbstractResult):
     """The findings on records, errors first.
 
     Attributes:
@@ -75,14 +76,20 @@ class Preflight:
         for f in self.findings:
             start, stop = (None, None) if f.between is None else f.between
             rows.append((f.severity, f.record, start, stop, f.name, f.message, f.size, f.unit, f.remedy))
-        return Table(self.summary(), columns, tuple(rows))
+        return Table(str(self.summary), columns, tuple(rows))
 
-    def summary(self) -> str:
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The errors and warnings in words, worst first."""
+        return tuple(sentence for sentence in self.sentences() if not sentence.startswith("note"))
+
+    @property
+    def summary(self) -> CallableText:
         """How many records were checked, and how much was found, in words."""
         counts = [(len(self.of(severity)), severity) for severity in SEVERITIES]
         words = ", ".join(f"{count} {severity}{'s' * (count > 1)}" for count, severity in counts if count)
         records = f"{len(self.records)} record{'s' * (len(self.records) > 1)}"
-        return f"Preflight of {records}: {words or 'nothing odd'}"
+        return CallableText(f"Preflight of {records}: {words or 'nothing odd'}")
 
     def sentences(self) -> list[str]:
         """Each kind of finding once, worst first: in how many records, and that with the largest size in words."""
@@ -102,7 +109,7 @@ class Preflight:
         left_out = tuple(names)
         return Preflight(tuple(f for f in self.findings if f.name not in left_out), self.records)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """All findings as plain data."""
         return {"ok": self.ok, "records": list(self.records), "findings": plain(self.table().records())}
 
@@ -113,7 +120,7 @@ class Preflight:
         return plots.preflight(self)
 
     def __repr__(self) -> str:
-        return "\n".join([self.summary(), *(f"- {sentence}" for sentence in self.sentences())])
+        return "\n".join([self.summary, *(f"- {sentence}" for sentence in self.sentences())])
 
 
 def preflight(runs: BenchRun | Iterable[BenchRun]) -> Preflight:
