@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[1] / "jaxdamp"
 
 STOREYS = [
-    {"parameters", "configuration", "codegen"},  # and every private module `_*.py` at the top
+    {"parameters", "solve", "configuration", "codegen"},  # and every private module `_*.py` at the top
     {"dampers", "roads", "metrics"},
     {"vehicles", "rig"},
     {"simulation", "bench"},

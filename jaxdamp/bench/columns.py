@@ -9,11 +9,10 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench.gains import gain_conversion
 from jaxdamp.bench.problems import Problems
 from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.stamps import is_stamp
-from jaxdamp.bench.units import SI, USUAL, Conversion, conversion, named_conversion, ratio
+from jaxdamp.bench.units import SI, USUAL, Conversion, conversion, gain_conversion, named_conversion, ratio
 
 
 ROLES = tuple(SI)

@@ -10,8 +10,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench.cells import PLAIN_COMMA, columns_of
-from jaxdamp.bench.layout import DELIMITERS, Layout, header_of, layout_of, split
+from jaxdamp.bench.layout import DELIMITERS, PLAIN_COMMA, Layout, columns_of, header_of, layout_of, split
 from jaxdamp.bench.raw import RawColumn, RawTable
 
 

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, Unpack, final
 
 import numpy as np
 from jaxtyping import Float
@@ -20,6 +20,7 @@ from jaxdamp.tune.limits import LimitRange
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.risk import exact
 from jaxdamp.tune.scenarios import Scenarios
+from jaxdamp.tune.settings import RUN, Run, completed
 from jaxdamp.tune.verdict import decided, half_interval
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -113,9 +114,7 @@ class Rescore(AbstractResult):
 def rescore(
     result: "TuneResult[Any]",
     roads: Sequence[AbstractRoad | Scenarios],
-    *,
-    duration: float | None = None,
-    dt: float = 1e-3,
+    **run: Unpack[Run],
 ) -> Rescore:
     """Compute all ride metrics of the original and the tuned vehicle on other roads.
 
@@ -126,8 +125,7 @@ def rescore(
     Arguments:
         result: result of `minimise`.
         roads: one or more roads, or scenarios, whose metrics are then those of their risk.
-        duration: length of each run [s], as in `simulate`.
-        dt: step [s], as in `simulate`.
+        run: `duration`, `dt` and `engine` of each run, as in `simulate` (see `Run`).
 
     Raises:
         ValueError: no road; what `simulate` refuses.
@@ -153,7 +151,7 @@ def rescore(
     known += [m for m in (objective.metrics if objective else ()) if m not in known]
     units = {m.name: m.unit(result.start.units) for m in known} | (objective.units(result.start) if objective else {})
     cars = (result.start, result.vehicle)
-    return rescored(cars, roads, known, objective, units, result.metric, duration=duration, dt=dt)
+    return rescored(cars, roads, known, objective, units, result.metric, completed("rescore", run, RUN))
 
 
 def rescored(
@@ -163,19 +161,17 @@ def rescored(
     objective: Objective | None,
     units: dict[str, str],
     metric: str,
-    *,
-    duration: float | None,
-    dt: float,
+    run: Mapping[str, Any],
 ) -> Rescore:
     """The metrics of the vehicle before and after on roads or in scenarios."""
 
     def drive(car: AbstractVehicle, road: Any) -> Mapping[str, Scalar]:
         if isinstance(road, Scenarios):
-            ride = road.ride(car, metrics=metrics, duration=duration, dt=dt)
+            ride = road.ride(car, metrics=metrics, **run)
             each = objective.of_each(ride.each()) if objective else ride.each()
             risk = exact(ride.risk)
             return {name: risk(values, ride.weights) for name, values in each.items()}
-        values = Ride(car, road, metrics=metrics, duration=duration, dt=dt)()
+        values = Ride(car, road, metrics=metrics, **run)()
         return objective.of(values) if objective else values
 
     before, after = ([drive(car, road) for road in roads] for car in cars)
@@ -192,9 +188,7 @@ def on_fresh_roads(
     allowed: Mapping[str, LimitRange],
     objective: Objective,
     units: dict[str, str],
-    *,
-    duration: float | None,
-    dt: float,
+    run: Mapping[str, Any],
 ) -> Rescore | None:
     """The vehicle before and after on other realisations of a road, on so many that gain and limits are decided.
 
@@ -205,8 +199,7 @@ def on_fresh_roads(
         allowed: the limits.
         objective: of the tuning.
         units: of its metrics.
-        duration: as in `simulate`.
-        dt: as in `simulate`.
+        run: as in `simulate`.
 
     Returns:
         None where there is no other realisation.
@@ -216,7 +209,7 @@ def on_fresh_roads(
         part = others[first:last]
         if not part:
             break
-        new = rescored(cars, part, objective.metrics, objective, units, objective.name, duration=duration, dt=dt)
+        new = rescored(cars, part, objective.metrics, objective, units, objective.name, run)
         driven = new if driven is None else driven.and_on(new)
         if decided(driven, allowed):
             break

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -13,12 +13,10 @@ from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_tied, with_unit
 from jaxdamp.tune.limits import LimitRange, written
-from jaxdamp.tune.objective import Objective
+from jaxdamp.tune.objective import Objective, Targets
 from jaxdamp.tune.rescoring import Rescore
 from jaxdamp.tune.scenarios import Road
 from jaxdamp.tune.spectra import Spectrum, spectra
-from jaxdamp.tune.starts import Attempt
-from jaxdamp.tune.targets import Targets
 from jaxdamp.tune.verdict import Verdict, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -74,11 +72,28 @@ class ScenarioValues(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What a tuning drove over: a road, that of the first scenario, for so long [s] with this step [s]."""
+    """What a tuning drove over: a road, that of the first scenario, and how: the keywords of `Run`."""
 
     road: Road
-    duration: float | None
-    dt: float
+    run: Mapping[str, Any]
+
+
+class Attempt(NamedTuple):
+    """The search from one start.
+
+    Attributes:
+        start: the free numbers at its start.
+        end: the free numbers at its end.
+        metric: the metric at its end.
+        meets_limits: whether all limits are met there.
+        converged: whether it ended at an optimum.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    metric: float
+    meets_limits: bool
+    converged: bool
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -215,7 +230,7 @@ class TuneResult(AbstractResult, Generic[V]):
         """
         if self.drive is None:
             return {}
-        sides = [spectra(car, self.drive.road, channels, *self.drive[1:]) for car in (self.start, self.vehicle)]
+        sides = [spectra(car, self.drive.road, channels, self.drive.run) for car in (self.start, self.vehicle)]
         return {channel: (sides[0][channel], sides[1][channel]) for channel in channels}
 
     def parameter_table(self) -> Table:

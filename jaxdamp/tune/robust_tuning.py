@@ -1,8 +1,8 @@
 """`robust`: a tuning over scenarios, and what the scatter of its parameters costs."""
 
 import dataclasses
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Generic, final
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Generic, Unpack, final
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
@@ -15,6 +15,7 @@ from jaxdamp.tune.objective import Function
 from jaxdamp.tune.result import TuneResult, V
 from jaxdamp.tune.risk import Risk
 from jaxdamp.tune.scenarios import Scenarios
+from jaxdamp.tune.settings import RUN, Settings
 from jaxdamp.tune.tolerance import ToleranceEffect, check_scatter, tolerance_effects, tolerance_table
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -97,9 +98,8 @@ def robust(
     *,
     risk: str | Risk | None = None,
     scatter: Mapping[str, float] | None = None,
-    duration: float | None = None,
-    dt: float = 1e-3,
-    **options: Any,
+    progress: Callable[[int, float], None] | None = None,
+    **settings: Unpack[Settings],
 ) -> RobustResult[V]:
     """Minimise a metric over scenarios by its mean, its worst case or the mean of its worst share.
 
@@ -110,9 +110,8 @@ def robust(
         risk: `"mean"`, `"worst"` or `CVaR(share)`, in place of that of the scenarios.
         scatter: standard deviations, relative to the values, of parameters whose cost is stated at the result, such as
             `{"damper.**_rate": 0.1}`; none if left out.
-        duration: as in `simulate`.
-        dt: as in `simulate`.
-        options: further arguments of `minimise`: `over`, `limits`, `shape`, `starts`, ...
+        progress: as in `minimise`.
+        settings: keywords of `minimise`: `over`, `limits`, `duration`, `starts` and the others.
 
     Raises:
         ValueError: what `minimise` refuses.
@@ -132,8 +131,9 @@ def robust(
     scenarios = scenarios if risk is None else scenarios.with_risk(risk)
     if scatter is not None:
         check_scatter(scatter)
-    tuning = minimise(metric, vehicle, scenarios, duration=duration, dt=dt, **options)
+    tuning = minimise(metric, vehicle, scenarios, progress=progress, **settings)
     effects: tuple[ToleranceEffect, ...] = ()
     if scatter:
-        effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, duration=duration, dt=dt)
+        run: dict[str, Any] = {name: value for name, value in settings.items() if name in RUN}
+        effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, **run)
     return RobustResult(tuning, effects)
