@@ -10,7 +10,7 @@ from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, CallableText
 from jaxdamp._tables import Cell, Column, Table, plain
 from jaxdamp.bench.analysis import as_records
-from jaxdamp.bench.preflight import bench_checks, changes, channel_checks, consistency, motion_checks, sample_checks
+from jaxdamp.bench.preflight import bench_checks, changes, consistency, motion_checks, sample_checks
 from jaxdamp.bench.preflight.finding import SEVERITIES, Examined, Finding
 from jaxdamp.bench.runs import BenchRun
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 # In this order; where one family finds an error in a record, the later ones are left out for it.
 FAMILIES = (
     (motion_checks.magnitudes, motion_checks.few_samples, motion_checks.few_cycles, motion_checks.integrated),
-    (sample_checks.repeated, sample_checks.edges, channel_checks.clipping, motion_checks.rest, motion_checks.run_up),
-    (channel_checks.quantisation, channel_checks.ripple, consistency.velocity, consistency.sign),
+    (sample_checks.repeated, sample_checks.edges, sample_checks.clipping, motion_checks.rest, motion_checks.run_up),
+    (sample_checks.quantisation, sample_checks.ripple, consistency.velocity, consistency.sign),
     (
         motion_checks.jitter,
         changes.changes,
@@ -34,7 +34,7 @@ FAMILIES = (
     ),
 )
 # The checks that find errors, which are quick.
-ERRORS = (sample_checks.repeated, sample_checks.edges, channel_checks.clipping, consistency.velocity, consistency.sign)
+ERRORS = (sample_checks.repeated, sample_checks.edges, sample_checks.clipping, consistency.velocity, consistency.sign)
 # What is in the names of warnings, by what it does to results; all others come behind.
 CONSEQUENCE = ("unusual", "changes", "jump", "dropout", "held", "spikes", "velocity", "contradiction", "sign", "delay")
 BAD_RECORDS = ("refuse", "leave_out", "keep")
@@ -196,10 +196,10 @@ def usable(
         return runs  # a fit says itself that no force varies
     errors = [_first_error(run, robust) for run in runs]
     sound = tuple(run for run, error in zip(runs, errors, strict=True) if error is None)
-    found = [error for error in errors if error is not None]
-    if found and (bad_records == "refuse" or not sound):
-        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-        error = found[0]
+    wrong = [error for error in errors if error is not None]
+    if wrong and (bad_records == "refuse" or not sound):
+        more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
+        error = wrong[0]
         ways = '`bad_records="leave_out"` fits the others, `bad_records="keep"` fits them as they are.'
         is_ = f"{error.record}{more}: {error.message}"
         _checks.refuse(argument, "be records without errors", is_, f"{error.remedy} {ways}")
