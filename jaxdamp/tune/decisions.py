@@ -110,9 +110,15 @@ def compare_dampers(
             units = {m.name: m.unit(car.units) for m in ride.metrics}
             by_damper[name], notes = _metrics_of(damper, vehicle, ride, heights)
             warnings += [f"{name}: {note}" for note in notes]
+    return _comparison(by_damper, units, warnings, len(listed))
+
+
+def _comparison(
+    by_damper: Mapping[str, "_DamperMetrics"], units: dict[str, str], warnings: Sequence[str], roads: int
+) -> DamperComparison:
+    """The metrics of all dampers, and the differences from the first to each other one."""
     order, (first, *others) = list(units), list(by_damper)
     by_metric = {name: dict(zip(order, one.values.T, strict=True)) for name, one in by_damper.items()}
-    count = len(listed)
     return DamperComparison(
         values=by_metric,
         parameter_errors={
@@ -122,7 +128,7 @@ def compare_dampers(
             name: {metric: _standard_error(values[metric]) for metric in order} for name, values in by_metric.items()
         },
         differences=tuple(
-            _difference(name, metric, by_damper[first], by_damper[name], i, count)
+            _difference(name, metric, by_damper[first], by_damper[name], i, roads)
             for name in others
             for i, metric in enumerate(order)
         ),

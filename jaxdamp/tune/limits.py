@@ -127,27 +127,32 @@ def limit_ranges(limits: Mapping[Any, Any] | None, known: Sequence[str]) -> dict
 
 
 def _range(one: str | Metric, given: Any) -> LimitRange:
+    """A limit as it is written, checked."""
     label = f"limits[{one.name if isinstance(one, Metric) else one!r}]"
     must = "be the largest allowed value, or the smallest and the largest one"
     pair = given if isinstance(given, tuple | list) else (None, given)
-    shares = [PERCENT.fullmatch(end.strip()) if isinstance(end, str) else None for end in pair]
-    texts = any(isinstance(end, str) and share is None for end, share in zip(pair, shares, strict=True))
-    if texts or len(pair) != 2 or all(end is None for end in pair):
-        _checks.refuse(label, must, repr(given), ENDS)
     try:
-        lower, upper = (
-            0.01 * float(share.group(1)) if share else default if end is None else float(end)
-            for end, share, default in zip(pair, shares, (-math.inf, math.inf), strict=True)
-        )
+        (lower, lower_relative), (upper, upper_relative) = map(_end, pair, (-math.inf, math.inf))
     except (TypeError, ValueError):
         _checks.refuse(label, must, repr(given), ENDS)
-    relative = shares[0] is not None, shares[1] is not None
-    comparable = relative[0] == relative[1]
+    if len(pair) != 2 or all(end is None for end in pair):
+        _checks.refuse(label, must, repr(given), ENDS)
+    comparable = lower_relative == upper_relative
     if math.isnan(lower) or math.isnan(upper) or (comparable and lower >= upper):
         _checks.refuse(label, f"{must}, in increasing order", repr(given), "Write (-0.08, 0.1).")
     if math.isinf(lower) and math.isinf(upper):
         _checks.refuse(label, "be finite", repr(given), "Leave the limit out, or write None for an end without one.")
-    return LimitRange(lower, upper, relative)
+    return LimitRange(lower, upper, (lower_relative, upper_relative))
+
+
+def _end(end: Any, default: float) -> tuple[float, bool]:
+    """One end of a limit as a number, and whether it is relative to the start; the default for None."""
+    if isinstance(end, str):
+        share = PERCENT.fullmatch(end.strip())
+        if share is None:
+            raise ValueError
+        return 0.01 * float(share.group(1)), True
+    return default if end is None else float(end), False
 
 
 def written(span: Span) -> str:

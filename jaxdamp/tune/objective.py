@@ -115,8 +115,7 @@ def objective_of(
     extra += vehicle.chosen_metrics(own, argument) if own else []
     beside = tuple(exact for exact in map(exact_counterpart, extra) if exact is not None)
     extra += beside
-    all_metrics = (*vehicle.ride_metrics, *extra)
-    known = {m.name: m for m in all_metrics if not white or is_stationary(m, vehicle.layout.by_name)}
+    known = _available(vehicle, extra, white=white)
     names, functions, used = [], {}, [m.name for m in extra]
     for one in wanted:
         if isinstance(one, str | Metric):
@@ -126,22 +125,43 @@ def objective_of(
         names.append(_name(one))
         functions[names[-1]] = one
         used += _metrics_used_by(one, list(known), argument)
-        if names[-1] in known:
-            remedy = "Give the function another name."
-            _checks.refuse(argument, "have a name that no metric has", repr(names[-1]), remedy)
-    if len(set(names)) < len(names):
-        remedy = "Functions need different names: use `def` instead of `lambda`."
-        _checks.refuse(argument, "have different names", names, remedy)
-    for place, name in [*((argument, name) for name in used), *(("limits", name) for name in limited)]:
-        _checks.one_of(place, name, known)
-        if not known[name].statistic.differentiable:
-            remedy = (
-                "Tune on the dynamic load coefficient; limit `Metric('relative_tyre_load', 'minimum')` to (-1, None)."
-            )
-            _checks.refuse(place, "have a slope", f"{name!r}, a count", remedy)
+    _refuse_same_names(names, functions, known, argument)
+    _refuse_unusable(known, {argument: used, "limits": limited})
     # Further metrics for information: those without weightings, counts and means, which may be negative.
     chosen = [m for m in known.values() if m.name in (*used, *limited) or _for_information(m)]
     return Objective(tuple(names), tuple(functions.items()), tuple(chosen), beside)
+
+
+def _available(vehicle: AbstractVehicle, extra: Sequence[Metric], *, white: bool) -> dict[str, Metric]:
+    """All metrics by name; on a white road those that follow from an RMS."""
+    every = (*vehicle.ride_metrics, *extra)
+    return {m.name: m for m in every if not white or is_stationary(m, vehicle.layout.by_name)}
+
+
+def _refuse_same_names(
+    names: Sequence[str], functions: Mapping[str, Function], known: Mapping[str, Metric], argument: str
+) -> None:
+    """Refuse two objectives of one name, and functions with the name of a metric."""
+    for name in functions:
+        if name in known:
+            remedy = "Give the function another name."
+            _checks.refuse(argument, "have a name that no metric has", repr(name), remedy)
+    if len(set(names)) < len(names):
+        remedy = "Functions need different names: use `def` instead of `lambda`."
+        _checks.refuse(argument, "have different names", names, remedy)
+
+
+def _refuse_unusable(known: Mapping[str, Metric], names_by_argument: Mapping[str, Sequence[str]]) -> None:
+    """Refuse metrics that are unknown, or have no derivative."""
+    for argument, names in names_by_argument.items():
+        for name in names:
+            _checks.one_of(argument, name, known)
+            if not known[name].statistic.differentiable:
+                remedy = (
+                    "Tune on the dynamic load coefficient; limit `Metric('relative_tyre_load', 'minimum')` to "
+                    "(-1, None)."
+                )
+                _checks.refuse(argument, "have a slope", f"{name!r}, a count", remedy)
 
 
 def check_objective(argument: str, one: Any, remedy: str) -> None:

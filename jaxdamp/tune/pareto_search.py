@@ -17,7 +17,7 @@ from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, share
 from jaxdamp.tune.limits import Limit, limit_ends, margins
 from jaxdamp.tune.measuring import LANES, ride_on
 from jaxdamp.tune.objective import Function, check_objective, exact_counterpart
-from jaxdamp.tune.ranges import start_points
+from jaxdamp.tune.ranges import SearchRange, start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenarios import Road, Scenarios
@@ -108,7 +108,6 @@ def pareto(
     filled = between if len(chosen) > len(names) else 0
     if filled:
         designs, numbers = _with_designs_between(evaluator, designs, numbers, limits, between)
-    free = zip(space.free.names, space.free.owners, space.start, space.lower, space.upper, strict=True)
     fresh, start_on_fresh = _on_fresh_roads(evaluator, designs, asked["fresh_roads"])
     front = ParetoFront[V](
         start=vehicle,
@@ -116,7 +115,7 @@ def pareto(
         values={name: numbers[name] for name in task.units},
         before={name: before[name] for name in task.units},
         units=task.units,
-        parameters=tuple(FrontParameter(n, p.unit, float(a), float(b), float(c)) for n, p, a, b, c in free),
+        parameters=_parameters(space),
         designs=designs,
         limits=task.shown_limits(before),
         reference=worst | given,
@@ -130,6 +129,12 @@ def pareto(
         fresh=fresh,
     )
     return dataclasses.replace(front, warnings=(*notes, *_notes_on_points(front, task, start_on_fresh)))
+
+
+def _parameters(space: SearchRange) -> tuple[FrontParameter, ...]:
+    """The free numbers with their bounds."""
+    free = zip(space.free.names, space.free.owners, space.start, space.lower, space.upper, strict=True)
+    return tuple(FrontParameter(n, p.unit, float(a), float(b), float(c)) for n, p, a, b, c in free)
 
 
 def _check(objectives: Any, vehicle: Any, road: Any, points: int, counts: Mapping[str, Any]) -> None:
@@ -171,17 +176,22 @@ def _judged(states: Sequence[SearchState], problem: FrontProblem) -> tuple[list[
         names = dict.fromkeys(limit.of for limits in short for limit in limits)
         notes.append(f"{len(states) - len(allowed)} searches ended beyond the limits of {', '.join(names)}: left out.")
     objectives = np.stack([state.evaluation.rows[:count] for state in allowed])
-    best = [state for state, is_best in zip(allowed, non_dominated(objectives), strict=True) if is_best]
+    best = [allowed[i] for i in np.flatnonzero(non_dominated(objectives))]
     best.sort(key=lambda state: tuple(state.evaluation.rows[:count]))
     span = range_of(states, count) / np.maximum(np.abs(objectives).max(axis=0), np.finfo(float).tiny)
     if min(span) < NO_CONFLICT:
         notes.append("The objectives do not conflict: one design is the best in all of them, and there is no front.")
+    status, early = _ends_of(best, problem.max_steps)
+    return best, status, [*notes, *early, *_at_bounds(best, task)]
+
+
+def _ends_of(best: Sequence[SearchState], max_steps: int) -> tuple[Status, list[str]]:
+    """How the searches of the points ended, and a sentence if some of them are no optima."""
     failed = [state for state in best if not state.converged]
-    status = Status.CONVERGED
-    if failed:
-        status = Status.STEP_LIMIT if any(s.steps >= problem.max_steps for s in failed) else Status.NO_BETTER_STEP
-        notes.append(f"{len(failed)} of {len(best)} points are not optima: {status.sentence}")
-    return best, status, [*notes, *_at_bounds(best, task)]
+    if not failed:
+        return Status.CONVERGED, []
+    status = Status.STEP_LIMIT if any(state.steps >= max_steps for state in failed) else Status.NO_BETTER_STEP
+    return status, [f"{len(failed)} of {len(best)} points are not optima: {status.sentence}"]
 
 
 def _nearest(

@@ -109,23 +109,18 @@ def sensitivity(
     hatted, paths = _with_curves(vehicle, first, asked, run)
     own, free = _free(vehicle, hatted, asked["over"], asked["freeze"])
     point = np.array([*np.asarray(free.values, float), *given.values()])
-    if given:
-        measured = _on_made_roads(hatted, make, list(given), objective, free, run)
-    else:
-        fixed = Measurement(hatted, first, objective, free, run=run)
-        measured = lambda x: fixed(free.build(x))  # noqa: E731
+    measured = _measured(hatted, make, list(given), objective, free, run)
     names = [name for name in objective.units(vehicle) if name in objective.names]
     values, slopes = _derivatives(measured, names, point)
     is_curve = np.array([is_hat(p.path, hatted) for p in free.owners] + [False] * len(given), bool)
     chosen = np.flatnonzero(~is_curve)
-    columns = [(name, p.unit) for p, name in zip(own.owners, own.names, strict=True)]
-    columns += [(name, "m/s" if name == "speed" else "") for name in given]
+    units = [*(p.unit for p in own.owners), *("m/s" if name == "speed" else "" for name in given)]
     second = _second(measured, names, point, chosen) if second_order else None
     return Sensitivity(
         values=dict(zip(names, values.tolist(), strict=True)),
         units={name: objective.units(vehicle)[name] for name in names},
-        parameters=tuple(name for name, _ in columns),
-        parameter_units=tuple(unit for _, unit in columns),
+        parameters=(*own.names, *given),
+        parameter_units=tuple(units),
         point=point[chosen],
         gradient=dict(zip(names, slopes[:, chosen], strict=True)),
         curves=_curve_parts(vehicle, hatted, paths, names, slopes[:, is_curve]),
@@ -215,15 +210,18 @@ def _free(
     return own, free_parameters(hatted, over=[*exact, *hats])
 
 
-def _on_made_roads(
+def _measured(
     vehicle: AbstractVehicle,
-    make: Callable[..., Any],
+    make: Any,
     names: Sequence[str],
     objective: Objective,
     free: FreeParameters,
     run: Mapping[str, Any],
 ) -> Callable[[Any], Mapping[str, Any]]:
-    """The metrics as a function of the parameters and of the quantities that a road is made from."""
+    """The metrics as a function of the parameters and of the quantities that a road is made from, if there are any."""
+    if not names:
+        fixed = Measurement(vehicle, make, objective, free, run=run)
+        return lambda x: fixed(free.build(x))
     count = free.values.size
 
     def measured(x: Any) -> Mapping[str, Any]:

@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp._tables import percent_change, typeset_unit
+from jaxdamp.metrics import Metric
 from jaxdamp.tune.limits import LimitRange
-from jaxdamp.vehicles import ChannelKind
+from jaxdamp.vehicles import AbstractVehicle, ChannelKind
 
 
 if TYPE_CHECKING:
@@ -110,12 +111,14 @@ def _price(result: "TuneResult[Any]") -> tuple[float, str]:
         change, metric = _mean_change(result, name), metrics.get(name)
         if change is None or name in named or any(x is not None and np.isclose(change, x, 1e-6) for x in known):
             continue
-        if metric is not None:
-            kind = result.start.layout.by_name[metric.channel].kind
-            if metric.channel in limited or metric.statistic.signed or kind not in PRICED:
-                continue
-        worst = max(worst, (change, name))
+        if metric is None or (metric.channel not in limited and _has_price(metric, result.start)):
+            worst = max(worst, (change, name))
     return worst
+
+
+def _has_price(metric: Metric, vehicle: AbstractVehicle) -> bool:
+    """Whether a rise of a metric is a price."""
+    return not metric.statistic.signed and vehicle.layout.by_name[metric.channel].kind in PRICED
 
 
 def _mean_change(result: "TuneResult[Any]", name: str) -> float | None:
