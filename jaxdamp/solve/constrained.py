@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, final
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 
 RADIUS = 0.5  # largest change of a coordinate in the first step; coordinates are one at the start
@@ -82,6 +82,7 @@ class SearchState:
         steps: number of steps tried.
         open: whether the search goes on.
         converged: whether the models promise no more improvement.
+        fixed: coordinates that stay as they are; none if left out.
     """
 
     aim: Float[np.ndarray, " objectives"]
@@ -93,6 +94,7 @@ class SearchState:
     steps: int = 0
     open: bool = True
     converged: bool = False
+    fixed: Bool[np.ndarray, " free"] | None = None
 
     def neighbour(self, aim: np.ndarray, y: np.ndarray, evaluation: Evaluation) -> "SearchState":
         """A search that starts from a point near this one, with its curvature."""
@@ -263,6 +265,8 @@ class SequentialQuadratic:
         count, free, region = self.scaling.objectives, len(state.y), self.region
         lower, upper = (np.clip(end - state.y, -state.radius, state.radius) for end in region[:2])
         lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
+        if state.fixed is not None:
+            lower, upper = (np.where(state.fixed, 0.0, end) for end in (lower, upper))
         unit = self.scaling.unit
         slopes, curvature = state.evaluation.slopes / unit[:, None], state.curvature / unit[:, None, None]
         reach = np.abs(slopes[:count]) @ np.maximum(-lower, upper)

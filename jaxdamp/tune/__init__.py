@@ -4,6 +4,7 @@
 - `robust`: a tuning over scenarios, with the cost of tolerances; `tolerance_effects` of any vehicle.
 - `sensitivity`: which parameters, and which velocities of the damper curve, a metric comes from.
 - `Design`, `Run`, `Search`: keywords of all of them, to be kept for several calls.
+- `Choice`: the values that can be built: clicks, springs and shims of a catalogue.
 - `Scenarios`: roads and conditions of the vehicle, in place of one road.
 - `Targets`, `smooth_peak`, `smooth_settling`: objectives.
 - `slope`, `monotone`, `ratio`, `knee`: constraints on the shape of the force-velocity curve.
@@ -21,6 +22,7 @@ from jaxdamp.tune.limits import limit_spans
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Targets, smooth_peak, smooth_settling
 from jaxdamp.tune.pareto_search import pareto
+from jaxdamp.tune.ranges import Choice
 from jaxdamp.tune.rescoring import Rescore, rescore
 from jaxdamp.tune.result import TuneResult
 from jaxdamp.tune.robust_tuning import robust, tolerance_effects
@@ -37,6 +39,7 @@ from jaxdamp.tune.verdict import Outcome
 
 __all__ = [
     "CVaR",
+    "Choice",
     "Condition",
     "DamperComparison",
     "Design",

@@ -1,5 +1,6 @@
 """The descent of `minimise`: searches from one or several starts, and how far from an optimum they ended."""
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, final
 
@@ -7,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp.solve import Evaluation, Scaling, SearchState, SequentialQuadratic
-from jaxdamp.tune.limits import Limit, limit_ends
+from jaxdamp.tune.limits import Limit, LimitEnd, limit_ends
 from jaxdamp.tune.task import Evaluator, Tolerance
 
 
@@ -41,10 +42,13 @@ class Descent:
         evaluator: of rows and derivatives.
         max_steps: of each search.
         progress: called with the number of steps and the smallest present value of the objective.
+
+    Attributes:
+        task: of the evaluator.
     """
 
     def __init__(self, evaluator: Evaluator, max_steps: int, progress: Callable[[int, float], None]) -> None:
-        self._evaluator, self._max_steps, self._progress = evaluator, max_steps, progress
+        self.task, self._evaluator, self._max_steps, self._progress = evaluator.task, evaluator, max_steps, progress
 
     def search(
         self, starts: Sequence[np.ndarray] | np.ndarray, evaluations: Sequence[Evaluation], limits: Sequence[Limit]
@@ -59,19 +63,38 @@ class Descent:
             evaluations: of the starts.
             limits: that must hold at the end.
         """
-        tolerance, ends = self._evaluator.task.tolerance, limit_ends(limits)
-        level = abs(float(evaluations[0].rows[0])) or 1.0
-        zeros, units = ([0.0, *(e.sign * e.value for e in ends)], [level, *(e.scale for e in ends)])
-        solver = SequentialQuadratic(
-            self._evaluator.region,
-            Scaling(np.array(zeros), np.array(units), 1),
-            self._max_steps,
-            improvement=0.1 * tolerance.rounding,
-            rounding=tolerance.rounding,
-            feasible=0.1 * tolerance.limit,
-        )
+        return self._search(starts, evaluations, limits, None)
+
+    def choose(self, ended: Ended, limits: Sequence[Limit]) -> list[Ended]:
+        """Searches with each combination of the choices next to where a search ended, over what else is free.
+
+        Arguments:
+            ended: of numbers between the choices.
+            limits: that must hold at the end.
+        """
+        space = self.task.space
+        pairs = zip(space.choices, ended.values, strict=True)
+        sides = [[value] if choice is None else choice.around(value) for choice, value in pairs]
+        combinations = np.array(list(itertools.product(*sides)))
+        starts = combinations / space.unit
+        several = self._search(starts, self._evaluator.at(starts), limits, space.is_choice)
+        return [
+            one._replace(values=np.where(space.is_choice, exact, one.values))
+            for exact, one in zip(combinations, several, strict=True)
+        ]
+
+    def _search(
+        self,
+        starts: Sequence[np.ndarray] | np.ndarray,
+        evaluations: Sequence[Evaluation],
+        limits: Sequence[Limit],
+        fixed: np.ndarray | None,
+    ) -> list[Ended]:
+        solver = self._solver(abs(float(evaluations[0].rows[0])) or 1.0, limit_ends(limits))
         aim = np.zeros(1)
         states = [solver.init(aim, y, now) for y, now in zip(starts, evaluations, strict=True)]
+        for state in states:
+            state.fixed, state.open = fixed, fixed is None or not fixed.all()
         histories: list[list[float]] = [[] for _ in states]
         rounds = 0
 
@@ -88,17 +111,30 @@ class Descent:
             again = [i for i, state in enumerate(states) if self._ended_early(state, solver.scaling)]
             for i in again:
                 steps, states[i] = states[i].steps, solver.init(aim, states[i].y, states[i].evaluation)
-                states[i].steps = steps
+                states[i].steps, states[i].fixed = steps, fixed
             if again:
                 solver.solve(self._evaluator.at, states, note)
         return [self._ended(state, tuple(h), solver.scaling) for state, h in zip(states, histories, strict=True)]
 
+    def _solver(self, level: float, ends: Sequence[LimitEnd]) -> SequentialQuadratic:
+        """The solver for an objective of this size, and limits with these ends."""
+        tolerance = self.task.tolerance
+        zeros, units = [0.0, *(end.sign * end.value for end in ends)], [level, *(end.scale for end in ends)]
+        return SequentialQuadratic(
+            self._evaluator.region,
+            Scaling(np.array(zeros), np.array(units), 1),
+            self._max_steps,
+            improvement=0.1 * tolerance.rounding,
+            rounding=tolerance.rounding,
+            feasible=0.1 * tolerance.limit,
+        )
+
     def _ended_early(self, state: SearchState, scaling: Scaling) -> bool:
         left = _slope_left(self._evaluator, state, scaling)
-        return not left < self._evaluator.task.tolerance.slope and state.steps < self._max_steps
+        return not left < self.task.tolerance.slope and state.steps < self._max_steps
 
     def _ended(self, state: SearchState, history: tuple[float, ...], scaling: Scaling) -> Ended:
-        space, tolerance = self._evaluator.task.space, self._evaluator.task.tolerance
+        space, tolerance = self.task.space, self.task.tolerance
         values = np.clip(state.y * space.unit, space.lower, space.upper)
         left, out_of_steps = _slope_left(self._evaluator, state, scaling), state.steps >= self._max_steps
         if left >= tolerance.slope and not out_of_steps:
@@ -120,6 +156,7 @@ def _slope_left(evaluator: Evaluator, state: SearchState, scaling: Scaling) -> f
     """Length of the scaled gradient after projection on bounds and active limits, relative to the metric."""
     space, (_, rows, slopes) = evaluator.task.space, state.evaluation
     unbound = np.array([not side for side in space.side(state.y * space.unit)])
+    unbound &= True if state.fixed is None else ~state.fixed
     gradient, walls = slopes[0, unbound], slopes[1:][_tight(evaluator, rows, scaling)][:, unbound].T
     if walls.size and gradient.size:
         gradient = gradient - walls @ np.linalg.lstsq(walls, gradient, rcond=None)[0]
@@ -148,8 +185,9 @@ def _slope_left_at_kink(evaluator: Evaluator, state: SearchState, scaling: Scali
     near = state.y + NEAR * np.random.default_rng(0).uniform(-1.0, 1.0, (4 * free + 4, free))
     sampled = [state.evaluation, *evaluator.at(np.clip(near, region.lower, region.upper))]
     tight = _tight(evaluator, state.evaluation.rows, scaling)
-    gradients = [one.slopes[0] / size for one in sampled]
-    walls = [wall for one in sampled for wall in one.slopes[1:][tight]]
+    moved = np.ones(free) if state.fixed is None else 1.0 - state.fixed
+    gradients = [moved * one.slopes[0] / size for one in sampled]
+    walls = [moved * wall for one in sampled for wall in one.slopes[1:][tight]]
     sides = {"lower": -1.0, "upper": 1.0}
     at_bounds = space.side(state.y * space.unit)
     walls += [sides[side] * row for side, row in zip(at_bounds, np.eye(free), strict=True) if side]

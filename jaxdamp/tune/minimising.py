@@ -112,7 +112,7 @@ def minimise(
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
         descent = Descent(evaluator, max_steps, progress)
         several = descent.search(starts, evaluations, limits)
-        ended = min(several, key=lambda one: _rank(task, one, limits))
+        ended = _best(descent, several, limits)
         attempts = _attempts(task, starts, several, limits) if len(several) > 1 else ()
         result = _result(task, evaluations[0], ended, attempts, (limits, limits), max_steps, fresh_roads)
         tighter = limits
@@ -121,9 +121,21 @@ def minimise(
             if not excess:
                 break
             tighter = [limit.tightened(excess.get(limit.of, 0.0)) for limit in tighter]
-            (ended,) = descent.search([ended.values / task.space.unit], [ended.evaluation], tighter)
+            again_from = descent.search([ended.values / task.space.unit], [ended.evaluation], tighter)
+            ended = _best(descent, again_from, tighter)
             result = _result(task, evaluations[0], ended, attempts, (limits, tighter), max_steps, fresh_roads, again)
     return result
+
+
+def _best(descent: Descent, several: Sequence[Ended], limits: Sequence[Limit]) -> Ended:
+    """The search that ended best; of numbers that are choices, the best combination next to it."""
+    task = descent.task
+    best = min(several, key=lambda one: _rank(task, one, limits))
+    if not task.space.is_choice.any():
+        return best
+    chosen = min(descent.choose(best, limits), key=lambda one: _rank(task, one, limits))
+    steps = chosen.history or (float(chosen.evaluation.rows[0]),)
+    return chosen._replace(history=best.history + steps)
 
 
 def _rank(task: DesignTask[Any], ended: Ended, limits: Sequence[Limit]) -> tuple[float, float]:

@@ -86,6 +86,7 @@ def pareto(
     task = DesignTask(objectives, vehicle, road, argument="objectives", settings=asked)
     names, space, evaluator = task.objective.names, task.space, Evaluator(task, LANES)
     given = _reference(reference, names)
+    _refuse_choices(space)
     starts = start_points(space, asked["starts"], asked["seed"]) / space.unit
     evaluations, limits = evaluator.begin(starts)
     usable = [i for i, one in enumerate(evaluations) if i == 0 or all(np.all(np.isfinite(a)) for a in one)]
@@ -149,6 +150,12 @@ def _check(objectives: Any, vehicle: Any, road: Any, points: int, counts: Mappin
     least = 3 * (len(objectives) - 1)  # the ends and one point between them
     if points < least:
         _checks.refuse("points", f"be {least} or more for {len(objectives)} objectives", points)
+
+
+def _refuse_choices(space: SearchRange) -> None:
+    if space.is_choice.any():
+        remedy = "Choose by `minimise`, from a point of the front."
+        _checks.refuse("over", "have bounds along a front", "with a `Choice`", remedy)
 
 
 def _reference(reference: Mapping[str, float] | None, names: Sequence[str]) -> dict[str, float]:

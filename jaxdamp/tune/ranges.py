@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp.parameters import (
@@ -24,7 +25,38 @@ Pair = tuple[float, float]
 FACTOR = 3.0  # default factor by which a number may decrease or increase
 INSIDE = 1e-6  # distance from the open ends of a domain, relative to the unit of the coordinate
 DAMPERS = ("**damper.**",)  # what is tuned by default, as far as it is adjustable
+MOST_CHOICES = 6  # numbers of which all combinations of two neighbours are tried
 NO_BOUND = (-math.inf, math.inf)
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class Choice:
+    """The values that a parameter may take, in place of its bounds: clicks, or springs and shims of a catalogue.
+
+    Arguments:
+        values: two or more, in the unit of the parameter; of a vector, for each of its numbers.
+
+    Raises:
+        ValueError: fewer than two values, or such that are not finite.
+
+    >>> Choice([2000.0, 1500.0, 2500.0]).values
+    (1500.0, 2000.0, 2500.0)
+    """
+
+    values: tuple[float, ...]
+
+    def __init__(self, values: Sequence[float] | Float[np.ndarray, " values"]) -> None:
+        given = np.asarray(values)
+        if given.ndim != 1 or given.dtype.kind not in "iuf" or not np.all(np.isfinite(given)) or len(set(given)) < 2:
+            remedy = "Write `tune.Choice([1500.0, 2000.0, 2500.0])`."
+            _checks.refuse("values", "be two or more finite numbers", _checks.described(values), remedy)
+        object.__setattr__(self, "values", tuple(sorted({float(value) for value in given})))
+
+    def around(self, value: float) -> list[float]:
+        """The nearest values on both sides."""
+        place = int(np.searchsorted(self.values, value))
+        return list(dict.fromkeys([self.values[max(place - 1, 0)], self.values[min(place, len(self.values) - 1)]]))
 
 
 @final
@@ -39,6 +71,7 @@ class SearchRange:
         lower: the smallest allowed value of each number.
         upper: the largest allowed value of each number.
         origin: where the two bounds of each number come from: `"default"`, `"given"` or `"domain"`.
+        choices: the values that each number may take at the end; None for all between its bounds.
     """
 
     coordinates: Coordinates
@@ -47,6 +80,12 @@ class SearchRange:
     lower: np.ndarray
     upper: np.ndarray
     origin: tuple[tuple[str, str], ...]
+    choices: tuple[Choice | None, ...]
+
+    @property
+    def is_choice(self) -> Bool[np.ndarray, " free"]:
+        """Which numbers are choices."""
+        return np.array([choice is not None for choice in self.choices])
 
     @property
     def free(self) -> FreeParameters:
@@ -54,8 +93,8 @@ class SearchRange:
         return self.coordinates.free
 
     def side(self, values: np.ndarray) -> list[str]:
-        """The bound that each value is at: `"lower"`, `"upper"`, or nothing."""
-        slack = 2 * INSIDE * self.unit
+        """The bound that each value is at: `"lower"`, `"upper"`, or nothing; choices have none."""
+        slack = np.where(self.is_choice, -np.inf, 2 * INSIDE * self.unit)
         low, high = values <= self.lower + slack, values >= self.upper - slack
         return ["lower" if at_low else "upper" if at_high else "" for at_low, at_high in zip(low, high, strict=True)]
 
@@ -86,9 +125,14 @@ def search_range(
     start = np.asarray(free.values, np.float64)
     unit = np.concatenate([np.ravel(np.asarray(unit, np.float64)) for unit in coordinates.units])
     numbers = zip(free.names, free.owners, start, unit, strict=True)
-    rows = [_one_range(name, p, float(value), size, given.get(p.path)) for name, p, value, size in numbers]
+    spans = {path: (one.values[0], one.values[-1]) if isinstance(one, Choice) else one for path, one in given.items()}
+    rows = [_one_range(name, p, float(value), size, spans.get(p.path)) for name, p, value, size in numbers]
     lower, upper, origin = zip(*rows, strict=True)
-    return SearchRange(coordinates, start, unit, np.array(lower), np.array(upper), origin)
+    choices = tuple(one if isinstance(one := given.get(p.path), Choice) else None for p in free.owners)
+    if (count := sum(one is not None for one in choices)) > MOST_CHOICES:
+        remedy = "Give bounds to the others, or tie numbers together."
+        _checks.refuse("over", f"have choices for up to {MOST_CHOICES} numbers", count, remedy)
+    return SearchRange(coordinates, start, unit, np.array(lower), np.array(upper), origin, choices)
 
 
 def start_points(space: SearchRange, count: int, seed: int) -> np.ndarray:
@@ -127,7 +171,7 @@ def _adjustable(vehicle: Any) -> list[str]:
     return adjustable
 
 
-def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> dict[str, Pair]:
+def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> dict[str, Pair | Choice]:
     """Bounds by path, infinite without a bound. If two names match a parameter, the later one counts."""
     if not isinstance(bounds, Mapping):
         remedy = "Write `{'damper.rate': (1000.0, 5000.0)}`."
@@ -144,8 +188,10 @@ def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> di
     return by_path
 
 
-def _pair(argument: str, name: str, bound: Any) -> Pair:
-    """A lower and an upper bound as numbers."""
+def _pair(argument: str, name: str, bound: Any) -> Pair | Choice:
+    """A lower and an upper bound as numbers, or a choice."""
+    if isinstance(bound, Choice):
+        return bound
     if bound is None:
         return NO_BOUND
     label = f"{argument}[{name!r}]"

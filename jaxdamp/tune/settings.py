@@ -24,7 +24,7 @@ class Design(Free, total=False):
     Arguments:
         over: the parameters to change, by path, last part or pattern; all of the dampers that a workshop can change
             (`Parameter.adjustable`) if left out. A mapping `{parameter: (lower, upper)}` gives their bounds too, as
-            `bounds` does.
+            `bounds` does; `{parameter: Choice(values)}` the values that can be built.
         freeze: parameters among these to hold at their start.
         bounds: bounds `{parameter: (lower, upper)}` in the unit of the parameter, instead of the default ones; the
             start must be between them. None removes one bound or both: with `bounds={"*": None}` only the domains

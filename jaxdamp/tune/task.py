@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Generic, NamedTuple, final
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -189,11 +188,6 @@ class Evaluator:
         """Where the coordinates may be."""
         space = self.task.space
         return Region(space.lower / space.unit, space.upper / space.unit, *space.coordinates.order())
-
-    def vehicle(self, design: np.ndarray) -> Any:
-        """The vehicle of a design."""
-        free = self.task.space.free
-        return free.build(jnp.asarray(design, free.values.dtype))
 
 
 def _metrics_of_targets(objectives: Sequence[Any], known: Sequence[str], limited: Sequence[Metric]) -> list[Metric]:

@@ -1,0 +1,59 @@
+"""Numbers that can only take some values: clicks, springs and shims of a catalogue."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from jaxdamp import Ride, dampers, roads, sweep, tune, vehicles
+
+
+COMFORT, TYRE = "rms_sprung_acceleration", "rms_dynamic_tyre_load"
+CAR, WHITE = vehicles.presets.quarter_car_000(), roads.white("C", 20.0)
+RATES = [1500.0, 3000.0, 4400.0, 5200.0, 7000.0]
+
+
+def test_the_best_choice_is_that_of_all_of_them() -> None:
+    result = tune.minimise(COMFORT, CAR, WHITE, over={"damper.rate": tune.Choice(RATES)})
+    swept = sweep(Ride(CAR, WHITE, metrics=[COMFORT]), {"damper.rate": RATES})[COMFORT].values
+    assert result.parameters[0].after == RATES[int(np.argmin(swept))] == float(result.vehicle.damper.rate)
+    assert result.after[COMFORT] == pytest.approx(swept.min(), rel=1e-9) == result.history[-1]
+    assert result.converged and not result.parameters[0].note
+
+
+def test_what_is_free_beside_a_choice_is_best_for_it() -> None:
+    """Two catalogues and a bound, with a limit: against all combinations, each with the rest searched."""
+    car = vehicles.presets.quarter_car_000(dampers.Linear(1500.0) + dampers.Linear(1500.0))
+    choices = {"spring_rate": [40e3, 60e3, 75e3], "damper.terms.0.rate": [1000.0, 1500.0, 2600.0]}
+    free = {"damper.terms.1.rate": (500.0, 1800.0)}
+    limits = {TYRE: 1300.0}
+    found = tune.minimise(
+        COMFORT, car, WHITE, over={name: tune.Choice(values) for name, values in choices.items()} | free, limits=limits
+    )
+    assert found.after[TYRE] <= 1300.0 * (1 + 1e-6) and found.converged
+    values = {change.name: change.after for change in found.parameters}
+    assert all(values[name] in given for name, given in choices.items())
+    axes = {name: given for name, given in choices.items()} | {"damper.terms.1.rate": np.linspace(500.0, 1800.0, 131)}
+    points = np.array(list(itertools.product(*axes.values())))
+    swept = sweep(Ride(car, WHITE, metrics=[COMFORT, TYRE]), axes)
+    allowed = swept[TYRE].values.ravel() <= 1300.0
+    best = points[allowed][np.argmin(swept[COMFORT].values.ravel()[allowed])]
+    assert [values[name] for name in choices] == best[:2].tolist()
+    assert found.after[COMFORT] <= swept[COMFORT].values.ravel()[allowed].min() * (1 + 1e-9)
+
+
+def test_wrong_choices_are_refused() -> None:
+    for values in ([1.0], [1.0, np.nan], 3.0, [1.0, 1.0], ["a", "b"]):
+        with pytest.raises(ValueError, match="`values` must be two or more finite numbers"):
+            tune.Choice(values)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="must start between 3000 and 4000"):
+        tune.minimise(COMFORT, CAR, WHITE, over={"rate": tune.Choice([3000.0, 4000.0])})
+    with pytest.raises(ValueError, match="`over` must have bounds along a front"):
+        tune.pareto([COMFORT, TYRE], CAR, WHITE, over={"rate": tune.Choice([2000.0, 4000.0])})
+    law = dampers.PiecewiseLinear(np.array([-0.3, 0.1]), np.array([1500.0, 2500.0, 1500.0]))
+    many = dampers.PiecewiseLinear(np.linspace(-0.3, 0.3, 7), np.full(8, 2000.0))
+    car, over = vehicles.presets.quarter_car_000(law), {"slopes": tune.Choice([1000.0, 3000.0])}
+    result = tune.minimise(COMFORT, car, WHITE, over=over, max_steps=1)
+    assert {change.after for change in result.parameters} <= {1000.0, 3000.0}
+    with pytest.raises(ValueError, match="choices for up to 6 numbers, but is 8"):
+        tune.minimise(COMFORT, vehicles.presets.quarter_car_000(many), WHITE, over={"slopes": tune.Choice([1e3, 3e3])})
