@@ -12,6 +12,7 @@ RADIUS = 0.5  # largest change of a coordinate in the first step; coordinates ar
 LEAST_RADIUS = 1e-6
 CURVATURE = 0.1  # second derivative of a row by a coordinate at first, relative to its size
 SHARE = 1e-4  # of the sum of several objectives in each problem: excludes points that others beat in one objective
+PLANES = 4  # refused points whose tangents take part
 FAR_WORSE = -10.0  # loss in units of the promised gain, from which slopes at a point say nothing of those near by
 PENALTY, FURTHER, HIGHEST = 10.0, 10.0, 1e6  # of a violated limit, in units of the objectives: first, factor, highest
 
@@ -83,6 +84,7 @@ class SearchState:
         open: whether the search goes on.
         converged: whether the models promise no more improvement.
         fixed: coordinates that stay as they are; none if left out.
+        refused: points tried from here that were no better: where rows have kinks, their slopes there are others.
     """
 
     aim: Float[np.ndarray, " objectives"]
@@ -95,6 +97,7 @@ class SearchState:
     open: bool = True
     converged: bool = False
     fixed: Bool[np.ndarray, " free"] | None = None
+    refused: tuple[tuple[Float[np.ndarray, " free"], Evaluation], ...] = ()
 
     def neighbour(self, aim: np.ndarray, y: np.ndarray, evaluation: Evaluation) -> "SearchState":
         """A search that starts from a point near this one, with its curvature."""
@@ -243,7 +246,9 @@ class SequentialQuadratic:
         elif gain > 0.75 and length > 0.99 * state.radius:
             state.radius *= 2.0
         if gain > 1e-4:
-            state.y, state.evaluation = y, evaluation
+            state.y, state.evaluation, state.refused = y, evaluation, ()
+        elif usable:
+            state.refused = (*state.refused, (y, evaluation))[-PLANES:]
         state.open = state.radius > LEAST_RADIUS or self._raised_penalty(state)
 
     def _raised_penalty(self, state: SearchState) -> bool:
@@ -277,6 +282,10 @@ class SequentialQuadratic:
         level, slopes, curvature = level / size, slopes / size, curvature / size
         slack = np.zeros((len(level), 2))
         slack[:count, 0] = slack[count:, 1] = 1.0
+        base = self.scaling.of(state.evaluation.rows)[:count] - state.aim
+        planes, plane_slopes = self._planes(state, float(base.max()))
+        planes, plane_slopes = planes / size, plane_slopes / size
+        plane_slack = np.tile(slack, (len(state.refused), 1))
         weights, share = np.array([1.0, state.penalty]), self._share
         gaps = region.least - region.matrix @ state.y
         order = np.concatenate([region.matrix, np.zeros((len(region.matrix), 2))], axis=1)
@@ -290,10 +299,12 @@ class SequentialQuadratic:
             return weights @ z[free:] + share * value, np.concatenate([share * slope, weights])
 
         def room(z: np.ndarray) -> np.ndarray:
-            return np.concatenate([slack @ z[free:] - level - change(z[:free])[0], order @ z - gaps])
+            below = plane_slack @ z[free:] - planes - plane_slopes @ z[:free]
+            return np.concatenate([slack @ z[free:] - level - change(z[:free])[0], below, order @ z - gaps])
 
         def room_slope(z: np.ndarray) -> np.ndarray:
-            return np.concatenate([np.concatenate([-change(z[:free])[1], slack], axis=1), order])
+            below = np.concatenate([-plane_slopes, plane_slack], axis=1)
+            return np.concatenate([np.concatenate([-change(z[:free])[1], slack], axis=1), below, order])
 
         violation = level[count:].max(initial=0.0)
         solved = scipy.optimize.minimize(
@@ -306,7 +317,17 @@ class SequentialQuadratic:
             options={"ftol": 1e-12, "maxiter": 100},
         )
         step = np.clip(np.nan_to_num(solved.x[:free]), lower, upper)
-        moved = level + change(step)[0]
-        after = moved[:count].max() + share * (moved - level)[:count].sum()
-        after += state.penalty * (moved[count:].max(initial=0.0) - violation)
-        return step, -size * float(after)
+        moved, below = level + change(step)[0], (planes + plane_slopes @ step).reshape(-1, len(level))
+        after = max(moved[:count].max(), below[:, :count].max(initial=-np.inf)) + share * (moved - level)[:count].sum()
+        beyond = max(moved[count:].max(initial=0.0), below[:, count:].max(initial=0.0))
+        return step, -size * float(after + state.penalty * (beyond - violation))
+
+    def _planes(self, state: SearchState, base: float) -> tuple[np.ndarray, np.ndarray]:
+        """Values at the present point, and slopes, of the tangents of all rows at the refused points; scaled."""
+        values, slopes = [np.zeros(0)], [np.zeros((0, len(state.y)))]
+        for y, evaluation in state.refused:
+            slope = evaluation.slopes / self.scaling.unit[:, None]
+            value = self.scaling.of(evaluation.rows) - slope @ (y - state.y)
+            value[: self.scaling.objectives] -= state.aim + base
+            values, slopes = [*values, value], [*slopes, slope]
+        return np.concatenate(values), np.concatenate(slopes)

@@ -125,3 +125,18 @@ def test_points_without_numbers_are_no_steps() -> None:
 def test_a_search_stops_after_its_steps() -> None:
     (state,) = solved(rosenbrock, np.array([[-1.2, 1.0]]), ONE, max_steps=3)
     assert state.steps == 3 and not state.converged and not state.open
+
+
+def test_a_kinked_valley_is_followed_by_tangents_of_refused_points() -> None:
+    """The largest of |x + 10 y| and |x − 10 y|, each smooth but for its sign: a search along the crease y = 0."""
+
+    def creased(x, y):
+        one, other = x + 10.0 * y + 0.05 * x**2, x - 10.0 * y + 0.05 * x**2
+        if one >= other:
+            return [(one, [1.0 + 0.1 * x, 10.0])]
+        return [(other, [1.0 + 0.1 * x, -10.0])]
+
+    region = Region(np.array([-3.0, -5.0]), np.full(2, 5.0), *NONE)
+    (state,) = solved(creased, np.array([[4.0, 1.0]]), ONE, region=region)
+    np.testing.assert_allclose(state.y, [-3.0, 0.0], atol=1e-5)
+    assert state.steps < 30
