@@ -4,7 +4,8 @@
 
 Half cars drive 1 s at 1 kHz, all ride metrics. Plain `jax.vmap` chooses the form for many cars by itself; a function
 that is compiled before it is batched cannot. The step of optax follows the gradient of one metric of a quarter car by
-the parameters of its damper over 60 s; memory is what the compiled step needs beside its arguments.
+the parameters of its damper over 60 s; memory is what the compiled step needs beside its arguments. The fits to 64
+noisy records of the same motion are one program, beside `fit_many` of the same records.
 """
 
 import argparse
@@ -12,6 +13,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import optax
 from jaxtyping import Array
 
@@ -21,7 +23,7 @@ from jaxdamp import configure
 configure(cpu_devices=1, cache=False)
 
 from benchmarks._timing import first_and_warm, report  # noqa: E402
-from jaxdamp import Ride, dampers, roads  # noqa: E402
+from jaxdamp import Ride, bench, dampers, identify, roads  # noqa: E402
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000  # noqa: E402
 
 
@@ -62,11 +64,26 @@ def step_of_optax(seconds: float) -> list[Any]:
     return [f"optax step through {seconds:g} s", 1, first, warm, needed.temp_size_in_bytes / 2**20]
 
 
+def noisy_fits(count: int = 64) -> list[list[Any]]:
+    """Fits to records with other noise, in a program of one's own and by `fit_many`."""
+    start, tests = dampers.Besinger(1500.0, 4000.0, 1000.0, 0.12, 0.06), [bench.SineTest(0.02, f) for f in (1.0, 3.0)]
+    records = [bench.VirtualDyno(LAW, force_noise=20.0, seed=seed).run(tests) for seed in range(count)]
+    problem = identify.prepare(start, records[0])
+    forces = jnp.stack([identify.prepare(start, runs).measured for runs in records])
+    fits = jax.jit(jax.vmap(problem.minimum))
+    apart = np.max(np.abs((fits(forces) - identify.fit_many(start, records).values) / 4200.0))
+    own = first_and_warm(lambda: fits(forces), 5)
+    many = first_and_warm(lambda: identify.fit_many(start, records).values, 5)
+    rows = [["jit(vmap(problem.minimum))", own], ["fit_many", many]]
+    print(f"largest difference of a number, relative to the rate: {apart:.1e}")
+    return [[f"{name}, {count} records", count, *seconds, None] for name, seconds in rows]
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--cars", type=int, default=32_768)
     cars = options.parse_args().cars
-    rows = [*batches(cars), step_of_optax(6.0), step_of_optax(60.0)]
+    rows = [*batches(cars), step_of_optax(6.0), step_of_optax(60.0), *noisy_fits()]
     report("from_jax", "In a program of one's own, one core", ["work", "cars", "first, s", "then, s", "MiB"], rows)
 
 
