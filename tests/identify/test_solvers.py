@@ -2,6 +2,7 @@
 
 import jax
 import jax.numpy as jnp
+import jaxtyping
 import numpy as np
 import optimistix as optx
 import pytest
@@ -30,7 +31,8 @@ def test_a_law_with_conditions_by_another_solver(sines, solver):
     usual, other = identify.fit(AWAY, runs), identify.fit(AWAY, runs, solver=solver)
     assert other.status is identify.Status.CONVERGED and apart(usual, other) < 1e-3
     assert other.warnings == usual.warnings
-    np.testing.assert_allclose(other.covariance, usual.covariance, rtol=1e-4)
+    errors = np.sqrt(np.diag(usual.covariance))
+    np.testing.assert_allclose((other.covariance - usual.covariance) / np.outer(errors, errors), 0.0, atol=1e-4)
 
 
 def test_orders_and_bounds_hold_by_construction(sines):
@@ -42,7 +44,15 @@ def test_orders_and_bounds_hold_by_construction(sines):
     assert np.all(np.diff(result.law.knots) > 0.0)
 
 
-def test_steps_tolerances_and_wrong_solvers(sines):
+@pytest.fixture
+def unchecked():
+    """Annotations are not checked, as in a user's program."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
+
+
+def test_steps_tolerances_and_wrong_solvers(sines, unchecked):
     runs = sines(BESINGER, noise=20.0)
     short = identify.fit(AWAY, runs, solver=optx.Dogleg(**HOW), max_steps=2, starts=1)
     assert short.status is identify.Status.STEP_LIMIT and "did not converge" in short.warnings[0]
@@ -88,4 +98,4 @@ def test_the_minimum_by_the_measured_force_also_at_a_bound(sines):
     slope = both(0.0)[1]
     np.testing.assert_allclose(slope, (ends[0] - ends[1]) / 2e-4, rtol=1e-5, atol=1e-9)
     names = [p.path for p in parameters(AWAY)]
-    assert slope[names.index("rebound_rate")] == 0.0 and np.count_nonzero(slope) == 4
+    assert np.flatnonzero(np.abs(slope) < 1e-9).tolist() == [names.index("rebound_rate")]
