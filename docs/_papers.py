@@ -91,8 +91,9 @@ def write_table(path: Path) -> None:
         "Every equation, table, figure and claim of the four papers that jaxdamp builds on. *Reproduced*: the numbers",
         "follow. *Corrected*: a slip of the paper. *Contradicted*: a conclusion that does not hold where it can be",
         "computed. *Consistent on a twin*: the records are unpublished, and a virtual damper that was made to show it",
-        "shows it, which proves nothing of the real one. *Not treated*: the paper does not say enough. The last column",
-        "says what computes the number of jaxdamp; the tests compare it with the one that stands here.",
+        "shows it, which proves nothing of the real one. *Not treated*: the paper does not say enough; a number beside",
+        "it says what can be computed. The last column names what computes the number of jaxdamp; the tests compare it",
+        "with the one that stands here.",
         "",
     ]
     for paper in PAPERS.values():
