@@ -24,10 +24,8 @@ from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import fitted_range_table, range_use_table
 from jaxdamp.report.records import add_records, records_table
 from jaxdamp.report.rides import (
-    GOALS,
     add_rides,
     axles_sentence,
-    goal_metrics,
     notes_of,
     ride_report,
     ride_tables,
@@ -39,7 +37,6 @@ from jaxdamp.report.vehicle_fits import ride_records_table, vehicle_fit_report
 
 
 __all__ = [
-    "GOALS",
     "Attempts",
     "Column",
     "Report",
@@ -59,7 +56,6 @@ __all__ = [
     "fit_verdict",
     "fitted_range_table",
     "fitted_velocities",
-    "goal_metrics",
     "law_evaluation",
     "notes_of",
     "parameters_of",

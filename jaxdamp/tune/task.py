@@ -13,7 +13,7 @@ from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride, stationary_notes
 from jaxdamp.tune.limits import Limit, LimitRange, limit_ranges, scaled
 from jaxdamp.tune.measuring import Measurement
-from jaxdamp.tune.objective import Function, objective_of
+from jaxdamp.tune.objective import Function, goal_limits, goal_objective, objective_of
 from jaxdamp.tune.range_notes import range_notes
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import V
@@ -66,7 +66,13 @@ class DesignTask(Generic[V]):
         dt: float,
     ) -> None:
         self.vehicle, self.road, self.run, self._argument = vehicle, road, (duration, dt), argument
-        known = [m.name for m in (*vehicle.ride_metrics, *(m for m in metrics if isinstance(m, Metric)))]
+        white, further = is_white(road), [m.name for m in metrics if isinstance(m, Metric)]
+        known = [*(m.name for m in vehicle.ride_metrics), *further]
+        objectives = [
+            one if one in further else goal_objective(one, vehicle, white=white, argument=argument)
+            for one in objectives
+        ]
+        limits = goal_limits(limits, vehicle, white=white, known=further)
         self.allowed = limit_ranges(limits, known)
         limited = [metric for metric in limits or {} if isinstance(metric, Metric)]
         targets = [one for one in objectives if isinstance(one, Targets)]
@@ -74,7 +80,7 @@ class DesignTask(Generic[V]):
         for name in (name for one in targets for name in one.values):
             with_targets = [*known, *(metric.name for metric in (*limited, *of_targets))]
             _checks.one_of("targets", current_name(name, known), with_targets)
-        more, white = [*metrics, *limited, *of_targets], is_white(road)
+        more = [*metrics, *limited, *of_targets]
         self.objective = objective_of(objectives, vehicle, more, list(self.allowed), white=white, argument=argument)
         _refuse_negative(self.allowed, self.objective.metrics)
         self.space = search_range(vehicle, over, freeze, bounds, tie)
