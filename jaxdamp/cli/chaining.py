@@ -76,11 +76,11 @@ def report(
         best = fits.comparison.best.result
         fitted = make(best.law)
         result, cars = None, {"vehicle as it is": car, "fitted law": fitted}
-        search, sentences = _what_can_be_tuned(best, search)
-        if search is None:
+        adjusting, sentences = _what_can_be_tuned(best, search)
+        if adjusting is None:
             screen.points(sentences)
         else:
-            call, chosen = tuning_arguments(fitted, minimise, [surface], search, driving.seed, run)
+            call, chosen = tuning_arguments(fitted, minimise, [surface], adjusting, driving.seed, run)
             sentences = [*chosen, *sentences]
             screen.points(sentences)
             result = tuned(screen, call)

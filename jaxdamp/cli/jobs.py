@@ -84,7 +84,7 @@ def job(screen: Screen, command: str, output: Output, page: Path | None = None) 
         page: another place for the page.
     """
     target = output.out or Path(f"jaxdamp-{command}")
-    attempts, replace = Attempts(interrupt.check, message), output.replace
+    attempts, replace = Attempts(interrupt.check, message, in_command_line), output.replace
     with another_page(page, target, replace=replace), results_folder(target, command, replace=replace) as results:
         yield Job(screen, results, attempts)
     screen.files(target, results.published)

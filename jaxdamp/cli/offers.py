@@ -74,7 +74,7 @@ class Written(NamedTuple):
 
 
 SENSOR = {"gain": 1.0, "offset": 0.0, "lag": 0.0, "delay": 0.0, "high_pass": None}
-GUIDE = dict.fromkeys(("friction", "stiffness", "damping", "friction_velocity", "ahead"))
+GUIDE: dict[str, float | None] = dict.fromkeys(("friction", "stiffness", "damping", "friction_velocity", "ahead"))
 
 WRITTEN = {  # by the name of the option, where its type does not say it
     "bound": Written(words.spans, "NAME=LOWER:UPPER", "rate=1000:4000"),

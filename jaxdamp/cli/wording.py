@@ -21,6 +21,8 @@ OTHER_WORDS = {
     "start": "The beginning in --between",
 }
 CALLS = {
+    r" It is in `result\.rig`, not in the law,": " It is in machines/, not in the law,",
+    r"; `law \+ dampers\.Spring\([^`]*` is the damper if it is gas": "",
     r'add "(\w+)" or "(\w+)" to the machine \(`rig`\)': r"add --rig \1 or --rig \2",
     r'add "(\w+)" to the machine \(`rig`\)': r"add --rig \1",
     r"or a `Spring` to the law": "or fit a law with a spring",

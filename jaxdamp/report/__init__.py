@@ -7,6 +7,7 @@
 - Tables of these pages: `records_table`, `ride_records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp._tables import Column, Table
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.benches import add_evaluation, baseline_table, bench_report, law_evaluation
@@ -69,3 +70,5 @@ __all__ = [
     "tuning_report",
     "vehicle_fit_report",
 ]
+
+answer_guesses(__name__, __all__)

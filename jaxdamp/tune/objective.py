@@ -144,7 +144,7 @@ def goal_objective(
         return names[0]
 
     def mean_of_all(m: Mapping[str, Scalar]) -> Scalar:
-        return sum(m[name] for name in names) / len(names)
+        return sum((m[name] for name in names), jnp.zeros(())) / len(names)
 
     mean_of_all.__name__ = one
     return mean_of_all
