@@ -149,7 +149,7 @@ def _page(
     report = Report("jaxdamp demo: from bench records to a better damper", folder, attempts)
     preflight = bench.preflight(runs)
     report.verdict(
-        f"{preflight.summary()}.",
+        f"{preflight.summary}.",
         *fit_verdict(report, fits.comparison),
         "" if truth is None else truth_verdict(scenario, truth),
         *(f"{name}: {ride_verdict(responses)}" for name, responses in rides.items()),

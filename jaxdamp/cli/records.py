@@ -79,7 +79,7 @@ class Reading:
         """
         with screen.stage("Checking the records"):
             found = bench.preflight(runs).without(() if self.keep_rest else _CUT_OFF)
-        screen.heading(found.summary())
+        screen.heading(found.summary)
         sentences = found.sentences()
         shown = sentences if self.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
         for sentence in shown:

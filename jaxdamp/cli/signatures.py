@@ -103,7 +103,7 @@ def _statements(module: str) -> tuple[ast.stmt, ...]:
 def _find(module: str, name: str) -> tuple[str, ast.stmt]:
     """The statement that defines a name of a module, and the module where it stands."""
     for node in _statements(module):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name and not _overloaded(node):
             return module, node
         targets = [node.target] if isinstance(node, ast.AnnAssign) else getattr(node, "targets", [])
         if any(isinstance(target, ast.Name) and target.id == name for target in targets):
@@ -113,6 +113,10 @@ def _find(module: str, name: str) -> tuple[str, ast.stmt]:
                 if (alias.asname or alias.name) == name:
                     return _find(str(node.module), alias.name)
     raise LookupError(f"{module} defines no {name}.")
+
+
+def _overloaded(node: ast.FunctionDef | ast.ClassDef) -> bool:
+    return any(ast.unparse(decorator).split(".")[-1] == "overload" for decorator in node.decorator_list)
 
 
 def _parameters(module: str, node: ast.FunctionDef, texts: dict[str, str]) -> Iterator[Argument]:
