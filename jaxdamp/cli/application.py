@@ -21,8 +21,8 @@ COMMANDS = {  # along the chain from records to a damper: name and function
     "report": "cli.chaining.report",
     "explore": "cli.exporting.explore",
     "export": "cli.exporting.export_command",
-    "laws": "cli.listing.laws",
-    "vehicles": "cli.listing.list_vehicles",
+    "laws": "cli.vehicle_words.list_laws",
+    "vehicles": "cli.vehicle_words.list_vehicles",
 }
 
 _typed: list[str] = []  # the command that is running, as it was typed

@@ -4,8 +4,7 @@ Every argument of a command's function, and of the library functions that it nam
 stands here. Help and defaults come from docstrings and signatures (`options`).
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from jaxdamp.cli import words
 
@@ -71,20 +70,25 @@ class Written(NamedTuple):
         repeated: whether it may be given several times.
     """
 
-    read: Callable[[str, Any], Any]
+    read: words.Reader
     metavar: str
     example: str = ""
     repeated: bool = True
 
 
+SPANS = words.named(words.span, "be a number, or two as LOWER:UPPER")
 SENSOR = {"gain": 1.0, "offset": 0.0, "lag": 0.0, "delay": 0.0, "high_pass": None}
 GUIDE: dict[str, float | None] = dict.fromkeys(("friction", "stiffness", "damping", "friction_velocity", "ahead"))
 
 WRITTEN = {  # by the name of the option, where its type does not say it
-    "bound": Written(words.spans, "NAME=LOWER:UPPER", "rate=1000:4000"),
-    "limit": Written(words.limits, "NAME=LIMIT", "travel=0.1,grip=+10%,comfort=none, or NAME=LOWER:UPPER"),
-    "priors": Written(words.spans, "NAME=MEAN:DEVIATION"),
-    "columns": Written(words.columns, "NAME=COLUMN", "time=t_s,stroke=1,velocity=none"),
+    "bound": Written(SPANS, "NAME=LOWER:UPPER", "rate=1000:4000"),
+    "limit": Written(
+        words.named(words.limit, "be a number, or two as LOWER:UPPER"),
+        "NAME=LIMIT",
+        "travel=0.1,grip=+10%,comfort=none, or NAME=LOWER:UPPER",
+    ),
+    "priors": Written(SPANS, "NAME=MEAN:DEVIATION"),
+    "columns": Written(words.named(words.column, like="stroke=..."), "NAME=COLUMN", "time=t_s,stroke=1,velocity=none"),
     "command": Written(words.commands, "PATTERN=NUMBER"),
     "sensor": Written(
         words.named_numbers(SENSOR, "stroke:offset,delay=0.001"),
@@ -97,11 +101,14 @@ WRITTEN = {  # by the name of the option, where its type does not say it
 }
 
 TYPES = (  # pattern of one alternative of an annotation, and how it is written; the first that fits an alternative
-    (r"Mapping\[str, tuple\[", Written(words.spans, "NAME=LOWER:UPPER")),
+    (r"Mapping\[str, tuple\[", Written(SPANS, "NAME=LOWER:UPPER")),
     (r"Mapping\[str, np\.ndarray\]", Written(words.axes, "NAME=VALUES")),
-    (r"Mapping\[str, (float|int)[ |floatin]*\]", Written(words.numbers, "NAME=NUMBER")),
-    (r"Mapping\[str, str( \| int)?( \| None)?\]", Written(words.texts, "NAME=TEXT")),
-    (r"Sequence\[(str|int)( \| int)\]", Written(words.columns_in_order, "COLUMN")),
+    (r"Mapping\[str, (float|int)[ |floatin]*\]", Written(words.named(float), "NAME=NUMBER")),
+    (r"Mapping\[str, str( \| int)?( \| None)?\]", Written(words.named(str), "NAME=TEXT")),
+    (
+        r"Sequence\[(str|int)( \| int)\]",
+        Written(words.columns, "COLUMN"),
+    ),
     (r"Sequence\[str\]", Written(words.words, "NAME,...")),
     (r"Sequence\[(float|int)[ |floatin]*\]", Written(words.numbers_in_order, "NUMBER,...")),
     (r"tuple\[(float|int)[ |floatin]*, (float|int)[ |floatin]*\]", Written(words.two, "FIRST:SECOND", repeated=False)),

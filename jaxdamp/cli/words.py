@@ -9,6 +9,9 @@ import numpy as np
 from jaxdamp import _checks
 
 
+Reader = Callable[[str, Any], Any]  # gives the value of an option, from its name and its text or texts
+
+
 def words(option: str, texts: Sequence[str]) -> list[str]:
     """Words between commas, also from several texts.
 
@@ -42,32 +45,42 @@ def pairs(option: str, texts: Sequence[str], like: str = "NAME=VALUE") -> list[t
     return found
 
 
-def texts(option: str, given: Sequence[str]) -> dict[str, str]:
-    """Texts by name.
+def column(text: str) -> str | int | None:
+    """The header or the number of a column; "none" for no column.
 
-    >>> texts("units", ["stroke=mm,force=kN"])
-    {'stroke': 'mm', 'force': 'kN'}
+    >>> column("Displacement, in"), column("2"), column("none")
+    ('Displacement, in', 2, None)
     """
-    return dict(pairs(option, given, "stroke=..." if option in ("columns", "units", "gains") else "NAME=VALUE"))
+    return int(text) if text.isdigit() else None if text.lower() == "none" else text
 
 
-def columns(option: str, given: Sequence[str]) -> dict[str, str | int | None]:
-    """Headers or numbers of columns by quantity; "none" leaves a quantity out.
-
-    >>> columns("columns", ["time=t_s,stroke=Displacement, in", "force=2,velocity=none"])
-    {'time': 't_s', 'stroke': 'Displacement, in', 'force': 2, 'velocity': None}
-    """
-    return {role: None if text.lower() == "none" else column(text) for role, text in texts(option, given).items()}
-
-
-def column(text: str) -> str | int:
-    """The header or the number of a column."""
-    return int(text) if text.isdigit() else text
-
-
-def columns_in_order(option: str, given: Sequence[str]) -> list[str | int]:
+def columns(option: str, given: Sequence[str]) -> list[str | int | None]:
     """Headers or numbers of columns, one from each text: a header may hold commas."""
     return [column(text) for text in given]
+
+
+def named(value: Callable[[str], Any], must: str = "be numbers", like: str = "NAME=VALUE") -> Reader:
+    """The reader of "a=1,b=2".
+
+    Arguments:
+        value: of a text.
+        must: what a text must be that has none.
+        like: how it is written, for messages.
+
+    >>> named(float)("noise", ["stroke=0.0002"])
+    {'stroke': 0.0002}
+    """
+
+    def read(option: str, given: Sequence[str]) -> dict[str, Any]:
+        found = {}
+        for name, text in pairs(option, given, like):
+            try:
+                found[name] = value(text)
+            except ValueError:
+                _checks.refuse(option, must, repr(text))
+        return found
+
+    return read
 
 
 def commands(option: str, given: Sequence[str]) -> dict[str, float]:
@@ -76,31 +89,8 @@ def commands(option: str, given: Sequence[str]) -> dict[str, float]:
     >>> commands("command", ["*_0.5A=0.5,*_1A=1"])
     {'*_0.5A': 0.5, '*_1A': 1.0}
     """
-    stated: dict[str, float] = {}
-    for part in words(option, given):
-        pattern, _, number = (piece.strip() for piece in part.rpartition("="))
-        try:
-            stated[pattern] = float(number)
-        except ValueError:
-            pattern = ""
-        if not pattern:
-            _checks.refuse(option, "read like '*_0.5A=0.5'", repr(part))
-    return stated
-
-
-def numbers(option: str, given: Sequence[str]) -> dict[str, float]:
-    """Numbers by name.
-
-    >>> numbers("noise", ["stroke=0.0002"])
-    {'stroke': 0.0002}
-    """
-    found = {}
-    for name, text in pairs(option, given):
-        try:
-            found[name] = float(text)
-        except ValueError:
-            _checks.refuse(option, "be numbers", repr(text))
-    return found
+    like = "'*_0.5A=0.5'"
+    return named(float, f"read like {like}", like)(option, given)
 
 
 def numbers_in_order(option: str, given: Sequence[str]) -> list[float]:
@@ -118,7 +108,7 @@ def numbers_in_order(option: str, given: Sequence[str]) -> list[float]:
 def names_or_numbers(option: str, given: Sequence[str]) -> str | list[float]:
     """One word, or numbers."""
     try:
-        return [float(word) for word in words(option, given)]
+        return numbers_in_order(option, given)
     except ValueError:
         return ",".join(given)
 
@@ -132,76 +122,58 @@ def two(option: str, given: str) -> tuple[float, float]:
     return first, second
 
 
-def spans(option: str, given: Sequence[str]) -> dict[str, tuple[float | None, float | None]]:
-    """Lower and upper end by name.
-
-    >>> spans("bound", ["rate=1000:4000,mass=:50"])
-    {'rate': (1000.0, 4000.0), 'mass': (None, 50.0)}
-    """
-    return {name: span(option, text) for name, text in pairs(option, given)}
-
-
-def span(option: str, text: str) -> tuple[float | None, float | None]:
+def span(text: str) -> tuple[float | None, float | None]:
     """The ends of "0.1" (an upper one alone), "0.05:0.1" or "0.05:".
 
-    >>> span("limit", "0.05:"), span("limit", "3")
+    >>> span("0.05:"), span("3")
     ((0.05, None), (None, 3.0))
     """
-    ends = text.split(":")
-    try:
-        both = [float(end) if end.strip() else None for end in ends]
-    except ValueError:
-        both = []
-    if len(both) not in (1, 2) or not any(number is not None for number in both):
-        _checks.refuse(option, "be a number, or two as LOWER:UPPER", repr(text))
-    return (None, both[0]) if len(both) == 1 else (both[0], both[1])
+    ends = [float(end) if end.strip() else None for end in text.split(":")]
+    if len(ends) > 2 or ends in ([None], [None, None]):
+        raise ValueError(text)
+    return (None, ends[0]) if len(ends) == 1 else (ends[0], ends[1])
 
 
-def limits(option: str, given: Sequence[str]) -> dict[str, Any]:
-    """Largest values, ranges, or values relative to the start by metric; None is no limit.
+def limit(text: str) -> Any:
+    """A largest value, a range, or either relative to the start; None is no limit.
 
-    >>> limits("limit", ["travel=0.1,maximum_x=-0.1:0.2", "grip=+10%", "comfort=0.05:+20%"])
-    {'travel': 0.1, 'maximum_x': (-0.1, 0.2), 'grip': '+10%', 'comfort': (0.05, '+20%')}
-    >>> limits("limit", ["grip=none"])
-    {'grip': None}
+    >>> limit("0.1"), limit("-0.1:0.2"), limit("+10%"), limit("0.05:+20%"), limit("none")
+    (0.1, (-0.1, 0.2), '+10%', (0.05, '+20%'), None)
     """
-    found: dict[str, Any] = {}
-    for name, text in pairs(option, given):
-        parts = [part.strip() for part in text.split(":")]
-        if text == "none":
-            found[name] = None
-            continue
-        if any(part.endswith("%") for part in parts) and len(parts) < 3:
-            ends = [part if part.endswith("%") else span(option, part)[1] if part else None for part in parts]
-            lower, upper = (None, ends[0]) if len(ends) == 1 else ends
-        else:
-            lower, upper = span(option, text)
-        found[name] = upper if lower is None else (lower, upper)
-    return found
+    parts = [part.strip() for part in text.split(":")]
+    if text == "none":
+        return None
+    if any(part.endswith("%") for part in parts) and len(parts) < 3:
+        ends = [part if part.endswith("%") else float(part) if part else None for part in parts]
+        lower, upper = (None, ends[0]) if len(ends) == 1 else ends
+    else:
+        lower, upper = span(text)
+    return upper if lower is None else (lower, upper)
+
+
+def axis(text: str) -> np.ndarray:
+    """The values of an axis: "1000:8000:15" are 15 of them, "1000;1200" two.
+
+    >>> axis("1000:2000:3").tolist(), axis("1;2").tolist()
+    ([1000.0, 1500.0, 2000.0], [1.0, 2.0])
+    """
+    first, *more = text.split(":")
+    if more:
+        last, count = more
+        return np.linspace(float(first), float(last), int(count))
+    return np.array([float(number) for number in text.split(";")])
 
 
 def axes(option: str, given: Sequence[str]) -> dict[str, np.ndarray]:
-    """The axes of a sweep: "damper.rate=1000:8000:15" are 15 values, "sprung_mass=1000;1200" two.
-
-    >>> {name: values.tolist() for name, values in axes("over", ["rate=1000:2000:3", "mass=1;2"]).items()}
-    {'rate': [1000.0, 1500.0, 2000.0], 'mass': [1.0, 2.0]}
-    """
-    found = {}
-    for name, text in pairs(option, given):
-        parts = text.split(":")
-        try:
-            if len(parts) == 3:
-                found[name] = np.linspace(float(parts[0]), float(parts[1]), int(parts[2]))
-            else:
-                found[name] = np.array([float(number) for number in text.split(";")])
-        except ValueError:
-            _checks.refuse(option, "read like NAME=FIRST:LAST:COUNT or NAME=A;B;C", f"{name}={text}")
-        if not found[name].size:
-            _checks.refuse(option, "have one value or more on each axis", f"{name}={text}")
+    """The axes of a sweep by parameter, each of one value or more."""
+    found = named(axis, "read like NAME=FIRST:LAST:COUNT or NAME=A;B;C")(option, given)
+    for name, values in found.items():
+        if not values.size:
+            _checks.refuse(option, "have one value or more on each axis", name)
     return found
 
 
-def named_numbers(known: Mapping[str, float | None], example: str) -> Callable[[str, Sequence[str]], list[Any]]:
+def named_numbers(known: Mapping[str, float | None], example: str) -> Reader:
     """The reader of texts such as "stroke:offset,delay=0.001".
 
     It gives the owner and its numbers of each text; those without a value take that of `known`.

@@ -9,10 +9,9 @@ from rich.console import Console
 
 from jaxdamp import bench
 from jaxdamp.bench import SineTest
-from jaxdamp.cli import console
+from jaxdamp.cli import console, offers
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.records import decisions
-from jaxdamp.cli.words import columns
 from jaxdamp.dampers import Linear
 from jaxdamp.report import Column, Table
 
@@ -27,7 +26,7 @@ def test_notes_of_one_kind_are_said_once() -> None:
 
 
 def test_assignments_may_hold_commas() -> None:
-    assert columns("columns", ["time=t_s,stroke=Displacement, in", "force=2,velocity=none"]) == {
+    assert offers.WRITTEN["columns"].read("columns", ["time=t_s,stroke=Displacement, in", "force=2,velocity=none"]) == {
         "time": "t_s",
         "stroke": "Displacement, in",
         "force": 2,

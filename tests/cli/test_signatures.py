@@ -96,13 +96,13 @@ class Settings(Base, total=False):
 def preflight(runs, *, steps: Steps = Steps(), engine: Engine = None, **settings: Unpack[Settings]):
     """Do it."""
 
-def laws(screen, *, how: Annotated[Call, "cli.listing.preflight"]):
+def laws(screen, *, how: Annotated[Call, "cli.vehicle_words.preflight"]):
     """List."""
 '''
-    rewrite("jaxdamp.cli.listing", lambda source: text)
+    rewrite("jaxdamp.cli.vehicle_words", lambda source: text)
     found = {
         leaf.option: (leaf.path, getattr(how, "metavar", how))
-        for leaf, how in options.offered("cli.listing.laws").items()
+        for leaf, how in options.offered("cli.vehicle_words.laws").items()
     }
     assert found == {
         "low": (("how", "steps", "low"), float),
@@ -110,9 +110,16 @@ def laws(screen, *, how: Annotated[Call, "cli.listing.preflight"]):
         "over": (("how", "over"), "NAME=NUMBER"),
         "hold": (("how", "hold"), "FIRST:SECOND"),
     }
-    given = options.values("cli.listing.laws", {"names": ["a,b"], "over": ["x=1"], "hold": "1:2"})
-    call = options.build("cli.listing.laws", given)["how"]
-    assert call == Call("cli.listing.preflight", {"names": ["a", "b"], "over": {"x": 1.0}, "hold": (1.0, 2.0)})
+    given = options.values("cli.vehicle_words.laws", {"names": ["a,b"], "over": ["x=1"], "hold": "1:2"})
+    call = options.build("cli.vehicle_words.laws", given)["how"]
+    assert call == Call("cli.vehicle_words.preflight", {"names": ["a", "b"], "over": {"x": 1.0}, "hold": (1.0, 2.0)})
+
+
+def test_a_call_puts_what_is_given_into_its_objects() -> None:
+    made = Call("cli.benching.bench_command", {"keep_rest": True, "replace": True}).arguments(baseline=None)
+    assert set(made) == {"reading", "how", "output", "baseline"} and made["baseline"] is None
+    assert made["reading"].keep_rest and made["output"].replace and made["output"].out is None
+    assert made["reading"].read == Call("bench.read") and made["how"] == Call("bench.evaluate")
 
 
 @pytest.mark.parametrize("command", COMMANDS)
