@@ -12,6 +12,7 @@ import jax.numpy as jnp
 
 from jaxdamp._progress import Progress
 from jaxdamp._tables import Table, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
@@ -147,6 +148,7 @@ class Comparison:
         return "\n".join([*lines, *about_records, answer, f"best: {self.best.name}"])
 
 
+@of_known_numbers
 def compare(
     laws: Mapping[str, Start],
     runs: Iterable[BenchRun],

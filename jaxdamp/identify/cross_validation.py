@@ -10,6 +10,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import fit
 from jaxdamp.identify.machine import OFFSET, Machine
@@ -176,6 +177,7 @@ class CrossValidation:
         return f"{self.table().to_text()}\nbest: {self.best}"
 
 
+@of_known_numbers
 def cross_validate(
     laws: Mapping[str, Start],
     runs: Iterable[BenchRun],

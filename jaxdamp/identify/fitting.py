@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -9,6 +10,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify._blas import one_thread
@@ -34,6 +36,7 @@ UNSEEN = 1e-12  # of the largest derivative, up to which one is a rounding error
 NUMERICAL = (ValueError, ArithmeticError, eqx.EquinoxRuntimeError, jax.errors.JaxRuntimeError)
 
 
+@partial(of_known_numbers, instead="; the residuals of a `Problem` can be traced")
 @also_of_vehicles
 def fit(
     law: Start,

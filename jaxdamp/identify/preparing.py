@@ -2,11 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import Reach
 from jaxdamp.identify.criteria import FIRST_NOISE, Priors, priors_on
@@ -33,6 +35,7 @@ from jaxdamp.parameters import free_parameters, match_paths, name_patterns, para
 FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residuals of a `Problem` can be traced."
 
 
+@partial(of_known_numbers, instead="; the residuals of a `Problem` can be traced")
 def prepare(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],

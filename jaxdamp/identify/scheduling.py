@@ -12,6 +12,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._tables import Column, Table, plain
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import AbstractDamper, Scheduled, takes_command
 from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
@@ -138,6 +139,7 @@ class ScheduledFit:
         return "\n".join([self.table().to_text(), *self.verdict])
 
 
+@of_known_numbers
 def fit_scheduled(
     law: Start,
     runs: Iterable[BenchRun],

@@ -12,6 +12,7 @@ from jaxtyping import Array, Bool, Float
 from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.ends import at_ends
@@ -142,6 +143,7 @@ class TargetResiduals(AbstractResiduals):
         return jnp.sum(1.0 / jnp.square(self.tolerance))
 
 
+@of_known_numbers
 @one_thread()
 def fit_targets(
     numbers: Callable[[Any], Mapping[str, Any]] | Ride,

@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.estimating import estimate
@@ -40,6 +41,7 @@ ALIKE = 0.05  # relative change of the estimated noise below which the weights a
 MOST_ROUNDS = 6
 
 
+@of_known_numbers
 @one_thread()
 def fit_vehicle(
     vehicle: AbstractVehicle,

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks, metrics
 from jaxdamp._tables import Table, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import Metric, MetricValues
@@ -309,6 +310,7 @@ class Response(eqx.Module):
         """Comfort by ISO 2631-1 of every acceleration, with units."""
         return comfort_table({"value": self})
 
+    @of_known_numbers
     def to_dict(self) -> dict[str, Any]:
         """Metrics, comfort, energies and notes of the run, ready for JSON; numbers that are not finite are None."""
         values, comfort = self.metrics(), self.comfort()

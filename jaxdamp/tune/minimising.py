@@ -2,6 +2,7 @@
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import jax.numpy as jnp
@@ -9,6 +10,7 @@ import numpy as np
 
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.tune.limits import Limit
 from jaxdamp.tune.objective import Function, check_objective
@@ -41,6 +43,7 @@ from jaxdamp.tune.wording import (
 TIGHTENED = 2  # times that a search is repeated with limits that did not hold on fresh roads
 
 
+@partial(of_known_numbers, instead="; a `Ride` can be traced")
 def minimise(
     metric: str | Metric | Function,
     vehicle: V,

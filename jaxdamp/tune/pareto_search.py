@@ -2,12 +2,14 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.tune.filling import with_designs_between
 from jaxdamp.tune.front import FrontParameter, ParetoFront
@@ -27,6 +29,7 @@ from jaxdamp.tune.tracing import FrontProblem, trace_front
 BEYOND = 0.1  # distance of the default reference point beyond the worst values, relative to their range
 
 
+@partial(of_known_numbers, instead="; a `Ride` can be traced")
 def pareto(
     objectives: Sequence[str | Metric | Function],
     vehicle: V,

@@ -2,11 +2,13 @@
 
 import dataclasses
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, final
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._tables import Table, plain
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Function
@@ -74,6 +76,7 @@ class RobustResult(Generic[V]):
         return "\n".join([self.summary, repr(self.tuning), *self.sentences])
 
 
+@partial(of_known_numbers, instead="; a `Ride` can be traced")
 def robust(
     metric: str | Metric | Function,
     vehicle: V,

@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import FreeParameters, free_parameters, get, match_paths, matching, name_patterns, parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
@@ -29,6 +30,7 @@ REACH = 3.0  # RMS values of the damper velocity up to which the curve is looked
 HATS = 12  # on each side
 
 
+@of_known_numbers
 def sensitivity(
     metric: str | Metric | Function | Sequence[str | Metric],
     vehicle: AbstractVehicle,

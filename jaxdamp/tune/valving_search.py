@@ -14,6 +14,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, MonoTube
 from jaxdamp.parameters import FreeParameters
@@ -60,6 +61,7 @@ class Wanted(NamedTuple):
         return np.concatenate([self.velocity, *(loop.velocity[loop.first :] for loop in self.loops)])
 
 
+@of_known_numbers
 def valving(
     target: AbstractDamper | BenchRun | Sequence[BenchRun] | tuple[Any, Any],
     start: MonoTube,
