@@ -116,7 +116,8 @@ def _while_loop(going: Any, step: Any, begin: Any, *, max_steps: int) -> Any:
     def both(now: tuple[Array, Any]) -> tuple[Array, Any]:
         return now[0] + 1, step(now[1])
 
-    return jax.lax.while_loop(lambda now: going(now[1]) & (now[0] < max_steps), both, (jnp.zeros((), int), begin))[1]
+    start = jnp.zeros((), int), varying_as(begin)
+    return jax.lax.while_loop(lambda now: going(now[1]) & (now[0] < max_steps), both, start)[1]
 
 
 @eqx.filter_custom_jvp
