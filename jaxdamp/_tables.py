@@ -186,6 +186,7 @@ def plain(value: Any) -> Any:
         return value
     if isinstance(value, float):
         return float(value) if np.isfinite(value) else None
+    _checks.untraced("value", value)
     array = np.asarray(value)
     if array.dtype.kind not in "biufU":
         raise TypeError(

@@ -112,13 +112,8 @@ def row(tree: Tree, values: list[np.ndarray], index: int) -> Tree:
     return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), chosen), rest)
 
 
-def of_known_numbers(function: Function, instead: str = "") -> Function:
-    """A function that needs known numbers: it refuses traced ones by argument, and works at once inside `jax.jit`.
-
-    Arguments:
-        function: whose arguments must be known.
-        instead: what can be traced in its place, for the message.
-    """
+def of_known_numbers(function: Function) -> Function:
+    """A function that needs known numbers: it refuses traced ones by argument, and works at once inside `jax.jit`."""
     signature = inspect.signature(function)
 
     @functools.wraps(function)
@@ -126,7 +121,8 @@ def of_known_numbers(function: Function, instead: str = "") -> Function:
         if is_traced((args, kwargs)):
             from jaxdamp import _checks
 
-            remedy = f"Call `{function.__name__}` outside `jax.jit`, `jax.grad` and `jax.vmap`{instead}."
+            outside = f"Call `{function.__name__}` outside `jax.jit`, `jax.grad` and `jax.vmap`"
+            remedy = f"{outside}: docs/from_jax.md says what can be traced in its place."
             for name, value in signature.bind(*args, **kwargs).arguments.items():
                 _checks.untraced(name, value, remedy)
         with at_compile_time():

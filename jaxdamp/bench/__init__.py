@@ -31,8 +31,7 @@ from jaxdamp.bench.preflight import Finding, Preflight, preflight, usable
 from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import Excitation, RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable
-from jaxdamp.bench.read import read
-from jaxdamp.bench.read_rides import read_rides
+from jaxdamp.bench.read import read, read_rides
 from jaxdamp.bench.readers import READERS
 from jaxdamp.bench.ride_record import RideRecord
 from jaxdamp.bench.runs import BenchRun

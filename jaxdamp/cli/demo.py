@@ -113,7 +113,7 @@ def run_demo(screen: Screen, scenario: Scenario, *, out: Path, replace: bool = F
             report = Report("jaxdamp demo: from bench records to a better damper", results.draft, attempts)
             preflight = bench.preflight(runs)
             report.verdict(
-                f"{preflight.summary()}.",
+                f"{preflight.summary}.",
                 *fit_verdict(report, fits.comparison),
                 "" if truth is None else truth_verdict(scenario, truth),
                 *(f"{name}: {ride_verdict(responses)}" for name, responses in rides.items()),

@@ -29,7 +29,7 @@ def checked(
     """
     with screen.stage("Checking the records"):
         found = bench.preflight(runs).without(() if processing.keep_rest else _CUT_OFF)
-    screen.heading(found.summary())
+    screen.heading(found.summary)
     sentences = found.sentences()
     shown = sentences if reading.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
     for sentence in shown:

@@ -75,6 +75,7 @@ def _percent(share: float) -> str:
     return "less than 1 %" if percent < 1.0 else f"{percent:.0f} %"
 
 
+@of_known_numbers
 def range_use(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
     """Every quantity of a motion beside the range of the law, and of each law inside that has a range of its own.
 

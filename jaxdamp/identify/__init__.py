@@ -10,11 +10,13 @@ from jaxdamp.identify.estimates import Estimate, rounded
 from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import judge
 from jaxdamp.identify.ladder import LAWS, default_ladder, ladder_starts
+from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.laws import NAMED_LAWS, NamedLaw, laws_table
 from jaxdamp.identify.learnt import LearntStart
 from jaxdamp.identify.machine import OFFSET, machine_names, without_machine
 from jaxdamp.identify.many import fit_many
 from jaxdamp.identify.many_result import ManyFits
+from jaxdamp.identify.model import InitialMotion, VehicleTest
 from jaxdamp.identify.predicting import predict_runs
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals, Problem
@@ -22,14 +24,13 @@ from jaxdamp.identify.profile_curve import ProfileCurve
 from jaxdamp.identify.propagation import Band, Evidence, Propagated
 from jaxdamp.identify.record_sensitivity import RecordSensitivity
 from jaxdamp.identify.residual import ErrorShares, error_shares
-from jaxdamp.identify.result import FitResult
+from jaxdamp.identify.result import Fit
 from jaxdamp.identify.rungs import Failure, Rung
 from jaxdamp.identify.scheduling import LeftOutSetting, ScheduledFit, fit_scheduled
 from jaxdamp.identify.scoring import Score, fit_percent
 from jaxdamp.identify.targets import TargetFit, fit_targets
 from jaxdamp.identify.training import Training, train
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
-from jaxdamp.identify.vehicle_model import InitialMotion, VehicleTest
 from jaxdamp.identify.vehicle_result import ChannelScore, VehicleFit
 from jaxdamp.identify.virtual_ride import virtual_ride
 
@@ -48,6 +49,7 @@ __all__ = [
     "Evidence",
     "ExperimentDesign",
     "Failure",
+    "Fit",
     "FitResult",
     "InitialMotion",
     "LearntStart",

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import Excitation
@@ -29,7 +30,7 @@ WEAK = 0.5  # standard error, relative to the value, above which a parameter is 
 
 
 @dataclasses.dataclass(frozen=True)
-class ExperimentDesign:
+class ExperimentDesign(AbstractResult):
     """Runs chosen for a law, and the standard errors that they are expected to give.
 
     Attributes:
@@ -82,6 +83,10 @@ class ExperimentDesign:
             rows.append((self.free.names[i], p.unit or "–", float(value), error, *beside, note))
         return Table("Expected standard errors", tuple(columns), tuple(rows))
 
+    def tables(self) -> dict[str, Table]:
+        """Expected standard errors, and the chosen runs."""
+        return {"parameters": self.table(), "runs": self.runs_table()}
+
     def runs_table(self) -> Table:
         """The chosen runs."""
         columns = (
@@ -100,12 +105,23 @@ class ExperimentDesign:
 
         return experiment(self)
 
+    @property
+    def summary(self) -> str:
+        """Number of runs, and how many are as good as the programme."""
+        if self.programme_covariance is None:
+            return f"{len(self.tests)} runs chosen by the criterion {self.criterion}."
+        whole, match = len(self.programme), self.runs_to_match
+        return f"{match or f'More than {whole}'} such runs are as good as the {whole} of the programme."
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Numbers that the runs will not determine."""
+        weak = [str(row["parameter"]) for row in self.table().records() if row["note"]]
+        return (f"The runs will not determine {', '.join(weak)}.",) * bool(weak)
+
     def __repr__(self) -> str:
         lines = [str(self.runs_table()), "", str(self.table())]
-        if self.programme_covariance is not None:
-            whole, match = len(self.programme), self.runs_to_match
-            lines += [f"{match or f'More than {whole}'} such runs are as good as the {whole} of the programme."]
-        return "\n".join(lines)
+        return "\n".join([*lines, *[self.summary] * (self.programme_covariance is not None)])
 
 
 def extent(test: Excitation) -> tuple[float, float]:

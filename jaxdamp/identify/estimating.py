@@ -10,12 +10,12 @@ from jaxtyping import Bool, Float
 from jaxdamp.dampers import Reach
 from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.ends import at_ends
+from jaxdamp.identify.estimates import Estimate, Minimum
 from jaxdamp.identify.identifiability import on_identifiability
 from jaxdamp.identify.model import START_PATH
 from jaxdamp.identify.noise import Noise, noise_of
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.profile import Profile, profile
-from jaxdamp.identify.result import Estimate, Minimum
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution, minima_of
 from jaxdamp.identify.uncertainty import uncertainty, weak_directions

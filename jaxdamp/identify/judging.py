@@ -2,26 +2,28 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._one_thread import one_thread
 from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
 from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, laws_inside, takes_command
-from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.blending import off_span
 from jaxdamp.identify.covered import covered_range
-from jaxdamp.identify.estimating import estimate, on_misfit
+from jaxdamp.identify.estimating import Estimates, estimate, on_misfit
+from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.left_out import left_out
 from jaxdamp.identify.model import Model, is_memoryless, law_of, of_record, on_rig, rig_of, starts_in, with_range
-from jaxdamp.identify.noise import noise_of
+from jaxdamp.identify.noise import Noise, noise_of
 from jaxdamp.identify.predicting import predict_runs
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
-from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.scoring import score
+from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
 from jaxdamp.parameters import get, modules_inside, with_values
 
@@ -54,7 +56,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     law, rig = law_of(model), rig_of(model)
     fitted = np.isfinite(problem.sigma)
     percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
-    notes = [f"The search did not converge: {best.status.sentence} {_REMEDY}"] * (not best.converged)
+    notes = on_status(best, _REMEDY)
     on_records = (*notes_on(law, problem.fitted_to), *off_span(model, problem.fitted_to, problem.initial_state))
     on_rest, effects = on_misfit(noise), left_out(problem, best)
     main = (*notes, *on_records, *effects, *estimates.summary, *on_rest)
@@ -62,25 +64,38 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     return FitResult(
         law=law,
         runs=problem.runs,
-        parameters=estimates.estimates,
-        covariance=estimates.covariance,
         fit_percent=percent,
         rmse=rmse,
         scores=scores,
         warnings=tuple(notes),
         main_warnings=main[:MOST_WARNINGS],
-        status=best.status,
-        steps=best.steps,
-        starts=solution.starts,
-        minima=estimates.minima,
-        inflation=noise.inflation,
         record_laws=tuple(map(law_of, models)),
         rig=rig,
         initial_state=problem.initial_state,
         record_rigs=tuple(rig for rig in map(rig_of, models) if rig is not None),
         record_starts=starts_in(model),
-        evidence=Evidence(problem, best, noise, estimates.covariance),
+        **fields_of_fit(problem, solution, noise, estimates),
     )
+
+
+def fields_of_fit(problem: Problem, solution: Solution, noise: Noise, estimates: Estimates) -> dict[str, Any]:
+    """What every `Fit` holds of its minimum, whatever was fitted."""
+    best = solution.best
+    return {
+        "parameters": estimates.estimates,
+        "covariance": estimates.covariance,
+        "minima": estimates.minima,
+        "status": best.status,
+        "steps": best.steps,
+        "starts": solution.starts,
+        "inflation": noise.inflation,
+        "evidence": Evidence(problem, best, noise, estimates.covariance),
+    }
+
+
+def on_status(best: SearchEnd, remedy: str = "") -> list[str]:
+    """A sentence on a search that did not converge."""
+    return [] if best.converged else [f"The search did not converge: {best.status.sentence} {remedy}".rstrip()]
 
 
 def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Model]:

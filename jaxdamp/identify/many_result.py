@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Shown, Table, plain, with_unit
 from jaxdamp.bench import BenchRun
@@ -35,7 +36,7 @@ CERTAIN = 4.0  # standard errors by which it must differ as well
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class ManyFits:
+class ManyFits(AbstractResult):
     """One law fitted to many dampers.
 
     Attributes:
@@ -72,11 +73,6 @@ class ManyFits:
     record_rmse: tuple[Float[np.ndarray, " _"], ...] = ()
     share_left_out: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
     drift: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
-
-    @property
-    def converged(self) -> bool:
-        """Whether every search ended by its tolerance."""
-        return all(status is Status.CONVERGED for status in self.status)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -210,7 +206,7 @@ class ManyFits:
 
         return plots.many_fits(self)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """The fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         names = list(self.parameters)
         units = dict(zip(names, (owner.unit for owner in self.free.owners), strict=True))
@@ -229,10 +225,19 @@ class ManyFits:
         }
         return {"law": repr(law_of(self.free.tree)), "units": units, "dampers": dampers}
 
-    def __repr__(self) -> str:
-        named = [f"{name}: {remark}" for name, remark in zip(self.names, self.remarks, strict=True) if remark]
+    @property
+    def summary(self) -> str:
+        """Law, number of dampers and errors."""
         head = f"{type(law_of(self.free.tree)).__name__} fitted to {len(self)} dampers: mean fit"
-        return "\n".join([f"{head} {np.mean(self.fit_percent):.1f} %, RMSE up to {np.max(self.rmse):.4g} N", *named])
+        return f"{head} {np.mean(self.fit_percent):.1f} %, RMSE up to {np.max(self.rmse):.4g} N"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The remark on each damper that has one."""
+        return tuple(f"{name}: {remark}" for name, remark in zip(self.names, self.remarks, strict=True) if remark)
+
+    def __repr__(self) -> str:
+        return "\n".join([self.summary, *self.warnings])
 
     def _mostly_of(self, i: int) -> str:
         """The record that a large error of a damper is due to, if it is one."""

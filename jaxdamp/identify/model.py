@@ -1,8 +1,8 @@
-"""What explains the records of a bench: a law, or a law on a machine that adds to its force."""
+"""What explains records: a law, a law on a machine that adds to its force, a vehicle with its sensors."""
 
 import dataclasses
 from collections.abc import Sequence
-from typing import final
+from typing import Any, final
 
 import jax
 import jax.numpy as jnp
@@ -12,8 +12,9 @@ from jaxtyping import Array, Float
 from jaxdamp._types import Scalar, State, Vector
 from jaxdamp.dampers import AbstractDamper, FittedRange, with_fitted_range
 from jaxdamp.identify.initial_states import Cycle, periodic_state
-from jaxdamp.parameters import Module, parameter
-from jaxdamp.rig import Rig, march
+from jaxdamp.parameters import Module, check_parameters, parameter, readable
+from jaxdamp.rig import Rig, Sensor, march
+from jaxdamp.vehicles import AbstractVehicle
 
 
 STARTS = "records."  # with which the paths of the states at the beginning of records begin
@@ -43,6 +44,47 @@ class OnRig(Module):
 
 
 Model = AbstractDamper | OnRig
+
+
+@final
+class InitialMotion(Module):
+    """How a record begins: displacements and rates of all coordinates, beside rest on the first heights.
+
+    Arguments:
+        position: displacement of each coordinate from the equilibrium [m, rad].
+        rate: rate of each coordinate [m/s, rad/s].
+    """
+
+    position: Vector = parameter("", "displacement of a coordinate at the first sample, in m or rad")
+    rate: Vector = parameter("", "rate of a coordinate at the first sample, in m/s or rad/s")
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
+
+
+@final
+class VehicleTest(Module):
+    """A vehicle with the sensors of its records; paths of parameters begin with `vehicle.`, `sensors.` and so on.
+
+    Arguments:
+        vehicle: the vehicle.
+        sensors: the sensor of a channel, by the channel's name; channels without one are shown as they are.
+        starts: the initial motion of each record; empty if all begin at rest.
+        rig: the test machine of the bench records of its damper, if it adds to the force.
+    """
+
+    vehicle: AbstractVehicle
+    sensors: dict[str, Sensor]
+    starts: tuple[InitialMotion, ...] = ()
+    rig: Rig | None = None
+
+    def __repr__(self) -> str:
+        return readable(self)
+
+
+def fitted_part(model: Any) -> Any:
+    """What a user asked to be fitted: the law or the vehicle, without machine, sensors and beginnings of records."""
+    return model.vehicle if isinstance(model, VehicleTest) else law_of(model)
 
 
 def on_rig(law: AbstractDamper, rig: Rig | None, records: Sequence[RecordStart | None] = ()) -> Model:

@@ -1,14 +1,17 @@
 """The likelihood of one parameter, all others fitted again at each of its values: intervals without linearisation."""
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp._results import AbstractResult
+from jaxdamp._tables import Column, Table, plain
 from jaxdamp.identify.profile import moved_to
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.search import SearchEnd, search
+from jaxdamp.solve import BoundedLevenbergMarquardt
 
 
 if TYPE_CHECKING:
@@ -16,7 +19,7 @@ if TYPE_CHECKING:
 
 
 STEPS = 60  # of each search
-STEP_TOLERANCE = 0.01  # last step of a search, in standard errors
+COARSE = BoundedLevenbergMarquardt(tolerance=0.01)  # standard errors
 FIRST = 0.5  # first distance, in standard errors
 GROWTH = 1.5  # of the distance, from one point to the next
 MOST_POINTS = 24  # on each side
@@ -26,8 +29,8 @@ MOST_SECANTS = 12  # to find an end
 LEAST_SHARE = 0.05  # of the bracket, by which a secant stays away from its ends
 
 
-@dataclasses.dataclass(frozen=True)
-class ProfileCurve:
+@dataclasses.dataclass(frozen=True, repr=False)
+class ProfileCurve(AbstractResult):
     """How much worse the records fit with other values of a parameter, the best of all others given.
 
     Attributes:
@@ -47,6 +50,31 @@ class ProfileCurve:
     interval: tuple[float, float]
     level: float
     linear_interval: tuple[float, float]
+
+    @property
+    def summary(self) -> str:
+        """The interval, and the one from the standard error."""
+        (low, high), (lower, upper) = self.interval, self.linear_interval
+        unit = f" {self.unit}".rstrip()
+        return (
+            f"{self.name} lies between {low:.4g} and {high:.4g}{unit} (95 %); its standard error alone says"
+            f" {lower:.4g} to {upper:.4g}."
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """An interval without an end."""
+        open_ended = not np.all(np.isfinite(self.interval))
+        return (f"The records do not bound {self.name} on both sides.",) * open_ended
+
+    def table(self) -> Table:
+        """The values tried with their cost."""
+        columns = Column(self.name, self.unit, ".5g"), Column("cost in squared standard errors", spec=".3g")
+        return Table(f"Profile of {self.name}", columns, tuple(zip(*map(plain, (self.values, self.cost)), strict=True)))
+
+    def content(self) -> dict[str, Any]:
+        """The curve and its intervals as plain data."""
+        return plain({field.name: getattr(self, field.name) for field in dataclasses.fields(self)})
 
     def plot(self) -> "Figure":
         """Cost over value, with the interval and the parabola of the standard error."""
@@ -87,7 +115,7 @@ class _Side:
         moved = moved_to(self.evidence.problem, start, self.index, value)
         if moved is None:
             return None
-        end = search(moved, STEPS, held=self.index, tolerance=STEP_TOLERANCE)
+        end = search(moved, STEPS, held=self.index, solver=COARSE)
         return max(end.squares - self.evidence.minimum.squares, 0.0) / self.one, end
 
     def walk(self, way: float, level: float) -> tuple[list[tuple[float, float]], float]:

@@ -7,8 +7,8 @@ import numpy as np
 
 from jaxdamp._tables import Cell, Column, Table
 from jaxdamp.dampers import AbstractDamper, with_command
+from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.residual import ErrorShares
-from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.scheduling import ScheduledFit
 from jaxdamp.identify.scoring import Score
 from jaxdamp.parameters import parameters

@@ -7,10 +7,10 @@ import numpy as np
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import laws_inside
+from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine, machine_names
 from jaxdamp.identify.model import law_of, on_rig, rig_of, starts_in
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
 from jaxdamp.parameters import real

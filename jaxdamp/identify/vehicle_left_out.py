@@ -6,11 +6,14 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp.bench import RideRecord
+from jaxdamp.identify.model import VehicleTest
+from jaxdamp.identify.noise import channel_noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
-from jaxdamp.identify.vehicle_noise import channel_noise
+from jaxdamp.identify.vehicle_preparing import FreeScale
 from jaxdamp.identify.vehicle_residuals import RideBatch
 from jaxdamp.identify.vehicle_result import ChannelScore
+from jaxdamp.parameters import get
 from jaxdamp.rig import Sensor
 
 
@@ -28,6 +31,19 @@ def on_signs(scores: Sequence[ChannelScore]) -> list[str]:
         " extension; `read_rides(..., reversed_channels=[...])` and --reversed turn a channel round."
         for score in scores
         if score.correlation < REVERSED
+    ]
+
+
+def on_free_scale(scale: FreeScale, model: VehicleTest) -> list[str]:
+    """A sentence on numbers of which the records show the ratios only."""
+    if not scale.names:
+        return []
+    value = f"{float(get(model, scale.held_name)):.6g}" if scale.held_name else ""
+    held = f" {scale.held_name} was held at {value}; the standard errors are for this." if value else ""
+    return [
+        "These records hold no force, so only ratios of masses, rates and forces can be determined:"
+        f" {', '.join(scale.names)} may all be larger by one factor.{held}"
+        " Fix one mass that is known, or measure a force."
     ]
 
 
@@ -51,11 +67,11 @@ def on_sensors(
         sensors: the fitted sensors.
     """
     effects, columns = [], []
-    for number, channel in enumerate(channels):
+    for channel in channels:
         given = sensors[channel].given if channel in sensors else ()
         for effect in ("delay", "offset", "gain"):
             if effect not in given and not (effect == "delay" and "lag" in given):
-                column = _column(problem, end, records, number, channel, effect)
+                column = _column(problem, end, records, channel, effect)
                 if column is not None:
                     effects.append((channel, effect))
                     columns.append(column)
@@ -80,7 +96,7 @@ def on_sensors(
 
 
 def _column(
-    problem: Problem, end: SearchEnd, records: Sequence[RideRecord], owner: int, channel: str, effect: str
+    problem: Problem, end: SearchEnd, records: Sequence[RideRecord], channel: str, effect: str
 ) -> Float[np.ndarray, " samples"] | None:
     """Change of the weighted residual for each unit of an effect; None for a law on a bench."""
     parts, begin, found = [], 0, False
@@ -92,7 +108,9 @@ def _column(
             row, shaped, found = part.channels.index(channel), column.reshape(weight.shape), True
             errors = end.residual[begin : begin + size].reshape(weight.shape)
             for i, number in enumerate(np.asarray(part.number)):
-                expected = records[number][channel] + errors[i, row] * problem.sigma[owner]
+                counts = weight[i, row] > 0
+                error = np.divide(errors[i, row], weight[i, row], out=np.zeros(counts.size), where=counts)
+                expected = records[number][channel] + error
                 slope = np.gradient(expected, records[number].dt)
                 by_effect = {"delay": slope, "offset": -np.ones_like(slope), "gain": -expected}
                 shaped[i, row] = weight[i, row] * by_effect[effect]

@@ -1,5 +1,6 @@
 """The residuals of a vehicle: its records, and bench records of its damper."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, final
 
@@ -10,10 +11,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp.bench import BenchRun, RideRecord
-from jaxdamp.identify.model import on_rig
+from jaxdamp.identify.model import VehicleTest, on_rig
 from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.traces import Batch, batches, owners
-from jaxdamp.identify.vehicle_model import VehicleTest
 from jaxdamp.parameters import get, with_values
 from jaxdamp.simulation import AbstractEngine, recorded, settled
 from jaxdamp.vehicles import AbstractVehicle, ForceDriven
@@ -62,6 +62,10 @@ class RideBatch(AbstractResiduals):
         """Weighted difference between model and measurement."""
         return jnp.ravel((self.predict(model) - self.measured) * self.weight)
 
+    def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "RideBatch":
+        """The same with every weight times a factor."""
+        return dataclasses.replace(self, weight=self.weight * jnp.asarray(factor.reshape(self.weight.shape)))
+
     def used(self) -> Bool[np.ndarray, " samples"]:
         """Which samples count."""
         return np.ravel(np.asarray(self.weight)) > 0
@@ -81,6 +85,10 @@ class DamperOnBench(AbstractResiduals):
     def __call__(self, model: VehicleTest) -> Float[Array, " samples"]:
         """Weighted difference of the law's force from the measured one."""
         return self.batch(on_rig(get(model.vehicle, self.path), model.rig))
+
+    def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "DamperOnBench":
+        """The same with every weight times a factor."""
+        return dataclasses.replace(self, batch=self.batch.reweighted(factor))
 
     def used(self) -> Bool[np.ndarray, " samples"]:
         """Which samples count."""

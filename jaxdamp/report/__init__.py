@@ -2,7 +2,8 @@
 
 - Pages: `bench_report(evaluation, preflight)`, `fit_report(comparison)`, `vehicle_fit_report(result)`,
   `ride_report(responses)`, `tuning_report(result)`, `chain_report(comparison, rides, tuned)` of the whole chain,
-  `sweep_report(data)`; each gives a `Report`, to which more can be added before `write(path)`.
+  `sweep_report(data)`, `result_report(result)` of any result; each gives a `Report`, to which more can
+  be added before `write(path)`.
 - Your own page: `Report`, with the sections `add_records`, `add_evaluation`, `add_fits`, `add_rides`, `add_tuning`.
 - Tables of these pages: `records_table`, `ride_records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
 """
@@ -23,6 +24,7 @@ from jaxdamp.report.fits import (
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import fitted_range_table, range_use_table
 from jaxdamp.report.records import add_records, records_table
+from jaxdamp.report.results import result_report
 from jaxdamp.report.rides import (
     GOALS,
     add_rides,
@@ -65,6 +67,7 @@ __all__ = [
     "parameters_of",
     "range_use_table",
     "records_table",
+    "result_report",
     "ride_records_table",
     "ride_report",
     "ride_tables",

@@ -101,9 +101,8 @@ def check_compiled(law: AbstractDamper) -> None:
     def plain(numbers: Array) -> Array:
         return outputs(free.build(numbers), x, v)
 
-    size = np.concatenate(
-        [np.full(part.size, np.max(np.abs(part), initial=1e-300)) for part in (values[:2], values[2:])]
-    )
+    largest = [np.max(np.abs(part), initial=0.0) or 1.0 for part in (values[:2], values[2:])]  # of forces and of rates
+    size = np.repeat(largest, [2, values.size - 2])
     message = "Compiled and plain calls must agree: look for Python's `if` and `float` on numbers of the law."
     require_equal(plain(free.values) / size, values / size, message, atol=1e-12)
     scale = np.abs(np.asarray(free.values)) / size[:, None]

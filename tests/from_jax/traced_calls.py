@@ -33,7 +33,7 @@ PACKAGES += ["simulation", "sweeps", "tune", "vehicles"]
 NO_NUMBERS = {
     "": {"configure"},
     "bench": {"read", "read_limits", "read_rides", "contradictions_in_words"},
-    "codegen": {"compiler", "lower", "printed_scan", "symbols"},
+    "codegen": {"compiler", "is_printing", "lower", "printed_scan", "printing", "symbols"},
     "dampers": {"from_samples", "own_states", "sentence", "warn_outside", "drives_motion"},
     "export": {"from_json"},
     "identify": {"extent", "fit_percent", "judge", "ladder_starts", "laws_table", "machine_names", "rounded"},
@@ -340,6 +340,9 @@ SAMPLES: dict[str, dict[str, list[Call]]] = {
         },
     },
     "simulation": {
+        **{
+            name: [lambda f, x: f(response(x))] for name in ("absorbed_by", "comfort", "energy_balance", "ride_metrics")
+        },
         "comfort_table": [lambda f, x: f({"a": response(x)})],
         "metrics_table": [lambda f, x: f({"a": response(x)})],
         "moves_axles": [lambda f, x: f(lambda v: half_car_002(Linear(v)), 1500.0 * x)],

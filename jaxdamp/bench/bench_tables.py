@@ -1,4 +1,4 @@
-"""From the raw table of a file to a record in SI and the library's sign."""
+"""From the raw table of a file to a bench record in SI and the library's sign."""
 
 import json
 from collections.abc import Mapping
@@ -8,16 +8,15 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench import sampling, stamps
+from jaxdamp.bench import clock, stamps
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.clock import Part, regular_parts
 from jaxdamp.bench.columns import REQUIRED, Choice, Column, find_columns
-from jaxdamp.bench.integration import integrate_velocity
 from jaxdamp.bench.motion import Samples, cycle_instants
 from jaxdamp.bench.problems import Problems
 from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.runs import COMMAND_MARK, FILE_MARK, INTEGRATED_MARK, NOTE_MARK, SETTINGS_MARK, BenchRun
-from jaxdamp.bench.velocity import estimate_velocity
+from jaxdamp.bench.velocity import estimate_velocity, integrate_velocity
 
 
 @dataclass(frozen=True)
@@ -30,14 +29,14 @@ class Interpretation:
     sampling_rate: float | int | None = None
 
 
-def records(table: RawTable, name: str, how: Interpretation) -> list[BenchRun]:
+def bench_runs(table: RawTable, name: str, how: Interpretation) -> list[BenchRun]:
     """The record of a table; several if it has gaps in time.
 
     Raises:
         ValueError: all that is wrong with the table.
     """
     columns, doubts = find_columns(table, how.choice)
-    sampling.check_count(len(table), table.where)
+    clock.check_count(len(table), table.where)
     channels, notes = _channels(table, columns, how.choice)
     notes = [_columns_note(table, columns), *table.notes, *doubts, *notes]
     motion = channels["stroke" if "stroke" in channels else "velocity"]
@@ -78,7 +77,7 @@ def _values(table: RawTable, raw: RawColumn, column: Column) -> tuple[Samples, s
     if column.conversion is None:
         return stamps.seconds(values, where, table.place)
     values = column.conversion(np.ascontiguousarray(values))
-    sampling.check_numbers(values, f"{column.role} (column {column.header!r})", table.where, table.lines)
+    clock.check_numbers(values, f"{column.role} (column {column.header!r})", table.where, table.lines)
     return values, ""
 
 
@@ -100,7 +99,7 @@ def _parts(table: RawTable, time: Samples | None, motion: Samples, rate: float |
         return parts
     good = [part for part in parts if _has_cycle(part, motion)]
     if not good:
-        sampling.refuse_gaps(time, sampling.gaps(time), where, table.lines)
+        clock.refuse_gaps(time, clock.gaps(time), where, table.lines)
     left_out = [part for part in parts if part not in good]
     samples = sum(len(part.time) for part in left_out)
     plural = "s" if len(left_out) > 1 else ""
@@ -110,7 +109,7 @@ def _parts(table: RawTable, time: Samples | None, motion: Samples, rate: float |
 
 def _has_cycle(part: Part, motion: Float[np.ndarray, " file_time"]) -> bool:
     moved = part.of(motion)
-    return len(part.time) >= sampling.FEWEST and np.ptp(moved) > 0 and len(cycle_instants(part.time, moved)) > 1
+    return len(part.time) >= clock.FEWEST and np.ptp(moved) > 0 and len(cycle_instants(part.time, moved)) > 1
 
 
 def _from_rate(count: int, rate: float | int | None, where: str) -> Part:
@@ -122,7 +121,7 @@ def _from_rate(count: int, rate: float | int | None, where: str) -> Part:
             example,
             name,
         )
-    time = sampling.uniform_time(rate, count)
+    time = clock.uniform_time(rate, count)
     return Part(slice(None), time, time, False, (f"time from the sampling rate given, {rate:g} Hz",))
 
 
@@ -157,7 +156,7 @@ def _record(
         stroke, velocity, source = integrate_velocity(time, velocity, where)
     else:
         stroke = part.of(channels["stroke"])
-        sampling.check_stroke(stroke, f"{where}, column {columns['stroke'].header!r}")
+        clock.check_stroke(stroke, f"{where}, column {columns['stroke'].header!r}")
     own = bool(table.preamble) and table.preamble[0].strip() == FILE_MARK
     if own:
         _refuse_signs(how, where)
