@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxdamp import _checks
+
 
 Cell = str | float | int | None
 
