@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import require_finite_force
 from jaxdamp.identify.estimated_states import with_first_states
@@ -33,6 +34,7 @@ def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
     return values[left] + (places - left) * (values[left + 1] - values[left])
 
 
+@of_known_numbers
 def predict_runs(model: Model, runs: Sequence[BenchRun], initial_state: str = "warm_up") -> list[np.ndarray]:
     """Force [N] of the model at every sample of every record.
 

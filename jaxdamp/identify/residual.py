@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.model import Model, is_memoryless
 from jaxdamp.identify.predicting import predict_by_record, used_samples
@@ -25,6 +26,7 @@ class ErrorShares(NamedTuple):
     rest: float  # noise, and changes from cycle to cycle
 
 
+@of_known_numbers
 def error_shares(
     law: Model | Sequence[Model], runs: BenchRun | Iterable[BenchRun], initial_state: str = "warm_up"
 ) -> ErrorShares:

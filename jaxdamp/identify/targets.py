@@ -12,6 +12,7 @@ from jaxtyping import Array, Bool, Float
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._tables import Column, Table, plain
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
@@ -132,6 +133,7 @@ class TargetResiduals(AbstractResiduals):
         return jnp.sum(1.0 / jnp.square(self.tolerance))
 
 
+@of_known_numbers
 @one_thread()
 def fit_targets(
     numbers: Callable[[Any], Mapping[str, Any]] | Ride,

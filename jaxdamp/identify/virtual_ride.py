@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import RideRecord
 from jaxdamp.rig import Sensor
 from jaxdamp.roads import AbstractRoad
@@ -15,6 +16,7 @@ from jaxdamp.simulation import simulate
 from jaxdamp.vehicles import AbstractVehicle, prefixed
 
 
+@of_known_numbers
 def virtual_ride(
     vehicle: AbstractVehicle,
     road: AbstractRoad,

@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.descending import Descent, Ended, missed, reached
@@ -41,6 +42,7 @@ from jaxdamp.tune.wording import (
 TIGHTENED = 2  # times that a search is repeated with limits that did not hold on fresh roads
 
 
+@of_known_numbers
 def minimise(
     metric: str | Metric | Function,
     vehicle: V,
