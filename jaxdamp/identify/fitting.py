@@ -64,17 +64,14 @@ def of_any_records(fit: Callable[P, FitResult]) -> FitCall[P]:
 
     @functools.wraps(fit)
     def by_kind(*args: Any, **options: Any) -> Any:
-        names = ("law", "runs")
-        given = dict(zip(names, args, strict=False)) | {name: options[name] for name in names if name in options}
-        model, records = given.get("law", options.get("vehicle")), given.get("runs", options.get("records"))
-        if isinstance(model, AbstractVehicle) and "numbers" not in options:
-            return fit_vehicle(*args, **options)
+        given: dict[str, Any] = dict(zip(("law", "runs"), args, strict=False)) | options
+        model, records = given.pop("law", None), given.pop("runs", None)
         if "numbers" in options:
-            rest = {name: value for name, value in options.items() if name not in (*names, "numbers")}
-            return fit_targets(options["numbers"], model, records, **rest)
+            return fit_targets(given.pop("numbers"), model, cast(Any, records), **given)
+        if isinstance(model if model is not None else options.get("vehicle"), AbstractVehicle):
+            return fit_vehicle(*args, **options)
         if isinstance(records, Mapping):
-            rest = {name: value for name, value in options.items() if name not in names}
-            return fit_many(model, records, **rest)
+            return fit_many(cast(Any, model), records, **given)
         return fit(*args, **options)
 
     return cast(FitCall[P], by_kind)

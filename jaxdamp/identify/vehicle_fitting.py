@@ -173,10 +173,12 @@ def _solved(
 ) -> tuple[Problem, Solution]:
     """The minimum with each channel weighted by its noise, which is estimated until it is consistent."""
     sigma = dict(zip(data.channels, problem.sigma, strict=True))
-    for _ in range(MOST_ROUNDS):
-        end = search(problem, max_steps, solver=solver)
+    rounds = 0
+    while True:
+        end, rounds = search(problem, max_steps, solver=solver), rounds + 1
         before, sigma = sigma, {**data.noise_in(end, problem, sigma, loss), **known}
-        if not end.finite or all(abs(np.log(sigma[name] / before[name])) < ALIKE for name in sigma):
+        consistent = all(abs(np.log(sigma[name] / before[name])) < ALIKE for name in sigma)
+        if not end.finite or consistent or rounds == MOST_ROUNDS:
             break
         problem = data.problem(problem.free.started_at(end.values), sigma, expected)
     if not end.finite or (loss == "squares" and starts == 1 and not expected):
