@@ -1,8 +1,8 @@
 """The instants of a record: order, gaps, rounding, jitter; and channels that have clocks of their own."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NoReturn
 
 import numpy as np
@@ -206,7 +206,7 @@ def regular_parts(time: Samples, where: str, lines: Sequence[int] | None = None)
         refuse_gaps(time, missing, where, lines)
     edges = [0, *(int(gap) + 1 for gap in missing), len(time)]
     parts = []
-    for number, (start, stop) in enumerate(pairwise(edges), 1):
+    for number, (start, stop) in enumerate(itertools.pairwise(edges), 1):
         cut = f"part {number} of {len(missing) + 1} between gaps in time, {time[start]:.6g} to {time[stop - 1]:.6g} s"
         parts.append(_part(time, slice(start, stop), (*notes, cut) if len(missing) else notes))
     return parts
@@ -241,22 +241,29 @@ def on_one_clock(tables: Sequence[RawTable], choice: Choice) -> list[RawTable]:
     Raises:
         ValueError: several tables could belong together, a clock has gaps, or both do not run at the same time.
     """
-    roles = ("velocity" if choice.stroke_from_velocity else "stroke", "force")
-    groups = {role: [table for table in tables if is_record(table, choice, (role,))] for role in roles}
-    apart = [table for group in groups.values() for table in group]
-    has_both = len({id(table) for table in apart}) < len(apart)
-    clocks = [np.asarray(c.values) for table in apart for c in table.columns if (c.name, c.unit) == ("time", "s")]
-    if has_both or not all(groups.values()) or len(clocks) < len(apart):
+    motion = "velocity" if choice.stroke_from_velocity else "stroke"
+    moved = [table for table in tables if is_record(table, choice, (motion,))]
+    loaded = [table for table in tables if is_record(table, choice, ("force",))]
+    apart = [*moved, *loaded]
+    clocks = list(itertools.chain.from_iterable(map(_clocks, apart)))
+    have_both = any(table in loaded for table in moved)
+    if not moved or not loaded or have_both or len(clocks) < len(apart):
         return list(tables)
-    names = " and ".join(f"the {role} in {', '.join(repr(t.record) for t in group)}" for role, group in groups.items())
-    if len(apart) > len(groups):
+    names = f"the {motion} in {_records(moved)} and the force in {_records(loaded)}"
+    if len(apart) > 2:
         raise ArgumentError(
             f"{apart[0].file}: which groups of different clocks belong together is not clear: {names}. {_ONE_GROUP}"
         )
     instants, note = _common_instants(apart, clocks, names)
-    columns = [_at(instants, clock, c) for t, clock in zip(apart, clocks, strict=True) for c in _numbers(t)]
-    together = RawTable(apart[0].file, (RawColumn("time", instants, "s"), *columns), notes=(note,))
-    return [together, *(table for table in tables if table not in apart)]
+    return [_together(apart, clocks, instants, note), *(table for table in tables if table not in apart)]
+
+
+def _together(tables: Sequence[RawTable], clocks: Sequence[Samples], instants: Samples, note: str) -> RawTable:
+    """The channels of tables at the same instants."""
+    columns = [RawColumn("time", instants, "s")]
+    for table, clock in zip(tables, clocks, strict=True):
+        columns += [_at(instants, clock, column) for column in _numbers(table)]
+    return RawTable(tables[0].file, tuple(columns), notes=(note,))
 
 
 def _common_instants(tables: Sequence[RawTable], clocks: Sequence[Samples], names: str) -> tuple[Samples, str]:
@@ -274,6 +281,14 @@ def _common_instants(tables: Sequence[RawTable], clocks: Sequence[Samples], name
         f"{names}, on different clocks: brought onto that of {1 / np.median(np.diff(finest)):.4g} Hz by cubics, "
         f"from {start:.4g} to {stop:.4g} s, which both cover"
     )
+
+
+def _records(tables: Sequence[RawTable]) -> str:
+    return ", ".join(repr(table.record) for table in tables)
+
+
+def _clocks(table: RawTable) -> list[Samples]:
+    return [np.asarray(column.values) for column in table.columns if (column.name, column.unit) == ("time", "s")]
 
 
 def _numbers(table: RawTable) -> list[RawColumn]:

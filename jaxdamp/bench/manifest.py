@@ -11,26 +11,26 @@ from jaxdamp._documents import read_toml
 
 NAME = "jaxdamp.toml"
 TABLES = ("columns", "units", "gains")
-Kinds = Mapping[str, type | tuple[type, ...]]  # key of a manifest to what it may be
+Kinds = Mapping[str, tuple[type, ...]]  # key of a manifest to what it may be
 BENCH_KEYS: Kinds = {
-    "sign": str,
-    "force_sign": str,
+    "sign": (str,),
+    "force_sign": (str,),
     "sampling_rate": (int, float),
-    "delimiter": str,
+    "delimiter": (str,),
     "command": (int, float, str, dict),
     "settings": (str, dict),
-    "files": list,
-    "test": str,
-    "stroke_from_velocity": bool,
-    **dict.fromkeys(TABLES, dict),
+    "files": (list,),
+    "test": (str,),
+    "stroke_from_velocity": (bool,),
+    **dict.fromkeys(TABLES, (dict,)),
 }
 RIDE_KEYS: Kinds = {
-    "columns": dict,
+    "columns": (dict,),
     "road": (str, int, list),
-    "units": dict,
-    "reversed_channels": list,
+    "units": (dict,),
+    "reversed_channels": (list,),
     "sampling_rate": (int, float),
-    "delimiter": str,
+    "delimiter": (str,),
 }
 _KIND_NAMES = {"dict": "table", "str": "text", "bool": "true or false", "int": "whole number", "float": "number"}
 
@@ -71,7 +71,7 @@ def read_manifest(file: Path, keys: Kinds) -> dict[str, Any]:
             near = _checks.nearest(key, keys)
             hint = f" Did you mean {near!r}?" if near else ""
             raise ValueError(f"{file}: unknown key {key!r}; there are {', '.join(keys)}.{hint}")
-        kinds = keys[key] if isinstance(keys[key], tuple) else (keys[key],)
+        kinds = keys[key]
         if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
             names = " or ".join(_KIND_NAMES.get(kind.__name__, kind.__name__) for kind in kinds)
             article = "" if kinds == (bool,) else "a "

@@ -277,13 +277,16 @@ def sampled(
     if event is not None and event < 2 * dt * (1 - 1e-9):
         must = f"be at most half the time over the shortest bump, {event:.3g} s, which steps would skip"
         _checks.refuse("dt", must, f"{dt:g} s", f"Pass `dt={rounded_down(event / 8):g}`, or make the bump longer.")
-    count = round(duration / dt)
-    time = jnp.arange(count + 1, dtype=float)
+    time = _instants(duration, dt, begins)
+    return time, heights_under_wheels(vehicle, road, time)
+
+
+def _instants(duration: float, dt: float, begins: Scalar | None) -> Signal:
+    time = jnp.arange(round(duration / dt) + 1, dtype=float)
     if begins is not None:  # a whole number of steps, so that instants are those of the whole run to the last bit
         steps = begins / dt
         time = time + jnp.where(jnp.abs(steps - jnp.round(steps)) < 1e-6, jnp.round(steps), steps)
-    time = time * dt
-    return time, heights_under_wheels(vehicle, road, time)
+    return time * dt
 
 
 def refuse_stacked(vehicle: AbstractVehicle) -> None:

@@ -1,6 +1,6 @@
-"""Solvers of the whole library, with a batch axis, in the vocabulary of optimistix.
+"""Solvers of the whole library in the vocabulary of optimistix, with a batch axis, from the host or inside JAX.
 
-- `BoundedLevenbergMarquardt`: least squares within bounds, from a loop on the host or inside a JAX program.
+- `BoundedLevenbergMarquardt`: bounded nonlinear least squares.
 - `SequentialQuadratic`: constrained minimisation of one or several objectives, many searches side by side.
 """
 

@@ -26,8 +26,9 @@ def _of_bodies(frame: Frame, channels: Sequence[Channel]) -> list[Metric]:
     metrics: list[Metric] = []
     for c in channels:
         if c.kind.weighting is not None and c.place in places:
-            metrics += [Metric(c.name, statistic) for statistic in ("rms", "peak")]
             metrics += [
+                Metric(c.name, "rms"),
+                Metric(c.name, "peak"),
                 Metric(c.name, "rms", c.kind.weighting, name=f"weighted_rms_{c.name}"),
                 Metric(c.name, "vibration_dose_value", c.kind.weighting, name=f"vibration_dose_value_{c.name}"),
             ]

@@ -110,15 +110,15 @@ class Evaluation(AbstractResult):
     def _by_setting(self, title: str, rows: Sequence[tuple[str, str, float | None]]) -> Table:
         """Quantities (name, quantity, velocity) with a column for each setting and the change over them."""
         chosen = [m for m in self.measurements if m.velocity is not None or m.record]
-        measurements = {(m.quantity, m.velocity, m.setting): m for m in chosen}
+        cells = {(m.quantity, m.velocity, m.setting): m.cell for m in chosen}
+        units = {m.quantity: m.unit for m in self.measurements}
         compared = []
         for name, quantity, velocity in rows:
-            here = [measurements.get((quantity, velocity, setting)) for setting in self.settings]
-            values = [m.cell if m else None for m in here]
+            values = [cells.get((quantity, velocity, setting)) for setting in self.settings]
             numbers = [value for value in values if isinstance(value, float)]
-            change = percent_change(numbers[0], numbers[-1]) if len(numbers) == len(here) else None
+            change = percent_change(numbers[0], numbers[-1]) if len(numbers) == len(values) else None
             if numbers:
-                compared.append(Compared(name, next(m.unit for m in here if m), values, change))
+                compared.append(Compared(name, units[quantity], values, change))
         return comparison_table(title, "quantity", [name or "value" for name in self.settings], compared)
 
     def tables(self) -> dict[str, Table]:
@@ -219,11 +219,7 @@ def evaluate(
     >>> print(f"{ratio.value:.2f}")
     2.17
     """
-    if method is not None:
-        _checks.one_of("method", method, curve.METHODS)
-    _checks.positive("window", window)
-    for velocity in velocities or ():
-        _checks.positive("velocities", velocity, "The direction is in the quantity.")
+    _check_options(velocities, method, window)
     chosen = as_records(runs, "evaluate(runs)")
     cyclic = [run for run in chosen if run.cycles]
     if not cyclic:
@@ -231,18 +227,12 @@ def evaluate(
     settings, notes = _by_settings(cyclic, by)
     notes += _notes(chosen)
     cycles = {run.name: fold_cycles(run) for run in cyclic}
-    if method is None:
-        method = "interpolation" if all(len(_repeats(group)) > 1 for group in settings.values()) else "loop"
+    method = _usual_method(settings) if method is None else method
     measurements: list[Measurement] = []
     gas: dict[str, GasAndFriction] = {}
     for name, group in settings.items():
-        of_records = [m for run in group for m in record_measurements(cycles[run.name], name, run.name)]
-        peaks = {direction: _peak_forces(group, of_records, direction) for direction in curve.DIRECTIONS}
-        fastest = max(group, key=lambda run: run.peak_velocity)
         slowest = min(group, key=lambda run: run.peak_velocity)
-        measurements += of_records
-        measurements += _at_velocities(velocities, peaks, cycles[fastest.name], name, method, window)
-        measurements += curve.rates_and_knees(cycles[fastest.name], name, fastest.name)
+        measurements += _of_setting(name, group, cycles, velocities, method, window)
         try:
             gas[name] = separate_gas_and_friction(slowest)
         except ArgumentError as error:
@@ -252,6 +242,35 @@ def evaluate(
             notes += [f"{slowest.name}: {gas[name].note}"] if gas[name].note else []
     stated = tuple(sorted({m.velocity for m in measurements if m.velocity is not None}))
     return Evaluation(tuple(measurements), settings, cycles, gas, stated, method, tuple(notes))
+
+
+def _check_options(velocities: Sequence[float] | None, method: str | None, window: float) -> None:
+    if method is not None:
+        _checks.one_of("method", method, curve.METHODS)
+    _checks.positive("window", window)
+    for velocity in velocities or ():
+        _checks.positive("velocities", velocity, "The direction is in the quantity.")
+
+
+def _usual_method(settings: Mapping[str, Sequence[BenchRun]]) -> str:
+    """Interpolation where every setting has motions of different peak velocity, the loop elsewhere."""
+    return "interpolation" if all(len(_repeats(runs)) > 1 for runs in settings.values()) else "loop"
+
+
+def _of_setting(
+    name: str,
+    runs: Sequence[BenchRun],
+    cycles: Mapping[str, FoldedCycles],
+    velocities: Sequence[float] | None,
+    method: str,
+    window: float,
+) -> list[Measurement]:
+    """The figures of the records at one setting, its forces at the stated velocities, its rates and knees."""
+    of_records = [m for run in runs for m in record_measurements(cycles[run.name], name, run.name)]
+    peaks = {direction: _peak_forces(runs, of_records, direction) for direction in curve.DIRECTIONS}
+    fastest = max(runs, key=lambda run: run.peak_velocity).name
+    at_velocities = _at_velocities(velocities, peaks, cycles[fastest], name, method, window)
+    return [*of_records, *at_velocities, *curve.rates_and_knees(cycles[fastest], name, fastest)]
 
 
 def _notes(runs: Sequence[BenchRun]) -> list[str]:

@@ -197,14 +197,18 @@ def _fit(
     line, curve = orders[:2]
     ratio = (line.squares - curve.squares) / (2 * len(parts)) / max(curve.squares / max(curve.free, 1), 1e-300)
     best = 1 if curve.free > 0 and ratio > 1 + _CLEAR / np.sqrt(len(parts)) else 0
-    uncertain = {}
-    for name, column in (("gas force", 0), ("friction", 2)):
-        means = [float(fits.values[:, column].mean()) for fits in orders]
-        scatter = float(orders[best].values[:, column].std(ddof=1)) if len(parts) > 1 else 0.0
-        error = max(scatter, float(np.sqrt(np.mean(orders[best].errors[:, column] ** 2)))) / np.sqrt(len(parts))
-        below = _BELOW * (means[best] - means[0])
-        uncertain[name] = float(np.linalg.norm([_SAFE * error, _SAFE * (means[best + 1] - means[best]), below]))
+    uncertain = {name: _uncertainty(orders, best, column) for name, column in (("gas force", 0), ("friction", 2))}
     return orders[best].values, uncertain, ""
+
+
+def _uncertainty(orders: "Sequence[_Fits]", best: int, column: int) -> float:
+    """Of a figure: twice its standard error, twice what the next power changes, half of what the parabolas changed."""
+    count = len(orders[best].values)
+    means = [float(fits.values[:, column].mean()) for fits in orders]
+    scatter = float(orders[best].values[:, column].std(ddof=1)) if count > 1 else 0.0
+    error = max(scatter, float(np.sqrt(np.mean(orders[best].errors[:, column] ** 2)))) / np.sqrt(count)
+    below = _BELOW * (means[best] - means[0])
+    return float(np.linalg.norm([_SAFE * error, _SAFE * (means[best + 1] - means[best]), below]))
 
 
 def _columns(x: Samples, u: Samples, order: int) -> Float[np.ndarray, "time terms"]:

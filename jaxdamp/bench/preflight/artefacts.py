@@ -85,17 +85,16 @@ def mains_lines(values: Samples, rate: float, motion: float) -> dict[float, list
     orders = [(mains, line) for mains, line in orders if 8 * motion <= line and len(values) >= 4 * rate / line]
     if not orders:
         return {}
-    spectrum, found = _Spectrum(values, rate), {}
+    spectrum, lines = _Spectrum(values, rate), {}
     width, span = rate / len(values), float(np.ptp(np.quantile(values, (0.001, 0.999))))
     for mains, line in orders:
-        at, size = spectrum.peak(line, 0.4)
+        peak, size = spectrum.peak(line, 0.4)
         noise = float(np.median(np.concatenate([spectrum.lines(line + s * 12 * width, 8 * width) for s in (-1, 1)])))
-        beside = [line + k * motion for k in (-3, -2, -1, 1, 2, 3) if abs(k * motion) > 0.8 + 2 * width]
-        beside = [frequency for frequency in beside if frequency < 0.5 * rate - 1.0]
-        level = max([noise, *(spectrum.peak(frequency, 0.4)[1] for frequency in beside)])
+        multiples = [line + k * motion for k in (-3, -2, -1, 1, 2, 3) if abs(k * motion) > 0.8 + 2 * width]
+        level = max([noise, *(spectrum.peak(at, 0.4)[1] for at in multiples if at < 0.5 * rate - 1.0)])
         if size > max(_RIPPLE * level, 6 * noise, 1e-5 * span):
-            found.setdefault(mains, []).append((at, size))
-    return found
+            lines.setdefault(mains, []).append((peak, size))
+    return lines
 
 
 class _Spectrum:
