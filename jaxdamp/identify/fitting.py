@@ -16,10 +16,9 @@ from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
-from jaxdamp.identify.input_noise import input_noise_bias, on_bias
-from jaxdamp.identify.judging import MOST_WARNINGS, judge
+from jaxdamp.identify.judging import MOST_WARNINGS, input_noise_bias, judge, on_bias
 from jaxdamp.identify.law_result import FitResult
-from jaxdamp.identify.machine import Machine
+from jaxdamp.identify.machine import Machine, holds_static_force, static_force_in_words, with_static_force_on_machine
 from jaxdamp.identify.many import fit_many
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import rig_of
@@ -29,7 +28,6 @@ from jaxdamp.identify.problem import Problem, linearised
 from jaxdamp.identify.search import SearchEnd, Solver
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
-from jaxdamp.identify.static_force import holds_static_force, static_force_in_words, with_static_force_on_machine
 from jaxdamp.identify.targets import TargetFit, fit_targets
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
 from jaxdamp.identify.vehicle_result import VehicleFit
