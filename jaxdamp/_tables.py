@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxdamp import _checks
+
 
 Cell = str | float | int | None
 
@@ -186,6 +188,7 @@ def plain(value: Any) -> Any:
         return value
     if isinstance(value, float):
         return float(value) if np.isfinite(value) else None
+    _checks.untraced("value", value)
     array = np.asarray(value)
     if array.dtype.kind not in "biufU":
         raise TypeError(

@@ -48,6 +48,23 @@ class Estimate(NamedTuple):
         return with_tied(": ".join(filter(None, [self.note, self.reason])), self.tied)
 
 
+class Minimum(NamedTuple):
+    """A set of parameters at which the sum of squares has a minimum."""
+
+    values: dict[str, float]  # of the free numbers, in their units
+    chi_square: float  # sum of squares over the variance of the noise, above that of the best minimum
+    starts: int  # number of starts that ended here
+
+
+def describe(minima: Sequence[Minimum], starts: int) -> str:
+    """The ends of several starts, in words."""
+    best, *others = minima
+    parts = [f"{best.starts} ended here"]
+    parts += [f"{m.starts} in another minimum, chi-square {m.chi_square:.3g} higher" for m in others]
+    left = starts - sum(m.starts for m in minima)
+    return f"{starts} starts: " + "; ".join([*parts, *[f"{left} given up as worse"] * bool(left)])
+
+
 def rounded(value: float, error: float) -> tuple[str, str]:
     """A value and its standard error as text, with the significant digits.
 

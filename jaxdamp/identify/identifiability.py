@@ -135,7 +135,7 @@ def _groups(
 
 def _together(problem: Problem, estimates: Sequence[Estimate], members: set[int], how: str) -> str:
     """A sentence on parameters that only tests of another kind tell apart, and what kind."""
-    on_bench = all(isinstance(run, BenchRun) for run in problem.runs)
+    on_bench = bool(problem.runs) and all(isinstance(run, BenchRun) for run in problem.runs)
     runs = problem.fitted_to if on_bench else []
     lacking = [
         f"another {what}"

@@ -105,6 +105,7 @@ class RunCheck(NamedTuple):
         """The same for engines that choose their own steps: what the instants miss of the road is judged alike."""
         cars = known_cars(self.system, self.dt)
         if cars is None:
+            _warn(_unknown_vehicle(self.dt), TracedStepWarning)
             return
         per_period = self._per_period(cars)
         worst = int(np.argmin(per_period))
@@ -183,6 +184,14 @@ def _assumed(dt: float) -> str:
         "without which the result is wrong. Pass `substeps=`, as many as `simulation.substeps_needed(vehicle, dt)` "
         "says of the steepest vehicle outside the compiled function (`substeps=1` where it says 1), or make a `Ride` "
         "outside and call it inside."
+    )
+
+
+def _unknown_vehicle(dt: float) -> str:
+    return (
+        "JAX is compiling this run (`jax.jit`, `jax.lax.scan`), and the numbers of its vehicle are not known: whether "
+        f"instants every {dt:g} s resolve the road for its fastest mode is not checked. Drive one such vehicle outside "
+        "the compiled function, which checks it, or make a `Ride` outside and call it inside."
     )
 
 

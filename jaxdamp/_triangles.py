@@ -1,0 +1,63 @@
+"""Reduction of tall matrices to triangles."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+
+RANK_TOLERANCE = 1e-7  # singular value, relative to the largest, below which a direction leaves the force unchanged
+RANK_TOLERANCE_SINGLE = 1e-4  # the same in single precision
+_ROWS = 512  # of a block: small enough for the cache
+
+
+def triangle(tall: Any) -> Any:
+    """R of the QR decomposition of a matrix with many rows, NumPy's or JAX's, block by block: ten times faster."""
+    xp: Any = jnp if isinstance(tall, jax.Array) else np
+    rows, columns = tall.shape
+    if rows > 4 * _ROWS and columns < _ROWS // 4:
+        padded = xp.concatenate([tall, xp.zeros((-rows % _ROWS, columns), tall.dtype)])
+        tall = xp.reshape(xp.linalg.qr(xp.reshape(padded, (-1, _ROWS, columns)), mode="r"), (-1, columns))
+    return xp.linalg.qr(tall, mode="r")
+
+
+def rows_of_products(
+    products: Float[np.ndarray, "lanes columns columns"],
+) -> Float[np.ndarray, "lanes columns columns"]:
+    """Rows A with these products of columns AᵀA: triangles, or by eigenvectors where some columns depend on others."""
+    norms = np.sqrt(np.maximum(np.diagonal(products, axis1=1, axis2=2), 0.0))
+    scale = np.where(norms > 0, norms, 1.0)[:, None, :]
+    finite = np.all(np.isfinite(products), axis=(1, 2))[:, None, None]
+    unit = np.where(finite, products / (scale * scale.transpose(0, 2, 1)), np.eye(scale.shape[2]))
+    try:
+        rows = np.linalg.cholesky(unit).transpose(0, 2, 1)
+    except np.linalg.LinAlgError:
+        squares, directions = np.linalg.eigh(unit)
+        rows = np.sqrt(np.maximum(squares, 0.0))[:, :, None] * directions.transpose(0, 2, 1)
+    return np.where(finite, rows * scale, np.nan)
+
+
+def determined(
+    scaled: Float[np.ndarray, "rows free"],
+) -> tuple[Float[np.ndarray, " rank"], Float[np.ndarray, "rank free"]]:
+    """Singular values and directions in which a matrix with columns of length one or zero is not blind."""
+    _, singular, directions = np.linalg.svd(triangle(scaled))
+    blind = RANK_TOLERANCE if scaled.dtype == np.float64 else RANK_TOLERANCE_SINGLE
+    seen = singular > blind * singular[0]
+    return singular[seen], directions[: singular.size][seen]
+
+
+def unit_columns(tall: Float[np.ndarray, "rows free"]) -> tuple[Float[np.ndarray, "rows free"], np.ndarray]:
+    """The matrix with columns of length one, and the lengths it had; a column of zeros stays, with length one."""
+    norms = np.linalg.norm(tall, axis=0)
+    scale = np.where(norms > 0, norms, 1.0)
+    return tall / scale, scale
+
+
+def orthonormal(tall: Float[np.ndarray, "rows free"]) -> Float[np.ndarray, "rows rank"]:
+    """Orthonormal columns that span those of a matrix."""
+    scaled, _ = unit_columns(tall)
+    singular, directions = determined(scaled)
+    return scaled @ (directions.T / singular)

@@ -1,0 +1,35 @@
+"""The linear algebra of a fit runs in one thread, and the limit is lifted afterwards, whatever the order."""
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from jaxdamp._one_thread import one_thread
+
+
+def threads() -> set[int]:
+    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+
+@pytest.fixture(autouse=True)
+def two_threads():
+    np.linalg.qr(np.eye(3))
+    with threadpool_limits(2, "blas"):
+        yield
+
+
+def test_the_limit_holds_inside_and_is_lifted_after_the_last() -> None:
+    first, second = one_thread(), one_thread()
+    first.__enter__()
+    second.__enter__()
+    assert threads() == {1}
+    first.__exit__(None, None, None)  # the one that began first ends first, as in two threads
+    assert threads() == {1}
+    second.__exit__(None, None, None)
+    assert threads() == {2}
+
+
+def test_it_is_lifted_after_an_error() -> None:
+    with pytest.raises(RuntimeError), one_thread():
+        raise RuntimeError
+    assert threads() == {2}
