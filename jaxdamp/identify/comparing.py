@@ -20,11 +20,9 @@ from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine
-from jaxdamp.identify.recommending import Recommendation, recommendation
-from jaxdamp.identify.rungs import Failure, Rung, ladder_table
+from jaxdamp.identify.rungs import Failure, Recommendation, Rung, ladder_table, recommendation, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
 from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts
-from jaxdamp.identify.verdict import verdict
 
 
 if TYPE_CHECKING:

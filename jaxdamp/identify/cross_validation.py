@@ -18,8 +18,8 @@ from jaxdamp.identify.fitting import fit
 from jaxdamp.identify.law_result import AbstractFitted
 from jaxdamp.identify.machine import OFFSET, Machine
 from jaxdamp.identify.preparing import weights
+from jaxdamp.identify.rungs import cannot_choose
 from jaxdamp.identify.starting import Start, check_starts
-from jaxdamp.identify.verdict import cannot_choose
 from jaxdamp.parameters import parameters
 
 

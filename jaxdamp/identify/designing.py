@@ -13,9 +13,7 @@ from jaxdamp._tables import Column, Table
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import Excitation
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify.candidates import WAVEFORMS, MachineLimits, Point, grid, near
-from jaxdamp.identify.design_goal import Goal
-from jaxdamp.identify.information import Information, information
+from jaxdamp.identify.design_goal import WAVEFORMS, Goal, Information, MachineLimits, Point, grid, information, near
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import Rig
 

@@ -17,10 +17,9 @@ from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
-from jaxdamp.identify.input_noise import input_noise_bias, on_bias
-from jaxdamp.identify.judging import MOST_WARNINGS, judge
+from jaxdamp.identify.judging import MOST_WARNINGS, input_noise_bias, judge, on_bias
 from jaxdamp.identify.law_result import FitResult
-from jaxdamp.identify.machine import Machine
+from jaxdamp.identify.machine import Machine, holds_static_force, static_force_in_words, with_static_force_on_machine
 from jaxdamp.identify.many import fit_many
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import rig_of
@@ -30,7 +29,6 @@ from jaxdamp.identify.problem import Problem, linearised
 from jaxdamp.identify.search import SearchEnd, Solver
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
-from jaxdamp.identify.static_force import holds_static_force, static_force_in_words, with_static_force_on_machine
 from jaxdamp.identify.targets import TargetFit, fit_targets
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
 from jaxdamp.identify.vehicle_result import VehicleFit
@@ -65,17 +63,14 @@ def of_any_records(fit: Callable[P, FitResult]) -> FitCall[P]:
 
     @functools.wraps(fit)
     def by_kind(*args: Any, **options: Any) -> Any:
-        names = ("law", "runs")
-        given = dict(zip(names, args, strict=False)) | {name: options[name] for name in names if name in options}
-        model, records = given.get("law", options.get("vehicle")), given.get("runs", options.get("records"))
-        if isinstance(model, AbstractVehicle) and "numbers" not in options:
-            return fit_vehicle(*args, **options)
+        given: dict[str, Any] = dict(zip(("law", "runs"), args, strict=False)) | options
+        model, records = given.pop("law", None), given.pop("runs", None)
         if "numbers" in options:
-            rest = {name: value for name, value in options.items() if name not in (*names, "numbers")}
-            return fit_targets(options["numbers"], model, records, **rest)
+            return fit_targets(given.pop("numbers"), model, cast(Any, records), **given)
+        if isinstance(model if model is not None else options.get("vehicle"), AbstractVehicle):
+            return fit_vehicle(*args, **options)
         if isinstance(records, Mapping):
-            rest = {name: value for name, value in options.items() if name not in names}
-            return fit_many(model, records, **rest)
+            return fit_many(cast(Any, model), records, **given)
         return fit(*args, **options)
 
     return cast(FitCall[P], by_kind)

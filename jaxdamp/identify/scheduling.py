@@ -23,8 +23,8 @@ from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, constant_forces
 from jaxdamp.identify.model import law_of, rig_of
+from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
-from jaxdamp.identify.scoring import score
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
 

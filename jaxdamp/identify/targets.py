@@ -20,7 +20,7 @@ from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
 from jaxdamp.identify.noise import Noise, independent
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.result import Fit
-from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.search import SearchEnd, Solver
 from jaxdamp.identify.several import Solution, equally_good, scattered_starts, search_each
 from jaxdamp.parameters import FreeParameters, Parameter, free_parameters, interval, match_paths, name_patterns, real
 from jaxdamp.simulation import Ride
@@ -150,6 +150,7 @@ def fit_targets(
     max_steps: int = 100,
     starts: int = 4,
     seed: int = 0,
+    solver: Solver | None = None,
 ) -> TargetFit:
     """Find the parameters with which a model has given numbers, by least squares in units of the tolerances.
 
@@ -170,6 +171,7 @@ def fit_targets(
         starts: number of searches, the first from `start`, the others from parameters up to twice and half of it. The
             first one counts unless another one meets the targets better.
         seed: of the other starts.
+        solver: as in `fit`.
 
     Returns:
         The model, its parameters and the numbers reached. Targets outside their tolerance are named by a warning, and
@@ -205,7 +207,7 @@ def fit_targets(
     problem = Problem(free, parts, level, (), (1.0,), owner, everywhere, free.tree, (), False)
 
     def by_squares(problem: Problem, count: int | None) -> Solution:
-        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps)
+        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps, solver)
 
     problem, solution = solve_by(problem, by_squares, loss=loss, noise=_tolerances, starts=starts, spread=1.0)
     if not solution.best.finite:

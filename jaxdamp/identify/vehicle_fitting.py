@@ -16,12 +16,12 @@ from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.criteria import LOSSES, Priors, criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
+from jaxdamp.identify.left_out import on_free_scale, on_sensors, on_signs
 from jaxdamp.identify.machine import Machine, started_machine
 from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.search import SearchEnd, search
+from jaxdamp.identify.search import SearchEnd, Solver, search
 from jaxdamp.identify.several import Solution, scattered_starts, search_each
-from jaxdamp.identify.vehicle_left_out import on_free_scale, on_sensors, on_signs
 from jaxdamp.identify.vehicle_preparing import (
     FreeScale,
     VehicleData,
@@ -74,6 +74,7 @@ def fit_vehicle(
     starts: int = 1,
     seed: int = 0,
     max_steps: int = 100,
+    solver: Solver | None = None,
 ) -> VehicleFit:
     """Fit masses, rates, friction and damper laws of a vehicle to records of its motion.
 
@@ -114,6 +115,7 @@ def fit_vehicle(
             describes the others.
         seed: of the other starts.
         max_steps: largest number of steps of each search.
+        solver: as in `fit`.
 
     Returns:
         The fitted vehicle, its parameters with standard errors, scores of each channel, warnings.
@@ -148,7 +150,7 @@ def fit_vehicle(
     problem = data.problem(free, sigma, expected)
     scale = free_scale(problem, search(problem, 1))
     problem = problem._replace(free=without(free, scale.held))
-    how = {"loss": loss, "starts": starts, "max_steps": max_steps, "seed": seed}
+    how = {"loss": loss, "starts": starts, "max_steps": max_steps, "seed": seed, "solver": solver}
     problem, solution = _solved(data, problem, known, expected, **how)
     problem, solution, refused = _accepted(data, problem, solution, known, expected, dt, how | {"starts": 1})
     paths = [p.path for p in parameters(model)]
@@ -169,20 +171,23 @@ def _solved(
     starts: int,
     max_steps: int,
     seed: int,
+    solver: Solver | None,
 ) -> tuple[Problem, Solution]:
     """The minimum with each channel weighted by its noise, which is estimated until it is consistent."""
     sigma = dict(zip(data.channels, problem.sigma, strict=True))
-    for _ in range(MOST_ROUNDS):
-        end = search(problem, max_steps)
+    rounds = 0
+    while True:
+        end, rounds = search(problem, max_steps, solver=solver), rounds + 1
         before, sigma = sigma, {**data.noise_in(end, problem, sigma, loss), **known}
-        if not end.finite or all(abs(np.log(sigma[name] / before[name])) < ALIKE for name in sigma):
+        consistent = all(abs(np.log(sigma[name] / before[name])) < ALIKE for name in sigma)
+        if not end.finite or consistent or rounds == MOST_ROUNDS:
             break
         problem = data.problem(problem.free.started_at(end.values), sigma, expected)
     if not end.finite or (loss == "squares" and starts == 1 and not expected):
         return problem, Solution(end, (end,), 1)
 
     def by_squares(problem: Problem, count: int | None) -> Solution:
-        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps)
+        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps, solver)
 
     def noise(problem: Problem, end: SearchEnd) -> Noise:
         return channel_noise(problem, end.residual, end.values.size)

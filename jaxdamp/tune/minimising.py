@@ -69,8 +69,9 @@ def minimise(
     beyond.
 
     Arguments:
-        metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`; a `metrics.Metric` of any
-            channel; or a differentiable function of the metrics by name, such as
+        metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`, or "comfort", "travel" or
+            "grip" (`vehicle.goal_metrics`; of several metrics their mean); a `metrics.Metric` of any channel; or a
+            differentiable function of the metrics by name, such as
             `lambda m: m["rms_sprung_acceleration"] / 1.5 + m["dynamic_load_coefficient"] / 0.2`, or `Targets(...)`.
         vehicle: the vehicle to start from.
         road: a road for the simulation, the same in every step; `roads.white(...)` for the stationary response with
