@@ -1,5 +1,6 @@
 """From bench records to a damper law: `fit` one law, `compare` many, and say how well the records determine them."""
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp._status import Status
 from jaxdamp.identify.bayes import Posterior, Spread
 from jaxdamp.identify.comparing import Comparison, compare, fit_each
@@ -92,3 +93,5 @@ __all__ = [
     "virtual_ride",
     "without_machine",
 ]
+
+answer_guesses(__name__, __all__)

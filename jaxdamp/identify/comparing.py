@@ -14,6 +14,7 @@ from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Table, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
@@ -157,6 +158,7 @@ class Comparison(AbstractResult):
         return "\n".join([*lines, *about_records, answer, f"best: {self.best.name}"])
 
 
+@of_known_numbers
 def compare(
     laws: Mapping[str, Start],
     runs: Iterable[BenchRun],

@@ -12,6 +12,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
@@ -89,6 +90,7 @@ def of_any_records(fit: Callable[P, FitResult]) -> FitCall[P]:
 
 
 @of_any_records
+@of_known_numbers
 def fit(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],

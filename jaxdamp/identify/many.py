@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.criteria import FIRST_NOISE, LOSSES, Priors, priors_on
@@ -34,6 +35,7 @@ BLIND = 1e-12  # eigenvalue of JᵀJ, relative to the largest, below which a dir
 CALL = 'fit_many(law, {"A": runs_of_a, "B": runs_of_b})'
 
 
+@of_known_numbers
 @one_thread()
 def fit_many(
     law: Start,

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._tables import with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import require_finite_force
 from jaxdamp.identify.estimated_states import with_first_states
@@ -35,6 +36,7 @@ def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
     return values[left] + (places - left) * (values[left + 1] - values[left])
 
 
+@of_known_numbers
 def predict_runs(model: Model, runs: Sequence[BenchRun], initial_state: str = "warm_up") -> list[np.ndarray]:
     """Force [N] of the model at every sample of every record.
 
@@ -183,6 +185,7 @@ class ErrorShares(NamedTuple):
     rest: float  # noise, and changes from cycle to cycle
 
 
+@of_known_numbers
 def error_shares(
     law: Model | Sequence[Model], runs: BenchRun | Iterable[BenchRun], initial_state: str = "warm_up"
 ) -> ErrorShares:

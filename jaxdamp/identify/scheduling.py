@@ -14,6 +14,7 @@ from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import AbstractDamper, Scheduled, takes_command
 from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
@@ -153,6 +154,7 @@ class ScheduledFit(AbstractResult):
         return "\n".join([self.table().to_text(), *self.verdict])
 
 
+@of_known_numbers
 def fit_scheduled(
     law: Start,
     runs: Iterable[BenchRun],

@@ -16,6 +16,7 @@ from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.judging import notes_on
 from jaxdamp.identify.law_result import AbstractFitted
@@ -103,6 +104,7 @@ class Training(AbstractFitted):
         return self.summary
 
 
+@of_known_numbers
 def train(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],

@@ -11,6 +11,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._one_thread import one_thread
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.criteria import LOSSES, Priors, criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
@@ -49,6 +50,7 @@ MOST_ROUNDS = 6
 MOST_CHECKS = 4  # of whether `simulate` accepts the vehicle at the minimum
 
 
+@of_known_numbers
 @one_thread()
 def fit_vehicle(
     vehicle: AbstractVehicle,

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.model import VehicleTest, on_rig
 from jaxdamp.identify.problem import AbstractResiduals
@@ -181,6 +182,7 @@ def bench_parts(
     return parts, numbers
 
 
+@of_known_numbers
 def virtual_ride(
     vehicle: AbstractVehicle,
     road: AbstractRoad,
