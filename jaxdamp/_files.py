@@ -49,26 +49,29 @@ def natural_key(text: str) -> list[tuple[int, float, str]]:
 def _expand(path: str | os.PathLike[str], suffixes: Collection[str]) -> Iterator[Path]:
     text, file = os.fspath(path), Path(path).expanduser()
     if file.is_dir():
-        files = [f for f in file.iterdir() if f.is_file() and not f.name.startswith((".", "~$"))]
-        inside = [f for f in files if f.suffix.lower() in suffixes]
-        if not inside:
-            others = sorted(f.name for f in files if f.suffix.lower() in MAYBE_NOTES)
-            hint = (
-                f" It holds {', '.join(others[:5])}: name these files, or a pattern such as '*.txt'." if others else ""
-            )
-            raise FileNotFoundError(f"Folder {file} holds no *.csv or other file of records.{hint}")
-        yield from sorted(inside, key=lambda f: natural_key(f.name))
+        yield from _inside(file, suffixes)
     elif file.is_file():
         yield file
     elif file.exists():
         _checks.refuse("paths", "name files or folders", f"{text!r}, a pipe or a device", "Save the records to a file.")
     elif glob.has_magic(text):
-        found = [Path(name) for name in glob.glob(str(file), recursive=True) if Path(name).is_file()]
-        if not found:
+        files = [Path(name) for name in glob.glob(str(file), recursive=True) if Path(name).is_file()]
+        if not files:
             raise FileNotFoundError(f"No file matches the pattern {text!r}.{_near(file)}")
-        yield from sorted(found, key=lambda f: natural_key(str(f)))
+        yield from sorted(files, key=lambda f: natural_key(str(f)))
     else:
         raise FileNotFoundError(f"There is no file {text!r}.{_near(file)}")
+
+
+def _inside(folder: Path, suffixes: Collection[str]) -> list[Path]:
+    """The files of a folder with these suffixes, in natural order."""
+    files = [file for file in folder.iterdir() if file.is_file() and not file.name.startswith((".", "~$"))]
+    chosen = [file for file in files if file.suffix.lower() in suffixes]
+    if not chosen:
+        others = ", ".join(sorted(file.name for file in files if file.suffix.lower() in MAYBE_NOTES)[:5])
+        hint = f" It holds {others}: name these files, or a pattern such as '*.txt'." if others else ""
+        raise FileNotFoundError(f"Folder {folder} holds no *.csv or other file of records.{hint}")
+    return sorted(chosen, key=lambda file: natural_key(file.name))
 
 
 def _near(file: Path) -> str:

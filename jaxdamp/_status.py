@@ -13,8 +13,14 @@ class Status(enum.Enum):
     LIMIT_NOT_MET = "A limit is not met."
     STOPPED_EARLY = "The error on the held-out records fell no more."
     ALL_STEPS = "All steps were taken."
+    COMPUTED = "It was computed directly, without a search."
 
     @property
     def sentence(self) -> str:
         """Explanation in a sentence."""
         return self.value
+
+    @property
+    def good(self) -> bool:
+        """Whether the end is one that was wanted: converged, or computed without a search."""
+        return self in (Status.CONVERGED, Status.COMPUTED)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import jax
 
 from jaxdamp import _checks
+from jaxdamp.codegen import is_printing
 
 
 # A loop whose body touches fewer bytes than the threshold is compiled as one function; XLA's own threshold is 1 kB.
@@ -100,22 +101,21 @@ class Target(NamedTuple):
     library_functions: bool = False
 
 
+# One car on a processor of any kind, with the elementary functions of the C library.
+_PRINTED = Target(fused_loops=False, reciprocal_roots=False, library_functions=True)
 # Part of the key of compiled functions: what was traced for one target is not taken for another.
 _OTHER_TARGET = jax.make_user_context(None)
 
 
-def compiling_for(other: Target) -> AbstractContextManager[None]:
-    """Functions traced inside are for another target than XLA in this process."""
-    return _OTHER_TARGET(other)
-
-
 def one_at_a_time() -> AbstractContextManager[None]:
     """Functions traced inside are for one car: they take the library's elementary functions."""
-    return compiling_for(target()._replace(library_functions=True))
+    return _OTHER_TARGET(target()._replace(library_functions=True))
 
 
 def target() -> Target:
     """What the function that is being traced is compiled for; by default this process, see `_this_process`."""
+    if is_printing():
+        return _PRINTED
     return _OTHER_TARGET.value or _this_process()
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from diffrax import Tsit5
 
-from jaxdamp import Ride, bench, identify, respond, roads, simulate, sweep
+from jaxdamp import Ride, bench, identify, respond, roads, simulate, sweep, tune
 from jaxdamp.bench import BenchSet, SineTest
-from jaxdamp.dampers import Bilinear, BoucWen, Lag, Spring
+from jaxdamp.dampers import Bilinear, BoucWen, Lag, Linear, Spring
 from jaxdamp.rig import Rig
 from jaxdamp.simulation import Adaptive, Exponential
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
@@ -96,3 +96,22 @@ def test_of_a_fit_of_other_records(machine):
     made = [runs(rate) for rate in (1500.0, 1700.0, 1900.0)]
     first, *others = in_calls(fit, made)
     assert first > 0 and others == [0, 0]
+
+
+BOUNCE = roads.white("C", 20.0)
+TUNINGS: dict[str, Any] = {
+    "minimise": lambda rate: tune.minimise(
+        "rms_sprung_acceleration", quarter_car_000(Bilinear(rate, 900.0)), BOUNCE,
+        limits={"rms_dynamic_tyre_load": rate}, shape=tune.slope(1.0, 9.0 * rate), max_steps=2,
+    ),
+    "pareto": lambda rate: tune.pareto(
+        ["rms_sprung_acceleration", "rms_dynamic_tyre_load"], quarter_car_000(Linear(rate)), BOUNCE, points=3,
+        limits={"working_space_rms": 1e-5 * rate},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TUNINGS)
+def test_of_a_tuning_from_other_numbers(name):
+    first, *others = in_calls(lambda rate: TUNINGS[name](rate).before, [1500.0, 1700.0])
+    assert first > 0 and others == [0]

@@ -1,6 +1,7 @@
 """The storeys of the package: imports only go down, and a package is entered by its front door."""
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parents[1] / "jaxdamp"
 
 STOREYS = [
-    {"parameters", "configuration", "codegen", "solve"},  # and every private module `_*.py` at the top
+    {"parameters", "solve", "configuration", "codegen"},  # and every private module `_*.py` at the top
     {"dampers", "roads", "metrics"},
     {"vehicles", "rig"},
     {"simulation", "bench"},
@@ -25,6 +26,7 @@ STOREYS = [
 TOP = len(STOREYS) - 1
 # A result draws itself: `.plot()` loads the plots when it is called.
 DRAWS_ITSELF = {(own, "plots") for own in ("metrics", "roads", "vehicles", *STOREYS[3], *STOREYS[4])}
+DRAWS_ITSELF |= {("_results", "report")}  # and writes itself: `.report(path)`
 # Known only to someone who asks for them: importing the package loads none.
 LATE = ["matplotlib", "xarray", "pint", "typer", "rich", "pandas", "scipy.optimize", "scipy.signal", "scipy.io"]
 
@@ -158,6 +160,15 @@ def test_imports_past_the_front_door_are_found(own, source):
 )
 def test_imports_that_go_down_are_allowed(own, source):
     assert not faults(source, ["jaxdamp", own], own)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "codegen").glob("*.py")), ids=lambda p: p.name)
+def test_the_printer_knows_nothing_of_the_library(path):
+    """It could be a package of its own."""
+    source = path.read_text(encoding="utf-8")
+    assert {name[1] for name, _ in imported_modules(source, ["jaxdamp", "codegen"])} <= {"codegen"}
+    words = r"\b(dampers?|vehicles?|laws?|suspension|roads?|rides?|tyres?|strokes?)\b"
+    assert not re.search(words, source, re.IGNORECASE)
 
 
 def test_a_module_without_a_storey_is_found():

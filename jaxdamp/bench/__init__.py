@@ -3,6 +3,7 @@
 Stroke and velocity are positive in extension (rebound), force is positive when it resists extension.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp.bench import programmes
 from jaxdamp.bench.analysis import (
     FoldedCycles,
@@ -31,8 +32,7 @@ from jaxdamp.bench.preflight import Finding, Preflight, preflight, usable
 from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import Excitation, RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable
-from jaxdamp.bench.read import read
-from jaxdamp.bench.read_rides import read_rides
+from jaxdamp.bench.read import read, read_rides
 from jaxdamp.bench.readers import READERS
 from jaxdamp.bench.ride_record import RideRecord
 from jaxdamp.bench.runs import BenchRun
@@ -90,3 +90,5 @@ __all__ = [
     "steady_cycles",
     "usable",
 ]
+
+answer_guesses(__name__, __all__)

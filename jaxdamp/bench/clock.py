@@ -1,14 +1,161 @@
-"""The instants of a record: a clock that jitters is resampled, one with gaps is cut into parts."""
+"""The instants of a record: order, gaps, rounding, jitter; and channels that have clocks of their own."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from typing import NoReturn
 
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp.bench import sampling
+from jaxdamp._checks import ArgumentError, Setting
+from jaxdamp.bench.columns import Choice, is_record
 from jaxdamp.bench.motion import Samples
+from jaxdamp.bench.raw import RawColumn, RawTable
+
+
+FEWEST = 20  # samples of a record
+_GAP = 1.5  # sampling steps that are taken for a gap
+_OFTEN = 0.02  # share of such steps beyond which a clock jitters
+_WIDE_GAP = 3.0  # sampling steps that are a gap even then
+_JITTER = 0.02  # sampling steps by which an instant may be off
+
+
+def uniform_time(rate: float | int, count: int) -> Samples:
+    """Instants [s] of samples taken at a rate [Hz], from zero."""
+    return np.arange(count) / rate
+
+
+def check_time(time: Samples, where: str) -> tuple[Samples, str]:
+    """The instants of a uniformly sampled record, and a sentence if they had to be made uniform.
+
+    Instants that were only rounded when they were written (three decimals at 300 Hz) are put back on the uniform grid.
+
+    Raises:
+        ValueError: time goes back or stands still, samples are missing, or the steps are not uniform.
+    """
+    check_order(time, where)
+    if is_uniform(time):
+        return time, ""
+    missing = gaps(time)
+    if missing.size:
+        refuse_gaps(time, missing, where)
+    rounded = without_rounding(time)
+    if rounded is not None:
+        return rounded
+    steps = np.diff(time)
+    raise ValueError(
+        f"{where}: the samples are not uniform in time, the steps go from {steps.min():.4g} to {steps.max():.4g} s. "
+        "Resample all channels with numpy.interp to one rate; `bench.read` does so with files."
+    )
+
+
+def check_order(time: Samples, where: str, lines: Sequence[int] | None = None) -> None:
+    """Refuse a time that goes back or stands still, naming where."""
+    back = np.flatnonzero(np.diff(time) <= 0)
+    if back.size:
+        i = int(back[0]) + 1
+        without, rate = Setting("columns", {"time": None}), Setting("sampling_rate")
+        raise ArgumentError(
+            f"{where}, {_place(i, lines)}: time goes from {time[i - 1]:.9g} s to {time[i]:.9g} s, but must increase. "
+            f"Cut the record there; or, if its clock is too coarse, leave its column out and give the rate: "
+            f"{without}, {rate}.",
+            without,
+            rate,
+        )
+
+
+def is_uniform(time: Samples) -> bool:
+    """Whether increasing instants lie on a uniform grid, as near as a clock needs."""
+    step, off = _grid(time)
+    return off <= _JITTER * step
+
+
+def gaps(time: Samples) -> np.ndarray:
+    """Numbers of the samples behind which time jumps. A clock with steps of many lengths only jitters."""
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    if is_uniform(time):
+        return np.empty(0, dtype=int)
+    wide = steps > _GAP * usual
+    if np.mean(wide) > _OFTEN:
+        wide = steps > _WIDE_GAP * usual
+    return np.flatnonzero(wide)
+
+
+def refuse_gaps(time: Samples, missing: np.ndarray, where: str, lines: Sequence[int] | None = None) -> NoReturn:
+    """Refuse a record with samples missing behind these."""
+    i, steps = int(missing[0]) + 1, np.diff(time)
+    usual = float(np.median(steps))
+    without, rate = Setting("columns", {"time": None}), Setting("sampling_rate")
+    raise ArgumentError(
+        f"{where}, {_place(i, lines)}: {steps[i - 1] / usual - 1:.0f} samples are missing between {time[i - 1]:.6g} "
+        f"and {time[i]:.6g} s ({missing.size} such gaps in all; the usual step is {usual:.4g} s). Cut the record "
+        f"into the parts before and after the gap; or, if its clock is too coarse, leave its column out and give the "
+        f"rate: {without}, {rate}.",
+        without,
+        rate,
+    )
+
+
+def without_rounding(time: Samples) -> tuple[Samples, str] | None:
+    """The uniform instants that were rounded when they were written (three decimals at 300 Hz), and a note."""
+    step, off = _grid(time)
+    quantum = 10.0 ** -_decimals(time)
+    if off > 0.6 * quantum:
+        return None
+    note = f"time was rounded to {quantum:g} s in the file; it is put back on a grid of {1 / step:.6g} Hz"
+    return time[0] + step * np.arange(len(time)), note
+
+
+def _grid(time: Samples) -> tuple[float, float]:
+    """Step of the uniform grid next to the instants, and the largest distance from it."""
+    number = np.arange(len(time)) - (len(time) - 1) / 2
+    step = float(np.dot(number, time) / np.dot(number, number))
+    return step, float(np.max(np.abs(time - time.mean() - step * number)))
+
+
+def _place(sample: int, lines: Sequence[int] | None) -> str:
+    return f"line {lines[sample]}" if lines is not None and len(lines) else f"sample {sample}"
+
+
+def _decimals(time: Samples) -> int:
+    """The number of decimals that writes all instants, at most 9."""
+    for digits in range(9):
+        if np.all(np.abs(np.round(time, digits) - time) < 1e-10):
+            return digits
+    return 9
+
+
+def check_numbers(
+    values: Float[np.ndarray, " time"], role: str, where: str, lines: Sequence[int] | None = None
+) -> None:
+    """Refuse NaN and infinity, naming the first."""
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise ValueError(
+            f"{where}, {_place(int(bad[0]), lines)}: the {role} is {values[bad[0]]} ({bad.size} such values in all). "
+            "Cut the record there or mend it."
+        )
+
+
+def check_stroke(stroke: Samples, where: str) -> None:
+    """Refuse a stroke that stands still."""
+    if np.ptp(stroke) <= 1e-9:
+        name = Setting("columns", {"stroke": ...})
+        raise ArgumentError(
+            f"{where}: the stroke is constant ({stroke[0]:.6g} m), so there is no motion to learn from. Is it the "
+            f"right column? Name it with {name}.",
+            name,
+        )
+
+
+def check_count(count: int, where: str) -> None:
+    """Refuse a record that is too short."""
+    if count < FEWEST:
+        raise ValueError(
+            f"{where} has only {count} samples, too few: a record needs at least {FEWEST}, better 30 per cycle."
+        )
 
 
 _EPOCH = 1e8  # seconds: a larger time counts from 1970, not from the start of the record
@@ -53,23 +200,23 @@ def regular_parts(time: Samples, where: str, lines: Sequence[int] | None = None)
     if abs(time[0]) > _EPOCH:
         notes = (f"time counts from the first sample, which the file puts at {time[0]:.3f} s",)
         time = time - time[0]
-    sampling.check_order(time, where, lines)
-    gaps = sampling.gaps(time)
-    if len(gaps) >= _MOST_PARTS:
-        sampling.refuse_gaps(time, gaps, where, lines)
-    edges = [0, *(int(gap) + 1 for gap in gaps), len(time)]
+    check_order(time, where, lines)
+    missing = gaps(time)
+    if len(missing) >= _MOST_PARTS:
+        refuse_gaps(time, missing, where, lines)
+    edges = [0, *(int(gap) + 1 for gap in missing), len(time)]
     parts = []
-    for number, (start, stop) in enumerate(pairwise(edges), 1):
-        cut = f"part {number} of {len(gaps) + 1} between gaps in time, {time[start]:.6g} to {time[stop - 1]:.6g} s"
-        parts.append(_part(time, slice(start, stop), (*notes, cut) if len(gaps) else notes))
+    for number, (start, stop) in enumerate(itertools.pairwise(edges), 1):
+        cut = f"part {number} of {len(missing) + 1} between gaps in time, {time[start]:.6g} to {time[stop - 1]:.6g} s"
+        parts.append(_part(time, slice(start, stop), (*notes, cut) if len(missing) else notes))
     return parts
 
 
 def _part(time: Samples, samples: slice, notes: tuple[str, ...]) -> Part:
     stored = time[samples]
-    if len(stored) < sampling.FEWEST or sampling.is_uniform(stored):
+    if len(stored) < FEWEST or is_uniform(stored):
         return Part(samples, stored, stored, False, notes)
-    rounded = sampling.without_rounding(stored)
+    rounded = without_rounding(stored)
     if rounded is not None:
         grid, note = rounded
         return Part(samples, stored, grid, False, (*notes, note))
@@ -80,3 +227,81 @@ def _part(time: Samples, samples: slice, notes: tuple[str, ...]) -> Part:
         f"{1 / (grid[1] - grid[0]):.6g} Hz"
     )
     return Part(samples, stored, grid, True, (*notes, note))
+
+
+_ONE_GROUP = "Export the channels of a record on one clock, in one group."
+
+
+def on_one_clock(tables: Sequence[RawTable], choice: Choice) -> list[RawTable]:
+    """The tables of a file; those that hold only the stroke and only the force as one, on the clock with more samples.
+
+    The other channels are interpolated by cubics over the time that both clocks cover. Files with a table that has
+    both, and tables without a column "time" in seconds, stay as they are.
+
+    Raises:
+        ValueError: several tables could belong together, a clock has gaps, or both do not run at the same time.
+    """
+    motion = "velocity" if choice.stroke_from_velocity else "stroke"
+    moved = [table for table in tables if is_record(table, choice, (motion,))]
+    loaded = [table for table in tables if is_record(table, choice, ("force",))]
+    apart = [*moved, *loaded]
+    clocks = list(itertools.chain.from_iterable(map(_clocks, apart)))
+    have_both = any(table in loaded for table in moved)
+    if not moved or not loaded or have_both or len(clocks) < len(apart):
+        return list(tables)
+    names = f"the {motion} in {_records(moved)} and the force in {_records(loaded)}"
+    if len(apart) > 2:
+        raise ArgumentError(
+            f"{apart[0].file}: which groups of different clocks belong together is not clear: {names}. {_ONE_GROUP}"
+        )
+    instants, note = _common_instants(apart, clocks, names)
+    return [_together(apart, clocks, instants, note), *(table for table in tables if table not in apart)]
+
+
+def _together(tables: Sequence[RawTable], clocks: Sequence[Samples], instants: Samples, note: str) -> RawTable:
+    """The channels of tables at the same instants."""
+    columns = [RawColumn("time", instants, "s")]
+    for table, clock in zip(tables, clocks, strict=True):
+        columns += [_at(instants, clock, column) for column in _numbers(table)]
+    return RawTable(tables[0].file, tuple(columns), notes=(note,))
+
+
+def _common_instants(tables: Sequence[RawTable], clocks: Sequence[Samples], names: str) -> tuple[Samples, str]:
+    """The instants of the finest clock that all clocks cover, and a note."""
+    for table, clock in zip(tables, clocks, strict=True):
+        check_order(clock, table.where)
+        if gaps(clock).size:
+            raise ArgumentError(f"{table.where}: the clock has gaps, over which nothing is interpolated. {_ONE_GROUP}")
+    start, stop = max(clock[0] for clock in clocks), min(clock[-1] for clock in clocks)
+    finest = max(clocks, key=lambda clock: len(clock) / (clock[-1] - clock[0]))
+    common = finest[(finest >= start) & (finest <= stop)]
+    if len(common) < FEWEST:
+        raise ArgumentError(f"{tables[0].file}: the clocks of {names} hardly overlap. {_ONE_GROUP}")
+    return common, (
+        f"{names}, on different clocks: brought onto that of {1 / np.median(np.diff(finest)):.4g} Hz by cubics, "
+        f"from {start:.4g} to {stop:.4g} s, which both cover"
+    )
+
+
+def _records(tables: Sequence[RawTable]) -> str:
+    return ", ".join(repr(table.record) for table in tables)
+
+
+def _clocks(table: RawTable) -> list[Samples]:
+    return [np.asarray(column.values) for column in table.columns if (column.name, column.unit) == ("time", "s")]
+
+
+def _numbers(table: RawTable) -> list[RawColumn]:
+    """The channels beside the clock that hold numbers without faults."""
+    columns = [c for c in table.columns if c.name != "time" and not c.is_text and not c.faults]
+    return [c for c in columns if np.all(np.isfinite(np.asarray(c.values)))]
+
+
+def _at(common: np.ndarray, clock: np.ndarray, column: RawColumn) -> RawColumn:
+    """A channel at the instants of another clock."""
+    from scipy.interpolate import CubicSpline  # takes a second to import, and few files need it
+
+    values = np.asarray(column.values)
+    inside = (clock >= common[0]) & (clock <= common[-1])
+    same = np.array_equal(clock[inside], common)
+    return RawColumn(column.name, values[inside] if same else CubicSpline(clock, values)(common), column.unit)

@@ -9,11 +9,10 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench.gains import gain_conversion
 from jaxdamp.bench.problems import Problems
 from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.stamps import is_stamp
-from jaxdamp.bench.units import SI, USUAL, Conversion, conversion, named_conversion, ratio
+from jaxdamp.bench.units import SI, USUAL, Conversion, conversion, gain_conversion, named_conversion, ratio
 
 
 ROLES = tuple(SI)
@@ -79,9 +78,9 @@ def _tail_unit(name: str, role: str) -> tuple[str, Conversion] | None:
     """The unit behind an underscore or a space, the longest that is one: "v_mm_s" is mm/s."""
     pieces = re.split(r"[_\s]+", name)
     for start in range(1, len(pieces)):
-        found = conversion(role, "_".join(pieces[start:]))
-        if found is not None:
-            return "_".join(pieces[:start]), found
+        unit = conversion(role, "_".join(pieces[start:]))
+        if unit is not None:
+            return "_".join(pieces[:start]), unit
     return None
 
 
@@ -102,14 +101,12 @@ def role_of(header: str, unit: str = "") -> str | None:
     words = _words(name.removesuffix(signal))
     if _NOT_MEASURED.intersection(words):
         return None
-    long = [role for word in reversed(words) for role in ROLES if len(word) > 1 and word in _WORDS[role]]
-    short = [role for role in ROLES if words and words[0] in _WORDS[role] and len(words[0]) == 1]
-    fitting = [
-        role for role in long + short if (conversion(role, written) if written else _tail_unit(name, role)) is not None
-    ]
-    if fitting:
-        return fitting[0]
-    return (long + (short if len(words) <= 2 else []) or [None])[0]
+    by_words = [role for word in reversed(words) for role in ROLES if len(word) > 1 and word in _WORDS[role]]
+    by_letter = [role for role in ROLES if words and words[0] in _WORDS[role] and len(words[0]) == 1]
+    for role in by_words + by_letter:
+        if (conversion(role, written) if written else _tail_unit(name, role)) is not None:
+            return role
+    return next(iter(by_words + (by_letter if len(words) <= 2 else [])), None)
 
 
 @dataclass(frozen=True)
@@ -165,27 +162,27 @@ def find_columns(table: RawTable, choice: Choice) -> tuple[dict[str, Column], tu
             numbers,
             names,
         )
-    found, notes, problems = {}, [], Problems()
+    columns, notes, problems = {}, [], Problems()
     for role in ROLES:
         with problems.collected():
             try:
                 column, more = _column(table, role, choice)
             except ArgumentError as error:
                 if role in REQUIRED or role == "time" or choice.asks_for(role):
-                    found[role] = None  # there is one, but it is at fault
+                    columns[role] = None  # there is one, but it is at fault
                     raise
                 notes.append(f"{role} left out: {error}")
                 continue
             notes += more
             if column is not None:
-                found[role] = column
-    integrated = choice.stroke_from_velocity and "stroke" not in found
+                columns[role] = column
+    integrated = choice.stroke_from_velocity and "stroke" not in columns
     for role in ("velocity", "force") if integrated else REQUIRED:
         with problems.collected():
-            if role not in found:
-                _refuse_missing(table, role, found)
+            if role not in columns:
+                _refuse_missing(table, role, columns)
     problems.raise_any()
-    return found, tuple(notes)
+    return columns, tuple(notes)
 
 
 def is_record(table: RawTable, choice: Choice, roles: Sequence[str] = REQUIRED) -> bool:
@@ -246,17 +243,17 @@ def _candidates(table: RawTable, role: str, choice: Choice) -> list[int]:
 
 
 def _named(table: RawTable, role: str, choice: Choice) -> tuple[int | None, list[str]]:
-    hits = _candidates(table, role, choice)
-    stamped = [i for i, column in enumerate(table.columns) if column.is_text and _is_clock(column)]
-    if role == "time" and not hits:
-        hits = stamped
+    hits, stamped = _candidates(table, role, choice), []
+    if role == "time":
+        stamped = [i for i, column in enumerate(table.columns) if column.is_text and _is_clock(column)]
+        hits = hits or stamped
     if len(hits) < 2:
-        return (hits[0] if hits else None), []
-    fitting = [i for i in hits if _fits(table.columns[i], role, choice) or (role == "time" and i in stamped)]
+        return next(iter(hits), None), []
+    fitting = [i for i in hits if i in stamped or _fits(table.columns[i], role, choice)]
     names = [table.names[i] for i in hits]
     if len(fitting) == 1:
-        rest = " and ".join(repr(table.names[i]) for i in hits if i != fitting[0])
-        return fitting[0], [f"{role} from {table.names[fitting[0]]!r} rather than {rest}, by their units"]
+        others = " and ".join(repr(table.names[i]) for i in hits if i != fitting[0])
+        return fitting[0], [f"{role} from {table.names[fitting[0]]!r} rather than {others}, by their units"]
     choose = Setting("columns", {role: names[0] if names.count(names[0]) == 1 else hits[0]})
     raise ArgumentError(
         f"{table.where}: the columns {' and '.join(map(repr, names))} could all be the {role}. Choose one: {choose}.",
@@ -317,14 +314,14 @@ def _signal(name: str) -> str:
     return tail if tail and ratio(tail, "V") is not None else ""
 
 
-def _refuse_missing(table: RawTable, role: str, found: Mapping[str, Column | None]) -> NoReturn:
+def _refuse_missing(table: RawTable, role: str, columns: Mapping[str, Column | None]) -> NoReturn:
     """Refuse a table without a stroke or a force; propose a column that is no other quantity."""
     said = f"{table.where} has no column for the {role}: its columns are {', '.join(map(repr, table.names))}"
-    settings = (Setting("stroke_from_velocity", True),) if role == "stroke" and found.get("velocity") else ()
+    settings = (Setting("stroke_from_velocity", True),) if role == "stroke" and columns.get("velocity") else ()
     other = f" Or integrate the velocity, if the law needs no place of the stroke: {settings[0]}." if settings else ""
-    if settings and "time" not in found:
+    if settings and "time" not in columns:
         other = f" Points of a force-velocity curve are no record but a law: dampers.Table (docs/reading.md).{other}"
-    taken = {column.index for column in found.values() if column is not None}
+    taken = {column.index for column in columns.values() if column is not None}
     left = [i for i, column in enumerate(table.columns) if i not in taken and not column.is_text]
     free = [i for i in left if not _is_other(table.columns[i], role)]
     if not free:

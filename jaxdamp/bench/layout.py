@@ -1,12 +1,16 @@
-"""How rows of text cells are laid out: delimiter, preamble, header, units, rows of numbers and lines behind them."""
+"""How rows of text cells are laid out, and their columns as numbers: delimiter, header, units, decimal signs."""
 
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
+from jaxdamp.bench.raw import RawColumn
 from jaxdamp.bench.stamps import is_stamp
 from jaxdamp.bench.units import is_unit
 
@@ -67,6 +71,12 @@ class Layout:
         """How many columns of the record hold a number or a time stamp in this row; 0 if its width is another."""
         return sum(self.has_value(cells[i]) for i in self.full) if len(cells) == self.count else 0
 
+    def words(self, cells: list[str]) -> list[str]:
+        """The cells of a row of this width that holds words and no number, such as a header; empty for another row."""
+        cells = _join_units(cells) if self.delimiter == " " else cells
+        is_header = len(cells) == self.count and any(cells) and not any(map(self.has_value, cells))
+        return cells if is_header else []
+
     def is_row(self, cells: Sequence[str]) -> bool:
         """Whether this is a row of the record, with perhaps a value that is wrong."""
         return 2 * self.values_in(cells) > len(self.full) or self.values_in(cells) >= 2
@@ -74,24 +84,30 @@ class Layout:
 
 def layout_of(rows: Rows, delimiter: str) -> Layout | None:
     """The layout of rows divided at this delimiter, or None if they hold no numbers."""
-    kept = []
+    cells, numbers, values = _rows_of_one_width(rows, delimiter)
+    if not cells:
+        return None
+    filled = np.array([[bool(cell) for cell in row] for row in cells])
+    full = np.flatnonzero(values.sum(axis=0) >= _NUMERIC * len(cells))
+    numeric = np.flatnonzero(2 * numbers.sum(axis=0) > filled.sum(axis=0))
+    digits = sum(sum(map(str.isdigit, cells[row][column])) for row, column in np.argwhere(values))
+    return (
+        Layout(delimiter, len(cells[0]), tuple(full.tolist()), tuple(numeric.tolist()), digits) if len(full) else None
+    )
+
+
+def _rows_of_one_width(rows: Rows, delimiter: str) -> tuple[list[list[str]], np.ndarray, np.ndarray]:
+    """The rows with numbers that have the most frequent width, and which of their cells are numbers, and values."""
+    chosen = []
     for _, cells in rows:
         numbers = [number(cell, delimiter) is not None for cell in cells]
-        values = [yes or is_stamp(cell) for yes, cell in zip(numbers, cells, strict=True)]
+        values = [is_number or is_stamp(cell) for is_number, cell in zip(numbers, cells, strict=True)]
         if any(numbers) and sum(values) >= min(2, len(cells)):
-            kept.append((cells, numbers, values))
-    if not kept:
-        return None
-    count = Counter(len(cells) for cells, _, _ in kept).most_common(1)[0][0]
-    kept = [row for row in kept if len(row[0]) == count]
-    columns = range(count)
-    full = tuple(i for i in columns if sum(values[i] for _, _, values in kept) >= _NUMERIC * len(kept))
-    filled = [sum(bool(cells[i]) for cells, _, _ in kept) for i in columns]
-    numeric = tuple(i for i in columns if 2 * sum(numbers[i] for _, numbers, _ in kept) > filled[i])
-    digits = (
-        sum(map(str.isdigit, cell)) for cells, _, values in kept for cell, yes in zip(cells, values, strict=True) if yes
-    )
-    return Layout(delimiter, count, full, numeric, sum(digits)) if full else None
+            chosen.append((cells, numbers, values))
+    widths = Counter(len(cells) for cells, _, _ in chosen)
+    width = widths.most_common(1)[0][0] if widths else 0
+    chosen = [row for row in chosen if len(row[0]) == width]
+    return [row[0] for row in chosen], np.array([row[1] for row in chosen]), np.array([row[2] for row in chosen])
 
 
 class Header(NamedTuple):
@@ -113,21 +129,27 @@ def header_of(rows: Rows, layout: Layout) -> Header | None:
     first = next(complete, None)
     if first is None:
         return None
-    heads = []
-    for i, (_, cells) in enumerate(rows[:first]):
-        cells = _join_units(cells) if layout.delimiter == " " else cells
-        if len(cells) == layout.count and any(cells) and not any(map(layout.has_value, cells)):
-            heads.append((i, cells))
-    names, units, top, end = [""] * layout.count, [""] * layout.count, first, 0
-    if heads:
-        (top, names), end = heads[-1], heads[-1][0] + 1
-        named = [cell.strip("[](){} ") for cell in names]
-        above = len(heads) > 1 and heads[-2][0] == top - 1
-        if above and any(named) and all(not u or u == "-" or is_unit(u) for u in named):
-            units, (top, names) = ["" if u == "-" else u for u in named], heads[-2]
+    words = [(i, cells) for i, (_, row) in enumerate(rows[:first]) if (cells := layout.words(row))]
+    end = words[-1][0] + 1 if words else 0
     while first > end and layout.is_row(rows[first - 1][1]):  # rows at the start with a value that is wrong
         first -= 1
-    return Header(tuple(names), tuple(units), top if heads else first, first)
+    empty = ("",) * layout.count
+    if not words:
+        return Header(empty, empty, first, first)
+    top, names = words[-1]
+    units = _units(names)
+    if units and len(words) > 1 and words[-2][0] == top - 1:
+        above, names = words[-2]
+        return Header(tuple(names), units, above, first)
+    return Header(tuple(names), empty, top, first)
+
+
+def _units(cells: Sequence[str]) -> tuple[str, ...]:
+    """The units in a row that holds nothing else; empty if it holds something else."""
+    bare = [cell.strip("[](){} ") for cell in cells]
+    if not any(bare) or not all(unit in ("", "-") or is_unit(unit) for unit in bare):
+        return ()
+    return tuple("" if unit == "-" else unit for unit in bare)
 
 
 def _join_units(cells: list[str]) -> list[str]:
@@ -139,3 +161,95 @@ def _join_units(cells: list[str]) -> list[str]:
         else:
             joined.append(cell)
     return joined
+
+
+# A number with a comma that cannot divide thousands.
+PLAIN_COMMA = re.compile(r"(?<![\d,])0\d*,\d|\d,(\d{1,2}|\d{4,})(?!\d)|\d{4},\d|,\d+[eEdD]|\d,(?!\d)|(?<!\d),\d")
+
+
+def columns_of(
+    file: Path, numbers: Sequence[int], chunks: Iterable[Sequence[Sequence[str]]], layout: Layout
+) -> list[RawColumn]:
+    """The columns of rows of cells: numbers, what stands in their place, and text.
+
+    Arguments:
+        file: for messages.
+        numbers: number of the line of each row.
+        chunks: the rows, some at a time.
+        layout: which columns hold numbers.
+
+    Raises:
+        ValueError: a row of another width, or two decimal signs.
+    """
+    signs = _DecimalSigns(file, layout, numbers)
+    parts: list[list[np.ndarray]] = [[] for _ in range(layout.count)]
+    faults: list[dict[int, str]] = [{} for _ in range(layout.count)]
+    start = 0
+    for rows in chunks:
+        _check_widths(file, numbers, rows, start, layout.count)
+        for index, cells in enumerate(zip(*rows, strict=True)):
+            if index in layout.numeric:
+                signs.check(cells, start)
+                values, wrong = _numbers(cells, layout.delimiter)
+                faults[index] |= {start + row: text for row, text in wrong.items()}
+            else:
+                values = np.array(cells, dtype=object)
+            parts[index].append(values)
+        start += len(rows)
+    signs.finish()
+    return [RawColumn("", np.concatenate(p), faults=f) for p, f in zip(parts, faults, strict=True)]
+
+
+def _check_widths(file: Path, numbers: Sequence[int], rows: Sequence[Sequence[str]], start: int, count: int) -> None:
+    for row, cells in enumerate(rows, start):
+        if len(cells) != count:
+            raise ValueError(
+                f"{file}, line {numbers[row]}: {len(cells)} values where the file has {count} columns "
+                f"({list(cells[:6])}): mend or remove the line; a record must have no missing values."
+            )
+
+
+def _numbers(cells: Sequence[str], delimiter: str) -> tuple[np.ndarray, dict[int, str]]:
+    """The numbers in cells, NaN where there is none, and what stands there instead."""
+    try:
+        if all(map(str.isascii, cells)) and not any("_" in cell for cell in cells):
+            return np.array(list(map(float, cells))), {}
+    except ValueError:
+        pass
+    values = [number(cell, delimiter) for cell in cells]
+    wrong = {row: cells[row] for row, value in enumerate(values) if value is None}
+    return np.array([np.nan if value is None else value for value in values]), wrong
+
+
+class _DecimalSigns:
+    """Refuses a file whose numbers have decimal points and decimal commas."""
+
+    def __init__(self, file: Path, layout: Layout, numbers: Sequence[int]) -> None:
+        self.file, self.active, self.numbers = file, layout.delimiter != ",", numbers
+        self.first: dict[str, tuple[int, str]] = {}
+        self.plain = False  # whether a comma cannot divide thousands
+
+    def check(self, cells: Sequence[str], start: int) -> None:
+        """Look at the numbers of a column; `start` is the row of the first."""
+        if not self.active:
+            return
+        self.plain = self.plain or any("," in cell and PLAIN_COMMA.search(cell) for cell in cells)
+        for sign in ".,":
+            row = next((row for row, cell in enumerate(cells) if sign in cell and NUMBER.match(cell)), None)
+            if row is not None:
+                self.first.setdefault(sign, (self.numbers[start + row], cells[row]))
+        if len(self.first) == 2:
+            (line, text), (other, comma) = self.first["."], self.first[","]
+            raise ValueError(
+                f"{self.file}, line {other}: {comma!r} has a comma, {text!r} in line {line} a point. One of the two "
+                "may divide thousands: export the file with one decimal sign and without a sign for thousands."
+            )
+
+    def finish(self) -> None:
+        """Refuse commas that may all divide thousands."""
+        if "," in self.first and not self.plain:
+            line, text = self.first[","]
+            raise ValueError(
+                f"{self.file}, line {line}: the comma in {text!r} may be a decimal sign or divide thousands, and no "
+                "other number of the file tells which: export it with decimal points."
+            )

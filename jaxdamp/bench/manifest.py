@@ -11,20 +11,28 @@ from jaxdamp._documents import read_toml
 
 NAME = "jaxdamp.toml"
 TABLES = ("columns", "units", "gains")
-KEYS = ("sign", "force_sign", "sampling_rate", "delimiter", "command", "settings", "files", "test")
-KEYS += ("stroke_from_velocity", *TABLES)
-_KINDS = {
-    "sign": str,
-    "force_sign": str,
-    "delimiter": str,
-    "test": str,
+Kinds = Mapping[str, tuple[type, ...]]  # key of a manifest to what it may be
+BENCH_KEYS: Kinds = {
+    "sign": (str,),
+    "force_sign": (str,),
     "sampling_rate": (int, float),
+    "delimiter": (str,),
     "command": (int, float, str, dict),
     "settings": (str, dict),
-    "files": list,
-    "stroke_from_velocity": bool,
+    "files": (list,),
+    "test": (str,),
+    "stroke_from_velocity": (bool,),
+    **dict.fromkeys(TABLES, (dict,)),
 }
-_KIND_NAMES = {"dict": "table", "str": "text", "bool": "true or false"}
+RIDE_KEYS: Kinds = {
+    "columns": (dict,),
+    "road": (str, int, list),
+    "units": (dict,),
+    "reversed_channels": (list,),
+    "sampling_rate": (int, float),
+    "delimiter": (str,),
+}
+_KIND_NAMES = {"dict": "table", "str": "text", "bool": "true or false", "int": "whole number", "float": "number"}
 
 
 def find_manifest(manifest: str | os.PathLike[str] | bool, paths: Sequence[str | os.PathLike[str]]) -> Path | None:
@@ -47,30 +55,30 @@ def find_manifest(manifest: str | os.PathLike[str] | bool, paths: Sequence[str |
     raise FileNotFoundError(f"There is no manifest {os.fspath(manifest)!r}{places}.")
 
 
-def read_manifest(file: Path) -> dict[str, Any]:
-    """The arguments of `bench.read` that a manifest holds, and its `files` and `test`.
+def read_manifest(file: Path, keys: Kinds) -> dict[str, Any]:
+    """The arguments that a manifest holds.
+
+    Arguments:
+        file: the manifest.
+        keys: what it may hold.
 
     Raises:
         ValueError: no TOML, an unknown key, or a value of the wrong kind, naming file and key.
     """
-    given = read_toml(file)
-    for key, value in given.items():
-        if key not in KEYS:
-            near = _checks.nearest(key, KEYS)
+    stated = read_toml(file)
+    for key, value in stated.items():
+        if key not in keys:
+            near = _checks.nearest(key, keys)
             hint = f" Did you mean {near!r}?" if near else ""
-            raise ValueError(f"{file}: unknown key {key!r}; there are {', '.join(KEYS)}.{hint}")
-        kinds = _KINDS.get(key, dict)
-        if not isinstance(value, kinds) or (isinstance(value, bool) and kinds is not bool):
-            names = " or ".join(_KIND_NAMES.get(k.__name__, k.__name__) for k in _as_tuple(kinds))
-            article = "" if kinds is bool else "a "
+            raise ValueError(f"{file}: unknown key {key!r}; there are {', '.join(keys)}.{hint}")
+        kinds = keys[key]
+        if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
+            names = " or ".join(_KIND_NAMES.get(kind.__name__, kind.__name__) for kind in kinds)
+            article = "" if kinds == (bool,) else "a "
             raise ValueError(f"{file}: {key} must be {article}{names}, but is {_checks.described(value)}.")
-    if "columns" in given:  # TOML has no None
-        given["columns"] = {role: None if name is False else name for role, name in given["columns"].items()}
-    return given
-
-
-def _as_tuple(kinds: Any) -> tuple[type, ...]:
-    return kinds if isinstance(kinds, tuple) else (kinds,)
+    if "columns" in stated:  # TOML has no None
+        stated["columns"] = {role: None if name is False else name for role, name in stated["columns"].items()}
+    return stated
 
 
 def merged(manifest: Mapping[str, Any], arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -82,6 +90,7 @@ def merged(manifest: Mapping[str, Any], arguments: Mapping[str, Any]) -> dict[st
         elif value is not None or key not in out:
             out[key] = value
     if "test" in manifest:
-        rest = out["settings"] or {}
-        out["settings"] = {"*": {"test": manifest["test"]}, **({rest: {}} if isinstance(rest, str) else rest)}
+        settings = out["settings"] or {}
+        settings = {settings: {}} if isinstance(settings, str) else settings
+        out["settings"] = {"*": {"test": manifest["test"]}, **settings}
     return out

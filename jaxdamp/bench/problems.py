@@ -54,6 +54,6 @@ class Several(ArgumentError):
 
     def __init__(self, errors: Sequence[Exception], remedy: str = "", *settings: Setting) -> None:
         lines = [f"  {number}. {error}" for number, error in enumerate(errors, 1)] + [remedy] * bool(remedy)
-        own = [setting for error in errors for setting in getattr(error, "settings", ())]
-        super().__init__("\n".join([f"{len(errors)} problems:", *lines]), *own, *settings)
+        named = [setting for error in errors for setting in getattr(error, "settings", ())]
+        super().__init__("\n".join([f"{len(errors)} problems:", *lines]), *named, *settings)
         self.errors = tuple(errors)

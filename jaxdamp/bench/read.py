@@ -1,30 +1,37 @@
-"""Bench files in, records in SI and one sign convention out."""
+"""Files in, records in SI and one sign convention out: of a bench, or of a vehicle on a road or a rig."""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from jaxdamp import _checks
 from jaxdamp._checks import Setting
-from jaxdamp._files import find_files
+from jaxdamp._files import FOLDER_SUFFIXES, find_files
 from jaxdamp.bench import sign as signs
+from jaxdamp.bench.bench_tables import Interpretation, bench_runs
+from jaxdamp.bench.clock import on_one_clock
 from jaxdamp.bench.columns import Choice, is_record
-from jaxdamp.bench.manifest import find_manifest, merged, read_manifest
+from jaxdamp.bench.manifest import BENCH_KEYS, RIDE_KEYS, find_manifest, merged, read_manifest
 from jaxdamp.bench.problems import Problems
 from jaxdamp.bench.raw import RawTable
-from jaxdamp.bench.readers import Reader, folder_suffixes, read_tables, with_own
-from jaxdamp.bench.record import Interpretation, records
+from jaxdamp.bench.readers import Reader, read_tables, with_own
+from jaxdamp.bench.ride_record import RideRecord
+from jaxdamp.bench.ride_tables import RideInterpretation, ride_record
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.settings import Settings, settings_by_name
-from jaxdamp.bench.several_clocks import on_one_clock
+
+
+Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
+_Record = TypeVar("_Record")
+Command = float | int | str | Mapping[str, float | int]
 
 
 def read(
-    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    paths: Paths,
     *,
     sign: str | None = None,
     force_sign: str | None = None,
@@ -33,7 +40,7 @@ def read(
     gains: Mapping[str, str] | None = None,
     sampling_rate: float | int | None = None,
     delimiter: str | None = None,
-    command: float | int | str | Mapping[str, float | int] | None = None,
+    command: Command | None = None,
     settings: str | Mapping[str, Settings] | None = None,
     manifest: str | os.PathLike[str] | bool = True,
     readers: Mapping[str, Reader] | None = None,
@@ -106,10 +113,10 @@ def read(
         "settings": settings,
         "stroke_from_velocity": stroke_from_velocity,
     }
-    own_readers, note = with_own(readers), ()
+    all_readers, note = with_own(readers), ()
     file = find_manifest(manifest, asked)
     if file is not None:
-        stated = read_manifest(file)
+        stated = read_manifest(file, BENCH_KEYS)
         given, note = merged(stated, given), (f"read as the manifest {file} says",)
         asked = _files_of(asked, stated)
     signs.check_words(given["sign"], given["force_sign"])
@@ -118,10 +125,89 @@ def read(
     tables = ({**(given[name] or {})} for name in ("columns", "units", "gains"))
     choice = Choice(*tables, stroke_from_velocity=bool(given["stroke_from_velocity"]))
     how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"])
-    files = find_files(asked, folder_suffixes(readers))
-    runs, left_out = _read_files(files, own_readers, given["delimiter"], how, skip_bad)
+    files = find_files(asked, {*FOLDER_SUFFIXES, *(readers or {})})
+    runs, errors = _read_files(
+        files, all_readers, given["delimiter"], lambda tables, name: _bench_runs(tables, name, how)
+    )
+    if errors and not (skip_bad and runs):
+        ways, count = Setting("skip_bad", True), len(files) - len(errors)
+        others = "The other file" if count == 1 else f"The other {count} files"
+        _raise(errors, f"{others} can be read: {ways} leaves out what cannot." if runs else "", ways)
     runs = [(base, replace(run, notes=(*run.notes, *note))) for base, run in runs]
-    return BenchSet(_commanded(_with_settings(runs, given["settings"]), given["command"]), left_out)
+    return BenchSet(_commanded(_with_settings(runs, given["settings"]), given["command"]), tuple(map(str, errors)))
+
+
+def read_rides(
+    paths: Paths,
+    *,
+    columns: Mapping[str, str | int] | None = None,
+    road: Sequence[str | int] | str | int | None = None,
+    units: Mapping[str, str] | None = None,
+    reversed_channels: Sequence[str] | None = None,
+    sampling_rate: float | int | None = None,
+    delimiter: str | None = None,
+    manifest: str | os.PathLike[str] | None = None,
+    readers: Mapping[str, Reader] | None = None,
+) -> tuple[RideRecord, ...]:
+    r"""Read records of a vehicle on a road or a rig, from text files and all formats of `read`.
+
+    Each column needs a unit, in its header (`body acc [g]`), in a row under it, or in `units`. Nothing is guessed.
+
+    Arguments:
+        paths: a file, several, a pattern, or a folder.
+        columns: name of the channel of the vehicle to header or number (from 0) of its column, such as
+            `{"sprung_acceleration": "acc body", "stroke": "LVDT FL"}`. Left out, every column is a channel of the name
+            in its header.
+        road: headers or numbers of the columns with the height under each wheel, or the force on it, in the order of
+            `vehicle.wheel_names`; left out, the column "road", or "road 1", "road 2" and so on.
+        units: channel, "time" or "road" to its unit, where the header has none or a wrong one.
+        reversed_channels: channels (or "road") that the file counts positive downwards or in compression.
+        sampling_rate: samples per second [Hz], for files without the column "time".
+        delimiter: the character between columns of text files, if the search fails.
+        manifest: TOML file with these arguments; those of the call take precedence.
+        readers: suffix to function that reads such files, as in `read`.
+
+    Returns:
+        The records, named after their files.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: naming file, column and remedy; all problems of all files at once.
+
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> file = Path(tempfile.mkdtemp()) / "sweep.csv"
+    >>> rows = [f"{i / 100},{5 * np.sin(0.3 * i)},{0.1 * np.cos(0.3 * i)}" for i in range(100)]
+    >>> _ = file.write_text("\n".join(["time [s],road [mm],sprung_acceleration [g]", *rows]))
+    >>> record = read_rides(file)[0]
+    >>> record.units["sprung_acceleration"], round(float(record["sprung_acceleration"][0]), 6)
+    ('m/s^2', 0.980665)
+    """
+    asked: list[str | os.PathLike[str]] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
+    given: dict[str, Any] = {
+        "columns": columns,
+        "road": road,
+        "units": units,
+        "reversed_channels": reversed_channels,
+        "sampling_rate": sampling_rate,
+        "delimiter": delimiter,
+    }
+    file = None if manifest is None else find_manifest(manifest, asked)
+    stated = {} if file is None else read_manifest(file, RIDE_KEYS)
+    given = {key: stated.get(key) if value is None else value for key, value in given.items()}
+    if given["sampling_rate"] is not None:
+        _checks.positive("sampling_rate", given["sampling_rate"])
+    delimiter, files = given.pop("delimiter"), find_files(asked, {*FOLDER_SUFFIXES, *(readers or {})})
+    how = RideInterpretation(**given)
+    records, errors = _read_files(
+        files,
+        with_own(readers),
+        delimiter,
+        lambda tables, name: [ride_record(table, base, how) for table, base in _named(tables, name)],
+    )
+    _raise(errors)
+    return tuple(records)
 
 
 def _files_of(asked: list[str | os.PathLike[str]], manifest: Mapping[str, Any]) -> list[str | os.PathLike[str]]:
@@ -132,22 +218,28 @@ def _files_of(asked: list[str | os.PathLike[str]], manifest: Mapping[str, Any]) 
 
 
 def _read_files(
-    files: Sequence[Path], readers: Mapping[str, Reader], delimiter: str | None, how: Interpretation, skip_bad: bool
-) -> tuple[list[tuple[str, BenchRun]], tuple[str, ...]]:
-    """The records of all files, each with its name before it was cut at gaps, and what was left out and why."""
-    runs, errors, problems = [], [], Problems()
+    files: Sequence[Path],
+    readers: Mapping[str, Reader],
+    delimiter: str | None,
+    records: Callable[[Sequence[RawTable], str], list[_Record]],
+) -> tuple[list[_Record], list[Exception]]:
+    """The records of all files that can be read, and what was wrong with the others."""
+    good, errors = [], []
     for file, name in zip(files, _names(files), strict=True):
         try:
-            runs += _read_file(read_tables(file, readers, delimiter), name, how)
+            good += records(read_tables(file, readers, delimiter), name)
         except (ValueError, OSError, ImportError) as error:
             errors.append(error)
-    for error in errors if not skip_bad or not runs else ():
+    return good, errors
+
+
+def _raise(errors: Sequence[Exception], remedy: str = "", *settings: Setting) -> None:
+    """Raise all errors as one, if there are any."""
+    problems = Problems()
+    for error in errors:
         with problems.collected():
             raise error
-    setting, count = Setting("skip_bad", True), len(files) - len(errors)
-    others = "The other file" if count == 1 else f"The other {count} files"
-    problems.raise_any(f"{others} can be read: {setting} leaves out what cannot." if runs else "", setting)
-    return runs, tuple(map(str, errors))
+    problems.raise_any(remedy, *settings)
 
 
 def _names(files: Sequence[Path]) -> list[str]:
@@ -158,17 +250,24 @@ def _names(files: Sequence[Path]) -> list[str]:
     return [f"{n} ({f.suffix[1:]})" if names.count(n) > 1 else n for f, n in zip(files, names, strict=True)]
 
 
-def _read_file(tables: Sequence[RawTable], name: str, how: Interpretation) -> list[tuple[str, BenchRun]]:
-    """The records of a file. Tables without stroke and force are left out of a file that has others, with a note."""
+def _named(tables: Sequence[RawTable], name: str) -> list[tuple[RawTable, str]]:
+    """Each table with the name of its record: that of the file, and its own where the file holds several."""
+    return [(table, f"{name}/{table.record}" if len(tables) > 1 else name) for table in tables]
+
+
+def _bench_runs(tables: Sequence[RawTable], name: str, how: Interpretation) -> list[tuple[str, BenchRun]]:
+    """The records of a file, each with its name before it was cut at gaps.
+
+    Tables without stroke and force are left out of a file that has others, with a note.
+    """
     tables = on_one_clock(tables, how.choice) if len(tables) > 1 else tables
     good = [table for table in tables if is_record(table, how.choice)] or tables
-    rest = ", ".join(repr(table.record) for table in tables if table not in good)
-    note = (f"{rest} of the file left out: neither stroke nor force",) if rest else ()
+    left_out = ", ".join(repr(table.record) for table in tables if table not in good)
+    note = (f"{left_out} of the file left out: neither stroke nor force",) if left_out else ()
     runs, problems = [], Problems()
-    for table in good:
-        base = f"{name}/{table.record}" if len(good) > 1 else name
+    for table, base in _named(good, name):
         with problems.collected():
-            runs += [(base, replace(run, notes=(*run.notes, *note))) for run in records(table, base, how)]
+            runs += [(base, replace(run, notes=(*run.notes, *note))) for run in bench_runs(table, base, how)]
     problems.raise_any()
     return runs
 
@@ -180,9 +279,7 @@ def _with_settings(
     return [(base, replace(run, settings={**run.settings, **table[base]})) for base, run in runs]
 
 
-def _commanded(
-    runs: list[tuple[str, BenchRun]], command: float | int | str | Mapping[str, float | int] | None
-) -> list[BenchRun]:
+def _commanded(runs: list[tuple[str, BenchRun]], command: Command | None) -> list[BenchRun]:
     """The records with the commands given."""
     if command is None:
         return [run for _, run in runs]
@@ -190,24 +287,28 @@ def _commanded(
         return [replace(run, command=_setting(run, command)) for _, run in runs]
     if not isinstance(command, Mapping):
         return [replace(run, command=command) for _, run in runs]
-    fitting = {base: [key for key in command if fnmatchcase(base, key)] for base, _ in runs}
-    unused = [key for key in command if not any(key in keys for keys in fitting.values())]
+    patterns = {base: [key for key in command if fnmatchcase(base, key)] for base, _ in runs}
+    _check_patterns(command, patterns)
+    return [replace(run, command=command[patterns[base][0]]) for base, run in runs]
+
+
+def _check_patterns(command: Mapping[str, float | int], patterns: Mapping[str, Sequence[str]]) -> None:
+    """Refuse commands for no record, and records with none or several commands."""
+    fitting = {key for keys in patterns.values() for key in keys}
+    unused = ", ".join(repr(key) for key in command if key not in fitting)
     if unused:
-        names = ", ".join(fitting)
-        _checks.refuse("command", "name records that are read", ", ".join(map(repr, unused)), f"There are {names}.")
-    doubtful = [f"{name} ({len(keys)})" for name, keys in fitting.items() if len(keys) != 1]
+        _checks.refuse("command", "name records that are read", unused, f"There are {', '.join(patterns)}.")
+    doubtful = [f"{name} ({len(keys)})" for name, keys in patterns.items() if len(keys) != 1]
     if doubtful:
         must = "fit each record with exactly one pattern"
         _checks.refuse("command", must, f"fitting otherwise for {', '.join(doubtful)}")
-    return [replace(run, command=command[fitting[base][0]]) for base, run in runs]
 
 
 def _setting(run: BenchRun, name: str) -> float:
     """The setting of a record that is its command."""
     value = run.settings.get(name)
     if not isinstance(value, int | float):
-        known = ", ".join(f"{key}={value!r}" for key, value in run.settings.items()) or "none"
-        _checks.refuse(
-            "command", f"name a setting that is a number, also of {run.name!r}", repr(name), f"Its settings: {known}."
-        )
+        settings = ", ".join(f"{key}={value!r}" for key, value in run.settings.items()) or "none"
+        must = f"name a setting that is a number, also of {run.name!r}"
+        _checks.refuse("command", must, repr(name), f"Its settings: {settings}.")
     return float(value)

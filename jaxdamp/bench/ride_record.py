@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp.bench import sampling
+from jaxdamp.bench import clock
 
 
 RIDE_MARK = "# jaxdamp ride record: heights and accelerations up, travels positive in extension"
@@ -69,16 +69,17 @@ class RideRecord:
         if not self.channels:
             remedy = "Write `channels={'sprung_acceleration': values}`."
             _checks.refuse("channels", "hold at least one measured channel", "empty", remedy)
+        _checks.untraced("channels", (self.time, self.road, dict(self.channels)))
         time, road = np.array(self.time, np.float64), np.array(self.road, np.float64)
         road = road[:, None] if road.ndim == 1 else road
-        sampling.check_count(len(time), where)
-        sampling.check_numbers(time, "time", where)
-        time, note = sampling.check_time(time, where)
+        clock.check_count(len(time), where)
+        clock.check_numbers(time, "time", where)
+        time, note = clock.check_time(time, where)
         channels = {name: np.array(values, np.float64) for name, values in self.channels.items()}
         for name, values in {ROAD: road, **channels}.items():
             if len(values) != len(time) or values.ndim != 1 + (name == ROAD):
                 _checks.refuse(name, f"have one sample for each of {len(time)} instants", f"of shape {values.shape}")
-            sampling.check_numbers(np.ravel(values), name, where)
+            clock.check_numbers(np.ravel(values), name, where)
         if not np.any(np.ptp(road, axis=0) > 0):
             remedy = "Free motion after a release has no input: give the heights while the vehicle is moved."
             _checks.refuse(ROAD, "move", f"constant in {where}", remedy)

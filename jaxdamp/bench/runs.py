@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
-from jaxdamp.bench import sampling
+from jaxdamp.bench import clock
 from jaxdamp.bench.motion import cycle_instants, cycle_works, dominant_frequency, motion_amplitude
 from jaxdamp.bench.processing import Steps, choose_cycles, cut_between, processed
 from jaxdamp.bench.velocity import estimate_velocity
@@ -27,11 +27,13 @@ NOTE_MARK = "# note: "
 COMMAND_MARK = "# command: "
 SETTINGS_MARK = "# settings: "
 INTEGRATED_MARK = "# stroke: integrated from the velocity"
+MEASURED = "A record is measured: keep it out of the arguments of `jax.jit`, and trace the law (`jaxdamp.respond`)."
 _HEADERS = {"time": "time [s]", "stroke": "stroke [m]", "velocity": "velocity [m/s]", "force": "force [N]"}
 
 
 def _column(channel: str, values: ArrayLike, count: int) -> Float[np.ndarray, " time"]:
     """A copy of a channel, of the length of the time."""
+    _checks.untraced(channel, values, MEASURED)
     column = np.array(values, dtype=np.float64)
     if column.ndim != 1 or len(column) != count:
         _checks.refuse(channel, f"be a column of as many samples as the time, {count}", f"of shape {column.shape}")
@@ -91,16 +93,16 @@ class BenchRun:
             if channel == "temperature" and self.temperature is None:
                 continue
             values = _column(channel, getattr(self, channel), len(self.time))
-            sampling.check_numbers(values, channel, where)
+            clock.check_numbers(values, channel, where)
             values.setflags(write=False)
             object.__setattr__(self, channel, values)
         if self.command is not None:
             _checks.finite("command", np.asarray(self.command))
             object.__setattr__(self, "command", float(self.command))
         object.__setattr__(self, "notes", tuple(self.notes))
-        sampling.check_count(len(self.time), where)
-        sampling.check_time(self.time, where)
-        sampling.check_stroke(self.stroke, where)
+        clock.check_count(len(self.time), where)
+        clock.check_time(self.time, where)
+        clock.check_stroke(self.stroke, where)
 
     @classmethod
     def from_arrays(

@@ -30,9 +30,9 @@ def settings_by_name(names: Sequence[str], given: str | Mapping[str, Settings] |
     >>> settings_by_name(["5mm_0.5A", "5mm_1A"], "*_{current}A")
     {'5mm_0.5A': {'current': 0.5}, '5mm_1A': {'current': 1.0}}
     """
-    found: dict[str, dict] = {name: {} for name in names}
+    settings: dict[str, dict] = {name: {} for name in names}
     if given is None:
-        return found
+        return settings
     table = {given: {}} if isinstance(given, str) else given
     must = 'map patterns to settings, such as {"*_hot": {"temperature": 80}}, or be a pattern such as "*_{current}A"'
     _checks.instance("settings", table, Mapping, must)
@@ -47,8 +47,8 @@ def settings_by_name(names: Sequence[str], given: str | Mapping[str, Settings] |
                 "settings", "have patterns that fit the records", repr(pattern), f"It does not fit {records}."
             )
         for name, match in fitting.items():
-            _add(found[name], {**values, **{key: _value(text) for key, text in match.groupdict().items()}}, name)
-    return found
+            _add(settings[name], {**values, **{key: _value(text) for key, text in match.groupdict().items()}}, name)
+    return settings
 
 
 def _expression(pattern: str) -> re.Pattern[str]:
@@ -92,24 +92,27 @@ def settings_apart(runs: Sequence[BenchRun]) -> tuple[dict[str, str], str]:
         return {}, ""
     begin = f"{len(apart)} of {alike} pairs of records of the same motion differ in force: "
     remedy = "State what was set as `command`."
-    stated = [
-        (f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs})
-        for key in runs[0].settings
-        if all(key in run.settings for run in runs)
+    kinds = [
+        (what, settings)
+        for what, settings in _candidates(runs)
+        if all(settings[first] != settings[second] for first, second in apart)
+        and (len(set(settings.values())) < len(runs) or len(runs) == 2)
     ]
-    words = {run.name: re.split(r"[_\s,;()]+|-(?=\D)", run.name) for run in runs}
-    fewest = min(map(len, words.values()))
-    named = [("a word of their names", {n: w[i] for n, w in words.items()}) for i in range(-1, -fewest - 1, -1)]
-    splitting = [
-        (what, found) for what, found in stated + named if all(found[first] != found[second] for first, second in apart)
-    ]
-    splitting = [(what, found) for what, found in splitting if len(set(found.values())) < len(runs) or len(runs) == 2]
-    if not splitting:
+    if not kinds:
         said = "they are not pooled but stand one by one, since neither names nor settings tell them apart. "
         return {run.name: run.name for run in runs}, begin + said + remedy
-    what, found = min(splitting, key=lambda each: len(set(each[1].values())))
-    values = sorted(set(found.values()), key=by_number)
-    return found, f"{begin}they are taken as settings {', '.join(values)}, by {what}. {remedy}"
+    what, settings = min(kinds, key=lambda kind: len(set(kind[1].values())))
+    values = sorted(set(settings.values()), key=by_number)
+    return settings, f"{begin}they are taken as settings {', '.join(values)}, by {what}. {remedy}"
+
+
+def _candidates(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
+    """What may tell records apart: each setting that all of them state, and each word of their names, from the last."""
+    keys = [key for key in runs[0].settings if all(key in run.settings for run in runs)]
+    stated = [(f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs}) for key in keys]
+    words = {run.name: re.split(r"[_\s,;()]+|-(?=\D)", run.name) for run in runs}
+    places = range(-1, -min(map(len, words.values())) - 1, -1)
+    return stated + [("a word of their names", {name: parts[i] for name, parts in words.items()}) for i in places]
 
 
 def by_number(text: str) -> tuple[float, str]:

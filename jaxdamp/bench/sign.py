@@ -81,33 +81,37 @@ def decide(
             f"{abs(loss):.1%} of that of a damper with this force and stroke. Pass {ways[0]} or {ways[1]}.",
             *ways,
         )
-    if force_sign is None:
-        force_sign = "opposite" if sign is None and loss < 0 else "same"
-        if sign is not None and clear and loss < 0:
-            given, remedy = Setting("sign", sign), Setting("force_sign", "opposite")
-            raise ArgumentError(
-                f"{where}: {given} contradicts the data: with force and stroke of the same sign the {done}, and "
-                f"a damper cannot give energy. If the force of this bench counts the other way, pass also {remedy}.",
-                given,
-                remedy,
-            )
-    elif clear and (loss < 0) == (force_sign == "same"):
+    if clear:
+        _refuse_contradiction(loss, sign, force_sign, f"{where}: ", done)
+    turned = force_sign == "opposite" or (force_sign is None and sign is None and loss < 0)
+    motion = -1.0 if sign == "compression-positive" else 1.0
+    return Decision(motion, -motion if turned else motion, _explain(sign, turned, done, clear))
+
+
+def _refuse_contradiction(loss: float, sign: str | None, force_sign: str | None, where: str, done: str) -> None:
+    """Refuse signs with which the damper would give energy."""
+    if force_sign is not None and (loss < 0) == (force_sign == "same"):
         other = "opposite" if force_sign == "same" else "same"
         given, remedy = Setting("force_sign", force_sign), Setting("force_sign", other)
         raise ArgumentError(
-            f"{where}: {given} contradicts the data ({done} as the file counts): a damper cannot give energy. "
+            f"{where}{given} contradicts the data ({done} as the file counts): a damper cannot give energy. "
             f"Pass {remedy}, or leave it out.",
             given,
             remedy,
         )
-    motion = -1.0 if sign == "compression-positive" else 1.0
-    turned = -1.0 if force_sign == "opposite" else 1.0
-    return Decision(motion, motion * turned, _explain(sign, force_sign, done, clear))
+    if force_sign is None and sign is not None and loss < 0:
+        given, remedy = Setting("sign", sign), Setting("force_sign", "opposite")
+        raise ArgumentError(
+            f"{where}{given} contradicts the data: with force and stroke of the same sign the {done}, and "
+            f"a damper cannot give energy. If the force of this bench counts the other way, pass also {remedy}.",
+            given,
+            remedy,
+        )
 
 
-def _explain(sign: str | None, force_sign: str, work: str, clear: bool) -> tuple[str, ...]:
+def _explain(sign: str | None, turned: bool, work: str, clear: bool) -> tuple[str, ...]:
     notes = []
-    if force_sign == "opposite":
+    if turned:
         notes.append(f"{OPPOSITE} ({work}): force turned")
     elif clear:
         notes.append(f"force and stroke of the file agree in sign ({work})")

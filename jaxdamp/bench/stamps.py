@@ -50,11 +50,7 @@ def seconds(texts: np.ndarray, where: str, place: Callable[[int], str]) -> tuple
                 without,
                 rate,
             )
-        hours = int(stamp["hours"])
-        if stamp["half"]:
-            hours = hours % 12 + 12 * (stamp["half"].lower() == "pm")
-        clock = 3600 * hours + 60 * int(stamp["minutes"])
-        values[index] = clock + float((stamp["seconds"] or "0").replace(",", "."))
+        values[index] = _time_of_day(stamp)
         dates.append(stamp["iso"] or stamp["dotted"] or stamp["slashed"] or "")
         zones.add(stamp["zone"])
     if len(zones) > 1:
@@ -67,6 +63,15 @@ def seconds(texts: np.ndarray, where: str, place: Callable[[int], str]) -> tuple
     for turn in turns:
         days[turn + 1 :] += 1
     return _from_first(values, days), _NOTE + (", with midnight in between" if len(turns) else "")
+
+
+def _time_of_day(stamp: re.Match[str]) -> float:
+    """Seconds from midnight."""
+    hours = int(stamp["hours"])
+    if stamp["half"]:
+        hours = hours % 12 + 12 * (stamp["half"].lower() == "pm")
+    clock = 3600 * hours + 60 * int(stamp["minutes"])
+    return clock + float((stamp["seconds"] or "0").replace(",", "."))
 
 
 def _at_once(texts: np.ndarray) -> Float[np.ndarray, " time"] | None:

@@ -10,8 +10,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench.cells import PLAIN_COMMA, columns_of
-from jaxdamp.bench.layout import DELIMITERS, Layout, header_of, layout_of, split
+from jaxdamp.bench.layout import DELIMITERS, PLAIN_COMMA, Layout, columns_of, header_of, layout_of, split
 from jaxdamp.bench.raw import RawColumn, RawTable
 
 
@@ -67,8 +66,8 @@ def text_lines(file: Path) -> list[str]:
         return raw.decode("utf-16", errors="replace").splitlines()
     other = next((name for begin, name in _CONTENT.items() if raw.startswith(begin)), None)
     if other or b"\0" in raw[:4096]:
-        found = f"it looks like {other}: give it that ending" if other else "its format is unknown"
-        raise ValueError(f"{file} is not a text file; {found}, or export it from the bench software as CSV.")
+        kind = f"it looks like {other}: give it that ending" if other else "its format is unknown"
+        raise ValueError(f"{file} is not a text file; {kind}, or export it from the bench software as CSV.")
     try:
         return raw.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:
@@ -78,20 +77,19 @@ def text_lines(file: Path) -> list[str]:
 def _choose(file: Path, top: list[tuple[int, str]], given: str | None) -> Layout:
     """The layout with the delimiter given, or with the one that fits best."""
     candidates = [*DELIMITERS] if given in DELIMITERS or given is None else [*DELIMITERS, given]
-    found = {d: layout_of([(n, split(line, d)) for n, line in top], d) for d in candidates}
-    fitting = {d: layout for d, layout in found.items() if layout is not None and len(layout.full) > 1}
+    layouts = {d: layout_of([(n, split(line, d)) for n, line in top], d) for d in candidates}
+    fitting = {d: layout for d, layout in layouts.items() if layout is not None and len(layout.full) > 1}
     best = max(fitting.values(), key=lambda layout: layout.score, default=None)
+    if given in fitting:
+        return fitting[given]
     if given is not None:
-        if given in fitting:
-            return fitting[given]
         setting = Setting("delimiter", given)
-        hint = "" if best is None else f" It looks like {best.delimiter!r} ({DELIMITERS[best.delimiter]}): leave "
-        hint += f"{setting} out." if hint else ""
+        hint = f" It looks like {best.delimiter!r} ({DELIMITERS[best.delimiter]}): leave {setting} out." if best else ""
         raise ArgumentError(f"{file} has no columns divided by {given!r}, the delimiter that was given.{hint}", setting)
     kind = _other_format(top[0][1])
     if best is not None and not kind:
         return best
-    if any(found.values()) and not kind:
+    if any(layouts.values()) and not kind:
         raise ValueError(
             f"{file} has only one column of numbers: a record needs at least the stroke and the force, side by side, "
             "divided by comma, semicolon, tab, white space or vertical bar."
@@ -127,13 +125,10 @@ def _body(lines: list[str], first: int, layout: Layout) -> tuple[Sequence[int], 
 
 def _all_at_once(body: list[str], layout: Layout) -> list[RawColumn] | None:
     """The columns by NumPy's reader; None where a row needs a closer look."""
-    mark, lines = layout.delimiter, body
-    if mark != "," and any("," in line for line in body):
-        if not _plain_decimal_commas(body):
-            return None
-        lines = [line.replace(",", ".") for line in body]
+    mark = layout.delimiter
+    lines = body if mark == "," else _with_points(body)
     texts = [index for index in range(layout.count) if index not in layout.numeric]
-    if texts and (mark in " |" or any('"' in line or line.count(mark) != layout.count - 1 for line in body)):
+    if not lines or (texts and not _divides_plainly(body, mark, layout.count)):
         return None
     try:
         delimiter, numeric = (None if mark == " " else mark), (layout.numeric if texts else None)
@@ -143,13 +138,22 @@ def _all_at_once(body: list[str], layout: Layout) -> list[RawColumn] | None:
     if values.shape != (len(body), len(layout.numeric)):
         return None
     columns = dict(zip(layout.numeric, values.T, strict=True))
-    columns |= {i: np.array([line.split(mark, i + 1)[i].strip() for line in body], dtype=object) for i in texts}
+    for index in texts:
+        columns[index] = np.array([line.split(mark, index + 1)[index].strip() for line in body], dtype=object)
     return [RawColumn("", columns[index]) for index in range(layout.count)]
 
 
-def _plain_decimal_commas(body: list[str]) -> bool:
-    """Whether commas are the only decimal sign, and at least one cannot be a separator of thousands."""
-    return not any("." in line for line in body) and any(PLAIN_COMMA.search(line) for line in body)
+def _divides_plainly(body: list[str], mark: str, count: int) -> bool:
+    """Whether every line has the delimiter between its columns only, and no quotes."""
+    return mark not in " |" and all('"' not in line and line.count(mark) == count - 1 for line in body)
+
+
+def _with_points(body: list[str]) -> list[str]:
+    """The lines with decimal points; none if commas might also divide thousands."""
+    if not any("," in line for line in body):
+        return body
+    plain = not any("." in line for line in body) and any(PLAIN_COMMA.search(line) for line in body)
+    return [line.replace(",", ".") for line in body] if plain else []
 
 
 def _in_chunks(body: list[str], delimiter: str, count: int) -> Iterator[list[list[str]]]:

@@ -16,8 +16,9 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
-from jaxdamp.bench import sampling
-from jaxdamp.bench.motion import Samples, dominant_frequency
+from jaxdamp._traced import of_known_numbers
+from jaxdamp.bench import clock
+from jaxdamp.bench.motion import Samples, cycle_instants, dominant_frequency
 
 
 METHODS = ("harmonic", "savitzky-golay")
@@ -27,6 +28,7 @@ _LAST_SHARE = 0.005  # of the highest harmonics in the velocity, relative to the
 _QUIET = 0.03  # residual, relative to the amplitude, that is taken for ripple and noise of any colour
 
 
+@of_known_numbers
 def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None = None) -> tuple[Samples, str]:
     """Velocity of a uniformly sampled stroke, and a sentence that says how it was found.
 
@@ -57,11 +59,11 @@ def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None 
     time, stroke = np.asarray(time, dtype=np.float64), np.asarray(stroke, dtype=np.float64)
     if time.ndim != 1 or time.shape != stroke.shape:
         _checks.refuse("stroke", f"have the shape of the time, {time.shape}", f"of shape {stroke.shape}")
-    sampling.check_count(len(time), "the record")
-    sampling.check_numbers(time, "time", "the record")
-    sampling.check_numbers(stroke, "stroke", "the record")
-    sampling.check_stroke(stroke, "the record")
-    time, _ = sampling.check_time(time, "the record")
+    clock.check_count(len(time), "the record")
+    clock.check_numbers(time, "time", "the record")
+    clock.check_numbers(stroke, "stroke", "the record")
+    clock.check_stroke(stroke, "the record")
+    time, _ = clock.check_time(time, "the record")
     frequency = dominant_frequency(time, stroke)
     if method != "savitzky-golay":
         fit = _fit_harmonics(time, stroke, frequency)
@@ -216,3 +218,46 @@ def _response(half: int, order: int, omega: Float[np.ndarray, " lines"]) -> Floa
     coefficients[1 : half + 1] = savgol_coeffs(2 * half + 1, order, deriv=1, use="dot")[half + 1 :]
     size = 32 * half
     return np.interp(omega, 2 * np.pi * np.arange(size // 2 + 1) / size, -2 * np.fft.rfft(coefficients, size).imag)
+
+
+def integrate_velocity(time: Samples, velocity: Samples, where: str) -> tuple[Samples, Samples, str]:
+    """Stroke and velocity without drift, and a sentence that says what was done.
+
+    A constant error of the velocity makes the stroke drift. It is the slope of the straight line through the means of
+    the stroke over the full cycles, and is taken off the velocity. Zero stroke is the middle of the motion.
+
+    Arguments:
+        time: instants [s], uniform.
+        velocity: as measured [m/s].
+        where: the file, for messages.
+
+    Returns:
+        Stroke [m], velocity [m/s], and the sentence.
+
+    Raises:
+        ValueError: a velocity without a full cycle, from which drift cannot be told.
+    """
+    from scipy.interpolate import CubicSpline  # takes a second to import, and few records need it
+
+    instants = cycle_instants(time, velocity) if np.ptp(velocity) > 0 else time[:1]
+    if len(instants) < 2:
+        raise ValueError(
+            f"{where}: the velocity has no full cycle, so that drift cannot be told from motion when it is integrated. "
+            "Record a cycle or more, or a stroke channel."
+        )
+    curve = CubicSpline(time, velocity)
+    lengths, wander = np.diff(instants), ""
+    if len(lengths) > 1:
+        means, middles = np.diff(curve.antiderivative(2)(instants)) / lengths, instants[:-1] + 0.5 * lengths
+        offset, start = np.polyfit(middles - time[0], means, 1)
+        off = means - start - offset * (middles - time[0])
+        wander = f", and wanders by {1e3 * np.std(off):.2g} mm from cycle to cycle" if len(off) > 2 else ""
+    else:
+        offset = np.diff(curve.antiderivative()(instants))[0] / lengths[0]
+    stroke = curve.antiderivative()(time) - offset * (time - time[0])
+    steady = stroke[(time >= instants[0]) & (time <= instants[-1])]
+    note = (
+        f"stroke integrated from the velocity, less a constant {offset:.3g} m/s against drift; its zero is the middle "
+        f"of the motion, not a place in the damper{wander}"
+    )
+    return stroke - 0.5 * (steady.max() + steady.min()), velocity - offset, note

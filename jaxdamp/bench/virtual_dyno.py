@@ -12,11 +12,10 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp.bench.clock import Part, regular_parts
+from jaxdamp.bench.clock import FEWEST, Part, regular_parts
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.programmes import Excitation
 from jaxdamp.bench.runs import BenchRun
-from jaxdamp.bench.sampling import FEWEST
 from jaxdamp.bench.sensors import Sensors, described
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.velocity import estimate_velocity

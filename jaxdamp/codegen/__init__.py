@@ -15,6 +15,7 @@ functions are those of the language's own library. A primitive that cannot be pr
 from jaxdamp.codegen._languages import AbstractLanguage, C, JavaScript, PrintedFunction
 from jaxdamp.codegen._lowering import Program, Symbols, lower, symbols
 from jaxdamp.codegen._native import compiler
+from jaxdamp.codegen._printing import is_printing, printing
 from jaxdamp.codegen._program import Constant
 from jaxdamp.codegen._scan import printed_scan
 
@@ -28,7 +29,9 @@ __all__ = [
     "Program",
     "Symbols",
     "compiler",
+    "is_printing",
     "lower",
     "printed_scan",
+    "printing",
     "symbols",
 ]

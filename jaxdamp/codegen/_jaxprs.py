@@ -2,14 +2,16 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import jax
 import numpy as np
-from jax.extend import core
+from jax.core import ShapedArray, Tracer
+from jax.extend.core import ClosedJaxpr, Jaxpr, Literal, Var, jaxpr_as_fun
+from jaxtyping import Array, ArrayLike, PyTree
 
 
-Inner = Any  # a jaxpr, open or closed
+Inner: TypeAlias = Jaxpr | ClosedJaxpr
 
 
 @dataclass(frozen=True)
@@ -17,7 +19,7 @@ class Equation:
     """One primitive with its parameters; shapes and types are those of its results."""
 
     name: str
-    parameters: dict[str, Any]
+    parameters: dict[str, Any]  # of JAX, another type for each primitive
     shapes: list[tuple[int, ...]]
     dtypes: list[str]
 
@@ -36,7 +38,7 @@ class Equation:
         function = self.parameters.get("_prim")
         if function is not None:  # from JAX 0.12, such as `custom_root`
 
-            def expanded(*flat: Any) -> list[Any]:
+            def expanded(*flat: Array) -> list[Array]:
                 return jax.tree.leaves(function.expand(*jax.tree.unflatten(function.in_tree, flat)))
 
             return jax.make_jaxpr(expanded)(*function.in_avals_flat)
@@ -49,48 +51,60 @@ def scan_sizes(equation: Equation, operands: list[np.ndarray]) -> tuple[int, int
     By the ranks, which those over the steps lose inside: JAX 0.12 names the parameters otherwise than 0.10.
     """
     jaxpr, _ = opened(equation.parameters["jaxpr"])
-    carried = sum(len(shape) == v.aval.ndim for shape, v in zip(equation.shapes, jaxpr.outvars, strict=True))
-    rows = sum(operand.ndim != v.aval.ndim for operand, v in zip(operands, jaxpr.invars, strict=True))
+    carried = sum(len(shape) == array_type(v).ndim for shape, v in zip(equation.shapes, jaxpr.outvars, strict=True))
+    rows = sum(operand.ndim != array_type(v).ndim for operand, v in zip(operands, jaxpr.invars, strict=True))
     return len(operands) - rows - carried, carried
 
 
-def traced(function: Callable[..., Any], inputs: list[tuple[tuple[int, ...], str]]) -> Inner:
+def array_type(value: Var | Literal) -> ShapedArray:
+    """Shape and type of a value of a jaxpr, which is an array."""
+    kind = value.aval
+    assert isinstance(kind, ShapedArray), f"{kind} is no array"
+    return kind
+
+
+def known(value: ArrayLike) -> np.ndarray | None:
+    """The value of an array; `None` of one that JAX traces."""
+    return None if isinstance(value, Tracer) else np.asarray(value)
+
+
+def traced(function: Callable[..., PyTree], inputs: list[tuple[tuple[int, ...], str]]) -> ClosedJaxpr:
     """The jaxpr of a function of arrays, given by their shapes and types."""
     return jax.make_jaxpr(function)(*(jax.ShapeDtypeStruct(*each) for each in inputs))
 
 
-def with_constants_as_inputs(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Inner, list[Any]]:
+def with_constants_as_inputs(
+    function: Callable[..., PyTree], arguments: tuple[PyTree, ...]
+) -> tuple[ClosedJaxpr, list[Array]]:
     """The jaxpr of a function that closes over arrays, which may be traced; they come first among its inputs."""
     closed = jax.make_jaxpr(function)(*arguments)
 
-    def outside(constants: list[Any], *flat: Any) -> list[Any]:
-        return called(core.ClosedJaxpr(closed.jaxpr, constants), flat)
+    def outside(constants: list[Array], *flat: Array) -> list[Array]:
+        return called(ClosedJaxpr(closed.jaxpr, constants), flat)
 
     return jax.make_jaxpr(outside)(closed.consts, *jax.tree.leaves(arguments)), closed.consts
 
 
-def called(closed: Inner, flat: Sequence[Any]) -> list[Any]:
+def called(closed: ClosedJaxpr, flat: Sequence[Array]) -> list[Array]:
     """The results of a jaxpr on arrays, by JAX."""
-    return core.jaxpr_as_fun(closed)(*flat)
+    return jaxpr_as_fun(closed)(*flat)
 
 
-def opened(inner: Inner) -> tuple[Any, list[np.ndarray]]:
+def opened(inner: Inner) -> tuple[Jaxpr, list[np.ndarray]]:
     """A jaxpr and the values of its constants."""
-    jaxpr = inner.jaxpr if hasattr(inner, "consts") else inner
-    return jaxpr, [np.asarray(value) for value in getattr(inner, "consts", [])]
+    if isinstance(inner, ClosedJaxpr):
+        return inner.jaxpr, [np.asarray(value) for value in inner.consts]
+    return inner, []
 
 
-def equations(jaxpr: Any) -> Iterator[tuple[Equation, list[Any], list[Any]]]:
+def equations(jaxpr: Jaxpr) -> Iterator[tuple[Equation, list[Var | Literal], list[Var]]]:
     """Each equation with its operands and its results."""
     for e in jaxpr.eqns:
-        shapes = [tuple(v.aval.shape) for v in e.outvars]
-        dtypes = [v.aval.dtype.name for v in e.outvars]
+        shapes = [tuple(array_type(v).shape) for v in e.outvars]
+        dtypes = [array_type(v).dtype.name for v in e.outvars]
         yield Equation(e.primitive.name, dict(e.params), shapes, dtypes), e.invars, e.outvars
 
 
-def literal(operand: Any) -> np.ndarray | None:
-    """The value of an operand that is written as a number; `None` of a variable."""
-    if not isinstance(operand, core.Literal):
-        return None
-    kind: Any = operand.aval
-    return np.asarray(operand.val, kind.dtype)
+def literal(operand: Literal) -> np.ndarray:
+    """The value of an operand that is written as a number."""
+    return np.asarray(operand.val, array_type(operand).dtype)

@@ -10,7 +10,8 @@ from jaxdamp.codegen import _arrays
 from jaxdamp.codegen._jaxprs import Inner
 from jaxdamp.codegen._languages import FUNCTIONS, C
 from jaxdamp.codegen._loop_passes import Kept, kept_values, sums_of_products
-from jaxdamp.codegen._lowering import evaluated, printing
+from jaxdamp.codegen._lowering import evaluated
+from jaxdamp.codegen._printing import printing
 from jaxdamp.codegen._program import (
     Atom,
     Atoms,
@@ -172,8 +173,7 @@ def _parts(
     statements: list[Define | Table], levels: dict[str, int], inputs: _Names, before: list[Atoms], after: list[Atoms]
 ) -> dict[str, str | list[str]]:
     printer = _InLanes()
-    pairs = zip(before, after, strict=True)
-    carried = {str(old.name): new for olds, news in pairs for old, new in zip(olds.ravel(), news.ravel(), strict=True)}
+    carried = _carried(before, after)
     kept, carried, statements = _with_kept(statements, levels, carried)
     inside = {name for name, level in levels.items() if level == OF_BOTH}
     statements = sums_of_products(statements, inside, carried.values())
@@ -181,10 +181,9 @@ def _parts(
     parts: dict[int, list[Define | Table]] = {level: [] for level in range(4)}
     for statement in statements:
         parts[levels.get(statement.target.name, OF_BOTH)].append(statement)
-    late = names([atom for s in parts[OF_BOTH] for atom in operands_of(s)]) | names(carried.values())
-    hoisted = [s.target for s in parts[OF_POINT] if s.target.name in late]
-    store = [f"hoisted[{i}][lane] = {v.name};" for i, v in enumerate(hoisted)]
+    hoisted = _read_later(parts[OF_POINT], parts[OF_BOTH], carried.values())
     load = [f"const {printer.types[v.dtype]} {v.name} = hoisted[{i}][lane];" for i, v in enumerate(hoisted)]
+    store = [f"hoisted[{i}][lane] = {v.name};" for i, v in enumerate(hoisted)]
     store += _missing(limits)
     store += printer.lines(dict.fromkeys(s for value in kept for s in value.first), 0)
     store += [f"{_kept_name(i)} = {value.target.name};" for i, value in enumerate(kept)]
@@ -201,6 +200,20 @@ def _parts(
         "of_both": [*load, *printer.lines(parts[OF_BOTH], 0), *_assigned(ends, now=False)],
         "next": _assigned(ends, now=True),
     }
+
+
+def _read_later(
+    statements: list[Define | Table], inside: list[Define | Table], results: Iterable[Atom]
+) -> list[Variable]:
+    """The values of statements that are read in every step."""
+    used = names(results).union(*(names(operands_of(s)) for s in inside))
+    return [s.target for s in statements if s.target.name in used]
+
+
+def _carried(before: list[Atoms], after: list[Atoms]) -> dict[str, Atom]:
+    """The next value of each carried number by its name."""
+    old, new = (np.concatenate([atoms.ravel() for atoms in arrays]) for arrays in (before, after))
+    return {str(variable.name): atom for variable, atom in zip(old, new, strict=True)}
 
 
 def _kept_name(number: int) -> str:

@@ -27,32 +27,40 @@ class Kept(NamedTuple):
 def kept_values(statements: Sequence[Define | Table], after: Mapping[str, Atom], results: Iterable[Atom]) -> list[Kept]:
     """Values of the carried numbers that the body computes again from what they will be in the next step.
 
-    A law with a lag, for instance, is evaluated at the beginning and at the end of each step: once is enough.
+    What is evaluated at the beginning and at the end of each step, for instance: once is enough.
 
     Arguments:
         statements: of the body.
         after: for each carried number, its value in the next step; for each number that stays the same, itself.
         results: what is carried.
     """
-    known = {(s.operation, s.operands, s.target.dtype): s.target for s in statements if isinstance(s, Define)}
+    moved, defined = _computed_before(statements, after)
+    outside = names(results)
+    outside |= names(a for s in statements if s.target.name not in defined for a in operands_of(s))
+    values = []
+    for name in filter(defined.__contains__, sorted(outside)):
+        first = _tree(name, defined)
+        again = moved[name]
+        if len(first) >= WORTH_KEEPING and isinstance(again, Variable) and again.dtype == "float64":
+            values.append(Kept(defined[name].target, again, first))
+    return values
+
+
+def _computed_before(
+    statements: Sequence[Define | Table], after: Mapping[str, Atom]
+) -> tuple[dict[str, Atom], dict[str, Define]]:
+    """What numbers will be in the next step, and the statements whose value there is computed in this one."""
+    targets = {(s.operation, s.operands, s.target.dtype): s.target for s in statements if isinstance(s, Define)}
     moved: dict[str, Atom] = dict(after)
     defined: dict[str, Define] = {}
     for s in statements:
         if not isinstance(s, Define) or any(isinstance(a, Variable) and a.name not in moved for a in s.operands):
             continue
         operands = tuple(moved[a.name] if isinstance(a, Variable) else a for a in s.operands)
-        again = known.get((s.operation, operands, s.target.dtype))
+        again = targets.get((s.operation, operands, s.target.dtype))
         if again is not None and again != s.target:
             moved[s.target.name], defined[s.target.name] = again, s
-    outside = names(results)
-    outside |= names(a for s in statements if s.target.name not in defined for a in operands_of(s))
-    kept = []
-    for name in filter(defined.__contains__, sorted(outside)):
-        first = _tree(name, defined)
-        again = moved[name]
-        if len(first) >= WORTH_KEEPING and isinstance(again, Variable) and again.dtype == "float64":
-            kept.append(Kept(defined[name].target, again, first))
-    return kept
+    return moved, defined
 
 
 def _tree(name: str, defined: Mapping[str, Define]) -> list[Define]:
@@ -70,37 +78,8 @@ def sums_of_products(
         inside: the names of those that are computed in every step for every point.
         results: what is carried.
     """
-    uses = Counter(a.name for s in statements for a in operands_of(s) if isinstance(a, Variable))
-    uses.update(a.name for a in results if isinstance(a, Variable))
-    parts = {s.target.name: s for s in statements if isinstance(s, Define) and s.target.name in inside}
-
-    def part(atom: Atom, *operations: str) -> Define | None:
-        """The statement of a value that is used once."""
-        s = parts.get(atom.name) if isinstance(atom, Variable) and uses[atom.name] == 1 else None
-        return s if s is not None and s.operation in operations and s.target.dtype == "float64" else None
-
-    def inner(s: Define) -> list[Define]:
-        """The sums whose only use is in this one, and those in them."""
-        found = [within for atom in s.operands if (within := part(atom, "add", "sub")) is not None]
-        return found + [deeper for within in found for deeper in inner(within)]
-
-    def terms(s: Define, minus: bool) -> list[tuple[bool, Atom]]:
-        """Terms, and whether they are subtracted."""
-        found = []
-        for negative, atom in zip((minus, minus != (s.operation == "sub")), s.operands, strict=True):
-            within = part(atom, "add", "sub")
-            found += [(negative, atom)] if within is None else terms(within, negative)
-        return found
-
-    sums = [s for s in parts.values() if s.operation in ("add", "sub") and s.target.dtype == "float64"]
-    nested = {within.target.name for s in sums for within in inner(s)}
-    chains, replaced = {}, set()
-    for s in sums:
-        whole = sorted(((part(a, "mul") is not None, minus, a) for minus, a in terms(s, False)), key=lambda t: t[:2])
-        known = any(isinstance(a, Constant) for _, _, a in whole)  # may be there to round another term
-        if s.target.name not in nested and not known and sum(product for product, _, _ in whole) > 1:
-            chains[s.target.name] = [(minus, a) for _, minus, a in whole]
-            replaced |= {within.target.name for within in inner(s)}
+    sums = _Sums(statements, inside, results)
+    chains, replaced = sums.chains()
     written: list[Define | Table] = []
     for s in statements:
         if s.target.name in chains:
@@ -108,6 +87,52 @@ def sums_of_products(
         elif s.target.name not in replaced:
             written.append(s)
     return written
+
+
+class _Sums:
+    """The sums among statements, with the sums inside them whose value is used nowhere else."""
+
+    def __init__(self, statements: Sequence[Define | Table], inside: set[str], results: Iterable[Atom]) -> None:
+        self._uses = Counter(a.name for s in statements for a in operands_of(s) if isinstance(a, Variable))
+        self._uses.update(a.name for a in results if isinstance(a, Variable))
+        self._parts = {s.target.name: s for s in statements if isinstance(s, Define) and s.target.name in inside}
+
+    def chains(self) -> tuple[dict[str, list[tuple[bool, Atom]]], set[str]]:
+        """The terms of each sum with several products, the products last; and the names of the sums inside them."""
+        sums = [s for s in self._parts.values() if s.operation in ("add", "sub") and s.target.dtype == "float64"]
+        nested = {within.target.name for s in sums for within in self._inner(s)}
+        chains, replaced = {}, set()
+        for s in sums:
+            terms = sorted(self._terms(s, False), key=lambda term: (self._is_product(term[1]), term[0]))
+            has_number = any(isinstance(atom, Constant) for _, atom in terms)  # may be there to round another term
+            products = sum(self._is_product(atom) for _, atom in terms)
+            if s.target.name not in nested and not has_number and products > 1:
+                chains[s.target.name] = terms
+                replaced |= {within.target.name for within in self._inner(s)}
+        return chains, replaced
+
+    def _part(self, atom: Atom | None, *operations: str) -> Define | None:
+        """The statement of a value that is used once."""
+        if not isinstance(atom, Variable) or self._uses[atom.name] != 1:
+            return None
+        s = self._parts.get(atom.name)
+        return s if s is not None and s.operation in operations and s.target.dtype == "float64" else None
+
+    def _is_product(self, atom: Atom) -> bool:
+        return self._part(atom, "mul") is not None
+
+    def _inner(self, s: Define) -> list[Define]:
+        """The sums whose only use is in this one, and those in them."""
+        sums = [within for atom in s.operands if (within := self._part(atom, "add", "sub")) is not None]
+        return sums + [deeper for within in sums for deeper in self._inner(within)]
+
+    def _terms(self, s: Define, minus: bool) -> list[tuple[bool, Atom]]:
+        """Whether they are subtracted, and terms."""
+        terms = []
+        for negative, atom in zip((minus, minus != (s.operation == "sub")), s.operands, strict=True):
+            within = self._part(atom, "add", "sub")
+            terms += [(negative, atom)] if within is None else self._terms(within, negative)
+        return terms
 
 
 def _chain(target: Variable, terms: list[tuple[bool, Atom]]) -> list[Define]:

@@ -1,26 +1,17 @@
 """JAX functions of numbers and small arrays as programs of scalars."""
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import Any
 
 import jax
 import numpy as np
+from jax.extend.core import Literal, Var
+from jaxtyping import Array, PyTree
 
 from jaxdamp.codegen import _arrays, _control, _elementwise, _indexing
 from jaxdamp.codegen._jaxprs import Inner, equations, literal, opened, traced
+from jaxdamp.codegen._printing import printing
 from jaxdamp.codegen._program import Atoms, Constant, Statement, Variable, Writer, pruned
-from jaxdamp.configuration import Target, compiling_for
-
-
-# One car on a processor of any kind, with the elementary functions of the C library.
-_SCALAR = Target(fused_loops=False, reciprocal_roots=False, library_functions=True)
-
-
-def printing() -> AbstractContextManager[None]:
-    """Functions traced inside use the elementary functions of the C library."""
-    return compiling_for(_SCALAR)
 
 
 @dataclass(frozen=True)
@@ -60,10 +51,10 @@ class Program:
     """
 
     statements: list[Statement]
-    results: Any
+    results: PyTree
 
 
-def lower(function: Callable[..., Any], *arguments: Any, finite: bool = False) -> Program:
+def lower(function: Callable[..., PyTree], *arguments: PyTree, finite: bool = False) -> Program:
     """Translate a function of trees of arrays into scalar statements.
 
     Arguments:
@@ -76,9 +67,9 @@ def lower(function: Callable[..., Any], *arguments: Any, finite: bool = False) -
         NotImplementedError: a primitive that cannot be printed; the message names it.
     """
     inputs, tree = jax.tree.flatten(arguments, is_leaf=lambda leaf: isinstance(leaf, Symbols))
-    structure: list[Any] = []
+    structure = []
 
-    def flat(*values: Any) -> list[Any]:
+    def flat(*values: Array) -> list[Array]:
         results, shape = jax.tree.flatten(function(*jax.tree.unflatten(tree, values)))
         structure.append(shape)
         return results
@@ -94,20 +85,19 @@ def lower(function: Callable[..., Any], *arguments: Any, finite: bool = False) -
 def _atoms(leaf: Symbols) -> Atoms:
     result = np.empty(leaf.names.shape, object)
     for index in np.ndindex(*leaf.names.shape):
-        name: Any = leaf.names[index]
-        result[index] = name if isinstance(name, Constant) else Variable(name, leaf.dtype)
+        name: object = leaf.names[index]
+        result[index] = name if isinstance(name, Constant) else Variable(str(name), leaf.dtype)
     return result
 
 
 def evaluated(writer: Writer, inner: Inner, operands: list[Atoms]) -> list[Atoms]:
     """The results of a jaxpr on arrays of atoms; what they take is written."""
     jaxpr, values = opened(inner)
-    known: dict[Any, Atoms] = dict(zip(jaxpr.constvars, map(_arrays.constants, values), strict=True))
-    known |= zip(jaxpr.invars, operands, strict=True)
+    atoms_of: dict[Var, Atoms] = dict(zip(jaxpr.constvars, map(_arrays.constants, values), strict=True))
+    atoms_of |= zip(jaxpr.invars, operands, strict=True)
 
-    def read(operand: Any) -> Atoms:
-        number = literal(operand)
-        return known[operand] if number is None else _arrays.constants(number)
+    def read(operand: Var | Literal) -> Atoms:
+        return _arrays.constants(literal(operand)) if isinstance(operand, Literal) else atoms_of[operand]
 
     for equation, reads, writes in equations(jaxpr):
         atoms = [read(operand) for operand in reads]
@@ -115,7 +105,7 @@ def evaluated(writer: Writer, inner: Inner, operands: list[Atoms]) -> list[Atoms
             results = _control.RULES[equation.name](writer, equation, atoms, evaluated)
         else:
             results = _rule(equation.name)(writer, equation, atoms)
-        known |= zip(writes, results, strict=True)
+        atoms_of |= zip(writes, results, strict=True)
     return [read(operand) for operand in jaxpr.outvars]
 
 

@@ -10,6 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.codegen import Program, Symbols, lower, symbols
@@ -50,7 +51,7 @@ class LawNumber:
 
 def law_numbers(law: eqx.Module) -> list[LawNumber]:
     """All parameters and settings of a law or a vehicle but empty ones, its own before those of laws inside."""
-    found = []
+    numbers = []
     for prefix, module in modules_inside(law):
         for field in dataclasses.fields(module):
             declared = field.metadata.get("parameter") or field.metadata.get("setting")
@@ -65,13 +66,13 @@ def law_numbers(law: eqx.Module) -> list[LawNumber]:
                 continue
             kind = "command" if declared.get("command") else "setting" if "setting" in field.metadata else "parameter"
             about = declared["unit"], declared["meaning"], domain
-            found.append(LawNumber(path, identifier(path), *about, np.asarray(value, float), kind))
-    return found
+            numbers.append(LawNumber(path, identifier(path), *about, np.asarray(value, float), kind))
+    return numbers
 
 
 def _conditions(law: AbstractDamper) -> list[tuple[AbstractDamper, Any]]:
     """Every condition between parameters, with the law that it is about."""
-    return [(own, c) for _, own in laws_inside(law) if own.has_conditions() for c in own.conditions()]
+    return [(inner, c) for _, inner in laws_inside(law) if inner.has_conditions() for c in inner.conditions()]
 
 
 def identifier(path: str) -> str:
@@ -138,8 +139,8 @@ class LawProgram:
         arguments, changes = self._step(), self._step("d")
         arguments, changes = (arguments[:-2], arguments[-1]), (changes[:-2], changes[-1])
 
-        def derivative(point: tuple[Any, ...], change: tuple[Any, ...], dt: Any) -> Any:
-            def after(first: tuple[Any, ...], state: Any) -> Any:
+        def derivative(point: tuple[PyTree, Array], change: tuple[PyTree, Array], dt: Array) -> Array:
+            def after(first: PyTree, state: Array) -> Array:
                 values, x0, v0, x1, v1 = first
                 return self._advance(values, x0, v0, x1, v1, dt, state)
 
@@ -154,7 +155,7 @@ class LawProgram:
     def margins(self) -> Program:
         """`margins(p)`: by how much each condition between parameters holds, in the order of `conditions`."""
 
-        def margins(values: list[Any]) -> list[Any]:
+        def margins(values: list[Array]) -> list[Array]:
             law = self.law_of(values)
             return [jnp.min(getattr(owner, c.parameter) - c.least) for owner, c in _conditions(law)]
 
@@ -165,24 +166,26 @@ class LawProgram:
         """The conditions between parameters in words."""
         return [f"{c.parameter} must be greater than {c.formula}. {c.reason}" for _, c in _conditions(self.law)]
 
-    def law_of(self, values: list[Any]) -> AbstractDamper:
+    def law_of(self, values: list[Array]) -> AbstractDamper:
         """The law with other numbers, in the order of `numbers`."""
         law = jax.tree.map(lambda a: jnp.asarray(a, self.dtype) if eqx.is_inexact_array(a) else a, self.law)
         return with_values(law, {n.path: value for n, value in zip(self.numbers, values, strict=True)})
 
-    def _force(self, values: list[Any], x: Any, v: Any, state: Any) -> Any:
+    def _force(self, values: list[Array], x: Array, v: Array, state: Array) -> Array:
         return self.law_of(values).force(x, v, state)
 
-    def _state_rate(self, values: list[Any], x: Any, v: Any, state: Any) -> Any:
+    def _state_rate(self, values: list[Array], x: Array, v: Array, state: Array) -> Array:
         return self.law_of(values).state_rate(x, v, state)
 
-    def _advance(self, values: list[Any], x0: Any, v0: Any, x1: Any, v1: Any, dt: Any, state: Any) -> Any:
+    def _advance(
+        self, values: list[Array], x0: Array, v0: Array, x1: Array, v1: Array, dt: Array, state: Array
+    ) -> Array:
         return self.law_of(values).advance(x0, v0, x1, v1, state, dt)
 
-    def _point(self, d: str = "") -> tuple[Any, ...]:
+    def _point(self, d: str = "") -> tuple[PyTree[Symbols], ...]:
         return self.values(f"{d}p"), self._symbols(f"{d}x"), self._symbols(f"{d}v"), self._state(d)
 
-    def _step(self, d: str = "") -> tuple[Any, ...]:
+    def _step(self, d: str = "") -> tuple[PyTree[Symbols], ...]:
         names = (f"{d}{name}" for name in ("x0", "v0", "x1", "v1"))
         return self.values(f"{d}p"), *map(self._symbols, names), self._symbols("dt"), self._state(d)
 

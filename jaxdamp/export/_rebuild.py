@@ -23,36 +23,48 @@ def rebuilt(plain: Any, where: str) -> Any:
     """
     if not isinstance(plain, dict) or not isinstance(plain.get("class"), str):
         _checks.refuse(where, 'be written as {"class": "...", ...}', json.dumps(plain)[:80])
-    name, classes = plain["class"], known_classes()
-    kind = classes.get(name)
-    if kind is None:
-        near = _checks.nearest(name, sorted(classes))
-        hint = f"Did you mean {near!r}? " if near else ""
-        remedy = f"{hint}Import the module of your own classes first."
-        _checks.refuse(where, "be of a class that is known", repr(name), remedy)
+    name = plain["class"]
+    kind = _class_named(name, where)
     fields = own_fields(kind)
     # fields that were added to a class after the file was written get their default
     later = [f for f in fields if declared(f) is None and f.default is not dataclasses.MISSING]
     is_law = issubclass(kind, AbstractDamper)
     given = {key: value for key, value in plain.items() if not (is_law and key == FITTED_TO)}
     _same_names(name, ["class", *(f.name for f in fields)], {f.name: None for f in later} | given)
-    module = object.__new__(kind)
+    return _filled(object.__new__(kind), given, plain.get(FITTED_TO) if is_law else None)
+
+
+def _filled(module: Any, given: dict[str, Any], fitted_to: Any) -> Any:
+    """An empty module with the values of a file; fields that it does not give have their default."""
+    name, fields = type(module).__name__, own_fields(type(module))
     for field in fields:
-        number, here = declared(field), f"{name}.{field.name}"
-        if field.name not in given:
-            value: Any = field.default
-        elif number is None:
-            value = _value(given[field.name], here)
-        else:
-            value = _number(given[field.name], number["unit"], here)
+        here = f"{name}.{field.name}"
+        value: Any = _of_field(field, given[field.name], here) if field.name in given else field.default
         if field.type is Number and np.ndim(value):
             _checks.refuse(here, "be one number", value)
         object.__setattr__(module, field.name, value)
-    if is_law:
-        object.__setattr__(module, "range_note", kind.range_note)
-        covered = _fitted_to(plain.get(FITTED_TO), name)
-        return module if covered is None else with_fitted_range(module, covered)
-    return module
+    if not isinstance(module, AbstractDamper):
+        return module
+    object.__setattr__(module, "range_note", type(module).range_note)
+    covered = _fitted_to(fitted_to, name)
+    return module if covered is None else with_fitted_range(module, covered)
+
+
+def _class_named(name: str, where: str) -> type:
+    """The class of the library, or of the caller, that a file names."""
+    classes = known_classes()
+    if name not in classes:
+        near = _checks.nearest(name, sorted(classes))
+        hint = f"Did you mean {near!r}? " if near else ""
+        remedy = f"{hint}Import the module of your own classes first."
+        _checks.refuse(where, "be of a class that is known", repr(name), remedy)
+    return classes[name]
+
+
+def _of_field(field: dataclasses.Field, plain: Any, where: str) -> Any:
+    """The value of a field as it is written."""
+    number = declared(field)
+    return _value(plain, where) if number is None else _number(plain, number["unit"], where)
 
 
 def _fitted_to(plain: Any, owner: str) -> FittedRange | None:

@@ -1,15 +1,15 @@
 """A vehicle with a law, and its ride metrics, as functions of their numbers, which the explorer computes."""
 
 from functools import cached_property
-from typing import Any
 
 import equinox as eqx
+from jaxtyping import Array, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.codegen import Program, Symbols, symbols
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export._law_program import LawProgram
-from jaxdamp.export._vehicle_program import FlatTree, VehicleProgram, road_input
+from jaxdamp.export._vehicle_program import FlatTree, Numbers, VehicleProgram, road_input
 from jaxdamp.parameters import get, modules_inside, with_values
 from jaxdamp.simulation import MetricObserver
 from jaxdamp.vehicles import AbstractVehicle
@@ -42,7 +42,6 @@ class RideProgram(VehicleProgram):
         self.numbers = [n for n in self.numbers if not any(n.path.startswith(prefix) for prefix in self._places)]
         self.metrics = [m for m in vehicle.ride_metrics if not m.statistic.needs_record]
         self.dt, self.count = dt, count
-        self._gathered = FlatTree()
 
     @property
     def needed(self) -> list[str]:
@@ -52,7 +51,6 @@ class RideProgram(VehicleProgram):
     @property
     def sizes(self) -> dict[str, int]:
         """Lengths of the arrays m, c and g."""
-        _ = self.begin
         return super().sizes | {"g": self._gathered.count}
 
     def with_law(self, law: AbstractDamper) -> AbstractVehicle:
@@ -60,11 +58,19 @@ class RideProgram(VehicleProgram):
         return self._placed(self.vehicle, law)
 
     @cached_property
+    def _gathered(self) -> FlatTree:
+        """What the observer has gathered."""
+        return self._flat(self._begun, self._held, self._carried, *self._road("h", "r"))
+
+    def _begun(self, held: list[Array], now: list[Array], height: Array, rate: Array) -> PyTree:
+        return self._observer(held).begin(self._carry.tree(now), road_input(height, rate))
+
+    @cached_property
     def begin(self) -> Program:
         """`begin(m, c, h, r)`: the metrics with the first instant, g."""
 
-        def begin(held: list[Any], now: list[Any], height: Any, rate: Any) -> list[Any]:
-            return self._gathered.taken(self._observer(held).begin(self._carry.tree(now), road_input(height, rate)))
+        def begin(held: list[Array], now: list[Array], height: Array, rate: Array) -> list[Array]:
+            return self._gathered.arrays(self._begun(held, now, height, rate))
 
         return self._lowered(begin, self._carried, *self._road("h", "r"))
 
@@ -72,9 +78,11 @@ class RideProgram(VehicleProgram):
     def observe(self) -> Program:
         """`observe(m, c, g, h, r)`: the metrics with this instant, g."""
 
-        def observe(held: list[Any], now: list[Any], gathered: list[Any], height: Any, rate: Any) -> list[Any]:
+        def observe(
+            held: list[Array], now: list[Array], gathered: list[Array], height: Array, rate: Array
+        ) -> list[Array]:
             before, road = self._gathered.tree(gathered), road_input(height, rate)
-            return self._gathered.taken(self._observer(held).add(before, self._carry.tree(now), road))
+            return self._gathered.arrays(self._observer(held).add(before, self._carry.tree(now), road))
 
         return self._lowered(observe, self._carried, self._observed_so_far, *self._road("h", "r"))
 
@@ -82,28 +90,27 @@ class RideProgram(VehicleProgram):
     def end(self) -> Program:
         """`end(m, g)`: the metrics, in the order of `metrics`."""
 
-        def end(held: list[Any], gathered: list[Any]) -> list[Any]:
+        def end(held: list[Array], gathered: list[Array]) -> list[Array]:
             values = self._observer(held).end(self._gathered.tree(gathered), ())
             return [values[m.name] for m in self.metrics]
 
         return self._lowered(end, self._observed_so_far)
 
-    def vehicle_of(self, values: Any) -> AbstractVehicle:
+    def vehicle_of(self, values: Numbers) -> AbstractVehicle:
         """The vehicle with other numbers, those of the law and its own."""
-        of_law, own = values
-        car = with_values(self.vehicle, {n.path: value for n, value in zip(self.numbers, own, strict=True)})
+        of_law, of_vehicle = values
+        car = with_values(self.vehicle, {n.path: value for n, value in zip(self.numbers, of_vehicle, strict=True)})
         return self._placed(car, self.law.law_of(of_law))
 
-    def values(self, owner: str = "p") -> Any:
+    def values(self, owner: str = "p") -> PyTree[Symbols]:
         """The numbers of the law, and those of the vehicle."""
         return self.law.values(owner), [symbols(f"q{self.member}{n.name}", n.value.shape) for n in self.numbers]
 
     @property
     def _observed_so_far(self) -> list[Symbols]:
-        _ = self.begin
         return self._gathered.symbols("g", self.dtype)
 
-    def _observer(self, held: list[Any]) -> MetricObserver:
+    def _observer(self, held: list[Array]) -> MetricObserver:
         return MetricObserver(self._equations(held), self.metrics, self.dt, self.count)
 
     def _placed(self, vehicle: AbstractVehicle, law: AbstractDamper) -> AbstractVehicle:

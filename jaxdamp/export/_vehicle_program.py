@@ -1,48 +1,56 @@
 """A vehicle as functions of its numbers, which are printed in other languages."""
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TypeAlias
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, PyTree
 
 from jaxdamp._vectors import MemoryLayout, scalars
-from jaxdamp.codegen import Constant, Program, Symbols, lower, symbols
+from jaxdamp.codegen import Constant, Program, Symbols, lower, printing, symbols
 from jaxdamp.export._law_program import law_numbers
 from jaxdamp.parameters import with_values
-from jaxdamp.simulation import Equations, Exponential, RoadInput, settled
+from jaxdamp.simulation import AbstractStepper, Equations, Exponential, RoadInput, settled
 from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind
 
 
+Numbers: TypeAlias = PyTree[Array]  # of a vehicle, in the order of `VehicleProgram.numbers`
+
+
 class FlatTree:
-    """How the numbers of a tree lie in one array of the program."""
+    """How the numbers of a tree lie in one array of the program.
 
-    def __init__(self) -> None:
-        self.count = 0
-        self._shapes: list[tuple[int, ...]] = []
-        self._structure: Any = None
-        self._rest: Any = None
+    Arguments:
+        shapes: such a tree, with `jax.ShapeDtypeStruct` in place of arrays of numbers.
 
-    def taken(self, tree: Any) -> list[Any]:
-        """The arrays of a tree, whose structure is remembered."""
-        held, self._rest = eqx.partition(tree, eqx.is_inexact_array)
-        leaves, self._structure = jax.tree.flatten(held)
+    Attributes:
+        count: the length of the array.
+    """
+
+    def __init__(self, shapes: PyTree) -> None:
+        arrays, self._others = eqx.partition(shapes, lambda leaf: isinstance(leaf, jax.ShapeDtypeStruct))
+        leaves, self._structure = jax.tree.flatten(arrays)
         self._shapes = [leaf.shape for leaf in leaves]
-        self.count = sum(leaf.size for leaf in leaves)
-        return leaves
+        self.count = sum(math.prod(shape) for shape in self._shapes)
 
-    def tree(self, leaves: Sequence[Any]) -> Any:
+    def arrays(self, tree: PyTree) -> list[Array]:
+        """The arrays of a tree."""
+        return jax.tree.leaves(eqx.filter(tree, eqx.is_array))
+
+    def tree(self, arrays: Sequence[Array]) -> PyTree:
         """The tree with these arrays."""
-        return eqx.combine(jax.tree.unflatten(self._structure, leaves), self._rest)
+        return eqx.combine(jax.tree.unflatten(self._structure, arrays), self._others)
 
-    def symbols(self, name: str, dtype: str, first: int = 0) -> list[Symbols]:
-        """The arrays as stretches of one array of the program, from a place on."""
-        ends = np.cumsum([int(np.prod(shape)) for shape in self._shapes])
-        names = np.array([f"{name}[{first + k}]" for k in range(self.count)], object)
+    def symbols(self, name: str, dtype: str) -> list[Symbols]:
+        """The arrays as stretches of one array of the program."""
+        ends = np.cumsum([math.prod(shape) for shape in self._shapes])
+        names = np.array([f"{name}[{k}]" for k in range(self.count)], object)
         parts = np.split(names, ends[:-1]) if self._shapes else []
         return [Symbols(part.reshape(shape), dtype) for part, shape in zip(parts, self._shapes, strict=True)]
 
@@ -69,7 +77,6 @@ class VehicleProgram:
         self.vehicle, self.dtype, self.member = vehicle, dtype, member
         self.numbers = law_numbers(self.vehicle)
         self.layout, self.wheels = vehicle.layout, len(vehicle.wheel_names)
-        self._stepper, self._carry = FlatTree(), FlatTree()
         self._state_sizes = [int(law.initial_state().size) for law in self.vehicle.elements()]
 
     @property
@@ -94,7 +101,6 @@ class VehicleProgram:
     @property
     def sizes(self) -> dict[str, int]:
         """Lengths of the arrays m and c."""
-        _ = self.start
         return {"m": self.prepare.results.size, "c": self._carry.count}
 
     @cached_property
@@ -105,26 +111,43 @@ class VehicleProgram:
 
     @cached_property
     def _matrices(self) -> Program:
-        def prepare(values: Any, dt: Any) -> list[Any]:
-            equations = Equations(self.vehicle_of(values).system(), MemoryLayout.SCALARS)
-            return self._stepper.taken(Exponential().stepper(equations, dt))
+        """The arrays of the stepper."""
+
+        def prepare(values: Numbers, dt: Array) -> list[Array]:
+            return self._stepper.arrays(self._prepared(values, dt))
 
         return lower(prepare, self.values(), self._symbols("dt"), finite=True)
 
     @cached_property
+    def _stepper(self) -> FlatTree:
+        """The stepper of the engine, which holds the equations."""
+        return self._flat(self._prepared, self.values(), self._symbols("dt"))
+
+    def _prepared(self, values: Numbers, dt: Array) -> AbstractStepper:
+        return Exponential().stepper(Equations(self.vehicle_of(values).system(), MemoryLayout.SCALARS), dt)
+
+    @cached_property
     def _held(self) -> list[Symbols]:
-        """The stepper: numbers that are known, such as the zeros of a matrix, and the rest as entries of m."""
+        """The stepper: numbers that are known, such as the zeros of a matrix, and the others as entries of m."""
         place = itertools.count()
         name = np.frompyfunc(lambda atom: atom if isinstance(atom, Constant) else f"m[{next(place)}]", 1, 1)
         return [Symbols(np.array(name(part), object), self.dtype) for part in self._matrices.results]
 
     @cached_property
+    def _carry(self) -> FlatTree:
+        """What a run carries from step to step."""
+        return self._flat(self._started, self._held, *self._road("h", "r"))
+
+    def _started(self, held: list[Array], height: Array, rate: Array) -> PyTree:
+        stepper = self._stepper.tree(held)
+        return stepper.start(settled(stepper.equations.system, height), road_input(height, rate))
+
+    @cached_property
     def start(self) -> Program:
         """`start(m, h, r)`: at rest in the static equilibrium on a road: c."""
 
-        def start(held: list[Any], height: Any, rate: Any) -> list[Any]:
-            stepper = self._stepper.tree(held)
-            return self._carry.taken(stepper.start(settled(stepper.equations.system, height), road_input(height, rate)))
+        def start(held: list[Array], height: Array, rate: Array) -> list[Array]:
+            return self._carry.arrays(self._started(held, height, rate))
 
         return self._lowered(start, *self._road("h", "r"))
 
@@ -132,9 +155,9 @@ class VehicleProgram:
     def step(self) -> Program:
         """`step(m, c, h0, r0, h1, r1)`: c a step later, the road being straight."""
 
-        def step(held: list[Any], now: list[Any], *road: Any) -> list[Any]:
+        def step(held: list[Array], now: list[Array], *road: Array) -> list[Array]:
             after = self._stepper.tree(held)(self._carry.tree(now), road_input(*road[:2]), road_input(*road[2:]))
-            return self._carry.taken(after)
+            return self._carry.arrays(after)
 
         return self._lowered(step, self._carried, *self._road("h0", "r0", "h1", "r1"))
 
@@ -142,9 +165,9 @@ class VehicleProgram:
     def resume(self) -> Program:
         """`resume(m, c, h, r, ratio)`: c at this instant after another `prepare`; ratio of the steps, new to old."""
 
-        def resume(held: list[Any], now: list[Any], height: Any, rate: Any, ratio: Any) -> list[Any]:
+        def resume(held: list[Array], now: list[Array], height: Array, rate: Array, ratio: Array) -> list[Array]:
             again = self._stepper.tree(held).resumed(self._carry.tree(now), road_input(height, rate), ratio)
-            return self._carry.taken(again)
+            return self._carry.arrays(again)
 
         return self._lowered(resume, self._carried, *self._road("h", "r"), self._symbols("ratio"))
 
@@ -162,23 +185,25 @@ class VehicleProgram:
     def derivative(self) -> Program:
         """The changes of the rates of the states and of the channels for changes of p, x, h and r."""
 
-        def observed(values: Any, *point: Any) -> Any:
+        def observed(values: Numbers, *point: PyTree) -> PyTree:
             equations = Equations(self.vehicle_of(values).system(), MemoryLayout.SCALARS)
             return self._observed(equations, *point)
 
         arguments, changes = (self.values(), *self._point()), (self.values("dp"), *self._point("d"))
         return lower(lambda point, change: jax.jvp(observed, point, change)[1], arguments, changes, finite=True)
 
-    def vehicle_of(self, values: Any) -> AbstractVehicle:
+    def vehicle_of(self, values: Numbers) -> AbstractVehicle:
         """The vehicle with other numbers, in the order of `numbers`."""
         vehicle = jax.tree.map(lambda a: jnp.asarray(a, self.dtype) if eqx.is_inexact_array(a) else a, self.vehicle)
         return with_values(vehicle, {n.path: value for n, value in zip(self.numbers, values, strict=True)})
 
-    def values(self, owner: str = "p") -> Any:
+    def values(self, owner: str = "p") -> PyTree[Symbols]:
         """All numbers, as members of an object of the program."""
         return [symbols(f"{owner}{self.member}{n.name}", n.value.shape, self.dtype) for n in self.numbers]
 
-    def _observed(self, equations: Equations, motion: Any, states: Any, height: Any, rate: Any) -> tuple[Any, Any]:
+    def _observed(
+        self, equations: Equations, motion: Array, states: list[Array], height: Array, rate: Array
+    ) -> tuple[tuple[Array, list[Array]], Array]:
         """The rates of the states, and the channels."""
         deflections = equations.at_ports(scalars(motion), road_input(height, rate))
         force = jnp.asarray(equations.ports.force(*deflections, states), motion.dtype)
@@ -186,10 +211,10 @@ class VehicleProgram:
         outputs = equations.system.channels([channel.name for channel in self.channels])
         return (rates, equations.ports.state_rate(*deflections, states)), outputs(motion, force, height, rate)
 
-    def _equations(self, held: list[Any]) -> Equations:
+    def _equations(self, held: list[Array]) -> Equations:
         return self._stepper.tree(held).equations
 
-    def _point(self, d: str = "") -> tuple[Any, ...]:
+    def _point(self, d: str = "") -> tuple[PyTree[Symbols], ...]:
         """The states and the road: motion, the states of each element, heights, rates."""
         names = symbols(f"{d}x", (len(self.states),), self.dtype).names
         motion, *states = np.split(names, np.cumsum([2 * len(self.layout.coordinates), *self._state_sizes])[:-1])
@@ -197,12 +222,21 @@ class VehicleProgram:
 
     @property
     def _carried(self) -> list[Symbols]:
-        _ = self.start
         return self._carry.symbols("c", self.dtype)
 
-    def _lowered(self, function: Callable[..., Any], *arguments: Any) -> Program:
+    def _lowered(self, function: Callable[..., PyTree], *arguments: PyTree[Symbols]) -> Program:
         """A function of the stepper and other arguments."""
         return lower(function, self._held, *arguments, finite=True)
+
+    def _flat(self, function: Callable[..., PyTree], *arguments: PyTree[Symbols]) -> FlatTree:
+        """How the numbers of what a function returns lie in an array of the program."""
+
+        def shape(symbols: Symbols) -> jax.ShapeDtypeStruct:
+            return jax.ShapeDtypeStruct(symbols.names.shape, symbols.dtype)
+
+        with printing(), jax.enable_x64(self.dtype == "float64"):
+            shapes = jax.tree.map(shape, arguments, is_leaf=lambda leaf: isinstance(leaf, Symbols))
+            return FlatTree(eqx.filter_eval_shape(function, *shapes))
 
     def _road(self, *names: str) -> list[Symbols]:
         return [symbols(name, (self.wheels,), self.dtype) for name in names]
@@ -211,6 +245,6 @@ class VehicleProgram:
         return symbols(name, (), self.dtype)
 
 
-def road_input(height: Any, rate: Any) -> RoadInput:
+def road_input(height: Array, rate: Array) -> RoadInput:
     """Heights and rates as scalars."""
     return RoadInput(scalars(height), scalars(rate))

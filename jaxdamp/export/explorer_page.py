@@ -83,19 +83,16 @@ def to_explorer(
     if file.suffix != ".html":
         _checks.refuse("path", "be a file NAME.html", str(file))
     vehicle = presets.quarter_car_000(law) if vehicle is None else vehicle
-    check_module("vehicle", vehicle, (AbstractVehicle,), "to_explorer(law, path, vehicle=QuarterCar(..., damper=law))")
-    wheels = len(vehicle.wheel_names)
-    if wheels != 1:
-        must = "be a vehicle with one wheel"
-        _checks.refuse("vehicle", must, f"a {type(vehicle).__name__} with {wheels}", "Take a `QuarterCar`.")
+    _check_vehicle(vehicle)
     _checks.positive("speed", speed)
     profile = road if isinstance(road, AbstractRoad) else None
     duration = (profile and profile.duration) or 10.0 if duration is None else duration
-    drawn = iso8608("C" if profile else str(road), speed, duration, seed=seed)
+    road_class = "C" if profile else str(road)
+    profile = profile or iso8608(road_class, speed, duration, seed=seed)
     count = round(duration / _STEP) + 1
     program = LawProgram(law, member=".")
     car = RideProgram(program, vehicle, _STEP, count)
-    ride = Ride(vehicle, profile or drawn, metrics=car.metrics[:1], duration=duration, dt=_STEP)
+    ride = Ride(vehicle, profile, metrics=car.metrics[:1], duration=duration, dt=_STEP)
     functions = {"LAW": law_functions(program) | vehicle_functions(car)}
     about = _of_law(program, car, "as loaded")
     compared, substeps = about, ride.substeps
@@ -103,33 +100,54 @@ def to_explorer(
         check_module("baseline", baseline, (AbstractDamper,), "to_explorer(law, path, baseline=law)")
         other = LawProgram(baseline, member=".")
         other_car = RideProgram(other, car.with_law(other.law), _STEP, count)
-        other_ride = Ride(other_car.vehicle, profile or drawn, metrics=car.metrics[:1], duration=duration, dt=_STEP)
+        other_ride = Ride(other_car.vehicle, profile, metrics=car.metrics[:1], duration=duration, dt=_STEP)
         functions["BASELINE"] = law_functions(other) | vehicle_functions(other_car)
         compared, substeps = _of_law(other, other_car, "baseline"), max(substeps, other_ride.substeps)
-    roads = _of_roads(speed, duration, seed, "C" if profile else str(road))
-    if profile is not None:
-        assert ride.heights is not None
-        roads["profile"] = {"title": f"given road ({type(profile).__name__})", "heights": _packed(ride.heights[:, 0])}
     data = {
         "title": " › ".join(dict.fromkeys(type(each).__name__ for _, each in laws_inside(law))),
         "file": file.stem,
         "law": about | {"document": json.loads(to_json(law)), "conditions": program.conditions},
         "baseline": compared,
-        "vehicle": {"title": type(vehicle).__name__, "numbers": [_of_number(n) for n in car.numbers]},
-        "metrics": [_of_metric(m, vehicle) for m in car.metrics],
-        "channels": [
-            {"name": name, "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]} for name in car.needed
-        ],
+        **_of_car(car),
         "dt": _STEP,
         "count": count,
         "substeps": substeps,
-        "road": roads,
+        "road": _of_roads(speed, duration, seed, road_class) | _of_profile(road, ride),
         "records": [_of_record(run) for run in records],
     }
-    programs = "".join(closed(name, own) for name, own in functions.items()) + closed("ROAD", {"bump": bump_function()})
-    return write_whole(
-        file, _assembled(data, programs if baseline is not None else f"{programs}const BASELINE = LAW;\n")
-    )
+    programs = "".join(closed(name, texts) for name, texts in functions.items())
+    programs += closed("ROAD", {"bump": bump_function()})
+    programs += "const BASELINE = LAW;\n" if baseline is None else ""
+    return write_whole(file, _assembled(data, programs))
+
+
+def _of_profile(road: AbstractRoad | str, ride: Ride) -> dict[str, Any]:
+    """The heights of a road that was given."""
+    if isinstance(road, str):
+        return {}
+    assert ride.heights is not None
+    return {"profile": {"title": f"given road ({type(road).__name__})", "heights": _packed(ride.heights[:, 0])}}
+
+
+def _check_vehicle(vehicle: AbstractVehicle) -> None:
+    check_module("vehicle", vehicle, (AbstractVehicle,), "to_explorer(law, path, vehicle=QuarterCar(..., damper=law))")
+    wheels = len(vehicle.wheel_names)
+    if wheels != 1:
+        must = "be a vehicle with one wheel"
+        _checks.refuse("vehicle", must, f"a {type(vehicle).__name__} with {wheels}", "Take a `QuarterCar`.")
+
+
+def _of_car(car: RideProgram) -> dict[str, Any]:
+    """The vehicle with its numbers, metrics and the channels that these need."""
+    vehicle = car.vehicle
+    channels = [
+        {"name": name, "unit": vehicle.units[name], "meaning": vehicle.descriptions[name]} for name in car.needed
+    ]
+    return {
+        "vehicle": {"title": type(vehicle).__name__, "numbers": [_of_number(number) for number in car.numbers]},
+        "metrics": [_of_metric(metric, vehicle) for metric in car.metrics],
+        "channels": channels,
+    }
 
 
 def _assembled(data: dict[str, Any], programs: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table
 from jaxdamp.identify.propagation import Evidence, Propagated
 from jaxdamp.parameters import Coordinates
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 INSIDE = 0.5  # standard errors from an edge at which a chain starts, if the fit ended there
 APART = 1.0  # spread of the starts of the chains, in standard errors
+AGREED = 1.05  # largest ratio r hat of chains that agree
 REFUSED = 1e12  # potential where the forces are not finite
 
 
@@ -47,8 +49,8 @@ class Spread(NamedTuple):
     effective: float  # number of independent samples
 
 
-@dataclasses.dataclass(frozen=True)
-class Posterior:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Posterior(AbstractResult):
     """Samples of the posterior of the free parameters.
 
     Attributes:
@@ -73,11 +75,24 @@ class Posterior:
         """A function of the law over the samples, as `FitResult.propagate`."""
 
         def of(values: Array) -> Array:
-            return jnp.asarray(function(self.evidence.law(values)), float)
+            return jnp.asarray(function(self.evidence.model(values)), float)
 
         drawn = np.asarray(eqx.filter_jit(jax.vmap(of))(jnp.asarray(self.samples)), float)
         lower, upper = np.quantile(drawn, [0.025, 0.975], axis=0)
         return Propagated(drawn.mean(axis=0), drawn.std(axis=0, ddof=1), lower, upper, drawn)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Steps of the sampler that went wrong, and numbers on which its chains do not agree."""
+        wrong = f"{self.divergences} steps of the sampler went wrong: corners of the posterior may be missing."
+        apart = [row.name for row in self.parameters if not row.r_hat < AGREED]
+        unsure = f"The chains do not agree on {', '.join(apart)}: take more samples."
+        return (*[wrong] * (self.divergences > 0), *[unsure] * bool(apart))
+
+    @property
+    def summary(self) -> str:
+        """Numbers of samples and of parameters."""
+        return f"{len(self.samples)} samples of the posterior of {len(self.parameters)} numbers."
 
     def plot(self) -> "matplotlib.figure.Figure":
         """Histograms of the samples (`plots.posterior`)."""

@@ -12,9 +12,9 @@ from jaxtyping import Float
 
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, Scheduled, laws_inside, without_fitted_ranges
+from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.model import Model, is_memoryless, law_of, on_rig
 from jaxdamp.identify.predicting import predict_runs, used_samples
-from jaxdamp.identify.result import FitResult
 from jaxdamp.rig import Rig
 
 

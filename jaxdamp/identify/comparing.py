@@ -11,17 +11,18 @@ import jax
 import jax.numpy as jnp
 
 from jaxdamp._progress import Progress
+from jaxdamp._results import AbstractResult
+from jaxdamp._status import Status
 from jaxdamp._tables import Table, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
+from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine
-from jaxdamp.identify.recommending import Recommendation, recommendation
-from jaxdamp.identify.result import FitResult
-from jaxdamp.identify.rungs import Failure, Rung, ladder_table
+from jaxdamp.identify.rungs import Failure, Recommendation, Rung, ladder_table, recommendation, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
 from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts
-from jaxdamp.identify.verdict import verdict
 
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ MOST_THREADS = 4  # fits side by side: more of them wait for Python's lock
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class Comparison:
+class Comparison(AbstractResult):
     """Laws fitted to the same records, in the order given.
 
     Attributes:
@@ -81,6 +82,16 @@ class Comparison:
         return min(self.rungs, key=lambda rung: rung.rmse)
 
     @property
+    def status(self) -> Status:
+        """How the search of the recommended law ended."""
+        return self.best.result.status
+
+    @property
+    def summary(self) -> str:
+        """The recommended law and its errors: the first sentence of the verdict."""
+        return self.verdict[0]
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """The warnings of all fits, which concern the records and not a law, such as contradicting records."""
         first, *others = (rung.result.warnings for rung in self.rungs)
@@ -107,7 +118,7 @@ class Comparison:
         """Each law with its number of free parameters, its errors, their shares, and remarks."""
         return ladder_table(self.rungs, self.failed, self.best.name)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """All fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         laws = {
             rung.name: {
@@ -147,6 +158,7 @@ class Comparison:
         return "\n".join([*lines, *about_records, answer, f"best: {self.best.name}"])
 
 
+@of_known_numbers
 def compare(
     laws: Mapping[str, Start],
     runs: Iterable[BenchRun],

@@ -5,7 +5,7 @@ one more residual, (value − mean)/standard deviation, in units of the noise, w
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
-from jaxdamp.identify.model import Model
-from jaxdamp.identify.noise import noise_of
+from jaxdamp.identify.noise import Noise
 from jaxdamp.identify.problem import AbstractResiduals, Problem
+from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution
 from jaxdamp.parameters import FreeParameters, get, match_paths
 
@@ -56,7 +56,7 @@ class Priors(AbstractResiduals):
     noise: Float[Array, ""]  # standard deviation of the noise of a weighted sample
     weak: bool = eqx.field(static=True, default=False)  # whether they only determine what the records do not
 
-    def __call__(self, model: Model) -> Float[Array, " samples"]:
+    def __call__(self, model: Any) -> Float[Array, " samples"]:
         """Distance of the values from their means, in standard deviations, times that of the noise."""
         values = zip(self.paths, self.mean, self.deviation, strict=True)
         return self.noise * jnp.concatenate([jnp.ravel((get(model, path) - m) / d) for path, m, d in values])
@@ -99,8 +99,9 @@ def solve_by(
     solve: Callable[[Problem, int | None], Solution],
     *,
     loss: str,
-    force_noise: float | None,
+    noise: Callable[[Problem, SearchEnd], Noise],
     starts: int | None,
+    spread: float | None = None,
 ) -> tuple[Problem, Solution]:
     """Minimise a loss, with priors if the problem has any: least squares again and again, with new weights.
 
@@ -108,8 +109,9 @@ def solve_by(
         problem: the problem with its start.
         solve: least squares of a problem from so many starts.
         loss: a name in `LOSSES`.
-        force_noise: standard deviation of the force [N], if it is known.
+        noise: the noise of the weighted residual at a minimum.
         starts: largest number of starts of the first round; the others continue from its end.
+        spread: standard deviation of the residuals of sound samples; estimated by their median if left out.
 
     Returns:
         The problem of the last round, with its weights, and its solution.
@@ -125,20 +127,20 @@ def solve_by(
         if not best.finite or problem.is_rounding(best.squares):
             break
         residual = best.residual / root
-        noise = noise_of(problem, best, force_noise).sigma
-        spread = 1.4826 * float(np.median(np.abs(residual[plain.used]))) if loss != "squares" else 1.0
-        if not spread > 0:
+        level = float(np.mean(noise(problem, best).sigma[plain.used]))
+        unit = 1.0 if loss == "squares" else spread or 1.4826 * float(np.median(np.abs(residual[plain.used])))
+        if not unit > 0:
             break
-        relative = residual / spread
+        relative = residual / unit
         root = np.where(plain.used, np.sqrt(LOSSES[loss].weight(relative)), 1.0)
         factor = noise_factor(LOSSES[loss], relative[plain.used])
-        problem = _weighted(plain, root, float(np.mean(noise[plain.used])))._replace(
+        problem = _weighted(plain, root, level)._replace(
             noise_factor=factor, share_left_out=float(np.mean(root[plain.used] ** 2 < HALF))
         )
         solution = solve(problem.started_at(best.values), 1)
         length = np.linalg.norm(solution.best.jacobian, axis=0)
         moved = np.abs(solution.best.values - best.values) * length
-        if np.all(moved < SETTLED * float(np.mean(noise[plain.used]))):
+        if np.all(moved < SETTLED * level):
             break
     return problem, solution
 

@@ -9,14 +9,17 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._results import AbstractResult, worst_status
+from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import fit
+from jaxdamp.identify.law_result import AbstractFitted
 from jaxdamp.identify.machine import OFFSET, Machine
 from jaxdamp.identify.preparing import weights
-from jaxdamp.identify.result import AbstractFitted
+from jaxdamp.identify.rungs import cannot_choose
 from jaxdamp.identify.starting import Start, check_starts
-from jaxdamp.identify.verdict import cannot_choose
 from jaxdamp.parameters import parameters
 
 
@@ -47,7 +50,7 @@ class Choice(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class CrossValidation:
+class CrossValidation(AbstractResult):
     """How well laws predict records that they were not fitted to. Results of the same records are joined with `+`.
 
     Attributes:
@@ -80,6 +83,22 @@ class CrossValidation:
     def best(self) -> str:
         """The law with the highest mean fit percent."""
         return max(self.laws, key=self.fit_percent)
+
+    @property
+    def status(self) -> Status:
+        """How the searches ended: the first that did not converge, if any."""
+        return worst_status(fold.result.status for fold in self.folds)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The fits whose search did not converge."""
+        failed = (fold for fold in self.folds if fold.result.status is not Status.CONVERGED)
+        return tuple(f"{fold.law} without {fold.held_out}: {fold.result.status.sentence}" for fold in failed)
+
+    @property
+    def summary(self) -> str:
+        """The best law: the first sentence of the verdict."""
+        return self.verdict[0]
 
     @property
     def verdict(self) -> tuple[str, ...]:
@@ -155,7 +174,11 @@ class CrossValidation:
         rows = tuple((fold.law, fold.held_out, fold.fit_percent, fold.rmse) for fold in self.folds)
         return Table("Errors of the held-out records", columns, rows)
 
-    def to_dict(self) -> dict[str, Any]:
+    def tables(self) -> dict[str, Table]:
+        """Errors by law, and by record."""
+        return {"laws": self.table(), "records": self.record_table()}
+
+    def content(self) -> dict[str, Any]:
         """The errors of each law on each held-out record with units, ready for JSON."""
         folds = [
             {
@@ -176,6 +199,7 @@ class CrossValidation:
         return f"{self.table().to_text()}\nbest: {self.best}"
 
 
+@of_known_numbers
 def cross_validate(
     laws: Mapping[str, Start],
     runs: Iterable[BenchRun],

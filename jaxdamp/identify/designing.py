@@ -8,12 +8,12 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import Excitation
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify.candidates import WAVEFORMS, MachineLimits, Point, grid, near
-from jaxdamp.identify.design_goal import Goal
-from jaxdamp.identify.information import Information, information
+from jaxdamp.identify.design_goal import WAVEFORMS, Goal, Information, MachineLimits, Point, grid, information, near
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import Rig
 
@@ -28,7 +28,7 @@ WEAK = 0.5  # standard error, relative to the value, above which a parameter is 
 
 
 @dataclasses.dataclass(frozen=True)
-class ExperimentDesign:
+class ExperimentDesign(AbstractResult):
     """Runs chosen for a law, and the standard errors that they are expected to give.
 
     Attributes:
@@ -81,6 +81,10 @@ class ExperimentDesign:
             rows.append((self.free.names[i], p.unit or "–", float(value), error, *beside, note))
         return Table("Expected standard errors", tuple(columns), tuple(rows))
 
+    def tables(self) -> dict[str, Table]:
+        """Expected standard errors, and the chosen runs."""
+        return {"parameters": self.table(), "runs": self.runs_table()}
+
     def runs_table(self) -> Table:
         """The chosen runs."""
         columns = (
@@ -99,12 +103,23 @@ class ExperimentDesign:
 
         return experiment(self)
 
+    @property
+    def summary(self) -> str:
+        """Number of runs, and how many are as good as the programme."""
+        if self.programme_covariance is None:
+            return f"{len(self.tests)} runs chosen by the criterion {self.criterion}."
+        whole, match = len(self.programme), self.runs_to_match
+        return f"{match or f'More than {whole}'} such runs are as good as the {whole} of the programme."
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Numbers that the runs will not determine."""
+        weak = [str(row["parameter"]) for row in self.table().records() if row["note"]]
+        return (f"The runs will not determine {', '.join(weak)}.",) * bool(weak)
+
     def __repr__(self) -> str:
         lines = [str(self.runs_table()), "", str(self.table())]
-        if self.programme_covariance is not None:
-            whole, match = len(self.programme), self.runs_to_match
-            lines += [f"{match or f'More than {whole}'} such runs are as good as the {whole} of the programme."]
-        return "\n".join(lines)
+        return "\n".join([*lines, *[self.summary] * (self.programme_covariance is not None)])
 
 
 def extent(test: Excitation) -> tuple[float, float]:
@@ -117,6 +132,7 @@ def extent(test: Excitation) -> tuple[float, float]:
     return 1e3 * float(np.max(np.abs(test.stroke(time)))), float(np.max(np.abs(test.velocity(time))))
 
 
+@of_known_numbers
 def design_experiment(
     law: AbstractDamper,
     limits: MachineLimits | None = None,

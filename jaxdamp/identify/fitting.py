@@ -1,7 +1,9 @@
 """`fit`: weighted nonlinear least squares of a damper law over many bench records."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Protocol, cast, overload, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -10,36 +12,91 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
-from jaxdamp.bench import BenchRun, as_runs, usable
+from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
-from jaxdamp.identify.front_door import also_of_vehicles
-from jaxdamp.identify.input_noise import input_noise_bias, on_bias
-from jaxdamp.identify.judging import MOST_WARNINGS, judge
-from jaxdamp.identify.machine import Machine
+from jaxdamp.identify.judging import MOST_WARNINGS, input_noise_bias, judge, on_bias
+from jaxdamp.identify.law_result import FitResult
+from jaxdamp.identify.machine import Machine, holds_static_force, static_force_in_words, with_static_force_on_machine
+from jaxdamp.identify.many import fit_many
+from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import rig_of
+from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.preparing import prepare, records_in_words
 from jaxdamp.identify.problem import Problem, linearised
-from jaxdamp.identify.result import FitResult
 from jaxdamp.identify.search import SearchEnd, Solver
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
-from jaxdamp.identify.static_force import holds_static_force, static_force_in_words, with_static_force_on_machine
+from jaxdamp.identify.targets import TargetFit, fit_targets
+from jaxdamp.identify.vehicle_fitting import fit_vehicle
+from jaxdamp.identify.vehicle_result import VehicleFit
 from jaxdamp.parameters import FreeParameters, matched_in_words, parameters
+from jaxdamp.vehicles import AbstractVehicle
 
 
+if TYPE_CHECKING:
+    from jaxdamp.identify.scheduling import ScheduledFit
+
+
+P = ParamSpec("P")
 UNSEEN = 1e-12  # of the largest derivative, up to which one is a rounding error
 # Errors due to a law that does not suit the records, as opposed to a wrong call (`TypeError` and so on).
 NUMERICAL = (ValueError, ArithmeticError, eqx.EquinoxRuntimeError, jax.errors.JaxRuntimeError)
 
 
-@also_of_vehicles
+@runtime_checkable
+class FitCall(Protocol[P]):
+    """`fit` by what is fitted: a law, a vehicle, one law to many dampers, a model to numbers."""
+
+    @overload
+    def __call__(self, law: AbstractVehicle, runs: RideRecord | Iterable[RideRecord], **options: Any) -> VehicleFit: ...
+    @overload
+    def __call__(
+        self, law: Any, runs: Mapping[str, float | tuple[float, float]], *, numbers: Any, **options: Any
+    ) -> TargetFit: ...
+    @overload
+    def __call__(self, law: Start, runs: Mapping[str, BenchRun | Iterable[BenchRun]], **options: Any) -> ManyFits: ...
+    @overload
+    def __call__(
+        self, law: Start, runs: Iterable[BenchRun], *, scheduled: Literal[True], **options: Any
+    ) -> "ScheduledFit": ...
+    @overload
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> FitResult: ...
+
+
+def of_any_records(fit: Callable[P, FitResult]) -> FitCall[P]:
+    """The same function, which hands other records than those of one damper to the fit that explains them."""
+
+    @functools.wraps(fit)
+    def by_kind(*args: Any, **options: Any) -> Any:
+        given: dict[str, Any] = dict(zip(("law", "runs"), args, strict=False)) | options
+        model = given.pop("law") if "law" in given else given.pop("vehicle", None)
+        records = given.pop("runs") if "runs" in given else given.pop("records", None)
+        if "numbers" in given:
+            return fit_targets(given.pop("numbers"), model, cast(Any, records), **given)
+        if isinstance(model, AbstractVehicle):
+            return fit_vehicle(model, cast(Any, records), **given)
+        if isinstance(records, Mapping):
+            return fit_many(cast(Any, model), records, **given)
+        if given.pop("scheduled", False):
+            from jaxdamp.identify.scheduling import fit_scheduled  # which is made of fits of a law
+
+            return fit_scheduled(cast(Any, model), cast(Any, records), **given)
+        return fit(*args, **options)
+
+    return cast(FitCall[P], by_kind)
+
+
+@of_any_records
+@of_known_numbers
 def fit(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],
     *,
     rig: Machine = None,
+    over: Sequence[str] | None = None,
     freeze: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tie: Mapping[str, str] | None = None,
@@ -56,7 +113,11 @@ def fit(
     bad_records: str = "refuse",
     solver: Solver | None = None,
 ) -> FitResult:
-    """Fit a damper law to bench records by least squares on the force; a vehicle to its records, as `fit_vehicle` says.
+    """Fit a damper law to bench records by least squares on the force, or another model to what was measured of it.
+
+    `fit(law, runs)` is described here. `fit(vehicle, records)` is `fit_vehicle`, `fit(law, {"A": runs, "B": runs})` of
+    many dampers is `fit_many`, `fit(model, {"frequency": 1.2}, numbers=function)` is `fit_targets`, and
+    `fit(law, runs, scheduled=True)` of records at several settings is `fit_scheduled`.
 
     Minimises Σ ((F_law − F_measured)/σ)² over all samples of all records, with Levenberg-Marquardt inside the domains
     of the parameters, and Jacobians by forward-mode differentiation through the law and its states. Where the law is
@@ -86,7 +147,8 @@ def fit(
             constant force of the law is held at zero, or zero at rest in a table, unless the call gives it a value; it
             is left out beside a law with a static force of its own meaning, such as a gas charge. All paths of
             parameters then begin with `law.` or `rig.`; their last parts stay the same.
-        freeze: parameters to hold at their start, by path, last part of a path, or pattern.
+        over: parameters of the law to fit, by path, last part of a path, or pattern; all if left out.
+        freeze: parameters to hold at their start, named in the same way.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
         tie: parameters that take the values of others, such as `{"terms.1.**": "terms.0.**"}`: one free value for each
             group (see `jaxdamp.parameters.free_parameters`).
@@ -143,6 +205,7 @@ def fit(
         law,
         runs,
         rig=rig,
+        over=over,
         freeze=freeze,
         bounds=bounds,
         tie=tie,
@@ -156,12 +219,13 @@ def fit(
     def by_squares(problem: Problem, starts: int | None) -> Solution:
         return solve(problem, starts=starts, max_steps=max_steps, solver=solver)
 
-    problem, solution = solve_by(problem, by_squares, loss=loss, force_noise=force_noise, starts=starts)
+    noise = functools.partial(noise_of, force_noise=force_noise)
+    problem, solution = solve_by(problem, by_squares, loss=loss, noise=noise, starts=starts)
     on_machine = holds_static_force(rig)
     if on_machine:
         problem, solution = with_static_force_on_machine(problem, solution)
     known = [p.path for p in parameters(problem.free.tree)]
-    named = matched_in_words(known, freeze=freeze, bounds=bounds or {}, per_record=per_record)
+    named = matched_in_words(known, over=over or (), freeze=freeze, bounds=bounds or {}, per_record=per_record)
     result = dataclasses.replace(judge(problem, solution, force_noise=force_noise), patterns=named)
     if on_machine:
         said = static_force_in_words(result, problem.runs)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
@@ -9,22 +10,24 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Shown, Table, plain, with_unit
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, Scheduled, with_fitted_range
-from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.dependence import OWN, Dependence
 from jaxdamp.identify.estimates import rounded
 from jaxdamp.identify.estimating import WEAK
 from jaxdamp.identify.initial_states import DRIFT
-from jaxdamp.identify.model import Model, law_of, rig_of, with_range
+from jaxdamp.identify.model import Model, covered_range, law_of, rig_of, with_range
 from jaxdamp.parameters import Coordinates, FreeParameters
 from jaxdamp.rig import Rig
 
 
 if TYPE_CHECKING:
     import matplotlib.figure
+
+    from jaxdamp.identify.law_result import FitResult
 
 
 OUTLYING = 6.0  # robust standard deviations from the other dampers from which one is named
@@ -35,7 +38,7 @@ CERTAIN = 4.0  # standard errors by which it must differ as well
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class ManyFits:
+class ManyFits(AbstractResult):
     """One law fitted to many dampers.
 
     Attributes:
@@ -55,6 +58,7 @@ class ManyFits:
         share_left_out: of the samples of each damper, to which a robust loss gives less than half weight.
         drift: largest relative change of the states of each damper over the cycle before a record that starts in the
             periodic solution.
+        options: of the call, for `fit` of one damper.
     """
 
     names: tuple[str, ...]
@@ -72,11 +76,7 @@ class ManyFits:
     record_rmse: tuple[Float[np.ndarray, " _"], ...] = ()
     share_left_out: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
     drift: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
-
-    @property
-    def converged(self) -> bool:
-        """Whether every search ended by its tolerance."""
-        return all(status is Status.CONVERGED for status in self.status)
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -107,6 +107,20 @@ class ManyFits:
         """The fitted law of the damper of that name."""
         _checks.one_of("name", name, self.names)
         return self.laws[self.names.index(name)]
+
+    def fit(self, name: str, **options: Any) -> "FitResult":
+        """The fit of one damper with everything that `identify.fit` gives: several minima, profiles, bias, states.
+
+        It starts at the law of this damper, with the options of `fit_many`; parameters that are shared are not held.
+
+        Arguments:
+            name: of the damper.
+            options: others of `identify.fit`, such as `input_noise`.
+        """
+        from jaxdamp.identify.fitting import fit  # which hands many dampers to `fit_many`
+
+        _checks.one_of("name", name, self.names)
+        return fit(self[name], self.records[self.names.index(name)], **{**self.options, **options})
 
     def law_at(self, setting: float, blend: str | None = None) -> AbstractDamper:
         """The law at a setting between those of the dampers.
@@ -210,7 +224,7 @@ class ManyFits:
 
         return plots.many_fits(self)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """The fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         names = list(self.parameters)
         units = dict(zip(names, (owner.unit for owner in self.free.owners), strict=True))
@@ -229,10 +243,19 @@ class ManyFits:
         }
         return {"law": repr(law_of(self.free.tree)), "units": units, "dampers": dampers}
 
-    def __repr__(self) -> str:
-        named = [f"{name}: {remark}" for name, remark in zip(self.names, self.remarks, strict=True) if remark]
+    @property
+    def summary(self) -> str:
+        """Law, number of dampers and errors."""
         head = f"{type(law_of(self.free.tree)).__name__} fitted to {len(self)} dampers: mean fit"
-        return "\n".join([f"{head} {np.mean(self.fit_percent):.1f} %, RMSE up to {np.max(self.rmse):.4g} N", *named])
+        return f"{head} {np.mean(self.fit_percent):.1f} %, RMSE up to {np.max(self.rmse):.4g} N"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The remark on each damper that has one."""
+        return tuple(f"{name}: {remark}" for name, remark in zip(self.names, self.remarks, strict=True) if remark)
+
+    def __repr__(self) -> str:
+        return "\n".join([self.summary, *self.warnings])
 
     def _mostly_of(self, i: int) -> str:
         """The record that a large error of a damper is due to, if it is one."""

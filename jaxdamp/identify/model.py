@@ -1,8 +1,8 @@
-"""What explains the records of a bench: a law, or a law on a machine that adds to its force."""
+"""What explains records: a law, a law on a machine that adds to its force, a vehicle with its sensors."""
 
 import dataclasses
 from collections.abc import Sequence
-from typing import final
+from typing import Any, final
 
 import jax
 import jax.numpy as jnp
@@ -10,13 +10,17 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar, State, Vector
+from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, FittedRange, with_fitted_range
 from jaxdamp.identify.initial_states import Cycle, periodic_state
-from jaxdamp.parameters import Module, parameter
-from jaxdamp.rig import Rig, march
+from jaxdamp.parameters import Module, check_parameters, parameter, readable
+from jaxdamp.rig import Rig, Sensor, march
+from jaxdamp.vehicles import AbstractVehicle
 
 
 STARTS = "records."  # with which the paths of the states at the beginning of records begin
+
+
 START_PATH = STARTS + "{}.initial_state"  # by the number of the record
 
 
@@ -43,6 +47,47 @@ class OnRig(Module):
 
 
 Model = AbstractDamper | OnRig
+
+
+@final
+class InitialMotion(Module):
+    """How a record begins: displacements and rates of all coordinates, beside rest on the first heights.
+
+    Arguments:
+        position: displacement of each coordinate from the equilibrium [m, rad].
+        rate: rate of each coordinate [m/s, rad/s].
+    """
+
+    position: Vector = parameter("", "displacement of a coordinate at the first sample, in m or rad")
+    rate: Vector = parameter("", "rate of a coordinate at the first sample, in m/s or rad/s")
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
+
+
+@final
+class VehicleTest(Module):
+    """A vehicle with the sensors of its records; paths of parameters begin with `vehicle.`, `sensors.` and so on.
+
+    Arguments:
+        vehicle: the vehicle.
+        sensors: the sensor of a channel, by the channel's name; channels without one are shown as they are.
+        starts: the initial motion of each record; empty if all begin at rest.
+        rig: the test machine of the bench records of its damper, if it adds to the force.
+    """
+
+    vehicle: AbstractVehicle
+    sensors: dict[str, Sensor]
+    starts: tuple[InitialMotion, ...] = ()
+    rig: Rig | None = None
+
+    def __repr__(self) -> str:
+        return readable(self)
+
+
+def fitted_part(model: Any) -> Any:
+    """What a user asked to be fitted: the law or the vehicle, without machine, sensors and beginnings of records."""
+    return model.vehicle if isinstance(model, VehicleTest) else law_of(model)
 
 
 def on_rig(law: AbstractDamper, rig: Rig | None, records: Sequence[RecordStart | None] = ()) -> Model:
@@ -162,3 +207,26 @@ def initial_state(
     law = law_in(model, temperature)
     state, change = periodic_state(law, cycle)
     return jnp.where(cycle.periodic, state, law.initial_state()), jnp.where(cycle.periodic, change, 0.0)
+
+
+def covered_range(runs: Sequence[BenchRun]) -> FittedRange:
+    """Lowest and highest value of each channel over all records, and of temperature and command if stated.
+
+    Arguments:
+        runs: the records that were fitted, one or more.
+
+    >>> from jaxdamp import bench, dampers
+    >>> runs = bench.VirtualDyno(dampers.Linear(1500.0)).run([bench.SineTest(0.01, f) for f in (1.0, 3.0)])
+    >>> covered_range(tuple(runs)).words()
+    'velocity −0.188 to 0.188 m/s, stroke −10 to 10 mm, frequency 1 to 3 Hz, force −283 to 283 N'
+    """
+    channels = {name: [getattr(run, name) for run in runs] for name in ("velocity", "stroke", "force")}
+    channels["frequency"] = [np.array([run.frequency]) for run in runs]
+    channels["temperature"] = [run.temperature for run in runs if run.temperature is not None]
+    channels["command"] = [np.array([run.command]) for run in runs if run.command is not None]
+    limits = {name: _ends(np.concatenate(values)) for name, values in channels.items() if values}
+    return FittedRange(**limits)
+
+
+def _ends(values: np.ndarray) -> tuple[float, float]:
+    return float(values.min()), float(values.max())

@@ -118,6 +118,27 @@ def _noise_of_records(problem: Problem, found: SearchEnd, force_noise: float | N
     return _corrected(noise, orthonormal(found.jacobian))
 
 
+def channel_noise(problem: Problem, residual: Float[np.ndarray, " samples"], free: int) -> Noise:
+    """The noise of a vehicle's records: a level for each channel, inflated where over `CORRELATED` samples are alike.
+
+    Arguments:
+        problem: the problem that was solved.
+        residual: the weighted residual.
+        free: count of free numbers, for the degrees of freedom.
+    """
+    used, owner = problem.used, problem.owner
+    parts = {int(i): residual[used & (owner == i)] for i in np.unique(owner[used])}
+    counted = correlation_time(list(parts.values()))
+    alike = counted > CORRELATED and not problem.is_rounding(float(residual @ residual))
+    inflation, total = float(np.sqrt(counted)) if alike else 1.0, np.count_nonzero(used)
+    widened = inflation * np.sqrt(total / max(total - free, 1))
+    sigma = np.ones(residual.size)
+    for i, part in parts.items():
+        sigma[owner == i] = widened * np.sqrt(np.mean(part**2))
+    noise = independent(sigma, used, free)._replace(inflation=inflation)
+    return noise.scaled(float(problem.noise_factor), used)
+
+
 def _corrected(noise: Noise, basis: Float[np.ndarray, "samples rank"]) -> Noise:
     """Noise from a residual, corrected for what a fit with these directions has removed from it."""
     removed, whole = float(np.trace(noise.covariance_of(basis))), float(np.sum(noise.sigma**2))

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import Reach
 from jaxdamp.identify.criteria import FIRST_NOISE, Priors, priors_on
@@ -15,8 +16,10 @@ from jaxdamp.identify.initial_states import INITIAL_STATES, moving_samples, star
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
 from jaxdamp.identify.model import (
     START_PATH,
+    STARTS,
     Model,
     RecordStart,
+    VehicleTest,
     can_rest,
     initial_state_for,
     is_memoryless,
@@ -33,11 +36,13 @@ from jaxdamp.parameters import free_parameters, match_paths, name_patterns, para
 FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residuals of a `Problem` can be traced."
 
 
+@of_known_numbers
 def prepare(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],
     *,
     rig: Machine = None,
+    over: Sequence[str] | None = None,
     freeze: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tie: Mapping[str, str] | None = None,
@@ -53,6 +58,7 @@ def prepare(
         law: as in `fit`.
         runs: as in `fit`.
         rig: as in `fit`.
+        over: as in `fit`.
         freeze: as in `fit`.
         bounds: as in `fit`.
         tie: as in `fit`.
@@ -93,7 +99,7 @@ def prepare(
         model, expected, unfitted = _with_estimated_states(model, runs, sigma)
         absent = [*absent, *unfitted]
     own = _per_record(model, per_record, sigma, absent)
-    frozen = [*name_patterns("freeze", freeze), *frozen_by(law), *absent]
+    frozen = [*name_patterns("freeze", freeze), *frozen_by(law), *absent, *not_chosen(model, over, "rig.", STARTS)]
     free = free_parameters(_spread(model, own, len(runs)), freeze=frozen, bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
     residuals, ranges = batches(model, runs, sigma, samples_per_cycle, own, initial_state)
@@ -127,6 +133,13 @@ def _with_estimated_states(
     mean, deviation = (jnp.asarray(a[fitted]) for a in (states.expected, states.size))
     prior = Priors(tuple(map(str, paths[fitted])), mean, deviation, mean.size, jnp.ones(()), weak=True)
     return on_rig(law_of(model), rig_of(model), starts), (prior,), [str(path) for path in paths[~fitted]]
+
+
+def not_chosen(model: Model | VehicleTest, over: Sequence[str] | None, *beside: str) -> list[str]:
+    """Paths of the law or the vehicle that `over` leaves out; all others, which begin with these words, stay free."""
+    paths = [p.path for p in parameters(model) if not p.path.startswith(beside)]
+    chosen = paths if over is None else match_paths(paths, name_patterns("over", over))
+    return [path for path in paths if path not in chosen]
 
 
 def records_in_words(problem: Problem) -> str:

@@ -12,9 +12,11 @@ import scipy.special
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
+from jaxdamp._tables import Column, Table, plain
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper, keeps_conditions, without_fitted_ranges
-from jaxdamp.identify.model import law_of
+from jaxdamp.dampers import AbstractDamper, keeps_conditions, laws_inside, without_fitted_ranges
+from jaxdamp.identify.model import fitted_part
 from jaxdamp.identify.noise import Noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
@@ -46,11 +48,11 @@ class Evidence(NamedTuple):
     noise: Noise
     covariance: Float[np.ndarray, "free free"]
 
-    def law(self, values: Float[Array, " free"]) -> AbstractDamper:
-        """The law with these values, without its fitted range; where each record has a value, with their mean."""
+    def model(self, values: Float[Array, " free"]) -> Any:
+        """The law, vehicle or model with these values, without fitted range; where each record has one, their mean."""
         model = self.problem.free.build(values)
         means = {path: jnp.mean(get(model, path)) for path in self.problem.per_record}
-        return without_fitted_ranges(law_of(with_values(model, means)))
+        return without_fitted_ranges(fitted_part(with_values(model, means) if means else model))
 
     @property
     def quantile(self) -> float:
@@ -65,7 +67,7 @@ class Evidence(NamedTuple):
         rng, free = np.random.default_rng(seed), self.problem.free
         half = _root(self.covariance)
         lower, upper = free.limits()
-        limited = any(law.has_conditions() for law in [self.law(free.values)])
+        limited = any(law.has_conditions() for _, law in laws_inside(free.tree))
         kept: list[np.ndarray] = []
         for _ in range(MOST_DRAWS):
             spread = np.sqrt(rng.chisquare(self.noise.dof, (count, 1)) / self.noise.dof)
@@ -110,7 +112,7 @@ def propagate(
     """`FitResult.propagate`."""
 
     def of(values: Array) -> Array:
-        return jnp.asarray(function(evidence.law(values)), float)
+        return jnp.asarray(function(evidence.model(values)), float)
 
     centre = jnp.asarray(evidence.minimum.values, evidence.problem.free.values.dtype)
     if samples is not None:
@@ -140,8 +142,8 @@ def standard_error(slopes: Float[np.ndarray, "... free"], covariance: Float[np.n
     return np.where(np.any((slopes != 0.0) & lost, axis=-1), np.inf, np.sqrt(np.maximum(variance, 0.0)))
 
 
-@dataclasses.dataclass(frozen=True)
-class Band:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Band(AbstractResult):
     """95 % intervals of the force of a fitted law, each for its own velocity.
 
     Attributes:
@@ -159,6 +161,27 @@ class Band:
     lower: Float[np.ndarray, " points"]
     upper: Float[np.ndarray, " points"]
     runs: tuple[BenchRun, ...] = ()
+
+    @property
+    def summary(self) -> str:
+        """The widest interval."""
+        width = 0.5 * (self.upper - self.lower)
+        if not np.any(np.isfinite(width)):
+            return "The force has no finite interval at any of these velocities."
+        i = int(np.nanargmax(np.where(np.isfinite(width), width, np.nan)))
+        return f"The force is known to ±{width[i]:.3g} N or better (95 %), least at {self.velocity[i]:.3g} m/s."
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Velocities at which the force has no finite interval."""
+        open_ended = int(np.count_nonzero(~np.isfinite(self.upper - self.lower)))
+        return (f"At {open_ended} velocities the force or its interval is not finite.",) * bool(open_ended)
+
+    def table(self) -> Table:
+        """Force with its interval at each velocity."""
+        columns = Column("velocity", "m/s"), *(Column(name, "N", ".1f") for name in ("force", "from", "to"))
+        rows = zip(*map(plain, (self.velocity, self.force, self.lower, self.upper)), strict=True)
+        return Table("Force at constant velocity with its 95 % interval", columns, tuple(rows))
 
     def plot(self) -> "Figure":
         """The curve with its band, over the records."""

@@ -11,8 +11,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain
-from jaxdamp.identify.ends import at_ends
+from jaxdamp.identify.estimating import at_ends
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.traces import Batch
@@ -31,7 +32,7 @@ SINGULAR = 1e-12  # smallest curvature, relative to the largest, both scaled, th
 
 @final
 @dataclasses.dataclass(frozen=True, repr=False)
-class RecordSensitivity:
+class RecordSensitivity(AbstractResult):
     """Exact derivatives of functions of a fitted law by the measured forces, all parameters fitted again.
 
     Attributes:
@@ -69,9 +70,19 @@ class RecordSensitivity:
             "Change of what follows from the fit, for other forces in each record", tuple(columns), tuple(rows)
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """All derivatives as plain data, ready for JSON; numbers that are not finite are None."""
-        return plain({field.name: getattr(self, field.name) for field in dataclasses.fields(self)})
+        fields = (field.name for field in dataclasses.fields(self) if field.name != "warnings")
+        return plain({name: getattr(self, name) for name in fields})
+
+    @property
+    def summary(self) -> str:
+        """The record that changes each function most."""
+        most = []
+        for name, slopes in self.by_gain.items():
+            i = int(np.argmax(np.abs(slopes)))
+            most.append(f"1 % more force in {self.records[i]} changes {name} by {GAIN * slopes[i]:+.3g}.")
+        return " ".join(most)
 
     def plot(self) -> "matplotlib.figure.Figure":
         """See `jaxdamp.plots.record_sensitivity`."""
@@ -212,7 +223,7 @@ def _function(
     names: list[str] = []
 
     def stacked(values: Array) -> tuple[Array, Array]:
-        results = function(evidence.law(values))
+        results = function(evidence.model(values))
         by_name = dict(results) if isinstance(results, Mapping) else {"value": results}
         for name, value in by_name.items():
             if jnp.shape(value) != ():

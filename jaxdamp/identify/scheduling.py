@@ -11,17 +11,20 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._results import AbstractResult
+from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import AbstractDamper, Scheduled, takes_command
 from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
 from jaxdamp.identify.estimating import undetermined
 from jaxdamp.identify.fitting import fit, solve
+from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, constant_forces
 from jaxdamp.identify.model import law_of, rig_of
+from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
-from jaxdamp.identify.result import FitResult
-from jaxdamp.identify.scoring import score
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
 
@@ -72,7 +75,7 @@ class LeftOutSetting(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class ScheduledFit:
+class ScheduledFit(AbstractResult):
     """One law for several settings.
 
     Attributes:
@@ -101,14 +104,27 @@ class ScheduledFit:
         return self.result.law
 
     @property
+    def status(self) -> Status:
+        """How the search of the common fit ended."""
+        return self.result.status
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Doubts about the common fit."""
+        return self.result.warnings
+
+    @property
+    def summary(self) -> str:
+        """The settings, and the errors of the common fit."""
+        settings = ", ".join(f"{setting:g}" for setting in self.alone)
+        percent, rmse = self.result.fit_percent, self.result.rmse
+        return f"One law for the settings {settings}: fit {percent:.1f} %, RMSE {rmse:.1f} N."
+
+    @property
     def verdict(self) -> tuple[str, ...]:
         """Sentences on the common fit and on the interpolation."""
-        settings = ", ".join(f"{setting:g}" for setting in self.alone)
-        head = (
-            f"One law for the settings {settings}: fit {self.result.fit_percent:.1f} %, RMSE {self.result.rmse:.1f} N."
-        )
         none = "No setting lies between two others, so the interpolation cannot be scored: measure a third one."
-        return head, self.choice.reason, *([left.sentence("The law") for left in self.between] or [none])
+        return self.summary, self.choice.reason, *([left.sentence("The law") for left in self.between] or [none])
 
     def table(self) -> Table:
         """For each setting, the fit of the law of this setting alone, of the common law, and of an interpolated one."""
@@ -122,7 +138,7 @@ class ScheduledFit:
         between_settings = "parameters interpolated" if self.choice.blend == "parameters" else "forces blended"
         return Table(f"Fit by setting ({between_settings} between settings)", tuple(columns), tuple(rows))
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """The fits as numbers with units and words, ready for JSON."""
         return {
             "verdict": list(self.verdict),
@@ -138,6 +154,7 @@ class ScheduledFit:
         return "\n".join([self.table().to_text(), *self.verdict])
 
 
+@of_known_numbers
 def fit_scheduled(
     law: Start,
     runs: Iterable[BenchRun],

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp.dampers import Reach, keeps_conditions, laws_inside
+from jaxdamp.identify.estimates import Minimum
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.result import Minimum
 from jaxdamp.identify.search import SearchEnd, Solver, search
 from jaxdamp.parameters import FreeParameters
 
@@ -24,6 +24,7 @@ FOLLOWED_STEPS = 80  # of each of them at most
 PROMISING = 1.5  # sum of squares, relative to the best, up to which a start is continued
 INSIDE = 0.02  # distance of a start from the ends of a range, relative to its width
 ROUNDS = 3  # rounds of proposals, each from the best end of the previous round
+ALIKE = 1e-2  # difference of sums of squares, relative to them, of ends that count as equally good
 SAME = 1.0  # largest difference in chi-square of two ends of the same minimum
 WORTH_A_ROUND = 1e-3  # relative decrease of the sum of squares after which there is another round
 BETTER = 1e-9  # relative decrease of the sum of squares that counts as one
@@ -93,6 +94,41 @@ def search_from(problem: Problem, *, starts: int | None, max_steps: int, solver:
             break
         problem = problem.started_at(best.values)
     return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(tried))
+
+
+def scattered_starts(free: FreeParameters, count: int, seed: int) -> list[Float[np.ndarray, " free"]]:
+    """The start, then others: each parameter times a factor between a half and two, where that is within its limits."""
+    random, (lower, upper) = np.random.default_rng(seed), free.limits()
+    values = np.asarray(free.values, float)
+    starts = [values]
+    for _ in range(count - 1):
+        factors = [np.full(p.value.size, 2.0 ** random.uniform(-1.0, 1.0)) for p in free.chosen]
+        moved = values * np.concatenate(factors)
+        starts.append(np.where((moved > lower) & (moved < upper), moved, values))
+    return starts
+
+
+def search_each(
+    problem: Problem, starts: Sequence[Float[np.ndarray, " free"]], max_steps: int, solver: Solver | None = None
+) -> Solution:
+    """Search from every start to its end; the first of those that count as equally good is the best.
+
+    Arguments:
+        problem: in residuals of unit noise: channels in their noise, targets in their tolerance.
+        starts: values of the free numbers.
+        max_steps: largest number of steps of each search.
+        solver: as in `search`.
+    """
+    kept = [v for i, v in enumerate(starts) if i == 0 or keeps_conditions(problem.free.started_at(v).tree)]
+    ends = [search(problem.started_at(values), max_steps, solver=solver) for values in kept]
+    squares = np.array([end.squares if end.finite else np.inf for end in ends])
+    best = ends[int(np.argmax(squares <= squares.min() + equally_good(squares.min())))]
+    return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(kept))
+
+
+def equally_good(squares: float) -> float:
+    """Difference of sums of squares, in units of the noise, of ends that count as equally good."""
+    return ALIKE * max(squares, 1.0)
 
 
 def _follow(

@@ -11,15 +11,17 @@ from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
-from jaxdamp._status import Status
-from jaxdamp._tables import Column, Table, plain
+from jaxdamp._tables import Column, Table, plain, plus_minus
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
-from jaxdamp.identify.ends import at_ends
-from jaxdamp.identify.estimates import Estimate, parameter_table
-from jaxdamp.identify.noise import independent
+from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
+from jaxdamp.identify.estimating import estimate
+from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
+from jaxdamp.identify.noise import Noise, independent
 from jaxdamp.identify.problem import AbstractResiduals, Problem
-from jaxdamp.identify.search import SearchEnd, search
-from jaxdamp.identify.uncertainty import uncertainty
+from jaxdamp.identify.result import Fit
+from jaxdamp.identify.search import SearchEnd, Solver
+from jaxdamp.identify.several import Solution, equally_good, scattered_starts, search_each
 from jaxdamp.parameters import FreeParameters, Parameter, free_parameters, interval, match_paths, name_patterns, real
 from jaxdamp.simulation import Ride
 
@@ -28,9 +30,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 
-ALIKE = 1e-2  # difference of sums of squares, in squared tolerances, of searches that count as equally good
 APART = 0.01  # relative difference of a parameter between them that is named
-NORMAL = 1.959964  # 97.5 % quantile of the normal distribution
 Goal: TypeAlias = float | int | tuple[float | int, float | int]
 
 
@@ -53,35 +53,23 @@ class Met(NamedTuple):
         return bool(abs(self.deviation) <= 1.0)
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
-class TargetFit:
-    """Parameters that meet targets as well as they can.
+@dataclasses.dataclass(frozen=True, repr=False, kw_only=True)
+class TargetFit(Fit):
+    """Parameters that meet targets as well as they can: a `Fit` of numbers.
+
+    Standard errors take the tolerances for standard deviations of the targets.
 
     Attributes:
         model: the module or the mapping with the fitted numbers.
-        parameters: the free numbers; standard errors take the tolerances for standard deviations of the targets.
         targets: each target with the value of the model.
-        warnings: targets that are missed, parameters at bounds, in words.
-        status: how the search ended.
-        steps: steps of the search.
     """
 
     model: Any
-    parameters: tuple[Estimate, ...]
     targets: tuple[Met, ...]
-    warnings: tuple[str, ...]
-    status: Status
-    steps: int
 
-    @property
-    def converged(self) -> bool:
-        """Whether the search ended by its tolerance."""
-        return self.status is Status.CONVERGED
-
-    def __getitem__(self, name: str) -> float:
-        """The fitted value of a parameter."""
-        _checks.one_of("name", name, [e.name for e in self.parameters])
-        return next(e.value for e in self.parameters if e.name == name)
+    def __getitem__(self, name: str) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The fitted value of a parameter; `estimate(name)` has its standard error."""
+        return self.estimate(name).value
 
     def table(self) -> Table:
         """The targets, the values reached and their deviations."""
@@ -99,22 +87,21 @@ class TargetFit:
 
         return plots.targets(self)
 
-    def parameters_table(self) -> Table:
-        """The fitted numbers with units and standard errors."""
-        return parameter_table("Parameters", self.parameters)
+    @property
+    def summary(self) -> str:
+        """How many targets are met."""
+        return f"{sum(t.met for t in self.targets)} of {len(self.targets)} targets are met."
 
-    def to_dict(self) -> dict[str, Any]:
-        """The result as plain numbers and words, ready for JSON."""
-        return {
-            "status": self.status.name.lower(),
-            "converged": self.converged,
-            "warnings": list(self.warnings),
-            "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
-            "targets": [plain({**t._asdict(), "met": t.met}) for t in self.targets],
-        }
+    def tables(self) -> dict[str, Table]:
+        """Targets, and parameters."""
+        return {"targets": self.table(), "parameters": self.parameters_table()}
+
+    def content(self) -> dict[str, Any]:
+        """Parameters and targets as plain data."""
+        return super().content() | {"targets": [plain({**t._asdict(), "met": t.met}) for t in self.targets]}
 
     def __repr__(self) -> str:
-        return "\n".join(map(str, (self.parameters_table(), self.table(), *(f"warning: {w}" for w in self.warnings))))
+        return "\n".join(map(str, (*reversed(self.tables().values()), *(f"warning: {w}" for w in self.warnings))))
 
 
 @final
@@ -133,6 +120,10 @@ class TargetResiduals(AbstractResiduals):
         values = jnp.stack([jnp.asarray(reached[name], self.wanted.dtype) for name in self.names])
         return jnp.concatenate([(values - self.wanted) / self.tolerance, jnp.zeros(self.padding, values.dtype)])
 
+    def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "TargetResiduals":
+        """The same with every weight times a factor."""
+        return dataclasses.replace(self, tolerance=self.tolerance / jnp.asarray(factor[: len(self.names)]))
+
     def used(self) -> Bool[np.ndarray, " samples"]:
         """The targets."""
         return np.arange(len(self.names) + self.padding) < len(self.names)
@@ -142,6 +133,7 @@ class TargetResiduals(AbstractResiduals):
         return jnp.sum(1.0 / jnp.square(self.tolerance))
 
 
+@of_known_numbers
 @one_thread()
 def fit_targets(
     numbers: Callable[[Any], Mapping[str, Any]] | Ride,
@@ -153,9 +145,12 @@ def fit_targets(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     tie: Mapping[str, str] | None = None,
     tolerance: float = 0.01,
+    loss: str = "squares",
+    priors: Mapping[str, tuple[float, float]] | None = None,
     max_steps: int = 100,
     starts: int = 4,
     seed: int = 0,
+    solver: Solver | None = None,
 ) -> TargetFit:
     """Find the parameters with which a model has given numbers, by least squares in units of the tolerances.
 
@@ -170,10 +165,13 @@ def fit_targets(
         bounds: extra limits `{name: (lower, upper)}`.
         tie: parameters that take the values of others, as in `fit`.
         tolerance: of targets without one of their own, relative to their value.
+        loss: as in `fit`: "huber", "soft_l1" or "student_t" if some targets may be wrong.
+        priors: as in `fit`.
         max_steps: largest number of steps.
         starts: number of searches, the first from `start`, the others from parameters up to twice and half of it. The
             first one counts unless another one meets the targets better.
         seed: of the other starts.
+        solver: as in `fit`.
 
     Returns:
         The model, its parameters and the numbers reached. Targets outside their tolerance are named by a warning, and
@@ -193,65 +191,72 @@ def fit_targets(
     [('frequency', 1.2, True), ('damping ratio', 0.3, True)]
     """
     goals = _goals(targets, tolerance)
+    _checks.one_of("loss", loss, LOSSES)
+    for name, count in (("starts", starts), ("max_steps", max_steps)):
+        if count < 1:
+            _checks.refuse(name, "be 1 or more", count)
     free = _free(start, over, freeze, bounds, tie)
+    known = priors_on(free, priors or {}, 1.0)
     padding = max(free.values.size + 1 - len(goals), 0)
     wanted, allowed = (jnp.asarray(np.array(column, float)) for column in zip(*goals.values(), strict=True))
     residuals = TargetResiduals(numbers, wanted, allowed, tuple(goals), padding)
     _check_numbers(residuals, free.tree)
-    owner, level = np.zeros(len(goals) + padding, int), float(jnp.linalg.norm(wanted / allowed)) or 1.0
-    everywhere = Reach(np.inf, np.inf)
-    if starts < 1:
-        _checks.refuse("starts", "be 1 or more", starts)
-    ends = []
-    for values in _starts(free, starts, seed):
-        begun = free if values is None else free.started_at(values)
-        problem = Problem(begun, (residuals,), level, (), (1.0,), owner, everywhere, begun.tree, (), False)
-        ends.append((problem, search(problem, max_steps)))
-    squares = np.array([end.squares if end.finite else np.inf for _, end in ends])
-    problem, end = ends[int(np.argmax(squares <= squares.min() + ALIKE * max(squares.min(), 1.0)))]
-    if not end.finite:
+    level = float(jnp.linalg.norm(wanted / allowed)) or 1.0
+    owner = np.zeros(len(goals) + padding + sum(part.size for part in known), int)
+    everywhere, parts = Reach(np.inf, np.inf), (residuals, *known)
+    problem = Problem(free, parts, level, (), (1.0,), owner, everywhere, free.tree, (), False)
+
+    def by_squares(problem: Problem, count: int | None) -> Solution:
+        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps, solver)
+
+    problem, solution = solve_by(problem, by_squares, loss=loss, noise=_tolerances, starts=starts, spread=1.0)
+    if not solution.best.finite:
         remedy = "Start nearer to the targets, or give `bounds`."
         _checks.refuse("numbers", "give finite numbers and derivatives", "one that does not", remedy)
-    reached = np.asarray(wanted) + end.residual[: len(goals)] * np.asarray(allowed)
+    result = _judged(problem.started_at(solution.best.values), solution, goals, residuals)
+    return dataclasses.replace(result, criterion=criterion_in_words(problem, loss, priors or {}))
+
+
+def _judged(
+    problem: Problem, solution: Solution, goals: Mapping[str, tuple[float, float]], residuals: TargetResiduals
+) -> TargetFit:
+    """The result at the minimum."""
+    free, end, noise = problem.free, solution.best, _tolerances(problem, solution.best)
+    deviations = np.asarray(residuals(free.tree))[: len(goals)]
+    reached = np.asarray(residuals.wanted) + deviations * np.asarray(residuals.tolerance)
     met = tuple(Met(name, *goals[name], float(value)) for name, value in zip(goals, reached, strict=True))
-    estimates = _estimates(problem, end)
-    notes = [f"The search did not converge: {end.status.sentence}"] * (not end.converged)
-    notes += [f"{e.name} = {e.value:.4g} is {e.note}." for e in estimates if e.note]
+    estimates = estimate(problem, solution, noise)
+    notes = [*on_status(end), *(f"{e.name} = {e.value:.4g} is {e.note}." for e in estimates.estimates if e.note)]
     notes += [
-        f"{t.name} is missed: {t.value:.4g} instead of {t.target:.4g} ± {t.tolerance:.2g}." for t in met if not t.met
+        f"{t.name} is missed: {t.value:.4g} instead of {plus_minus(t.target, t.tolerance)}." for t in met if not t.met
     ]
-    notes += _disagreements(free, end, [other for _, other in ends if other.finite])
-    model = free.started_at(end.values).tree
-    return TargetFit(model, estimates, met, tuple(notes), end.status, end.steps)
+    notes += _disagreements(free, solution)
+    how, main = fields_of_fit(problem, solution, noise, estimates), tuple(notes[:MOST_WARNINGS])
+    return TargetFit(model=free.tree, targets=met, warnings=tuple(notes), main_warnings=main, **how)
 
 
-def _starts(free: FreeParameters, count: int, seed: int) -> list[np.ndarray | None]:
-    """None for the start itself, then other values: one factor between a half and two for each parameter."""
-    random, (lower, upper) = np.random.default_rng(seed), free.limits()
-    values = np.asarray(free.values, float)
-    starts: list[np.ndarray | None] = [None]
-    for _ in range(count - 1):
-        factors = [np.full(p.value.size, 2.0 ** random.uniform(-1.0, 1.0)) for p in free.chosen]
-        moved = values * np.concatenate(factors)
-        starts.append(np.where((moved > lower) & (moved < upper), moved, values))
-    return starts
+def _tolerances(problem: Problem, end: SearchEnd) -> Noise:
+    """The tolerances as known, independent noise of the targets."""
+    noise = independent(np.ones(end.residual.size), problem.used, end.values.size)
+    return noise._replace(dof=np.inf)
 
 
-def _disagreements(free: FreeParameters, best: SearchEnd, ends: Sequence[SearchEnd]) -> list[str]:
+def _disagreements(free: FreeParameters, solution: Solution) -> list[str]:
     """A sentence on searches that ended elsewhere: with the same deviations, or with larger ones."""
+    best, ends = solution.best, solution.ends
     if len(ends) < 2:
         return []
-    alike = [end for end in ends if end.squares <= best.squares + ALIKE * max(best.squares, 1.0)]
+    alike = [end for end in ends if end.squares <= best.squares + equally_good(best.squares)]
     spread = np.ptp([end.values for end in alike], axis=0)
     apart = spread > APART * np.maximum(np.abs(best.values), np.finfo(float).tiny)
     notes = []
     if apart.any():
-        found = [
+        named = [
             f"{name} {min(values):.4g} to {max(values):.4g}"
             for name, values, differs in zip(free.names, np.transpose([e.values for e in alike]), apart, strict=True)
             if differs
         ]
-        notes.append(f"Several minima meet the targets alike, which do not determine {', '.join(found)}.")
+        notes.append(f"Several minima meet the targets alike, which do not determine {', '.join(named)}.")
     if len(alike) < len(ends):
         notes.append(f"{len(alike)} of {len(ends)} starts ended at the best minimum; the others in worse ones.")
     return notes
@@ -308,19 +313,3 @@ def _check_numbers(residuals: TargetResiduals, model: Any) -> None:
         given = eqx.filter_eval_shape(residuals.numbers, model)
     for name in residuals.names:
         _checks.one_of("targets", name, given)
-
-
-def _estimates(problem: Problem, end: SearchEnd) -> tuple[Estimate, ...]:
-    """The numbers with the errors that the tolerances leave them."""
-    free = problem.free
-    exact = independent(np.ones(end.residual.size), np.ones(end.residual.size, bool), end.values.size)
-    errors = np.sqrt(np.diag(uncertainty(end.jacobian, end.residual, exact).covariance))
-    sides, (lower, upper) = at_ends(problem.coordinates, end.values), free.limits()
-    rows = []
-    for i, (name, p, tied) in enumerate(zip(free.names, free.owners, free.followers, strict=True)):
-        value, error = float(end.values[i]), float(errors[i])
-        note = "not identifiable" if not np.isfinite(error) else "at a bound" if sides[i] else ""
-        reach = NORMAL * error
-        limits = (max(value - reach, float(lower[i])), min(value + reach, float(upper[i])))
-        rows.append(Estimate(name, value, p.unit, error, limits, p.meaning, note, tied=tied))
-    return tuple(rows)

@@ -16,15 +16,15 @@ from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.judging import notes_on
+from jaxdamp.identify.law_result import AbstractFitted
 from jaxdamp.identify.machine import Machine
-from jaxdamp.identify.model import Model, law_of, rig_of, with_range
+from jaxdamp.identify.model import Model, covered_range, law_of, rig_of, with_range
+from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals
-from jaxdamp.identify.result import AbstractFitted
-from jaxdamp.identify.scoring import score
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.traces import batches
 from jaxdamp.parameters import Coordinates
@@ -72,9 +72,9 @@ class Training(AbstractFitted):
             rows,
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """The training as numbers with units and words, ready for JSON; numbers that are not finite are None."""
-        return super().to_dict() | {
+    def content(self) -> dict[str, Any]:
+        """Law, errors and the course of the training as plain data."""
+        return super().content() | {
             "held_out": [run.name for run in self.held_out],
             "held_out_fit": with_unit(self.held_out_fit_percent, "%"),
             "held_out_rmse": with_unit(self.held_out_rmse, "N"),
@@ -91,14 +91,20 @@ class Training(AbstractFitted):
 
         return training_history(self, **options)
 
-    def __repr__(self) -> str:
+    @property
+    def summary(self) -> str:
+        """Law, number of records, errors, and how the training ended."""
         return (
             f"{type(self.law).__name__} trained on {len(self.runs)} records: {self.fit_percent:.1f} %, RMSE "
             f"{self.rmse:.4g} N; on {len(self.held_out)} held out: {self.held_out_fit_percent:.1f} %, RMSE "
             f"{self.held_out_rmse:.4g} N; best at step {self.best_step}, {self.stopped}"
         )
 
+    def __repr__(self) -> str:
+        return self.summary
 
+
+@of_known_numbers
 def train(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],

@@ -1,7 +1,9 @@
 """`fit_vehicle`: masses, rates, friction and damper laws of a vehicle from its records."""
 
 import dataclasses
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,28 +11,35 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._one_thread import one_thread
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
+from jaxdamp.identify.criteria import LOSSES, Priors, criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
+from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
+from jaxdamp.identify.left_out import on_free_scale, on_sensors, on_signs
 from jaxdamp.identify.machine import Machine, started_machine
-from jaxdamp.identify.noise import independent
+from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.search import SearchEnd, search
-from jaxdamp.identify.several import Solution
-from jaxdamp.identify.vehicle_left_out import on_sensors, on_signs
-from jaxdamp.identify.vehicle_noise import channel_noise
+from jaxdamp.identify.search import SearchEnd, Solver, search
+from jaxdamp.identify.several import Solution, scattered_starts, search_each
 from jaxdamp.identify.vehicle_preparing import (
+    FreeScale,
     VehicleData,
     checked_benches,
     checked_records,
     drives_of,
+    first_refused,
+    free_scale,
     frozen_paths,
     in_units,
     known_noise,
+    mean_over_records,
     per_record_paths,
     vehicle_test,
+    without,
 )
+from jaxdamp.identify.vehicle_residuals import Drive
 from jaxdamp.identify.vehicle_result import VehicleFit, channel_scores
-from jaxdamp.identify.vehicle_scale import FreeScale, free_scale, without
 from jaxdamp.parameters import free_parameters, get, matched_in_words, parameters, with_values
 from jaxdamp.rig import Sensor
 from jaxdamp.vehicles import AbstractVehicle
@@ -38,8 +47,10 @@ from jaxdamp.vehicles import AbstractVehicle
 
 ALIKE = 0.05  # relative change of the estimated noise below which the weights are final
 MOST_ROUNDS = 6
+MOST_CHECKS = 4  # of whether `simulate` accepts the vehicle at the minimum
 
 
+@of_known_numbers
 @one_thread()
 def fit_vehicle(
     vehicle: AbstractVehicle,
@@ -58,14 +69,19 @@ def fit_vehicle(
     noise: Mapping[str, float] | None = None,
     dt: float | None = None,
     samples_per_cycle: int | None = 400,
+    loss: str = "squares",
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    starts: int = 1,
+    seed: int = 0,
     max_steps: int = 100,
+    solver: Solver | None = None,
 ) -> VehicleFit:
     """Fit masses, rates, friction and damper laws of a vehicle to records of its motion.
 
     The vehicle is simulated on the road of each record and compared with all measured
     channels by Levenberg-Marquardt; derivatives pass forwards through the engine. Each channel is weighted by its
-    noise, which is estimated from the residual and the fit repeated until it is consistent. Nothing is random; there
-    is one start, the vehicle given.
+    noise, which is estimated from the residual and the fit repeated until it is consistent. Nothing is random: the
+    same records give the same result.
 
     If the records hold no force, all masses, rates and forces may be multiplied by one factor. This is found from the
     derivatives; the first mass is then held at its start, and a warning says so. Freeze what is known, or measure a
@@ -92,7 +108,14 @@ def fit_vehicle(
         dt: longest step of the simulation [s], 1 ms if left out. Records with a longer sampling interval are simulated
             in fractions of it. Between the samples the road is a smooth curve through the measured heights.
         samples_per_cycle: of bench records, as in `fit`.
+        loss: as in `fit`: "huber", "soft_l1" or "student_t" for channels with spikes and dropouts.
+        priors: as in `fit`; one on a mass shows the scale.
+        starts: number of searches, the first from `vehicle`, the others from parameters up to twice and half of it,
+            all with the noise found by the first. The first one counts unless another one fits better; `minima`
+            describes the others.
+        seed: of the other starts.
         max_steps: largest number of steps of each search.
+        solver: as in `fit`.
 
     Returns:
         The fitted vehicle, its parameters with standard errors, scores of each channel, warnings.
@@ -105,8 +128,10 @@ def fit_vehicle(
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "fit_vehicle(vehicle, records)")
     rides = checked_records(vehicle, records)
-    if max_steps < 1:
-        _checks.refuse("max_steps", "be 1 or more", max_steps)
+    for name, count in (("max_steps", max_steps), ("starts", starts)):
+        if count < 1:
+            _checks.refuse(name, "be 1 or more", count)
+    _checks.one_of("loss", loss, LOSSES)
     _checks.nonnegative("settling", settling)
     if settling > 0.5 * min(len(ride) * ride.dt for ride in rides):
         _checks.refuse("settling", "leave at least half of every record", settling)
@@ -120,48 +145,117 @@ def fit_vehicle(
 
     free = free_parameters(spread, freeze=frozen, bounds=bounds, tie=tie)
     _checks.finite("vehicle", free.values)
+    expected = priors_on(free, priors or {}, 1.0)
     free, sigma = in_units(free, vehicle.units), {**data.first_noise(), **known}
-    problem = data.problem(free, sigma)
-    end = search(problem, 1)
-    scale = free_scale(problem, end)
-    for _ in range(MOST_ROUNDS):
-        end = search(problem, max_steps, scale.held)
-        before, sigma = sigma, {**data.noise_in(end, problem, sigma), **known}
-        if not end.finite or all(abs(np.log(sigma[name] / before[name])) < ALIKE for name in sigma):
+    problem = data.problem(free, sigma, expected)
+    scale = free_scale(problem, search(problem, 1))
+    problem = problem._replace(free=without(free, scale.held))
+    how = {"loss": loss, "starts": starts, "max_steps": max_steps, "seed": seed, "solver": solver}
+    problem, solution = _solved(data, problem, known, expected, **how)
+    problem, solution, refused = _accepted(data, problem, solution, known, expected, dt, how | {"starts": 1})
+    paths = [p.path for p in parameters(model)]
+    named = matched_in_words([path for path in paths if path.startswith("vehicle.")], over=over or ())
+    others = matched_in_words(paths, freeze=freeze, bounds=bounds or {}, per_record=per_record)
+    result = _judged(data, problem, solution, scale, refused)
+    criterion = criterion_in_words(problem, loss, priors or {})
+    return dataclasses.replace(result, patterns="; ".join(filter(None, (named, others))), criterion=criterion)
+
+
+def _solved(
+    data: VehicleData,
+    problem: Problem,
+    known: Mapping[str, float],
+    expected: Sequence[Priors],
+    *,
+    loss: str,
+    starts: int,
+    max_steps: int,
+    seed: int,
+    solver: Solver | None,
+) -> tuple[Problem, Solution]:
+    """The minimum with each channel weighted by its noise, which is estimated until it is consistent."""
+    sigma = dict(zip(data.channels, problem.sigma, strict=True))
+    rounds = 0
+    while True:
+        end, rounds = search(problem, max_steps, solver=solver), rounds + 1
+        before, sigma = sigma, {**data.noise_in(end, problem, sigma, loss), **known}
+        consistent = all(abs(np.log(sigma[name] / before[name])) < ALIKE for name in sigma)
+        if not end.finite or consistent or rounds == MOST_ROUNDS:
             break
-        problem = data.problem(free.started_at(end.values), sigma)
-    known = [p.path for p in parameters(model)]
-    of_vehicle = [path for path in known if path.startswith("vehicle.")]
-    named = matched_in_words(of_vehicle, over=over or ())
-    others = matched_in_words(known, freeze=freeze, bounds=bounds or {}, per_record=per_record)
-    patterns = "; ".join(filter(None, (named, others)))
-    return dataclasses.replace(_judged(data, problem, end, scale), patterns=patterns)
+        problem = data.problem(problem.free.started_at(end.values), sigma, expected)
+    if not end.finite or (loss == "squares" and starts == 1 and not expected):
+        return problem, Solution(end, (end,), 1)
+
+    def by_squares(problem: Problem, count: int | None) -> Solution:
+        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps, solver)
+
+    def noise(problem: Problem, end: SearchEnd) -> Noise:
+        return channel_noise(problem, end.residual, end.values.size)
+
+    return solve_by(problem.started_at(end.values), by_squares, loss=loss, noise=noise, starts=starts)
 
 
-def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScale) -> VehicleFit:
+def _accepted(
+    data: VehicleData,
+    problem: Problem,
+    solution: Solution,
+    known: Mapping[str, float],
+    expected: Sequence[Priors],
+    dt: float | None,
+    how: Mapping[str, Any],
+) -> tuple[Problem, Solution, list[str]]:
+    """The minimum among the vehicles that `simulate` accepts, by as many substeps as their laws need."""
+    start, notes = np.asarray(problem.free.values), list[str]()
+
+    def drives_at(values: np.ndarray) -> list[Drive] | None:
+        """How the records are simulated with these numbers; None where `simulate` would refuse."""
+        vehicle = mean_over_records(problem.free.started_at(values).tree, data.per_record).vehicle
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                return drives_of(vehicle, data.rides, dt)
+            except ValueError:
+                return None
+
+    for _ in range(MOST_CHECKS):
+        end = solution.best
+        drives = drives_at(end.values) if end.finite else data.drives
+        if drives is not None:
+            if all(new.engine == old.engine for new, old in zip(drives, data.drives, strict=True)):
+                break
+            data = data._replace(drives=drives)
+        else:
+            limited = first_refused(problem.free, start, end.values, lambda values: drives_at(values) is not None)
+            if limited is None:
+                notes.append("`simulate` refuses the fitted vehicle: start nearer to the records, or give `bounds`.")
+                break
+            index, value, problem = limited[0], limited[1], problem._replace(free=limited[2])
+            name, unit = problem.free.names[index], problem.free.owners[index].unit
+            notes.append(
+                f"{name} was held at {value:.4g} {unit} or on this side of it: `simulate` refuses the vehicle beyond,"
+                " whose laws are too steep for its steps."
+            )
+        sigma = dict(zip(data.channels, problem.sigma, strict=True))
+        begin = problem.free if drives is None else problem.free.started_at(end.values)
+        problem, solution = _solved(data, data.problem(begin, sigma, expected), known, expected, **how)
+    return problem, solution, notes
+
+
+def _judged(
+    data: VehicleData, problem: Problem, solution: Solution, scale: FreeScale, refused: Sequence[str]
+) -> VehicleFit:
     """The result at the minimum."""
+    end = solution.best
     if not end.finite:
         remedy = "Start from a vehicle nearer to the records, or give `bounds`."
         _checks.refuse("vehicle", "give finite channels and derivatives over the records", "one that does not", remedy)
-    model = problem.free.started_at(end.values).tree
-    held = () if scale.held is None else (problem.free.names[scale.held],)
-    problem, end = without(problem.started_at(end.values), end, scale.held)
+    problem = problem.started_at(end.values)
+    model, held = problem.free.tree, (scale.held_name,) if scale.held_name else ()
     noise = channel_noise(problem, end.residual, end.values.size)
-    estimates = estimate(problem, Solution(end, (end,), 1), independent(noise.sigma, problem.used, end.values.size))
-    own = {path: get(model, path) for path in data.per_record}
-    model = with_values(model, {path: jnp.mean(values) for path, values in own.items()})
-    notes = [f"The search did not converge: {end.status.sentence}"] * (not end.converged)
-    if scale.names:
-        values = [
-            f" {name} was held at {float(get(model, name)):.6g}; the standard errors are for this." for name in held
-        ]
-        notes.append(
-            "These records hold no force, so only ratios of masses, rates and forces can be determined:"
-            f" {', '.join(scale.names)} may all be larger by one factor.{''.join(values)}"
-            " Fix one mass that is known, or measure a force."
-        )
-    scores = channel_scores(problem, end.residual, data.rides, data.channels)
-    notes += [*on_signs(scores), *estimates.notes]
+    estimates = estimate(problem, solution, noise)
+    model = mean_over_records(model, data.per_record)
+    scores = channel_scores(problem, end.residual, data.rides)
+    notes = [*on_status(end), *refused, *on_free_scale(scale, model), *on_signs(scores), *estimates.notes]
     notes += on_sensors(problem, end, data.rides, data.channels, model.sensors)
     if noise.inflation > 1.0:
         notes.append(
@@ -172,16 +266,12 @@ def _judged(data: VehicleData, problem: Problem, end: SearchEnd, scale: FreeScal
         vehicle=model.vehicle,
         records=data.rides,
         bench=data.benches,
-        parameters=estimates.estimates,
-        covariance=estimates.covariance,
         scores=scores,
         warnings=tuple(notes),
-        status=end.status,
-        steps=end.steps,
-        inflation=noise.inflation,
+        main_warnings=tuple(notes[:MOST_WARNINGS]),
         sensors=model.sensors,
         held=held,
         scale_free=scale.names,
         rig=model.rig,
-        problem=problem,
+        **fields_of_fit(problem, solution, noise, estimates),
     )

@@ -1,30 +1,38 @@
 """Records and a vehicle as a least-squares problem."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp.bench import BenchRun, RideRecord, as_runs
 from jaxdamp.dampers import AbstractDamper, Reach
+from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.machine import Machine, absent_paths
+from jaxdamp.identify.model import InitialMotion, VehicleTest
+from jaxdamp.identify.preparing import not_chosen
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
-from jaxdamp.identify.vehicle_model import InitialMotion, VehicleTest
 from jaxdamp.identify.vehicle_residuals import Drive, bench_parts, driven, finer_heights, ride_batches
-from jaxdamp.parameters import FreeParameters, get, match_paths, name_patterns, parameters
+from jaxdamp.parameters import FreeParameters, get, interval, match_paths, name_patterns, parameters, with_values
 from jaxdamp.rig import Rig, Sensor
 from jaxdamp.simulation import Exponential, RunCheck
 from jaxdamp.vehicles import AbstractVehicle
 
 
 FIRST_GUESS = 0.1  # noise of a channel at first, relative to its standard deviation
+MEDIAN = 1.4826  # standard deviation of normal noise, relative to the median of its magnitude
 LEAST_NOISE = 1e-4  # the same at the end, so that records without noise can be fitted
+UNSEEN = 1e-6  # change of the channels when the scale is doubled, relative to them, that counts as none
+FAR = 1e3  # times a limited number, to which it may go away from its limit
+INWARD = 0.1  # of the way from its limit back to the start, where the search begins anew
+BISECTIONS = 10  # of the range in which a number stops to be accepted
 EVERYWHERE = Reach(np.inf, np.inf)  # laws of a vehicle: no number is outside the records
 
 
@@ -58,7 +66,7 @@ class VehicleData(NamedTuple):
         forces = {path: np.concatenate([run.force for run in runs]) for path, runs in self.benches.items()}
         return {name: float(np.std(values)) for name, values in (rides | forces).items()}
 
-    def problem(self, free: FreeParameters, sigma: Mapping[str, float]) -> Problem:
+    def problem(self, free: FreeParameters, sigma: Mapping[str, float], priors: Sequence[Priors] = ()) -> Problem:
         """The least squares with residuals divided by the noise of each channel."""
         rides = ride_batches(self.rides, self.drives, sigma, self.settling, self.per_record)
         number = {name: i for i, name in enumerate(self.channels)}
@@ -69,17 +77,19 @@ class VehicleData(NamedTuple):
         weighted += [np.ravel(part.batch.force * part.batch.weight) for part in forces]
         level = float(np.sqrt(sum(np.sum(np.square(values)) for values in weighted)))
         ordered = tuple(sigma[name] for name in self.channels)
-        parts, owners = (*rides, *forces), np.concatenate(owner)
+        owner += [np.zeros(part.size, int) for part in priors]
+        parts, owners = (*rides, *forces, *priors), np.concatenate(owner)
         return Problem(
             free, parts, level, self.rides, ordered, owners, EVERYWHERE, self.model.vehicle, self.per_record, True
         )
 
-    def noise_in(self, end: SearchEnd, problem: Problem, sigma: Mapping[str, float]) -> dict[str, float]:
-        """RMS of the residual of each channel, in its unit."""
+    def noise_in(self, end: SearchEnd, problem: Problem, sigma: Mapping[str, float], loss: str) -> dict[str, float]:
+        """RMS of the residual of each channel, in its unit; with a robust loss that of most samples, by the median."""
         used, levels, noise = problem.used, self.levels(), {}
         for i, name in enumerate(self.channels):
             own = end.residual[used & (problem.owner == i)]
-            noise[name] = max(sigma[name] * float(np.sqrt(np.mean(own**2))), LEAST_NOISE * levels[name])
+            size = np.sqrt(np.mean(own**2)) if loss == "squares" else MEDIAN * np.median(np.abs(own))
+            noise[name] = max(sigma[name] * float(size), LEAST_NOISE * levels[name])
         return noise
 
 
@@ -146,10 +156,7 @@ def vehicle_test(
 
 def frozen_paths(model: VehicleTest, over: Sequence[str] | None, freeze: Sequence[str]) -> list[str]:
     """Paths that are held: those asked for, what `over` leaves out, what sensors and test machine do not have."""
-    known = [p.path for p in parameters(model)]
-    of_vehicle = [path for path in known if path.startswith("vehicle.")]
-    kept = of_vehicle if over is None else match_paths(of_vehicle, name_patterns("over", over))
-    held = [path for path in of_vehicle if path not in kept]
+    known, held = [p.path for p in parameters(model)], not_chosen(model, over, "sensors.", "starts.", "rig.")
     for name, sensor in model.sensors.items():
         held += [f"sensors.{name}.{p.path}" for p in parameters(sensor) if p.path not in sensor.given]
     held += absent_paths(model.rig)
@@ -186,6 +193,46 @@ def drives_of(vehicle: AbstractVehicle, rides: Sequence[RideRecord], dt: float |
     return drives
 
 
+def mean_over_records(model: VehicleTest, paths: Sequence[str]) -> VehicleTest:
+    """The model with the mean of each parameter that has a value for each record."""
+    return with_values(model, {path: jnp.mean(get(model, path)) for path in paths})
+
+
+def first_refused(
+    free: FreeParameters,
+    start: Float[np.ndarray, " free"],
+    end: Float[np.ndarray, " free"],
+    accepted: Callable[[Float[np.ndarray, " free"]], bool],
+) -> tuple[int, float, FreeParameters] | None:
+    """The number by which the end of a search is refused; None if no single number makes the difference.
+
+    Arguments:
+        free: the free parameters.
+        start: values that are accepted.
+        end: values that are not.
+        accepted: whether `simulate` takes a vehicle with these values.
+
+    Returns:
+        Its index, its last accepted value, and the free parameters with this value as limit.
+    """
+    for index, p in enumerate(free.owners):
+        moved = end.copy()
+        moved[index] = start[index]
+        if p.value.ndim or not accepted(moved):
+            continue
+        good, bad = float(start[index]), float(end[index])
+        for _ in range(BISECTIONS):
+            moved[index] = np.sqrt(good * bad) if good * bad > 0 else 0.5 * (good + bad)
+            good, bad = (moved[index], bad) if accepted(moved) else (good, moved[index])
+        lower, upper = (float(side[index]) for side in free.limits())
+        lower, upper = (np.clip(side, -FAR * abs(good), FAR * abs(good)) for side in (lower, upper))
+        limits = (float(good), float(upper)) if good > bad else (float(lower), float(good))
+        chosen = tuple(dataclasses.replace(q, domain=interval(*limits)) if q.path == p.path else q for q in free.chosen)
+        moved[index] = good + INWARD * (start[index] - good)
+        return index, float(good), FreeParameters(free.tree, chosen, free.ties).started_at(moved)
+    return None
+
+
 def known_noise(data: VehicleData, noise: Mapping[str, float]) -> dict[str, float]:
     """The noise that is given, checked."""
     for name, value in noise.items():
@@ -203,3 +250,60 @@ def in_units(free: FreeParameters, units: Mapping[str, str]) -> FreeParameters:
         unit = units[channel] if kind == "sensors" and field == "offset" else p.unit
         changed.append(dataclasses.replace(p, unit=unit))
     return FreeParameters(free.tree, tuple(changed), free.ties)
+
+
+class FreeScale(NamedTuple):
+    """Numbers that may all grow by one factor without any change of the channels, and the one that is held.
+
+    Attributes:
+        names: of the numbers; empty if the records show the scale.
+        held: index of the number held, the first mass if there is one; None if none can be.
+        held_name: its name.
+    """
+
+    names: tuple[str, ...] = ()
+    held: int | None = None
+    held_name: str = ""
+
+
+def force_powers(free: FreeParameters) -> Float[np.ndarray, " free"]:
+    """How often each number's unit contains a force or a mass: 1 for N/m and kg, −1 for K/J, 0 for m/s.
+
+    >>> from jaxdamp.parameters import free_parameters
+    >>> from jaxdamp.vehicles.presets import quarter_car_000
+    >>> force_powers(free_parameters(quarter_car_000(), over=["sprung_mass", "rate"])).tolist()
+    [1.0, 1.0]
+    """
+    return np.array([_power(p.unit) for p in free.owners], float)
+
+
+def _power(unit: str) -> int:
+    above, _, below = unit.partition("/")
+    return sum(sign * len(re.findall(r"\b(?:N|kg|Pa|J|W)\b", part)) for sign, part in ((1, above), (-1, below)))
+
+
+def free_scale(problem: Problem, point: SearchEnd) -> FreeScale:
+    """Whether all masses, rates and forces may grow by one factor, from the derivatives at a point.
+
+    They may not where a force is measured, or where one of them is frozen.
+    """
+    free = problem.free
+    powers = force_powers(free)
+    change = float(np.linalg.norm(point.jacobian @ (powers * point.values)))
+    if not np.any(powers) or not change < UNSEEN * problem.level:
+        return FreeScale()
+    single = [i for i, p in enumerate(free.owners) if powers[i] and p.value.ndim == 0]
+    masses = [i for i in single if free.owners[i].unit == "kg"]
+    names = tuple(name for name, power in zip(free.names, powers, strict=True) if power)
+    held = next(iter([*masses, *single]), None)
+    return FreeScale(names, held, "" if held is None else free.names[held])
+
+
+def without(free: FreeParameters, held: int | None) -> FreeParameters:
+    """The free parameters without the number that is held at its start, and those tied to it."""
+    if held is None:
+        return free
+    path = free.owners[held].path
+    ties = tuple(pair for pair in free.ties if pair[1] != path)
+    tree = free.started_at(np.asarray(free.values)).tree
+    return FreeParameters(tree, tuple(p for p in free.chosen if p.path != path), ties)

@@ -9,13 +9,13 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxdamp._status import Status
-from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._tables import Column, Table, with_unit
 from jaxdamp.bench import BenchRun, RideRecord
-from jaxdamp.identify.estimates import Estimate, parameter_table, rounded
+from jaxdamp.identify.estimates import parameter_table
+from jaxdamp.identify.model import VehicleTest
+from jaxdamp.identify.predicting import fit_percent
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.scoring import fit_percent
-from jaxdamp.identify.vehicle_model import VehicleTest
+from jaxdamp.identify.result import Fit
 from jaxdamp.identify.vehicle_preparing import checked_records, drives_of
 from jaxdamp.identify.vehicle_residuals import DamperOnBench, RideBatch, ride_batches
 from jaxdamp.rig import Rig, Sensor
@@ -48,50 +48,34 @@ class ChannelScore(NamedTuple):
     correlation: float  # of the predicted with the measured values
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
-class VehicleFit:
-    """A vehicle fitted to records of its motion, with the uncertainty of its parameters.
+@dataclasses.dataclass(frozen=True, repr=False, kw_only=True)
+class VehicleFit(Fit):
+    """A vehicle fitted to records of its motion, with the uncertainty of its parameters: a `Fit` of ride records.
 
     Attributes:
         vehicle: the fitted vehicle; parameters with a value for each record have their mean.
         records: the records given.
         bench: the bench records given, by the path of their law.
-        parameters: an estimate for each free number, with unit, standard error and 95 % interval.
-        covariance: of the free numbers, in their units, in the order of `parameters`.
         scores: errors of each channel of each record, and of the force of each law over its bench records.
-        warnings: doubts about the result, in words.
-        status: how the search ended.
-        steps: steps of the last search.
-        inflation: factor on the standard errors because residuals are correlated from sample to sample; 1 if not.
         sensors: the fitted sensors, by channel.
         held: parameters that were held because the records do not show the scale.
         scale_free: the parameters that may all be larger by one factor, which the records do not show.
         rig: the fitted test machine of the bench records, if one was fitted.
-        problem: the least squares at the result.
-        patterns: what each pattern with `*` in the call stood for, in words.
     """
 
     vehicle: AbstractVehicle
     records: tuple[RideRecord, ...]
     bench: dict[str, tuple[BenchRun, ...]]
-    parameters: tuple[Estimate, ...]
-    covariance: Float[np.ndarray, "free free"]
     scores: tuple[ChannelScore, ...]
-    warnings: tuple[str, ...]
-    status: Status
-    steps: int
-    inflation: float
     sensors: dict[str, Sensor]
     held: tuple[str, ...]
     scale_free: tuple[str, ...]
     rig: Rig | None
-    problem: Problem
-    patterns: str = ""
 
     @property
-    def converged(self) -> bool:
-        """Whether the search ended by its tolerance."""
-        return self.status is Status.CONVERGED
+    def summary(self) -> str:
+        """Vehicle, number of records, and the channel that is predicted worst."""
+        return f"{type(self.vehicle).__name__} on {len(self.records)} record(s): {self.worst}"
 
     @property
     def worst(self) -> str:
@@ -99,14 +83,15 @@ class VehicleFit:
         least = min(self.scores, key=lambda score: score.fit_percent)
         return f"the least fit is {least.fit_percent:.1f} %, of {least.channel} in {least.record}"
 
-    def __getitem__(self, name: str) -> Estimate:
-        """The estimate of that name, or of the only one whose name ends with it: "sprung_mass", "stroke.offset"."""
-        found = [e for e in self.parameters if e.name == name]
-        found = found or [e for e in self.parameters if e.name.endswith(f".{name}")]
-        if len(found) != 1:
-            what = f"{len(found)} parameters are" if found else "No parameter is"
-            raise KeyError(f"{what} named {name!r}; there are {', '.join(e.name for e in self.parameters)}.")
-        return found[0]
+    @property
+    def model(self) -> AbstractVehicle:
+        """`vehicle`."""
+        return self.vehicle
+
+    @property
+    def problem(self) -> Problem:
+        """The least squares at the result."""
+        return self._evidence.problem
 
     def respond(self, record: RideRecord) -> dict[str, Float[np.ndarray, " time"]]:
         """What the sensors would show in a record without noise, by channel, in SI.
@@ -183,20 +168,22 @@ class VehicleFit:
         columns += [Column("fit", "%", ".1f"), Column("largest error", spec=".3g")]
         return Table("Channels", tuple(columns), tuple(tuple(score)[:-1] for score in self.scores))
 
-    def to_dict(self) -> dict[str, Any]:
+    def parameters_table(self) -> Table:
+        """`table()`."""
+        return self.table()
+
+    def tables(self) -> dict[str, Table]:
+        """Parameters, and the errors of the channels."""
+        return {"parameters": self.table(), "scores": self.scores_table()}
+
+    def content(self) -> dict[str, Any]:
         """The fit as numbers with units and words, ready for JSON; numbers that are not finite are None."""
-        return {
+        return super().content() | {
             "vehicle": repr(self.vehicle),
             "sensors": {name: repr(sensor) for name, sensor in self.sensors.items()},
             **({} if self.rig is None else {"rig": repr(self.rig)}),
-            "status": self.status.name.lower(),
-            "converged": self.converged,
-            "warnings": list(self.warnings),
             "held": list(self.held),
             "scale_free": list(self.scale_free),
-            **({"patterns": self.patterns} if self.patterns else {}),
-            "parameters": [plain(estimate._asdict()) for estimate in self.parameters],
-            "covariance": plain(self.covariance),
             "scores": [
                 {
                     "record": s.record,
@@ -215,16 +202,6 @@ class VehicleFit:
 
         return vehicle_fit(self, record)
 
-    def __repr__(self) -> str:
-        width = max(len(e.name) for e in self.parameters)
-        texts = [rounded(e.value, e.standard_error) for e in self.parameters]
-        lines = [f"{type(self.vehicle).__name__} on {len(self.records)} record(s): {self.worst}"]
-        for e, (value, error) in zip(self.parameters, texts, strict=True):
-            note = f"  ({e.note})" * bool(e.note) + f"  = {', '.join(e.tied)}" * bool(e.tied)
-            lines.append(f"  {e.name:<{width}}  {value:>11} ± {error:<9} {e.unit}{note}")
-        lines += [f"  {self.patterns}"] * bool(self.patterns)
-        return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])
-
 
 @eqx.filter_jit
 def _predict(batch: RideBatch, model: VehicleTest) -> Array:
@@ -232,7 +209,7 @@ def _predict(batch: RideBatch, model: VehicleTest) -> Array:
 
 
 def channel_scores(
-    problem: Problem, residual: Float[np.ndarray, " samples"], records: Sequence[RideRecord], channels: Sequence[str]
+    problem: Problem, residual: Float[np.ndarray, " samples"], records: Sequence[RideRecord]
 ) -> tuple[ChannelScore, ...]:
     """Errors of each channel of each record over the samples that are compared.
 
@@ -240,12 +217,13 @@ def channel_scores(
         problem: the least squares.
         residual: at the minimum, weighted.
         records: the records.
-        channels: all channels in the order of `problem.sigma`.
     """
     scores, end, units = {}, 0, problem.law.units
     forces: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for part in problem.residuals:
-        assert isinstance(part, RideBatch | DamperOnBench)
+        if not isinstance(part, RideBatch | DamperOnBench):
+            end += part.used().size
+            continue
         weight = np.asarray(part.weight if isinstance(part, RideBatch) else part.batch.weight)
         begin, end = end, end + weight.size
         used, errors = weight > 0, residual[begin:end].reshape(weight.shape)
@@ -256,7 +234,7 @@ def channel_scores(
         for i, number in enumerate(np.asarray(part.number)):
             for k, channel in enumerate(part.channels):
                 chosen = used[i, k]
-                error = errors[i, k][chosen] * problem.sigma[channels.index(channel)]
+                error = errors[i, k][chosen] / weight[i, k][chosen]
                 figures = _figures(records[number][channel][chosen], error)
                 scores[number, k] = ChannelScore(records[number].name, channel, units[channel], *figures)
     on_bench = [

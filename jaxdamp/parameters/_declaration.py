@@ -8,9 +8,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array
 
 from jaxdamp import _checks
+from jaxdamp._traced import is_traced
 from jaxdamp.parameters._domains import Domain, real
 
 
@@ -33,7 +35,11 @@ def as_float(value: Any, name: str = "value") -> Array:
     try:
         if isinstance(value, int | float | np.ndarray):
             value = np.asarray(value)  # arrays of NumPy are copied; numbers would be converted by a compiled program
-        return jnp.asarray(value, dtype=float)
+        made = jnp.asarray(value, dtype=float)
+        if isinstance(made, Tracer) and not is_traced(value):
+            with jax.ensure_compile_time_eval():  # a plain number is known inside `jax.jit`, too
+                made = jnp.asarray(value, dtype=float)
+        return made
     except (TypeError, ValueError) as error:
         if isinstance(value, list | tuple | dict | set | np.ndarray):
             raise ValueError(f"Argument `{name}` must be numbers, but is {value!r}: {error}") from error

@@ -10,7 +10,7 @@ from jaxdamp.plots.curves import force_velocity
 from jaxdamp.plots.damper_use import damper_use
 from jaxdamp.plots.decisions import damper_comparison
 from jaxdamp.plots.errors import ladder
-from jaxdamp.plots.evaluation import evaluation, gas_and_friction
+from jaxdamp.plots.evaluation import evaluation, gas_and_friction, limit_check
 from jaxdamp.plots.experiments import experiment
 from jaxdamp.plots.fronts import pareto
 from jaxdamp.plots.history import training_history
@@ -40,6 +40,7 @@ __all__ = [
     "gas_and_friction",
     "ladder",
     "law_card",
+    "limit_check",
     "many_fits",
     "modes",
     "pareto",

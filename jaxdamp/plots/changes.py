@@ -47,21 +47,7 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
         below = rows[1].subgridspec(1, len(spectra))
         for place, (channel, pair) in enumerate(spectra.items()):
             _spectrum(figure.add_subplot(below[place]), channel, result.start.units[channel], pair)
-    points = np.asarray(velocities, dtype=float)
-    gaps = []
-    styles = _style.law_styles({name: after for name, (_, after) in pairs.items()})
-    for name, pair in pairs.items():
-        colour = styles[name]["color"]
-        held = [quasi_static(law, points) for law in pair]
-        old, new = (np.asarray(curve.force) for curve in held)
-        gaps += [f"{name}{when}: {c.note}" for when, c in zip(("before", "after"), held, strict=True) if c.note]
-        earlier = colour if len(pairs) > 1 else _style.BLACK
-        fitted_range.curve(curves, pair[0], points, old, linestyle="--", color=earlier, label=f"{name}before")
-        fitted_range.curve(curves, pair[1], points, new, color=colour, linewidth=1.8, label=f"{name}after")
-    fitted_range.shade(curves, [law for pair in pairs.values() for law in pair], points)
-    _style.dress(curves, _style.VELOCITY, _style.FORCE, "Damper law")
-    _style.cross(curves)
-    curves.legend(loc="upper left", facecolor="white", edgecolor="none")
+    gaps = _laws(curves, pairs, np.asarray(velocities, dtype=float))
     verdict = result.verdict
     colour = _style.COLOURS[2 if verdict.better else 1]
     lines = [verdict.outcome.value, *textwrap.wrap(verdict.sentence, 130)]
@@ -70,6 +56,27 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
     _search(search, result)
     _style.note_below(figure, gaps)
     return figure
+
+
+def _laws(
+    curves: "matplotlib.axes.Axes", pairs: dict[str, tuple[AbstractDamper, AbstractDamper]], points: np.ndarray
+) -> list[str]:
+    """The laws before and after over the velocity; a sentence for each that has no settled force somewhere."""
+    gaps = []
+    styles = _style.law_styles({name: after for name, (_, after) in pairs.items()})
+    for name, pair in pairs.items():
+        colour = styles[name]["color"]
+        settled = [quasi_static(law, points) for law in pair]
+        old, new = (np.asarray(curve.force) for curve in settled)
+        gaps += [f"{name}{when}: {c.note}" for when, c in zip(("before", "after"), settled, strict=True) if c.note]
+        earlier = colour if len(pairs) > 1 else _style.BLACK
+        fitted_range.curve(curves, pair[0], points, old, linestyle="--", color=earlier, label=f"{name}before")
+        fitted_range.curve(curves, pair[1], points, new, color=colour, linewidth=1.8, label=f"{name}after")
+    fitted_range.shade(curves, [law for pair in pairs.values() for law in pair], points)
+    _style.dress(curves, _style.VELOCITY, _style.FORCE, "Damper law")
+    _style.cross(curves)
+    curves.legend(loc="upper left", facecolor="white", edgecolor="none")
+    return gaps
 
 
 def _changed(result: TuneResult) -> dict[str, tuple[AbstractDamper, AbstractDamper]]:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import VectorLike
 from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle, peak_velocity_points
 from jaxdamp.dampers import AbstractDamper
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 
+@of_known_numbers
 def force_velocity(
     laws: AbstractDamper | Mapping[str, AbstractDamper],
     velocities: VectorLike | None = None,
@@ -56,13 +58,11 @@ def force_velocity(
         ValueError: no law, or a baseline or band that is not of one of the laws.
     """
     alone = _style.law_name(laws) if isinstance(laws, AbstractDamper) else ""
-    laws = _style.by_name(
-        "laws", laws, AbstractDamper, "a damper law", "Take `result.law` of a fit, or laws by name.", alone
-    )
+    remedy = "Take `result.law` of a fit, or laws by name."
+    laws = _style.by_name("laws", laws, AbstractDamper, "a damper law", remedy, alone)
     _checks.finite("static_force", static_force)
     runs = () if runs is None else as_runs(runs)
     runs = tuple(dataclasses.replace(run, force=run.force - static_force) for run in runs)
-    without = f"The measured points are drawn without the static force of {static_force:.0f} N: gas or zero error."
     if baseline is not None:
         _checks.one_of("baseline", baseline, laws)
     if velocities is None:
@@ -78,15 +78,21 @@ def force_velocity(
     curves, gaps = draw_laws(axes, laws, points, baseline, bands)
     handles += curves
     handles += fitted_range.shade(axes, laws.values(), points)
-    over = [runs[0].name if len(runs) == 1 else f"{len(runs)} records"] if runs else []
-    named = ", ".join([*([alone] if alone else []), *over])
-    title = title or "Force over velocity" + (f": {named}" if named else "")
-    _style.dress(axes, _style.VELOCITY, _style.FORCE, title)
+    _style.dress(axes, _style.VELOCITY, _style.FORCE, title or _title(alone, runs))
     _style.cross(axes)
     axes.set_xlim(float(points.min()), float(points.max()))
     _style.legend_beside(figure, handles)
-    _style.note_below(figure, [*([note] if note else []), *([without] if runs and static_force else []), *gaps])
+    without = f"The measured points are drawn without the static force of {static_force:.0f} N: gas or zero error."
+    remarks = [note, without if runs and static_force else "", *gaps]
+    _style.note_below(figure, [remark for remark in remarks if remark])
     return figure
+
+
+def _title(law: str, runs: Sequence[BenchRun]) -> str:
+    """What the picture shows: the only law, and the records."""
+    names = [law] if law else []
+    names += [runs[0].name if len(runs) == 1 else f"{len(runs)} records"] if runs else []
+    return "Force over velocity" + (f": {', '.join(names)}" if names else "")
 
 
 def draw_laws(

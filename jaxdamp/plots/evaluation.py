@@ -188,3 +188,30 @@ def _dress(panels: Mapping[str, "matplotlib.axes.Axes"]) -> None:
     for name, axes in panels.items():
         _style.cross(axes, vertical=name != "t")
         axes.locator_params(axis="x", nbins=6)
+
+
+def limit_check(check: LimitCheck) -> "matplotlib.figure.Figure":
+    """A row for each limit: its range as a bar, and the measured value, all divided by the largest of the row.
+
+    Arguments:
+        check: of `Evaluation.check`.
+    """
+    _checks.instance("check", check, LimitCheck, "be measurements beside limits", "Take `evaluation.check(limits)`.")
+    figure = _style.new_figure(7.0, 1.5 + 0.4 * len(check.results))
+    axes, labels = figure.subplots(), []
+    for row, (limit, measured) in enumerate(check.results):
+        value = float("nan") if measured is None else measured.value
+        ends = [np.nan if end is None else end for end in (limit.minimum, limit.maximum)]
+        size = np.nanmax(np.abs([*ends, value])) or 1.0
+        low, high = (-1.2 if np.isnan(ends[0]) else ends[0] / size), (1.2 if np.isnan(ends[1]) else ends[1] / size)
+        axes.barh(row, high - low, left=low, height=0.5, color="0.85")
+        colour = _style.COLOURS[2] if measured is not None and limit.kept_by(value) else _style.COLOURS[1]
+        axes.plot(value / size, row, "o", color=colour)
+        where = limit.setting if measured is None else measured.record or measured.setting
+        shown = "not measured" if measured is None else f"{_style.short(value)} {measured.unit}".strip()
+        labels.append(f"{limit.quantity}, {where}: {shown}")
+    axes.set_yticks(range(len(labels)), labels)
+    axes.set_ylim(len(labels) - 0.5, -0.5)
+    axes.set_xlabel("value, as a share of the largest of limits and value")
+    figure.suptitle(check.summary)
+    return figure

@@ -49,6 +49,6 @@ def preflight(found: Preflight) -> "matplotlib.figure.Figure":
     axes.grid(True, which="minor", color="0.9", linewidth=0.8)
     axes.tick_params(which="both", length=0)
     axes.spines[:].set_visible(False)
-    figure.suptitle(found.summary())
+    figure.suptitle(found.summary)
     _style.legend_beside(figure, [Patch(color=colour, alpha=0.55, label=word) for word, colour in _SHADES.items()])
     return figure

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks, metrics
 from jaxdamp._tables import typeset_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.simulation import Response
 from jaxdamp.vehicles import ChannelKind, Layout
@@ -25,6 +26,7 @@ _WORDS = {
 }
 
 
+@of_known_numbers
 def ride(
     responses: Response | Mapping[str, Response],
     *,
@@ -56,12 +58,8 @@ def ride(
         ValueError: no response, no channel or an unknown one, an unknown weighting, a window without samples.
     """
     responses = _style.by_name("responses", responses, Response, "a response", _style.SIMULATE)
-    if channels is not None and not channels:
-        _checks.refuse("channels", "hold at least one channel to draw", "empty")
     first = next(iter(responses.values()))
-    channels = ride_channels(first) if channels is None else channels
-    for channel in channels:
-        _checks.one_of("channels", channel, first.units)
+    channels = _chosen_channels(first, channels)
     if reference is not None:
         _checks.one_of("reference", reference, responses)
     start, stop = _window(first, channels[0]) if window is None else window
@@ -70,23 +68,22 @@ def ride(
     rows = [figure.add_subplot(grid[0, 0])]
     rows += [figure.add_subplot(grid[i, 0], sharex=rows[0]) for i in range(1, len(channels))]
     spectrum = figure.add_subplot(grid[:, 1])
-    handles = []
+    handles, unit = [], _unit(first, channels[0])
     styles = _ride_styles(responses, reference)
     for name, response in responses.items():
         style = styles[name]
         time, all_channels = np.asarray(response.time), response.channels
-        values = {channel: np.asarray(all_channels[channel]) for channel in channels}
         seen = (time >= start) & (time <= stop)
         if not seen.any():
             _checks.refuse("window", f"hold instants of the run, 0 to {time[-1]:g} s", (start, stop))
         for axes, channel in zip(rows, channels, strict=True):
-            axes.plot(time[seen], _factor(first, channel) * values[channel][seen], **style)
-        rms = float(metrics.rms(values[channels[0]]))
-        label = f"{name + ': ' if name else ''}RMS {_style.short(rms)} {_unit(first, channels[0])}"
-        frequency, density = _spectrum(values[channels[0]], time, frequencies)
+            axes.plot(time[seen], _factor(first, channel) * np.asarray(all_channels[channel])[seen], **style)
+        values = np.asarray(all_channels[channels[0]])
+        label = f"{name + ': ' if name else ''}RMS {_style.short(float(metrics.rms(values)))} {unit}"
+        frequency, density = _spectrum(values, time, frequencies)
         if weighting is not None:
             dt = float(time[1] - time[0])
-            weighted = metrics.weighted_rms(values[channels[0]], dt, weighting, method="step", remove_mean=False)
+            weighted = metrics.weighted_rms(values, dt, weighting, method="step", remove_mean=False)
             label += f", {weighting} {_style.short(float(weighted))}"
             gain = np.asarray(metrics.weighting_factor(frequency, weighting))
             spectrum.loglog(frequency, gain**2 * density, ":", color=style["color"], linewidth=1.1)
@@ -99,7 +96,6 @@ def ride(
     figure.align_ylabels(rows)
     rows[-1].set_xlabel("time [s]")
     rows[0].set_xlim(start, stop)
-    unit = _unit(first, channels[0])
     name = _label(first, channels[0]).split(" [")[0]
     words = f"Spectrum of the {name}" + (f", dotted: weighted by {weighting}" if weighting else "")
     _style.dress(spectrum, "frequency [Hz]", f"power spectral density [({unit})²/Hz]", words)
@@ -110,6 +106,17 @@ def ride(
     rows[0].set_title(title, loc="left", fontsize="medium")
     fitted_range.footnotes(figure, responses)
     return figure
+
+
+def _chosen_channels(response: Response, channels: Sequence[str] | None) -> Sequence[str]:
+    """The channels to draw, checked; the default ones if left out."""
+    if channels is None:
+        return ride_channels(response)
+    if not channels:
+        _checks.refuse("channels", "hold at least one channel to draw", "empty")
+    for channel in channels:
+        _checks.one_of("channels", channel, response.units)
+    return channels
 
 
 def _ride_styles(responses: Mapping[str, Response], reference: str | None) -> dict[str, dict[str, Any]]:

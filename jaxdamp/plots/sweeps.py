@@ -50,20 +50,8 @@ def sweep(
     >>> len(sweep(data, "area").axes)  # the map and its bar of colours
     2
     """
-    _checks.one_of("metric", metric, [str(name) for name in data.data_vars])
-    values = data[metric]
-    axes = [str(name) for name in values.dims]
-    if "point" in axes or not all(name in data.coords for name in axes) or values.dtype.kind != "f":
-        remedy = "Points of a list or sample are best drawn by `data.plot.scatter`."
-        _checks.refuse("metric", "be one number for each point of a grid", f"{metric!r} along {axes}", remedy)
-    chosen = axes if over is None else [over] if isinstance(over, str) else list(over)
-    for name in chosen:
-        _checks.one_of("over", name, axes)
-    rest = [name for name in axes if name not in chosen]
-    curves = len(chosen) == 1 and len(rest) <= 1 and values.size <= MOST_CURVES * values.sizes[chosen[0]]
-    if not curves and (len(chosen) != 2 or rest):
-        remedy = "Choose one or two by `over`, and fix the others by `data.sel`."
-        _checks.refuse("over", f"leave one or two axes, the others fixed (of {axes})", chosen, remedy)
+    axes = _grid_axes(data, metric)
+    chosen, others = _chosen_axes(data, metric, axes, over)
     names = [str(name) for name in data.data_vars]
     spans = limit_spans(limits, names)
     for name in spans:
@@ -74,8 +62,36 @@ def sweep(
     idle = without_effect(data).get(metric, [])
     flat = f" (no effect of {' and '.join(_words(data, name) for name in idle)})" if idle else ""
     plot.set_title(f"{_words(data, metric)} over {over_axes}{flat}", loc="left", fontsize="medium")
-    (_curves if curves else _map)(figure, plot, data, metric, chosen, rest, _ends(data, spans))
+    if len(chosen) == 1:
+        _curves(figure, plot, data, metric, chosen[0], others, _ends(data, spans))
+    else:
+        _map(figure, plot, data, metric, chosen, _ends(data, spans))
     return figure
+
+
+def _chosen_axes(
+    data: "xarray.Dataset", metric: str, axes: list[str], over: Sequence[str] | None
+) -> tuple[list[str], list[str]]:
+    """The axes to draw over, and the other ones: of a few values of one of them, each gets a curve."""
+    chosen = axes if over is None else [over] if isinstance(over, str) else list(over)
+    for name in chosen:
+        _checks.one_of("over", name, axes)
+    others = [name for name in axes if name not in chosen]
+    curves = len(chosen) == 1 and len(others) <= 1 and data[metric].size <= MOST_CURVES * data.sizes[chosen[0]]
+    if not curves and (len(chosen) != 2 or others):
+        remedy = "Choose one or two by `over`, and fix the others by `data.sel`."
+        _checks.refuse("over", f"leave one or two axes, the others fixed (of {axes})", chosen, remedy)
+    return chosen, others
+
+
+def _grid_axes(data: "xarray.Dataset", metric: str) -> list[str]:
+    """The axes of a result that is one number for each point of a grid."""
+    _checks.one_of("metric", metric, [str(name) for name in data.data_vars])
+    axes = [str(name) for name in data[metric].dims]
+    if "point" in axes or not all(name in data.coords for name in axes) or data[metric].dtype.kind != "f":
+        remedy = "Points of a list or sample are best drawn by `data.plot.scatter`."
+        _checks.refuse("metric", "be one number for each point of a grid", f"{metric!r} along {axes}", remedy)
+    return axes
 
 
 def _curves(
@@ -83,25 +99,23 @@ def _curves(
     plot: "matplotlib.axes.Axes",
     data: "xarray.Dataset",
     metric: str,
-    over: list[str],
-    rest: list[str],
+    name: str,
+    others: list[str],
     ends: Sequence["_End"],
 ) -> None:
     """A curve over one axis, for each value of another; a cross at the foot where points failed."""
-    (name,) = over
-    lines = data[metric].transpose(*rest, name).values.reshape(-1, data.sizes[name])
-    failed = data["failed"].transpose(*rest, name).values.reshape(lines.shape)
-    others = data[rest[0]].values if rest else [None]
+    lines = data[metric].transpose(*others, name).values.reshape(-1, data.sizes[name])
+    failed = data["failed"].transpose(*others, name).values.reshape(lines.shape)
     where = data[name].values
-    for number, (line, other) in enumerate(zip(lines, others, strict=True)):
-        label = None if other is None else f"{rest[0]} = {_style.short(float(other))}{_unit(data, rest[0])}"
+    for number, (line, value) in enumerate(zip(lines, data[others[0]].values if others else [None], strict=True)):
+        label = None if value is None else f"{others[0]} = {_style.short(float(value))}{_unit(data, others[0])}"
         plot.plot(where, line, marker="o", markersize=3.0, label=label, **_style.line_style(number))
     _style.dress(plot, _label(data, name), _label(data, metric))
-    if rest:
+    if others:
         plot.legend(frameon=False)
     marks = []
     for number, end in enumerate(ends):
-        beyond = end.beyond(data[end.name].transpose(*rest, name).values.reshape(lines.shape))
+        beyond = end.beyond(data[end.name].transpose(*others, name).values.reshape(lines.shape))
         places = np.broadcast_to(where, lines.shape)[beyond]
         size, colour = 60.0 + 50.0 * number, _style.COLOURS[-1 - number % len(_style.COLOURS)]
         marks.append(plot.scatter(places, lines[beyond], size, "none", edgecolors=colour, label=end.label, zorder=4))
@@ -123,11 +137,9 @@ def _map(
     data: "xarray.Dataset",
     metric: str,
     over: list[str],
-    rest: list[str],
     ends: Sequence["_End"],
 ) -> None:
     """Filled contours over two axes with the smallest value marked; crosses and hatching where points failed."""
-    del rest
     x, y = (data[name].values for name in over)
     values, failed = (data[name].transpose(over[1], over[0]).values for name in (metric, "failed"))
     if min(values.shape) < 2:

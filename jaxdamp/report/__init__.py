@@ -2,11 +2,13 @@
 
 - Pages: `bench_report(evaluation, preflight)`, `fit_report(comparison)`, `vehicle_fit_report(result)`,
   `ride_report(responses)`, `tuning_report(result)`, `chain_report(comparison, rides, tuned)` of the whole chain,
-  `sweep_report(data)`; each gives a `Report`, to which more can be added before `write(path)`.
+  `sweep_report(data)`, `result_report(result)` of any result; each gives a `Report`, to which more can
+  be added before `write(path)`.
 - Your own page: `Report`, with the sections `add_records`, `add_evaluation`, `add_fits`, `add_rides`, `add_tuning`.
 - Tables of these pages: `records_table`, `ride_records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp._tables import Column, Table
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.benches import add_evaluation, baseline_table, bench_report, law_evaluation
@@ -23,11 +25,10 @@ from jaxdamp.report.fits import (
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import fitted_range_table, range_use_table
 from jaxdamp.report.records import add_records, records_table
+from jaxdamp.report.results import result_report
 from jaxdamp.report.rides import (
-    GOALS,
     add_rides,
     axles_sentence,
-    goal_metrics,
     notes_of,
     ride_report,
     ride_tables,
@@ -39,7 +40,6 @@ from jaxdamp.report.vehicle_fits import ride_records_table, vehicle_fit_report
 
 
 __all__ = [
-    "GOALS",
     "Attempts",
     "Column",
     "Report",
@@ -59,12 +59,12 @@ __all__ = [
     "fit_verdict",
     "fitted_range_table",
     "fitted_velocities",
-    "goal_metrics",
     "law_evaluation",
     "notes_of",
     "parameters_of",
     "range_use_table",
     "records_table",
+    "result_report",
     "ride_records_table",
     "ride_report",
     "ride_tables",
@@ -73,3 +73,5 @@ __all__ = [
     "tuning_report",
     "vehicle_fit_report",
 ]
+
+answer_guesses(__name__, __all__)

@@ -106,7 +106,7 @@ def bench_verdict(
             parts = ((rebound, "in rebound"), (compression, "in compression"))
             words = " and ".join(f"{force(cell)} N {side}" for cell, side in parts if cell is not None)
             sentences += [f"{where} {velocity:.4g} m/s: {words}{share}."] if words else []
-    return sentences + ([f"{preflight.summary()}."] if preflight else [])
+    return sentences + ([f"{preflight.summary}."] if preflight else [])
 
 
 def law_evaluation(law: AbstractDamper, evaluation: Evaluation) -> Evaluation:

@@ -59,7 +59,7 @@ def fit_report(
     True
     """
     report = Report(title, folder, attempts)
-    report.verdict(*fit_verdict(report, comparison, baseline), f"{preflight.summary()}." if preflight else "")
+    report.verdict(*fit_verdict(report, comparison, baseline), f"{preflight.summary}." if preflight else "")
     records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
     add_records(report, records, comparison.held_out, remarks, preflight)
     add_fits(report, comparison, failures, baseline)

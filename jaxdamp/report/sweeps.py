@@ -86,16 +86,25 @@ def best_points(
     ]
     for name in names if count else ():
         acting = [axis for axis in axes if axis not in idle.get(name, ())]
-        if not acting:
-            continue
-        values = data[name].where(allowed)
-        place = values.isel(values.argmin(...)).coords
-        where = ", ".join(f"{axis} = {_in_words(data, axis, place[axis])}" for axis in acting)
-        beside = ""
-        if baseline is not None and (change := percent_change(float(baseline[name]), float(values.min()))) is not None:
-            beside = f", {change:+.1f} % from the baseline ({_in_words(data, name, baseline[name])})"
-        sentences.append(f"Smallest {_words(name)}: {_in_words(data, name, values.min())} at {where}{beside}.")
+        sentences += [_smallest(data, name, acting, allowed, baseline)] if acting else []
     return sentences
+
+
+def _smallest(
+    data: "xarray.Dataset",
+    name: str,
+    axes: Sequence[str],
+    allowed: "xarray.DataArray",
+    baseline: Mapping[str, Any] | None,
+) -> str:
+    """The smallest value of a result, where it is, and its change from the baseline."""
+    values = data[name].where(allowed)
+    place = values.isel(values.argmin(...)).coords
+    where = ", ".join(f"{axis} = {_in_words(data, axis, place[axis])}" for axis in axes)
+    change = None if baseline is None else percent_change(float(baseline[name]), float(values.min()))
+    if baseline is not None and change is not None:
+        where += f", {change:+.1f} % from the baseline ({_in_words(data, name, baseline[name])})"
+    return f"Smallest {_words(name)}: {_in_words(data, name, values.min())} at {where}."
 
 
 def _words(name: str) -> str:

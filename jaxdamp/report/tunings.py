@@ -110,11 +110,11 @@ def add_baseline(report: Report, result: TuneResult[Any], baseline: AbstractVehi
 def _beside(result: TuneResult[Any], baseline: AbstractVehicle) -> Table:
     """Ride metrics of the baseline, before and after, on the road of the tuning."""
     assert result.drive is not None
-    road, duration, dt = result.drive
+    road, run = result.drive
     known = (*result.start.layout.metrics, *(result.objective.metrics if result.objective else ()))
     metrics = list({m.name: m for m in known if m.name in result.units}.values())
     cars = (baseline, result.start, result.vehicle)
-    rides = [Ride(car, road, metrics=metrics, duration=duration, dt=dt)() for car in cars]
+    rides = [Ride(car, road, metrics=metrics, **run)() for car in cars]
     rows = []
     for name in (name for name in result.units if name in rides[0]):
         values = [float(ride[name]) for ride in rides]

@@ -2,7 +2,7 @@
 
 import warnings
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -44,6 +44,18 @@ class AbstractLawEngine(eqx.Module):
         """Force [N] of a law at uniform instants [s] of a stroke [m] and its velocity [m/s], without checks."""
 
 
+class _Options(TypedDict, total=False):
+    """What `respond` takes beside the record and `return_state`, for type checkers."""
+
+    state: Float[ArrayLike, " states"] | None
+    temperature: Float[ArrayLike, "..."] | None
+    substeps: int
+    engine: AbstractLawEngine | None
+    method: "str | diffrax.AbstractSolver | None"
+    rtol: float
+    atol: float
+
+
 @overload
 def respond(
     law: AbstractDamper,
@@ -51,14 +63,8 @@ def respond(
     stroke: SignalLike,
     velocity: SignalLike | None = ...,
     *,
-    state: Float[ArrayLike, " states"] | None = ...,
     return_state: Literal[False] = ...,
-    temperature: Float[ArrayLike, "..."] | None = ...,
-    substeps: int = ...,
-    engine: AbstractLawEngine | None = ...,
-    method: "str | diffrax.AbstractSolver | None" = ...,
-    rtol: float = ...,
-    atol: float = ...,
+    **options: Unpack[_Options],
 ) -> Signal: ...
 
 
@@ -69,10 +75,8 @@ def respond(
     stroke: SignalLike,
     velocity: SignalLike | None = ...,
     *,
-    state: Float[ArrayLike, " states"] | None = ...,
     return_state: Literal[True],
-    temperature: Float[ArrayLike, "..."] | None = ...,
-    substeps: int = ...,
+    **options: Unpack[_Options],
 ) -> tuple[Signal, State]: ...
 
 
@@ -139,6 +143,7 @@ def respond(
     check_module("law", law, (AbstractDamper,), "respond(law, time, stroke, velocity)")
     instants, time, stroke = _checks.concrete(time), as_float(time), as_float(stroke)
     _check_record(instants, time, stroke, velocity)
+    _checks.untraced("substeps", substeps, "The number of steps is part of a compiled program: give a plain number.")
     if substeps < 1:
         _checks.refuse("substeps", "be 1 or more", substeps)
     dt = (time[-1] - time[0]) / (time.size - 1)

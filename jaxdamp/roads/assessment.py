@@ -8,7 +8,9 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.roads.iso_classes import (
     HIGHEST_SPATIAL_FREQUENCY,
     LOWEST_SPATIAL_FREQUENCY,
@@ -31,7 +33,7 @@ _STRAIGHT = 0.7
 
 
 @dataclass(frozen=True, eq=False)
-class RoughnessAssessment:
+class RoughnessAssessment(AbstractResult):
     """The roughness of a profile, from `assess_roughness`; prints as a table with a summary in words.
 
     Attributes:
@@ -96,6 +98,11 @@ class RoughnessAssessment:
             words.append(f"The bands are of class {least} to {most}; the roughest has a wavelength of {wave:.2g} m.")
         return " ".join(words)
 
+    @property
+    def summary(self) -> str:
+        """`verdict`."""
+        return self.verdict
+
     def plot(self) -> "matplotlib.figure.Figure":
         """The spectrum with its straight line and the classes (`plots.roughness_spectrum`)."""
         from jaxdamp import plots
@@ -114,7 +121,7 @@ class RoughnessAssessment:
         numbers = self.spatial_frequency, 1.0 / self.spatial_frequency, self.displacement_psd, self.lines
         return Table("Road roughness", columns, tuple(zip(*map(plain, numbers), self.band_classes, strict=True)))
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """Class, fitted spectrum, bands and verdict with units, ready for JSON."""
         return {
             "road_class": self.road_class,
@@ -130,6 +137,7 @@ class RoughnessAssessment:
         return f"{self.table().to_text()}\n{self.verdict}"
 
 
+@of_known_numbers
 def assess_roughness(
     height: Float[ArrayLike, " samples"], spacing: float | int, *, bands_per_octave: int = 1
 ) -> RoughnessAssessment:

@@ -71,21 +71,27 @@ def read_profile(
 
 def _table(path: Path) -> tuple[list[str], np.ndarray]:
     """The names of the columns (their numbers where there are none) and the numbers of a file."""
-    text = read_text(path, "text")
-    lines = [line.strip() for line in text.splitlines() if line.strip() and line.strip()[0] not in "#%"]
-    if not lines:
-        _checks.refuse("path", "name a file with numbers", f"{path}, which is empty")
+    lines = _lines(path)
     separator = next((mark for mark in ";\t," if mark in lines[0]), None)
     split = [line.split() for line in lines] if separator is None else list(csv.reader(lines, delimiter=separator))
     rows = [[field.strip() for field in row] for row in split]
-    has_names = not all(_is_number(field) for field in rows[0])
+    has_names = not all(map(_is_number, rows[0]))
     names = rows.pop(0) if has_names else [str(number) for number in range(len(rows[0]))]
-    for number, row in enumerate(rows):
-        if len(row) != len(names) or not all(_is_number(field) for field in row):
-            remedy = "Remarks begin with # or %; decimals have a point."
-            must = f"name a file with {len(names)} numbers in each line"
-            _checks.refuse("path", must, f"{path} with {lines[number + has_names]!r}", remedy)
+    wrong = [i for i, row in enumerate(rows, has_names) if len(row) != len(names) or not all(map(_is_number, row))]
+    if wrong:
+        remedy = "Remarks begin with # or %; decimals have a point."
+        must = f"name a file with {len(names)} numbers in each line"
+        _checks.refuse("path", must, f"{path} with {lines[wrong[0]]!r}", remedy)
     return names, np.array(rows, float).reshape(len(rows), len(names))
+
+
+def _lines(path: Path) -> list[str]:
+    """The lines of a file but remarks."""
+    stripped = map(str.strip, read_text(path, "text").splitlines())
+    lines = [line for line in stripped if line and line[0] not in "#%"]
+    if not lines:
+        _checks.refuse("path", "name a file with numbers", f"{path}, which is empty")
+    return lines
 
 
 def _is_number(field: str) -> bool:

@@ -4,6 +4,7 @@ Engines are `Exponential` and `Adaptive`; one of your own derives from `Abstract
 """
 
 from jaxdamp.simulation.adaptive import Adaptive
+from jaxdamp.simulation.energy import absorbed_by, energy_balance
 from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState, settled
 from jaxdamp.simulation.exponential import Exponential
@@ -13,6 +14,7 @@ from jaxdamp.simulation.range_notes import named_laws, range_sentences
 from jaxdamp.simulation.recorder import recorded
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride
+from jaxdamp.simulation.ride_metrics import comfort, ride_metrics
 from jaxdamp.simulation.run import simulate
 from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.stationary import DEVIATIONS, stationary_notes
@@ -40,12 +42,16 @@ __all__ = [
     "RunCheck",
     "StepState",
     "TracedStepWarning",
+    "absorbed_by",
+    "comfort",
     "comfort_table",
+    "energy_balance",
     "metrics_table",
     "moves_axles",
     "named_laws",
     "range_sentences",
     "recorded",
+    "ride_metrics",
     "settled",
     "simulate",
     "stationary_notes",

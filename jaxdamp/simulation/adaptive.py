@@ -12,8 +12,8 @@ from jaxdamp._jacobian import Mode
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.rig import solve_law
-from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome
-from jaxdamp.simulation.equations import Equations, RoadInput, StepState, road_rate
+from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome, RunState
+from jaxdamp.simulation.equations import STRAIGHT, Equations, RoadEdges, RoadInput, StepState, road_rate
 from jaxdamp.vehicles import States
 
 
@@ -70,8 +70,9 @@ class Adaptive(AbstractEngine):
         equations: Equations,
         heights: Float[Array, "time wheels"],
         dt: ScalarLike,
-        start: Float[Array, " n"],
+        start: Float[Array, " n"] | RunState,
         observer: AbstractObserver,
+        edges: RoadEdges = STRAIGHT,
     ) -> Outcome:
         """The run by the solver; the observer sees its instants afterwards."""
         from jaxdamp._driven import solve
@@ -87,10 +88,12 @@ class Adaptive(AbstractEngine):
         def field(t: Scalar, y: tuple[Array, States]) -> tuple[Array, States]:
             return equations.rates(*y, road(t))
 
-        begin, options = (start, equations.ports.initial()), {"mode": self.mode, "every": observer.every}
+        resumed = isinstance(start, RunState)
+        begin = (start.now.motion, start.now.states) if resumed else (start, equations.ports.initial())
+        options = {"mode": self.mode, "every": observer.every}
         solver, limit = self._solver(), STEPS_PER_INSTANT
         run, status = solve(field, begin, time, solver, self.rtol, self.atol, steps_per_instant=limit, **options)
-        instants = (*run, heights[:: observer.every], road_rate(heights, dt)[:: observer.every])
+        instants = (*run, heights[:: observer.every], road_rate(heights, dt, edges)[:: observer.every])
 
         def see(instant: tuple) -> tuple[StepState, RoadInput]:
             motion, states, height, slope = instant
@@ -107,7 +110,8 @@ class Adaptive(AbstractEngine):
         first = observer.saved(now, gathered)
         gathered, saved = jax.lax.scan(add, gathered, jax.tree.map(lambda y: y[1:], instants))
         records = jax.tree.map(lambda y, rest: jnp.concatenate([y[None], rest]), first, saved)
-        return Outcome(gathered, records, equations.ports.by_port([y[-1] for y in run[1]]), status)
+        last, _ = see(jax.tree.map(lambda y: y[-1], instants))
+        return Outcome(gathered, records, equations.ports.by_port(last.states), status, last)
 
     def remedy(self, status: Any, dt: float) -> str:
         """What the solver says of a run that diverged, and what to do about it."""

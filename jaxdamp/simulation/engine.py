@@ -3,17 +3,18 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, final
 
+import equinox as eqx
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode
-from jaxdamp._types import ScalarLike, Signal
+from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp._vectors import MemoryLayout
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.rig import AbstractLawEngine
-from jaxdamp.simulation.equations import Equations, RoadInput, StepState
+from jaxdamp.simulation.equations import STRAIGHT, Equations, RoadEdges, RoadInput, StepState
 from jaxdamp.simulation.step_size import RunCheck
 
 
@@ -36,6 +37,25 @@ class AbstractObserver(ABC):
         """What is saved of an instant."""
 
 
+@final
+class RunState(eqx.Module):
+    """Where a run stopped, and from where another one goes on: `simulate(..., state=...)`.
+
+    A tree of arrays, which `jax.lax.scan`, `jax.vmap` and `pickle` take.
+
+    Attributes:
+        time: instant at which the run stopped [s].
+        now: motion (q, q̇), states and forces of the elements there, and what the engine remembers of earlier steps.
+        step: last step of the engine [s].
+        engine: name of its class, which alone knows what it remembers.
+    """
+
+    time: Scalar
+    now: StepState
+    step: float = eqx.field(static=True)
+    engine: str = eqx.field(static=True)
+
+
 class Outcome(NamedTuple):
     """What an engine gives back.
 
@@ -44,12 +64,14 @@ class Outcome(NamedTuple):
         records: what the observer saved, with the instants along the first axis.
         states: of the elements at the end.
         status: what the engine says of the run, for `AbstractEngine.remedy`.
+        last: the vehicle at the last instant, from which a run goes on; None of an engine that cannot.
     """
 
     gathered: Any
     records: Any
     states: list[Float[Array, " _state"]]
     status: Any = None
+    last: StepState | None = None
 
 
 class AbstractEngine(AbstractLawEngine):
@@ -70,8 +92,9 @@ class AbstractEngine(AbstractLawEngine):
         equations: Equations,
         heights: Float[Array, "time wheels"],
         dt: ScalarLike,
-        start: Float[Array, " n"],
+        start: Float[Array, " n"] | RunState,
         observer: AbstractObserver,
+        edges: RoadEdges = STRAIGHT,
     ) -> Outcome:
         """Drive a run, inside a compiled function.
 
@@ -79,8 +102,9 @@ class AbstractEngine(AbstractLawEngine):
             equations: of the vehicle, in the layout that `layout` chose.
             heights: of the road under the wheels at uniform instants [m], straight between them.
             dt: spacing of the instants [s].
-            start: the motion (q, q̇) at the first instant; the elements are at rest.
+            start: the motion (q, q̇) at the first instant, the elements at rest; or where an earlier run stopped.
             observer: sees every instant; one that saves one in `observer.every` need only see these.
+            edges: the road beyond both ends of a run that goes on.
         """
 
     @property

@@ -27,6 +27,19 @@ class RoadInput(NamedTuple):
     rate: Vector | None
 
 
+class RoadEdges(NamedTuple):
+    """The road one instant before the first and one after the last of a run that goes on [m], shape (wheels,).
+
+    With them rates at the ends of a part are those of the whole; None where the run begins or ends for good.
+    """
+
+    before: Float[Array, " wheels"] | None = None
+    after: Float[Array, " wheels"] | None = None
+
+
+STRAIGHT = RoadEdges()  # as straight beyond the ends as beside them
+
+
 class StepState(NamedTuple):
     """A vehicle at an instant: motion (q, q̇) in SI units, states and forces [N] of its elements.
 
@@ -101,7 +114,14 @@ def settled(system: System, road: Float[Array, " wheels"]) -> Float[Array, " n"]
     return jnp.concatenate([position, jnp.zeros_like(position)])
 
 
-def road_rate(heights: Float[Array, "time wheels"], dt: ScalarLike) -> Float[Array, "time wheels"]:
+def road_rate(
+    heights: Float[Array, "time wheels"], dt: ScalarLike, edges: RoadEdges = STRAIGHT
+) -> Float[Array, "time wheels"]:
     """Rate of the heights at the instants [m/s]: the mean of the slopes before and after."""
     steps = jnp.diff(heights, axis=0) / dt
-    return jnp.concatenate([steps[:1], 0.5 * (steps[1:] + steps[:-1]), steps[-1:]])
+    first, last = steps[:1], steps[-1:]
+    if edges.before is not None:
+        first = 0.5 * (first + (heights[:1] - edges.before[None]) / dt)
+    if edges.after is not None:
+        last = 0.5 * (last + (edges.after[None] - heights[-1:]) / dt)
+    return jnp.concatenate([first, 0.5 * (steps[1:] + steps[:-1]), last])

@@ -18,8 +18,8 @@ from jaxdamp._sharded import varying_as
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp._vectors import between, laid_out
 from jaxdamp.codegen import printed_scan
-from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome
-from jaxdamp.simulation.equations import FOR_REVERSE, Equations, RoadInput, StepState
+from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome, RunState
+from jaxdamp.simulation.equations import FOR_REVERSE, STRAIGHT, Equations, RoadEdges, RoadInput, StepState
 
 
 Carry: TypeAlias = tuple[StepState, Any, RoadInput, tuple[Array, ...]]
@@ -49,6 +49,17 @@ class AbstractStepper(eqx.Module):
         """The vehicle at the first instant, its elements at rest."""
         return self.equations.at_rest(motion, road)
 
+    def resumed(self, now: StepState, road: RoadInput, ratio: Scalar) -> StepState:
+        """The same instant for this stepper after another, from which a run goes on; here with the memory as it is.
+
+        Arguments:
+            now: the vehicle at the last instant of the other.
+            road: under the wheels.
+            ratio: this step to that of the other.
+        """
+        del ratio
+        return self.equations.at(now.motion, now.states, road, now.memory)
+
 
 class AbstractFixedStep(AbstractEngine):
     """An engine of equal steps: it has one method, `stepper`, and `step_count` where an interval takes several."""
@@ -72,12 +83,13 @@ class AbstractFixedStep(AbstractEngine):
         equations: Equations,
         heights: Float[Array, "time wheels"],
         dt: ScalarLike,
-        start: Float[Array, " n"],
+        start: Float[Array, " n"] | RunState,
         observer: AbstractObserver,
+        edges: RoadEdges = STRAIGHT,
     ) -> Outcome:
         """Step after step; of a long run reverse derivatives keep the beginnings of blocks only."""
         stepper = self.stepper(equations, jnp.asarray(dt / self.step_count, dtype=float))
-        heights, start = varying_as((heights, start), eqx.filter(stepper, eqx.is_array))
+        heights, start, edges = varying_as((heights, start, edges), eqx.filter(stepper, eqx.is_array))
         half_rate, layout = jnp.asarray(0.5 / dt, dtype=heights.dtype), equations.layout
         rated = equations.road_deflection is not None or not observer.saves_motion
 
@@ -111,14 +123,19 @@ class AbstractFixedStep(AbstractEngine):
         first = RoadInput(laid_out(heights[0], layout), None)
         window, road = (), heights[1:]
         if rated:
-            first = at(heights[0], 2.0 * half_rate * (heights[1] - heights[0]))
+            rise = heights[1] - heights[0]
+            first = at(heights[0], half_rate * (2.0 * rise if edges.before is None else heights[1] - edges.before))
             window = heights[0], heights[1]
-            road = jnp.concatenate([heights[2:], 2.0 * heights[-1:] - heights[-2:-1]])  # it ends as straight as it came
-        now = stepper.start(start, first)
+            ahead = 2.0 * heights[-1] - heights[-2] if edges.after is None else edges.after  # as straight as it came
+            road = jnp.concatenate([heights[2:], ahead[None]])
+        if isinstance(start, RunState):
+            now = stepper.resumed(start.now, first, stepper.dt / start.step)
+        else:
+            now = stepper.start(start, first)
         carry = varying_as((now, observer.begin(now, first), first, window))
         if self.runs_printed:
             carry = self._printed(step, carry, road, observer)
-            return Outcome(carry[1], observer.saved(carry[0], carry[1]), equations.ports.by_port(carry[0].states))
+            return self._outcome(carry, observer.saved(carry[0], carry[1]), equations)
         parts = [jax.tree.map(lambda y: y[None], observer.saved(now, carry[1]))]
         whole = 0 if observer.saves_motion or road.shape[0] <= BLOCK else road.shape[0] // BLOCK * BLOCK
         if whole:
@@ -130,7 +147,10 @@ class AbstractFixedStep(AbstractEngine):
             rest = rest.reshape(-1, observer.every, *rest.shape[1:])
         carry, saved = drive(carry, rest)
         records = jax.tree.map(lambda *ys: jnp.concatenate(ys), *parts, saved)
-        return Outcome(carry[1], records, equations.ports.by_port(carry[0].states))
+        return self._outcome(carry, records, equations)
+
+    def _outcome(self, carry: Carry, records: Any, equations: Equations) -> Outcome:
+        return Outcome(carry[1], records, equations.ports.by_port(carry[0].states), last=carry[0])
 
     def _printed(self, step: Any, carry: Carry, road: Array, observer: AbstractObserver) -> Carry:
         """The carry at the end of a loop that is printed; refused where something of each instant is saved."""

@@ -8,19 +8,20 @@ from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar
 from jaxdamp._vectors import Vector
-from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver
-from jaxdamp.simulation.equations import Equations, RoadInput, StepState, road_rate, settled
+from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, RunState
+from jaxdamp.simulation.equations import Equations, RoadEdges, RoadInput, StepState, road_rate, settled
 from jaxdamp.vehicles import States, System
 
 
 class Saved(NamedTuple):
-    """What is saved of a run, at the instants that are saved; the states of the laws at the end."""
+    """What is saved of a run, at the instants that are saved; the states of the laws, and the vehicle, at the end."""
 
     motion: Float[Array, "time n"]
     port_force: Float[Array, "time ports"]
     road: Float[Array, "time wheels"]
     road_rate: Float[Array, "time wheels"]
     final_state: list[Float[Array, " _state"]]
+    last: StepState | None
 
 
 @final
@@ -51,8 +52,9 @@ def recorded(
     system: System,
     heights: Float[Array, "time wheels"],
     dt: Scalar,
-    start: Float[Array, " n"] | None = None,
+    start: Float[Array, " n"] | RunState | None = None,
     every: int = 1,
+    edges: RoadEdges | None = None,
 ) -> tuple[Saved, Any]:
     """Motion (q, q̇) and element forces at every instant of the road, or every so many-th; what the engine says of it.
 
@@ -64,17 +66,19 @@ def recorded(
         system: the vehicle.
         heights: of the road under each wheel [m, up], shape (time, wheels).
         dt: step of the heights [s].
-        start: q and q̇ at the beginning, shape (n,); at rest if left out.
+        start: q and q̇ at the beginning, shape (n,), or where an earlier run stopped; at rest if left out.
         every: number of instants from one that is saved to the next.
+        edges: the road beyond both ends of a run that goes on.
     """
     equations = Equations(system)
     start = settled(system, heights[0]) if start is None else start
-    outcome = engine.run(equations, heights, dt, start, Recorder(every))
+    beyond = () if edges is None else (edges,)
+    outcome = engine.run(equations, heights, dt, start, Recorder(every), *beyond)
     motion, states = outcome.records
-    heights, slopes = heights[::every], road_rate(heights, dt)[::every]
+    heights, slopes = heights[::every], road_rate(heights, dt, *beyond)[::every]
 
     def force(motion: Array, states: States, height: Array, slope: Array) -> Array:
         return equations.at(motion, states, RoadInput(height, slope)).force
 
     forces = jax.vmap(force)(motion, states, heights, slopes)
-    return Saved(motion, forces, heights, slopes, outcome.states), outcome.status
+    return Saved(motion, forces, heights, slopes, outcome.states, outcome.last), outcome.status

@@ -1,24 +1,25 @@
-"""What a vehicle did on a road: motion, forces, channels with units, energy, ride metrics."""
+"""What a vehicle did on a road: motion, forces, channels with units."""
 
 import dataclasses
-import weakref
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import TYPE_CHECKING, Any, final
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
-from jaxdamp import _checks, metrics
+from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Table, with_unit
-from jaxdamp._types import Scalar, ScalarLike, Signal
+from jaxdamp._types import Scalar, Signal
 from jaxdamp.dampers import RangeUse
-from jaxdamp.metrics import Metric, MetricValues
-from jaxdamp.simulation.equations import settled
+from jaxdamp.metrics import Metric
+from jaxdamp.simulation.energy import absorbed_by, energy_balance
 from jaxdamp.simulation.notes import tyres_in_tension
 from jaxdamp.simulation.range_notes import range_sentences, range_uses
+from jaxdamp.simulation.ride_metrics import Comfort, comfort, ride_metrics
 from jaxdamp.simulation.tables import comfort_table, comfort_units, metrics_table
 from jaxdamp.simulation.wheels import AxleTiming
 from jaxdamp.vehicles import AbstractVehicle, LinearMap, System
@@ -29,20 +30,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Comfort(NamedTuple):
-    """An acceleration as ISO 2631-1 counts it: RMS and maximum in the unit of its channel, the dose times s^(1/4)."""
+@jax.tree_util.register_pytree_node_class
+class _Channels(dict[str, Signal]):
+    """The channels of one response that were asked for. It holds no leaf: another response begins without any."""
 
-    weighted_rms: Scalar
-    max_transient_value: Scalar
-    vibration_dose_value: Scalar
+    def tree_flatten(self) -> tuple[tuple[()], None]:
+        return (), None
 
-
-def _middle(values: Array) -> Array:
-    """Mean over each step."""
-    return 0.5 * (values[1:] + values[:-1])
-
-
-_COMPUTED: dict[int, dict[str, Signal]] = {}  # channels of living responses: a module has no place but its fields
+    @classmethod
+    def tree_unflatten(cls, aux: None, leaves: Sequence[object]) -> "_Channels":
+        return cls()
 
 
 @jax.jit
@@ -60,7 +57,7 @@ def _channel(
 
 
 @final
-class Response(eqx.Module):
+class Response(eqx.Module, AbstractResult):
     """The response of a vehicle to a road, at uniformly spaced instants.
 
     The road's rate is the mean of its slopes before and after an instant. `axle_timing`, printed with the response,
@@ -78,8 +75,8 @@ class Response(eqx.Module):
         road, road_rate: heights under the wheels [m, up] and their rates [m/s], shape (time, wheels).
         final_state: states of each element at the end.
         axle_timing: when each axle met the road.
-        whole: the response that this one is a part of, and the number of its first instant there.
-        begin: start of the statistics of this part.
+        whole: the run that this response is a part of; None for a run.
+        begin: number of the first instant of this part in the run.
     """
 
     vehicle: AbstractVehicle
@@ -91,8 +88,14 @@ class Response(eqx.Module):
     road_rate: Float[Array, "time wheels"]
     final_state: list[Float[Array, " _state"]]
     axle_timing: AxleTiming
-    whole: Any = None  # the response that this one is a part of, and the number of its first instant there
-    begin: Any = None
+    whole: "Response | None" = None
+    begin: Int[Array, ""] | None = None
+    _computed: _Channels = eqx.field(init=False, repr=False, default_factory=_Channels)
+
+    @property
+    def run(self) -> "Response":
+        """The run that this response is a part of, or itself."""
+        return self if self.whole is None else self.whole
 
     def __repr__(self) -> str:
         name, time = type(self.vehicle).__name__, _checks.concrete(self.time)
@@ -102,6 +105,16 @@ class Response(eqx.Module):
             begins = "over" if self.whole is None else f"from {time[0]:g} to"
             length = f" {begins} {time[-1]:g} s, {time.size} instants"
         return f"Response of a {name}{length}, {len(self.units)} channels{several}"
+
+    @property
+    def summary(self) -> str:
+        """Vehicle, length and number of channels."""
+        return repr(self)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """`notes`."""
+        return self.notes
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -132,74 +145,26 @@ class Response(eqx.Module):
         return {name: self[name] for name in self.system.layout.units}
 
     def __getitem__(self, channel: str) -> Signal:
-        numbers, computed = self.system.layout.numbers, _COMPUTED.get(id(self), {})
+        numbers = self.system.layout.numbers
         _checks.one_of("channel", channel, numbers)
-        if channel in computed:
-            return computed[channel]
+        if channel in self._computed:
+            return self._computed[channel]
         number = jnp.asarray(numbers[channel])
         values = _channel(self.system.outputs, number, self.motion, self.port_force, self.road, self.road_rate)
-        if _checks.concrete(values) is not None:  # a traced one belongs to one program
-            if id(self) not in _COMPUTED:
-                weakref.finalize(self, _COMPUTED.pop, id(self))
-            _COMPUTED.setdefault(id(self), {})[channel] = values
-        return values
+        if _checks.concrete(values) is None:  # traced: it belongs to one program
+            return values
+        return self._computed.setdefault(channel, values)
 
     def metrics(self, names: Sequence[str | Metric] | None = None) -> dict[str, Scalar]:
         """The vehicle's ride metrics by name, or those wanted, over the run or the part of it that this is.
 
-        Wanted are names of ride metrics, or a `metrics.Metric` of any channel.
-
-        Weighted ones take heights by Wk and angles by We, exactly for accelerations straight from sample to sample; the
-        ride starts from rest, so its mean counts. Differentiable but for peaks, which have the slope of one instant,
-        and counts, which have none.
+        Wanted are names of ride metrics, or a `metrics.Metric` of any channel; see `simulation.ride_metrics`.
         """
-        chosen, dt = self.vehicle.chosen_metrics(names, "names"), self._dt()
-        values = self._metrics([(m, self._samples_of(m, dt)) for m in chosen], dt)
-        return MetricValues.with_units(values, {m.name: m.unit(self.units) for m in chosen})
-
-    def _samples_of(self, metric: Metric, dt: ScalarLike) -> tuple[int, int]:
-        """Numbers of the first and the last instant that count."""
-        time = _checks.concrete(self.time)
-        if metric.window is None:
-            return metric.samples(self.time.size, 1.0)
-        if time is None:
-            remedy = "Inside compiled code, take the metric from a `Ride`, or cut the channel."
-            _checks.refuse(f"window of {metric.name!r}", "be asked of a run whose times are known", "traced", remedy)
-        return metric.samples(time.size, float(dt), float(time[0]))
-
-    @eqx.filter_jit
-    def _metrics(self, chosen: Sequence[tuple[Metric, tuple[int, int]]], dt: ScalarLike) -> dict[str, Scalar]:
-        found = {}
-        pairs = {(m.channel, m.weighting) for m, _ in chosen if m.weighting is not None}
-        weighted = {(channel, own): self._weighted(channel, own, dt) for channel, own in sorted(pairs)}
-        rest = self._at_rest() if any(m.from_rest for m, _ in chosen) else jnp.zeros(0)
-        for m, (first, last) in chosen:
-            record = self[m.channel] if m.weighting is None else weighted[m.channel, m.weighting]
-            record = record - rest[self.system.layout.numbers[m.channel]] if m.from_rest else record
-            record = record * self[m.by] if m.by else record
-            found[m.name] = m.statistic.of(record[first : last + 1], dt)
-        return found
+        return ride_metrics(self, names)
 
     def metric_units(self) -> dict[str, str]:
         """Unit of each ride metric."""
         return {m.name: m.unit(self.units) for m in self.system.layout.metrics}
-
-    def _dt(self) -> ScalarLike:
-        """Spacing of the instants, as a plain number where it is known: then filters are made by NumPy."""
-        time = (self if self.whole is None else self.whole).time
-        known = _checks.concrete(time)
-        return time[1] - time[0] if known is None else float(known[1] - known[0])
-
-    def _weighted(self, name: str, weighting: str, dt: ScalarLike) -> Signal:
-        """An acceleration weighted by ISO 2631-1 from the start of the run."""
-        run = self if self.whole is None else self.whole
-        weighted = metrics.weighted_signal(run[name], dt, weighting, method="step", remove_mean=False)
-        return weighted if self.whole is None else jax.lax.dynamic_slice_in_dim(weighted, self.begin, self.time.size)
-
-    def _at_rest(self) -> Float[Array, " channels"]:
-        """The channels in the static equilibrium on the first heights of the run, forces left out."""
-        road = (self if self.whole is None else self.whole).road[0]
-        return self.system.outputs(settled(self.system, road), jnp.zeros(len(self.system.laws)), road, None)
 
     def between(self, start: float, stop: float) -> "Response":
         """The part of the run from `start` to `stop` [s], both instants included, with the times of the run.
@@ -229,73 +194,20 @@ class Response(eqx.Module):
         part, last = slice(inside[0], inside[-1] + 1), inside[-1] + 1 == time.size
         states = [state if last else jnp.full_like(state, jnp.nan) for state in self.final_state]
         arrays = {name: getattr(self, name)[part] for name in ("time", "motion", "port_force", "road", "road_rate")}
-        whole = self if self.whole is None else self.whole
-        begin = jnp.asarray(inside[0] + (0 if self.whole is None else self.begin))
-        return dataclasses.replace(self, **arrays, final_state=states, whole=whole, begin=begin)
+        begin = jnp.asarray(inside[0] + (0 if self.begin is None else self.begin))
+        return dataclasses.replace(self, **arrays, final_state=states, whole=self.run, begin=begin)
 
     def comfort(self) -> dict[str, Comfort]:
-        """Weighted RMS, largest second (MTVV) and VDV of every body, seat and place acceleration, by ISO 2631-1.
+        """Weighted RMS, MTVV and VDV of every body, seat and place acceleration: `simulation.comfort`."""
+        return comfort(self)
 
-        Weighted as in `metrics`. Differentiable but for the maximum.
-        """
-        return self._comfort(self._dt())
-
-    @eqx.filter_jit
-    def _comfort(self, dt: ScalarLike) -> dict[str, Comfort]:
-        found = {}
-        layout = self.system.layout
-        for name in dict.fromkeys(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting):
-            weighted = self._weighted(name, layout.weighting(name), dt)
-            transient = metrics.max_transient_value(weighted, dt, None)
-            dose = metrics.vibration_dose_value(weighted, dt, None)
-            found[name] = Comfort(metrics.rms(weighted), transient, dose)
-        return found
-
-    @eqx.filter_jit
     def energy_balance(self) -> dict[str, Scalar]:
-        """Where the energy that the road put in has gone [J].
+        """Where the energy that the road put in has gone [J]: `simulation.energy_balance`."""
+        return energy_balance(self)
 
-        `road_work` = `stored` (in masses and linear springs, at the end less at the start) + `absorbed` (by the laws;
-        springs among them give it back later, dampers do not: `absorbed_by` takes them apart) + `dashpots` (linear
-        ones, as in the tyre), up to `error`, which falls with the square of the step. All integrals by the trapezoid
-        rule. Heights count from static equilibrium, so that weight and static loads do no work.
-        """
-        form, n = self.system.form, len(self.system.layout.coordinates)
-        q, rate, dt = self.motion[:, :n], self.motion[:, n:], jnp.diff(self.time)
-        slope = jnp.diff(self.road, axis=0) / dt[:, None]
-
-        def stored(i: int) -> Scalar:
-            spring = 0.5 * form.stiffness @ q[i] - form.road_stiffness @ self.road[i]
-            ground = 0.5 * self.road[i] @ form.ground_stiffness @ self.road[i]
-            return 0.5 * rate[i] @ form.mass @ rate[i] + q[i] @ spring + ground
-
-        push = self.road @ form.ground_stiffness - q @ form.road_stiffness
-        if form.port_road is not None:
-            push = push - self.port_force @ form.port_road
-        towed = _middle(rate) @ form.road_damping
-        rolled = slope @ form.ground_damping
-        road_work = jnp.sum((_middle(push) + rolled - towed) * slope * dt[:, None])
-        dashpots = _middle(jnp.sum((rate @ form.damping) * rate, axis=1))
-        dashed = jnp.sum((dashpots + jnp.sum((rolled - 2.0 * towed) * slope, axis=1)) * dt)
-        absorbed = sum(self.absorbed_by().values(), jnp.zeros(()))
-        change = stored(-1) - stored(0)
-        parts = {"road_work": road_work, "stored": change, "absorbed": absorbed, "dashpots": dashed}
-        return parts | {"error": road_work - change - absorbed - dashed}
-
-    @eqx.filter_jit
     def absorbed_by(self) -> dict[str, Scalar]:
-        """Energy that each element has taken in [J], ∫ F ė dt, by its name.
-
-        Where an element is several dampers that act together, it is that of all; force and power channels are of one.
-        """
-        form, n = self.system.form, len(self.system.layout.coordinates)
-        dt = jnp.diff(self.time)
-        moved = _middle(self.port_force * (self.motion[:, n:] @ form.ports.T))
-        if form.port_road is not None:
-            slope = jnp.diff(self.road, axis=0) / dt[:, None]
-            moved = moved - _middle(self.port_force) * (slope @ form.port_road.T)
-        taken = jnp.sum(moved * dt[:, None], axis=0)
-        return dict(zip(self.system.layout.ports, taken, strict=True))
+        """Energy that each element has taken in [J], by its name: `simulation.absorbed_by`."""
+        return absorbed_by(self)
 
     def range_use(self) -> dict[str, list[RangeUse]]:
         """What each damper did beside the range that its law was fitted to; only of laws that have one."""
@@ -309,10 +221,11 @@ class Response(eqx.Module):
         """Comfort by ISO 2631-1 of every acceleration, with units."""
         return comfort_table({"value": self})
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """Metrics, comfort, energies and notes of the run, ready for JSON; numbers that are not finite are None."""
         values, comfort = self.metrics(), self.comfort()
         return {
+            "notes": list(self.notes),
             "vehicle": type(self.vehicle).__name__,
             "start": with_unit(self.time[0], "s"),
             "end": with_unit(self.time[-1], "s"),
@@ -326,7 +239,6 @@ class Response(eqx.Module):
                 for channel, numbers in comfort.items()
             },
             "energy_balance": {name: with_unit(value, "J") for name, value in self.energy_balance().items()},
-            "notes": list(self.notes),
         }
 
     def plot(self, **options: Any) -> "Figure":

@@ -3,8 +3,9 @@
 import functools
 import warnings
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypedDict, Unpack, overload
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -12,12 +13,13 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types, check_module
 from jaxdamp._traced import at_compile_time, behind, is_traced
-from jaxdamp._types import Signal
+from jaxdamp._types import Scalar, Signal
 from jaxdamp.dampers import coverage, warn_outside
 from jaxdamp.parameters import modules_inside
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.adaptive import Adaptive
-from jaxdamp.simulation.engine import AbstractEngine, chosen_engine
+from jaxdamp.simulation.engine import AbstractEngine, RunState, chosen_engine
+from jaxdamp.simulation.equations import RoadEdges
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.range_notes import range_sentences
 from jaxdamp.simulation.recorder import recorded
@@ -25,11 +27,38 @@ from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.stability import known_system, rounded_down
 from jaxdamp.simulation.step_size import RunCheck
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
-from jaxdamp.vehicles import AbstractVehicle, System, refuse_restless, static_equilibrium
+from jaxdamp.vehicles import AbstractVehicle, Ports, System, refuse_restless, static_equilibrium
 
 
 if TYPE_CHECKING:
     import diffrax
+
+
+class _Options(TypedDict, total=False):
+    """What `simulate` takes beside the vehicle, the road and `return_state`, for type checkers."""
+
+    duration: float | None
+    dt: float | None
+    engine: AbstractEngine | None
+    start: Mapping[str, float] | None
+    state: RunState | None
+    substeps: int | None
+    every: int
+    method: "str | diffrax.AbstractSolver | None"
+    rtol: float | None
+    atol: float | None
+
+
+@overload
+def simulate(
+    vehicle: AbstractVehicle, road: AbstractRoad, *, return_state: Literal[False] = ..., **options: Unpack[_Options]
+) -> Response: ...
+
+
+@overload
+def simulate(
+    vehicle: AbstractVehicle, road: AbstractRoad, *, return_state: Literal[True], **options: Unpack[_Options]
+) -> tuple[Response, RunState]: ...
 
 
 def simulate(
@@ -40,29 +69,38 @@ def simulate(
     dt: float | None = None,
     engine: AbstractEngine | None = None,
     start: Mapping[str, float] | None = None,
+    state: RunState | None = None,
+    return_state: bool = False,
     substeps: int | None = None,
     every: int = 1,
     method: "str | diffrax.AbstractSolver | None" = None,
     rtol: float | None = None,
     atol: float | None = None,
-) -> Response:
+) -> Response | tuple[Response, RunState]:
     """Drive a vehicle over a road.
 
     The vehicle starts at rest in its static equilibrium on the road's first heights, or as `start` says. The road is
     taken as linear between instants.
+
+    With `state` a run goes on where an earlier one stopped (`return_state`): the motion, the states of the laws, what
+    the engine remembers, and the place on the road. With fixed steps parts are the whole run to rounding; an `Adaptive`
+    engine chooses its steps anew, and parts agree within its tolerances. The vehicle may differ in its numbers, such as
+    the command of a damper. Metrics of a part are those of the part alone, with weightings from rest.
 
     Arguments:
         vehicle: any vehicle, with its laws.
         road: heights under its wheels over time: one track, or a left-hand and a right-hand one. It reaches one axle
             after the other, delayed by `vehicle.axle_positions` and the road's speed; `roads.delayed` has other
             delays, `roads.in_phase` none. Motions over time alone have a column for each of `vehicle.wheel_names`.
-        duration: length of the run [s]; the road's own if it has one and this is left out.
+        duration: length of the run [s]; the road's own if it has one and this is left out, or what is left of it.
         dt: spacing of the instants [s], 1 ms if left out; for the exponential engine also its step (third order,
             second where laws have kinks or states; 1 ms is right for cars). Where it is coarse a `CoarseStepWarning`
             states the estimated error; what the vehicle cannot bear is refused.
         engine: `simulation.Exponential()`, fixed steps, if left out; `simulation.Adaptive()`, a diffrax solver, such as
             `simulation.Adaptive(diffrax.Kvaerno5())` for a stiff law; or one of your own (`docs/own_engine.md`).
         start: coordinates [m, rad] at time zero that differ from the equilibrium, such as `{"pitch": 0.05}`; at rest.
+        state: where an earlier run of the same kind of vehicle and engine stopped.
+        return_state: whether to return where this run stopped, too.
         substeps: of the exponential engine between two instants; as many as the steepest law needs (friction at
             standstill, a bristle, oil) if left out, so that every step is stable. The road stays straight between
             instants. Under `jax.grad`, `jax.jvp` and `jax.vmap` they are those of the numbers that are differentiated,
@@ -78,12 +116,14 @@ def simulate(
     and a sentence in `response.notes`; `response.range_use()` has the numbers.
 
     Returns:
-        The response at `round(duration/dt) + 1` instants, or one in `every` of them and the first.
+        The response at `round(duration/dt) + 1` instants, or one in `every` of them and the first; with `return_state`
+        a pair of it and the state at the last instant.
 
     Raises:
         ValueError: a step longer than the spacing of a sampled road, or too long for the vehicle; no duration, a road
             of other tracks than wheels, a road without a speed under several axles, an unknown coordinate, a vehicle
-            without equilibrium, instants that cannot be divided by `every`, a run that diverged.
+            without equilibrium, instants that cannot be divided by `every`, a run that diverged; a state of another
+            kind of vehicle or engine.
 
     >>> from jaxdamp import roads, vehicles
     >>> car = vehicles.presets.quarter_car_000()
@@ -101,21 +141,75 @@ def simulate(
         substeps = None
     engine, dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
     system = vehicle.system()
-    time, heights = sampled(vehicle, road, duration, dt)
+    if state is not None:
+        _check_state(state, start, engine, system)
+    begins = None if state is None else state.time
+    time, heights = sampled(vehicle, road, duration, dt, begins)
     _strides(time.size - 1, every, dt)
     begin = None if start is None else _displaced(vehicle, heights[0], start)
-    engine = engine.prepared(run_check(vehicle, system, road, heights, dt, begin))
+    engine = engine.prepared(run_check(vehicle, system, road, heights, dt, begin, begins))
+    edges = _edges(vehicle, road, time, heights, (state is not None, return_state))
     with engine.naming_derivatives():
-        saved, status = recorded(engine, system, heights, jnp.asarray(dt, dtype=float), begin, every)
+        step = jnp.asarray(dt, dtype=float)
+        saved, status = recorded(engine, system, heights, step, begin if state is None else state, every, edges)
     first, last = behind(saved.motion[0]), behind(saved.motion[-1])
     if first is not None and last is not None and not np.all(np.isfinite(last)):
         if not np.all(np.isfinite(first)):
             refuse_restless(vehicle)
         remedy = " ".join([*filter(None, map(coverage, system.laws)), engine.remedy(status, dt)])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
-    response = Response(vehicle, system, time[::every], *saved, axle_timing(vehicle, road))
+    response = Response(vehicle, system, time[::every], *saved[:-1], axle_timing(vehicle, road))
     warn_outside(range_sentences(response.range_use()))
-    return response
+    if not return_state:
+        return response
+    if saved.last is None:
+        remedy = "Its `run` must fill in `Outcome.last`."
+        _checks.refuse(
+            "return_state", f"be left out beside a {type(engine).__name__}, which does not say", True, remedy
+        )
+    return response, RunState(time[-1], saved.last, dt / engine.step_count, type(engine).__name__)
+
+
+def _check_state(state: RunState, start: Mapping[str, float] | None, engine: AbstractEngine, system: System) -> None:
+    """Refuse a state that no run of this vehicle by this engine can go on from."""
+    check_module("state", state, (RunState,), "simulate(vehicle, road, state=...)")
+    if start is not None:
+        _checks.refuse("start", "be left out of a run that goes on from a `state`", start)
+    if state.engine != type(engine).__name__:
+        _checks.refuse("state", f"be of a run by {type(engine).__name__}", f"of one by {state.engine}")
+    now, ports = state.now, Ports(system.laws)
+    of_vehicle = [(2 * len(system.layout.coordinates),), *map(jnp.shape, jax.eval_shape(lambda: ports.initial()))]
+    of_state = [*map(jnp.shape, (now.motion, *now.states))]
+    if of_state != of_vehicle:
+        must = f"have motion and states of the shapes {of_vehicle}, as the vehicle"
+        _checks.refuse("state", must, of_state, "Go on with the same kind of vehicle and laws.")
+    _checks.finite("state", now.motion)
+
+
+def _edges(
+    vehicle: AbstractVehicle,
+    road: AbstractRoad,
+    time: Signal,
+    heights: Float[Array, "time wheels"],
+    goes_on: tuple[bool, bool],
+) -> RoadEdges | None:
+    """The road an instant before and after a run that goes on there; straight where the road itself ends."""
+    if not any(goes_on):
+        return None
+    span, slack = [behind(end) for end in road.span], 1e-6
+
+    def at(beyond: Scalar, straight: Float[Array, " wheels"]) -> Float[Array, " wheels"]:
+        instant = behind(beyond)
+        if instant is not None:
+            inside = [side * (instant - end) for side, end in zip((1, -1), span, strict=True) if end is not None]
+            if any(np.any(length < -slack) for length in inside):
+                return straight
+        there = heights_under_wheels(vehicle, road, beyond[None])[0]
+        return jnp.where(jnp.isfinite(there), there, straight)
+
+    before = at(2.0 * time[0] - time[1], 2.0 * heights[0] - heights[1]) if goes_on[0] else None
+    after = at(2.0 * time[-1] - time[-2], 2.0 * heights[-1] - heights[-2]) if goes_on[1] else None
+    return RoadEdges(before, after)
 
 
 def _by_method(
@@ -150,17 +244,27 @@ def _strides(count: int, every: int, dt: float) -> None:
 
 
 def sampled(
-    vehicle: AbstractVehicle, road: AbstractRoad, duration: float | None, dt: float
+    vehicle: AbstractVehicle, road: AbstractRoad, duration: float | None, dt: float, begins: Scalar | None = None
 ) -> tuple[Signal, Float[Array, "time wheels"]]:
-    """The instants of a run and the heights under the wheels, with the checks of `simulate`."""
-    duration = road.duration if duration is None else duration
+    """The instants of a run and the heights under the wheels, with the checks of `simulate`.
+
+    Arguments:
+        vehicle: any vehicle.
+        road: under its wheels.
+        duration: length of the run [s].
+        dt: spacing of the instants [s].
+        begins: the first instant [s] of a run that goes on; zero if left out.
+    """
+    first = np.zeros(()) if begins is None else behind(begins)
+    if duration is None and road.duration is not None and first is not None and not first.ndim:
+        duration = road.duration - float(first)
     if duration is None:
         _checks.refuse("duration", "be given for a road without an end of its own", None, "Pass `duration=10.0`.")
     duration = _checks.plain_number("duration", duration)
     _checks.positive("duration", duration)
     _checks.positive("dt", dt)
     longest = road.longest_run
-    if longest is not None and duration > longest * (1 + 1e-9):
+    if longest is not None and first is not None and np.max(first) + duration > longest * (1 + 1e-9):
         must = f"not be longer than the random road, which repeats after {longest:g} s"
         remedy = f"Make the road with `duration={duration:g}`, or with a greater `length`."
         _checks.refuse("duration", must, f"{duration:g} s", remedy)
@@ -173,9 +277,16 @@ def sampled(
     if event is not None and event < 2 * dt * (1 - 1e-9):
         must = f"be at most half the time over the shortest bump, {event:.3g} s, which steps would skip"
         _checks.refuse("dt", must, f"{dt:g} s", f"Pass `dt={rounded_down(event / 8):g}`, or make the bump longer.")
-    count = round(duration / dt)
-    time = jnp.arange(count + 1, dtype=float) * dt
+    time = _instants(duration, dt, begins)
     return time, heights_under_wheels(vehicle, road, time)
+
+
+def _instants(duration: float, dt: float, begins: Scalar | None) -> Signal:
+    time = jnp.arange(round(duration / dt) + 1, dtype=float)
+    if begins is not None:  # a whole number of steps, so that instants are those of the whole run to the last bit
+        steps = begins / dt
+        time = time + jnp.where(jnp.abs(steps - jnp.round(steps)) < 1e-6, jnp.round(steps), steps)
+    return time * dt
 
 
 def refuse_stacked(vehicle: AbstractVehicle) -> None:
@@ -191,20 +302,23 @@ def run_check(
     heights: Float[Array, "time wheels"],
     dt: float,
     start: Float[Array, " n"] | None = None,
+    begins: Scalar | None = None,
 ) -> RunCheck:
     """The checks of a run before it is driven, with known numbers as far as they are not arguments of `jax.jit`."""
     count = heights.shape[0] - 1
-    if is_traced(heights) and not is_traced((vehicle, road)):
+    if is_traced(heights) and not is_traced((vehicle, road, begins)):
         with at_compile_time():
-            heights = sampled(vehicle, road, count * dt, dt)[1]
-    half = functools.partial(half_sampled, vehicle, road, count, dt)
+            heights = sampled(vehicle, road, count * dt, dt, begins)[1]
+    half = functools.partial(half_sampled, vehicle, road, count, dt, begins)
     system = known_system(vehicle) if is_traced(system) else system
     return RunCheck(system, heights, half, dt, start, road.grid)
 
 
-def half_sampled(vehicle: AbstractVehicle, road: AbstractRoad, count: int, dt: float) -> Float[Array, "fine wheels"]:
+def half_sampled(
+    vehicle: AbstractVehicle, road: AbstractRoad, count: int, dt: float, begins: Scalar | None = None
+) -> Float[Array, "fine wheels"]:
     """The heights under the wheels of a run of so many steps at twice as many instants."""
-    return sampled(vehicle, road, count * dt, 0.5 * dt)[1]
+    return sampled(vehicle, road, count * dt, 0.5 * dt, begins)[1]
 
 
 def _displaced(

@@ -1,5 +1,10 @@
-"""Solvers in the vocabulary of optimistix: bounded least squares, from a loop on the host or inside a JAX program."""
+"""Solvers of the whole library in the vocabulary of optimistix, with a batch axis, from the host or inside JAX.
 
+- `BoundedLevenbergMarquardt`: bounded nonlinear least squares.
+- `SequentialQuadratic`: constrained minimisation of one or several objectives, many searches side by side.
+"""
+
+from jaxdamp.solve.constrained import Evaluation, Region, Scaling, SearchState, SequentialQuadratic
 from jaxdamp.solve.damped_steps import Linearisation
 from jaxdamp.solve.least_squares import BoundedLevenbergMarquardt, ImplicitWithinBounds
 from jaxdamp.solve.on_host import SearchLanes, least_squares_on_host
@@ -7,8 +12,13 @@ from jaxdamp.solve.on_host import SearchLanes, least_squares_on_host
 
 __all__ = [
     "BoundedLevenbergMarquardt",
+    "Evaluation",
     "ImplicitWithinBounds",
     "Linearisation",
+    "Region",
+    "Scaling",
     "SearchLanes",
+    "SearchState",
+    "SequentialQuadratic",
     "least_squares_on_host",
 ]

@@ -5,6 +5,7 @@ import os
 import time
 import warnings
 import zlib
+from collections.abc import Hashable
 from pathlib import Path
 from typing import TYPE_CHECKING, final
 
@@ -65,11 +66,11 @@ class SweepFile:
         import xarray
 
         try:
-            kept = xarray.load_dataset(self.path, engine="scipy")
+            stored = xarray.load_dataset(self.path, engine="scipy")
         except Exception as error:
             remedy = "Choose another name, or delete the file."
             raise ValueError(f"Argument `file`: {self.path} cannot be read as a sweep ({error}). {remedy}") from error
-        differences = self._differences(kept)
+        differences = self._differences(stored)
         if differences:
             raise ValueError(
                 f"Argument `file`: {self.path} holds another sweep: {'; '.join(differences)}. Choose another name, or "
@@ -77,12 +78,12 @@ class SweepFile:
             )
         table = self._table
         for name, values in table.values.items():
-            table.values[name] = np.array(kept[name].values, values.dtype).reshape(values.shape)
-        table.done = np.array(kept["done"].values, bool).ravel()
-        reasons = np.array(kept["reason"].values, str).ravel()
+            table.values[name] = np.array(stored[name].values, values.dtype).reshape(values.shape)
+        table.done = np.array(stored["done"].values, bool).ravel()
+        reasons = np.array(stored["reason"].values, str).ravel()
         for reason in dict.fromkeys(reasons[reasons != ""]):
             table.give_reasons(np.flatnonzero(reasons == reason), str(reason))
-        self._drop_damaged(json.loads(kept.attrs[CHECKSUMS]))
+        self._drop_damaged(json.loads(stored.attrs[CHECKSUMS]))
 
     def _drop_damaged(self, checksums: list[int]) -> None:
         """Points in blocks of the file that are not as they were written count as not done, and are computed anew."""
@@ -100,38 +101,28 @@ class SweepFile:
             stacklevel=5,
         )
 
-    def _differences(self, kept: "xarray.Dataset") -> list[str]:
+    def _differences(self, stored: "xarray.Dataset") -> list[str]:
         """What keeps the file from being a part of this sweep, in words."""
-        if MARK not in kept.attrs or "done" not in kept:
+        if MARK not in stored.attrs or "done" not in stored:
             return ["it was not written by `jaxdamp.sweep`"]
-        if "reason" not in kept.coords:
+        if "reason" not in stored.coords:
             return ["an older jaxdamp wrote it, which did not note why points fail"]
-        if CHECKSUMS not in kept.attrs:
+        if CHECKSUMS not in stored.attrs:
             return ["an older jaxdamp wrote it, without the sums by which damage is seen"]
-        mine, found = self._table.label(), []
-        axes = json.loads(kept.attrs[AXES])
-        if kept["failed"].dims != mine["failed"].dims or axes != self._table.points.names:
+        new, axes = self._table.label(), json.loads(stored.attrs[AXES])
+        if stored["failed"].dims != new["failed"].dims or axes != self._table.points.names:
             names, before = ", ".join(map(repr, self._table.points.names)), ", ".join(map(repr, axes))
-            over = f"along {', '.join(map(repr, kept['failed'].dims))}"
+            over = f"along {', '.join(map(repr, stored['failed'].dims))}"
             return [f"its axes are {before} {over}, not {names}"]
-        for name in axes:
-            old, new = kept[name].values, mine[name].values
-            if not np.array_equal(old, new):
-                old, new = (f"{len(v)} values from {v.min():.6g} to {v.max():.6g}" for v in (old, new))
-                found.append(f"the axis {name!r} has other values ({old}; now {new})")
-        results = set(kept.data_vars) - {"done"}
-        if results != set(mine.data_vars):
-            old, new = (", ".join(map(repr, sorted(map(str, names)))) for names in (results, mine.data_vars))
-            return [*found, f"its results are {old}, not {new}"]
-        for name in mine.data_vars:
-            if kept[name].dtype.newbyteorder("=") != mine[name].dtype or kept[name].shape != mine[name].shape:
-                old, new = (f"{v.dtype.newbyteorder('=')} {v.shape}" for v in (kept[name], mine[name]))
-                found.append(f"{name!r} is {old} there, now {new}")
-        if not found and kept.attrs[MARK] != self._fingerprint:
-            version = kept.attrs.get("jax_version")
-            other = f", which JAX {version} traced, and now JAX {jax.__version__}" if version != jax.__version__ else ""
-            found.append(f"the function computes something else, or from other numbers{other}")
-        return found
+        differences = [text for name in axes if (text := _other_axis(name, stored[name].values, new[name].values))]
+        results = set(stored.data_vars) - {"done"}
+        if results != set(new.data_vars):
+            names = [", ".join(map(repr, sorted(map(str, each)))) for each in (results, new.data_vars)]
+            return [*differences, f"its results are {names[0]}, not {names[1]}"]
+        differences += [text for name in new.data_vars if (text := _other_result(name, stored[name], new[name]))]
+        if not differences and stored.attrs[MARK] != self._fingerprint:
+            differences.append(_other_function(stored.attrs.get("jax_version")))
+        return differences
 
     def save(self, *, now: bool = False) -> None:
         """Write what is done if it is time, whole or not at all; what cannot be written stops no sweep."""
@@ -157,6 +148,28 @@ class SweepFile:
         }
         with whole(self.path) as draft:
             data.to_netcdf(draft, engine="scipy", format="NETCDF3_64BIT")
+
+
+def _other_function(version: str | None) -> str:
+    """In what the function differs, which that version of JAX has traced."""
+    other = f", which JAX {version} traced, and now JAX {jax.__version__}" if version != jax.__version__ else ""
+    return f"the function computes something else, or from other numbers{other}"
+
+
+def _other_axis(name: str, stored: np.ndarray, new: np.ndarray) -> str:
+    """In what the values of an axis differ; empty if they do not."""
+    if np.array_equal(stored, new):
+        return ""
+    old, now = (f"{len(v)} values from {v.min():.6g} to {v.max():.6g}" for v in (stored, new))
+    return f"the axis {name!r} has other values ({old}; now {now})"
+
+
+def _other_result(name: Hashable, stored: "xarray.DataArray", new: "xarray.DataArray") -> str:
+    """In what the type or shape of a result differ; empty if they do not."""
+    if stored.dtype.newbyteorder("=") == new.dtype and stored.shape == new.shape:
+        return ""
+    old, now = (f"{v.dtype.newbyteorder('=')} {v.shape}" for v in (stored, new))
+    return f"{name!r} is {old} there, now {now}"
 
 
 def _checksums(table: Table) -> list[int]:

@@ -137,7 +137,7 @@ class _Static:
     def __init__(self, traced: Traced, layout: Layout) -> None:
         self.traced, self.layout = traced, layout
         results = tuple((name, r.shape, str(r.dtype)) for name, r in traced.results.items())
-        self._key = (traced.frame, traced.axes, results, traced.mode, layout)
+        self._key = (traced.static, traced.axes, results, traced.mode, layout)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Static) and self._key == other._key

@@ -24,28 +24,28 @@ RESERVED = (POINT, PARAMETER, "failed", "reason", "done")
 
 
 @final
-class Frame:
-    """A function without its arrays: `frame.build(arrays)` gives it back. Equal frames compile to the same code."""
+class StaticPart:
+    """A function without its arrays: `static.build(arrays)` gives it back. Equal parts compile to the same code."""
 
     def __init__(self, function: Any) -> None:
         leaves, self._tree = jax.tree.flatten(function)
-        self._rest = tuple(None if _is_array(leaf) else leaf for leaf in leaves)
+        self._others = tuple(None if _is_array(leaf) else leaf for leaf in leaves)
         self._places = tuple(i for i, leaf in enumerate(leaves) if _is_array(leaf))
-        self._key: Any = (self._tree, self._places, tuple((type(leaf), leaf) for leaf in self._rest))
+        self._key: Any = (self._tree, self._places, tuple((type(leaf), leaf) for leaf in self._others))
         try:
             hash(self._key)
         except TypeError:  # what cannot be compared is compiled anew
             self._key = id(self)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Frame) and self._key == other._key
+        return isinstance(other, StaticPart) and self._key == other._key
 
     def __hash__(self) -> int:
         return hash(self._key)
 
     def build(self, arrays: list[Array]) -> Callable[[dict[str, Array]], Any]:
         """The function."""
-        leaves = list(self._rest)
+        leaves = list(self._others)
         for place, array in zip(self._places, arrays, strict=True):
             leaves[place] = array
         return jax.tree.unflatten(self._tree, leaves)
@@ -58,7 +58,7 @@ def _is_array(leaf: Any) -> bool:
 class Traced(NamedTuple):
     """A function of named axes, traced for one point."""
 
-    frame: Frame
+    static: StaticPart
     arrays: list[Any]
     axes: tuple[str, ...]
     results: dict[str, jax.ShapeDtypeStruct]  # of one point, derivatives among them
@@ -78,50 +78,66 @@ def trace(function: Callable[[dict[str, Array]], Any], axes: list[str], gradient
     Raises:
         ValueError: the function asks for an axis that is not there, or returns no named numbers.
     """
-    frame = Frame(function)
+    static = StaticPart(function)
     arrays = [leaf for leaf in jax.tree.leaves(function) if _is_array(leaf)]
     point = dict.fromkeys(axes, jax.ShapeDtypeStruct((), number_type()))
 
     order: list[str] = []  # of the results, which JAX sorts
 
     def one(arrays: list[Array], point: dict[str, Array]) -> dict[str, Array]:
-        found = _named(frame.build(arrays)(point), axes)
-        order[:] = found
-        return found
+        results = _named(static.build(arrays)(point), axes)
+        order[:] = results
+        return results
 
     try:
         jaxpr, shapes = jax.make_jaxpr(one, return_shape=True)(arrays, point)
     except KeyError as error:
-        wanted = error.args[0] if error.args else None
-        if not isinstance(wanted, str) or wanted in axes:
+        message = _unknown_axis(error, axes)
+        if not message:
             raise
-        near = get_close_matches(wanted, axes, 1)
-        hint = f" Did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"The function asks for {wanted!r}, but the axes are {_listed(axes)}.{hint}") from error
+        raise ValueError(message) from error
     _warn_of_unused(jaxpr.jaxpr, axes)
     shapes = {name: shapes[name] for name in order}
     smooth = [name for name, s in shapes.items() if s.shape == () and jnp.issubdtype(s.dtype, jnp.floating)]
     slopes = {name: f"d_{name}" for name in smooth} if gradients else {}
     reversible = gradients is not True or not _loops_without_end(jaxpr)
     mode = chosen_mode(function, gradients, len(axes), len(slopes), reversible=reversible)
+    results = _with_slopes(shapes, slopes, axes)
+    return Traced(static, arrays, tuple(axes), results, slopes, mode, functools.partial(_fingerprint, jaxpr, arrays))
+
+
+def _with_slopes(
+    shapes: Mapping[str, jax.ShapeDtypeStruct], slopes: Mapping[str, str], axes: list[str]
+) -> dict[str, jax.ShapeDtypeStruct]:
+    """The results of one point as they are stored, and their derivatives."""
     results = {name: jax.ShapeDtypeStruct(s.shape, _stored(s.dtype)) for name, s in shapes.items()}
     for name, slope in slopes.items():
         if slope in results or slope in axes:
             _checks.refuse("function", f"leave the name {slope!r} to the derivative of {name!r}", "one that uses it")
         results[slope] = jax.ShapeDtypeStruct((len(axes),), results[name].dtype)
-    return Traced(frame, arrays, tuple(axes), results, slopes, mode, functools.partial(_fingerprint, jaxpr, arrays))
+    return results
+
+
+def _unknown_axis(error: KeyError, axes: list[str]) -> str:
+    """What is wrong if the function asked for an axis that is not there; empty for another error."""
+    wanted = error.args[0] if error.args else None
+    if not isinstance(wanted, str) or wanted in axes:
+        return ""
+    near = get_close_matches(wanted, axes, 1)
+    hint = f" Did you mean {near[0]!r}?" if near else ""
+    return f"The function asks for {wanted!r}, but the axes are {_listed(axes)}.{hint}"
 
 
 def evaluate(traced: Traced, arrays: list[Array], lanes: dict[str, Array]) -> dict[str, Array]:
     """Results and derivatives of points side by side."""
-    function, axes = traced.frame.build(arrays), list(traced.axes)
+    function, axes = traced.static.build(arrays), list(traced.axes)
     batched = jax.vmap(lambda point: _named(function(point), axes))
     if traced.mode is None:
-        found = batched(lanes)
+        values = batched(lanes)
     else:
-        found, slopes = value_and_jacobian(batched, lanes, traced.mode, of=traced.slopes)
-        found |= {d: jnp.stack([slopes[name][axis] for axis in axes], axis=-1) for name, d in traced.slopes.items()}
-    return {name: found[name].astype(result.dtype) for name, result in traced.results.items()}
+        values, slopes = value_and_jacobian(batched, lanes, traced.mode, of=traced.slopes)
+        values |= {d: jnp.stack([slopes[name][axis] for axis in axes], axis=-1) for name, d in traced.slopes.items()}
+    return {name: values[name].astype(result.dtype) for name, result in traced.results.items()}
 
 
 def _stored(dtype: Any) -> np.dtype:
@@ -129,13 +145,15 @@ def _stored(dtype: Any) -> np.dtype:
     return np.dtype(dtype) if dtype in (np.float32, np.float64) else number_type()
 
 
-def _named(found: Any, axes: list[str]) -> dict[str, Array]:
+def _named(returned: Any, axes: list[str]) -> dict[str, Array]:
     """The results as arrays by name, checked."""
-    if not isinstance(found, Mapping) or not found:
+    if not isinstance(returned, Mapping) or not returned:
         remedy = "Write `return {'rms': ...}`; of a `Response`, return `response.metrics()`."
-        _checks.refuse("function", "return a mapping from names to numbers", f"one that returns {type(found)}", remedy)
+        _checks.refuse(
+            "function", "return a mapping from names to numbers", f"one that returns {type(returned)}", remedy
+        )
     results = {}
-    for name, value in found.items():
+    for name, value in returned.items():
         if not isinstance(name, str) or not name or "/" in name or name in (*RESERVED, *axes):
             taken = _listed([*RESERVED, *axes])
             _checks.refuse("function", f"return names without '/' other than {taken}", f"one that returns {name!r}")

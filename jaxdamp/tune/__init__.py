@@ -11,26 +11,26 @@
 - `compare_dampers`: differences between dampers with error bars; `valving`: a mono-tube damper for a wanted force.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp._status import Status
 from jaxdamp.tune.comparison import DamperComparison, Difference
 from jaxdamp.tune.decisions import FittedLaw, compare_dampers
 from jaxdamp.tune.front import ParetoFront, hypervolume
 from jaxdamp.tune.limits import limit_spans
 from jaxdamp.tune.minimising import minimise
+from jaxdamp.tune.objective import Targets, smooth_peak, smooth_settling
 from jaxdamp.tune.pareto_search import pareto
 from jaxdamp.tune.rescoring import Rescore, rescore
-from jaxdamp.tune.result import Change, ScenarioValues, TuneResult
+from jaxdamp.tune.result import Attempt, Change, ScenarioValues, TuneResult
 from jaxdamp.tune.risk import CVaR
 from jaxdamp.tune.robust_tuning import RobustResult, robust
 from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Condition, Scenario, Scenarios, samples, tolerances
 from jaxdamp.tune.sensitivities import sensitivity
 from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
+from jaxdamp.tune.settings import Design, Run, Search
 from jaxdamp.tune.shape import Shape, damper_paths, knee, monotone, ratio, slope
-from jaxdamp.tune.smooth import smooth_peak, smooth_settling
 from jaxdamp.tune.spectra import Spectrum
-from jaxdamp.tune.starts import Attempt
-from jaxdamp.tune.targets import Targets
 from jaxdamp.tune.tolerance import ToleranceEffect, tolerance_effects
 from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
 from jaxdamp.tune.valving_search import valving
@@ -44,6 +44,7 @@ __all__ = [
     "Condition",
     "CurveSensitivity",
     "DamperComparison",
+    "Design",
     "Difference",
     "FittedLaw",
     "OutOfReach",
@@ -51,10 +52,12 @@ __all__ = [
     "ParetoFront",
     "Rescore",
     "RobustResult",
+    "Run",
     "Scenario",
     "ScenarioRide",
     "ScenarioValues",
     "Scenarios",
+    "Search",
     "Sensitivity",
     "Shape",
     "Spectrum",
@@ -84,3 +87,5 @@ __all__ = [
     "tolerances",
     "valving",
 ]
+
+answer_guesses(__name__, __all__)

@@ -7,7 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._tables import Column, Table, plain, typeset_unit
+from jaxdamp._results import AbstractResult
+from jaxdamp._tables import Column, Table, plain, plus_minus, typeset_unit
 
 
 if TYPE_CHECKING:
@@ -43,13 +44,13 @@ class Difference(NamedTuple):
         """The difference in words."""
         parts = f"± {self.from_parameters:.2g} % from the fitted parameters, ± {self.from_roads:.2g} % from the roads"
         less = "less" if self.change < 0 else "more"
-        size = f"{abs(self.change):.2g} ± {self.margin:.2g} % {less} {self.metric}"
+        size = f"{plus_minus(abs(self.change), self.margin)} % {less} {self.metric}"
         verdict = "" if self.significant else ", which may be none"
         return f"{self.damper} has {size}{verdict} (95 %; standard errors {parts})."
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class DamperComparison:
+class DamperComparison(AbstractResult):
     """Ride metrics of several dampers on the same roads, with their uncertainties.
 
     Attributes:
@@ -95,16 +96,14 @@ class DamperComparison:
                 rows.append((metric, typeset_unit(unit, "–"), damper, float(values[metric].mean()), *errors, *more))
         return Table("Ride metrics with standard errors", tuple(columns), tuple(rows))
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """All numbers with units and words, ready for JSON; numbers that are not finite are None."""
         return {
-            "summary": self.summary,
             "units": self.units,
             "values": plain(self.values),
             "parameter_errors": plain(self.parameter_errors),
             "road_errors": plain(self.road_errors),
             "differences": [plain(d._asdict()) | {"significant": bool(d.significant)} for d in self.differences],
-            "warnings": list(self.warnings),
         }
 
     def plot(self, **options: Any) -> "Figure":
@@ -112,7 +111,3 @@ class DamperComparison:
         from jaxdamp.plots import damper_comparison
 
         return damper_comparison(self, **options)
-
-    def __repr__(self) -> str:
-        warnings = [f"warning: {warning}" for warning in self.warnings]
-        return "\n".join([self.summary, self.table().to_text(), *warnings])

@@ -1,7 +1,7 @@
 """`compare_dampers`: the difference between dampers in ride metrics, with its uncertainty."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, Unpack, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -13,12 +13,14 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import value_and_jacobian
 from jaxdamp._progress import Progress
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
 from jaxdamp.tune.comparison import DamperComparison, Difference
+from jaxdamp.tune.settings import RUN, Run, completed
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -57,14 +59,14 @@ class _DamperMetrics(NamedTuple):
     variance: Float[np.ndarray, " metrics"]
 
 
+@of_known_numbers
 def compare_dampers(
     dampers: Mapping[str, AbstractDamper | FittedLaw],
     vehicle: Callable[[AbstractDamper], AbstractVehicle],
     roads: Sequence[AbstractRoad] | WhiteRoad,
     *,
     metrics: Sequence[str | Metric] | None = None,
-    duration: float | None = None,
-    dt: float = 1e-3,
+    **run: Unpack[Run],
 ) -> DamperComparison:
     """Compare dampers in ride metrics on the same roads, with standard errors and 95 % intervals of the differences.
 
@@ -81,8 +83,7 @@ def compare_dampers(
         vehicle: gives the vehicle for a law, such as `vehicles.presets.quarter_car_000`.
         roads: two or more roads, such as one class with several seeds; or `roads.white(...)`.
         metrics: as in `Ride`; all ride metrics if left out, but counts and means.
-        duration: length of each run [s], as in `simulate`.
-        dt: step [s], as in `simulate`.
+        run: `duration`, `dt` and `engine` of each run, as in `simulate` (see `Run`).
 
     Raises:
         ValueError: fewer than two dampers or roads; estimates that are no parameters of their law; what `Ride` refuses.
@@ -93,10 +94,10 @@ def compare_dampers(
     >>> round(compared.difference("rms_sprung_acceleration").change, 2)
     -8.68
     """
+    driven = completed("compare_dampers", run, RUN)
     _check(dampers, vehicle, roads)
     listed: list[Any] = [roads] if isinstance(roads, WhiteRoad) else list(roads)
     by_damper, warnings, units = {}, [], {}
-    run: dict[str, Any] = {"duration": duration, "dt": dt}
     heights = None
     with Progress("Comparing dampers") as shown:
         for number, (name, damper) in enumerate(dampers.items()):
@@ -104,9 +105,9 @@ def compare_dampers(
             law = damper if isinstance(damper, AbstractDamper) else damper.law
             car = vehicle(law)
             check_module("vehicle", car, (AbstractVehicle,), "compare_dampers(dampers, vehicle, roads)")
-            ride = Ride(car, listed[0], metrics=_chosen(car, listed, metrics), **run)
+            ride = Ride(car, listed[0], metrics=_chosen(car, listed, metrics), **driven)
             if ride.heights is not None and heights is None:  # the same roads for all dampers
-                rides = (ride, *(Ride(car, road, metrics=ride.metrics, **run) for road in listed[1:]))
+                rides = (ride, *(Ride(car, road, metrics=ride.metrics, **driven) for road in listed[1:]))
                 heights = jnp.stack([each.heights for each in rides if each.heights is not None])
             units = {m.name: m.unit(car.units) for m in ride.metrics}
             by_damper[name], notes = _metrics_of(damper, vehicle, ride, heights)

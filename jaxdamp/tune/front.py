@@ -9,8 +9,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, typeset_unit, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.tune.measuring import Measurement
@@ -29,6 +31,7 @@ def non_dominated(values: Float[np.ndarray, "points objectives"]) -> Bool[np.nda
     return ~np.any(no_worse & (better | earlier), axis=0)
 
 
+@of_known_numbers
 def hypervolume(values: Float[np.ndarray, "points objectives"], reference: Float[np.ndarray, " objectives"]) -> float:
     """Volume of objectives that at least one point beats, up to a reference point, by slices along the last objective.
 
@@ -70,7 +73,7 @@ class FrontParameter(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class ParetoFront(Generic[V]):
+class ParetoFront(AbstractResult, Generic[V]):
     """The designs of a front, ordered by the first objective, and the vehicle that the search started from.
 
     Attributes:
@@ -113,11 +116,6 @@ class ParetoFront(Generic[V]):
 
     def __len__(self) -> int:
         return len(self.designs)
-
-    @property
-    def converged(self) -> bool:
-        """Whether every point is an optimum."""
-        return self.status is Status.CONVERGED
 
     @property
     def objectives(self) -> Float[np.ndarray, "points objectives"]:
@@ -188,12 +186,10 @@ class ParetoFront(Generic[V]):
             "Parameters along the front", tuple(columns), (*rows, ("start", *(p.start for p in self.parameters)))
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """The front as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         return {
-            "summary": self.summary,
             "objectives": list(self.names),
-            "converged": self.converged,
             "metrics": {
                 name: {"points": plain(values), "start": plain(self.before[name]), "unit": self.units[name]}
                 for name, values in self.values.items()
@@ -210,8 +206,4 @@ class ParetoFront(Generic[V]):
             "evaluations": self.evaluations,
             "interpolated": self.interpolated,
             "dropped": self.dropped,
-            "warnings": list(self.warnings),
         }
-
-    def __repr__(self) -> str:
-        return "\n".join([self.summary, self.table().to_text(), *(f"warning: {warning}" for warning in self.warnings)])

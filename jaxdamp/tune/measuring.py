@@ -1,25 +1,45 @@
-"""What a tuning computes of a vehicle: the metrics of its objective on one road, or over scenarios."""
+"""What a tuning computes of a vehicle: metrics on one road or over scenarios, in one compiled program."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, final
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, final
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._jacobian import Mode, value_and_jacobian
 from jaxdamp._types import Scalar
 from jaxdamp.parameters import FreeParameters
-from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import Ride, moves_axles
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
+from jaxdamp.tune.settings import RUN
+from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
 
 
+LANES = 16  # points side by side in one call of the compiled program
+FORWARD = 5  # parameters for each result, up to which forward derivatives of so many lanes are faster
+
+
+def ride_on(
+    vehicle: AbstractVehicle, road: Road | Scenarios, objective: Objective, run: Mapping[str, Any]
+) -> Ride | ScenarioRide:
+    """The ride of a vehicle on a road or in scenarios, with all metrics of an objective."""
+    if isinstance(road, Scenarios):
+        return road.ride(vehicle, metrics=objective.metrics, **run)
+    return Ride(vehicle, road, metrics=objective.metrics, **run)
+
+
 @final
-class Measurement:
+class Measurement(eqx.Module):
     """The metrics of a vehicle and the value of the objective, as functions of the vehicle.
+
+    A pytree: programs of equal measurements, but for their numbers, are compiled once.
 
     Arguments:
         vehicle: with which the checks of a ride are done.
@@ -27,9 +47,15 @@ class Measurement:
         objective: with all metrics.
         free: parameters that change.
         each: names of metrics whose value in every scenario is given too, as "name in 'scenario'".
-        duration: as in `simulate`.
-        dt: as in `simulate`.
+        curves: numbers of force-velocity curves, which are given too.
+        run: as in `simulate`.
     """
+
+    ride: Ride | ScenarioRide
+    objective: Objective = eqx.field(static=True)
+    curves: ShapeNumbers = eqx.field(static=True)
+    each_of: tuple[str, ...] = eqx.field(static=True)
+    axles_move: bool = eqx.field(static=True)
 
     def __init__(
         self,
@@ -39,40 +65,35 @@ class Measurement:
         free: FreeParameters,
         *,
         each: Sequence[str] = (),
-        duration: float | None = None,
-        dt: float = 1e-3,
+        curves: ShapeNumbers | None = None,
+        run: Mapping[str, Any] = RUN,
     ) -> None:
-        self.objective, self.road, self._each = objective, road, list(each)
-        self._run: dict[str, Any] = {"duration": duration, "dt": dt}
-        self.ride = self._ride(vehicle, road)
+        self.objective, self.each_of = objective, tuple(each)
+        self.curves = ShapeNumbers(()) if curves is None else curves
+        self.ride = ride_on(vehicle, road, objective, run)
         if isinstance(self.ride, ScenarioRide):
             _refuse_fixed(self.ride, free)
             self.ride.refuse_moved_axles("over", free.build, free.values)
-        self._follows = (
-            isinstance(self.ride, Ride) and self.ride.road is not None and moves_axles(free.build, free.values)
-        )
-        names = list(objective.units(vehicle))
-        self.names = [*names, *(entry for name in self._each for entry in self.entries(name) if entry not in names)]
+            self.axles_move = False
+        else:
+            self.axles_move = self.ride.road is not None and moves_axles(free.build, free.values)
 
-    def on_road(self, road: Road | Scenarios) -> Ride | ScenarioRide:
-        """The ride of the vehicle on another road, or in other scenarios."""
-        return self._ride(self.ride.vehicle, road)
+    @property
+    def names(self) -> list[str]:
+        """The names of all numbers: metrics, some of them in every scenario, and those of curves."""
+        names = list(self.objective.units(self.ride.vehicle))
+        entries = [entry for name in self.each_of for entry in self.entries(name) if entry not in names]
+        return [*names, *entries, *self.curves.names]
 
-    def _ride(self, vehicle: AbstractVehicle, road: Road | Scenarios) -> Ride | ScenarioRide:
-        metrics = self.objective.metrics
-        if isinstance(road, Scenarios):
-            return road.ride(vehicle, metrics=metrics, **self._run)
-        return Ride(vehicle, road, metrics=metrics, **self._run)
+    @property
+    def limited_names(self) -> list[str]:
+        """The names of the numbers of single scenarios and of curves."""
+        return [*(entry for name in self.each_of for entry in self.entries(name)), *self.curves.names]
 
     @property
     def scenario_names(self) -> tuple[str, ...]:
         """Names of the scenarios; none for one road."""
         return self.ride.names if isinstance(self.ride, ScenarioRide) else ()
-
-    @property
-    def white(self) -> bool:
-        """Whether nothing is driven over."""
-        return self.road.white if isinstance(self.road, Scenarios) else isinstance(self.road, WhiteRoad)
 
     def entries(self, name: str) -> list[str]:
         """The names of the values of one metric in every scenario; itself on one road."""
@@ -85,27 +106,101 @@ class Measurement:
 
     def __call__(self, vehicle: AbstractVehicle) -> dict[str, Scalar]:
         """The metrics and the objective of a vehicle by name; those of scenarios by their risk, and some in each."""
-        return self.by(self.ride, vehicle)
-
-    def by(self, ride: Ride | ScenarioRide, vehicle: AbstractVehicle) -> dict[str, Scalar]:
-        """The same by another ride, of `on_road`."""
+        ride = self.ride
         if isinstance(ride, ScenarioRide):
-            each = self.objective.of_each(ride.of_vehicle(vehicle).each())
+            each = self.each(vehicle)
             values = {name: ride.risk(of_all, ride.weights) for name, of_all in each.items()}
-            return values | {entry: each[name][i] for name in self._each for i, entry in enumerate(self.entries(name))}
-        if self._follows:
-            return self.objective.of(ride.of_vehicle(vehicle)())
-        return self.objective.of(eqx.tree_at(lambda ride: ride.vehicle, ride, vehicle)())  # on the same heights
+            values |= {entry: each[name][i] for name in self.each_of for i, entry in enumerate(self.entries(name))}
+        elif self.axles_move:
+            values = self.objective.of(ride.of_vehicle(vehicle)())
+        else:  # on the same heights
+            values = self.objective.of(eqx.tree_at(lambda ride: ride.vehicle, ride, vehicle)())
+        return {**values, **self.curves(vehicle)}
 
-    def rides_of(self) -> list[Callable[[AbstractVehicle], Ride]]:
-        """For each road a function that makes the checked ride of a vehicle on it, in no special condition."""
-        roads = [s.road for s in self.road.scenarios] if isinstance(self.road, Scenarios) else [self.road]
-        distinct = list({id(road): road for road in roads}.values())
+    def by(self, ride: Ride | ScenarioRide) -> "Measurement":
+        """The same by another ride of the vehicle."""
+        return eqx.tree_at(lambda whole: whole.ride, self, ride)
 
-        def on(road: Road) -> Callable[[AbstractVehicle], Ride]:
-            return lambda vehicle: Ride(vehicle, road, metrics=self.objective.metrics, **self._run)
 
-        return [on(road) for road in distinct]
+@eqx.filter_jit
+def _values(measured: Measurement, free: FreeParameters, values: Float[Array, "*lanes free"]) -> Array:
+    """All numbers, shape (*lanes, numbers), of vectors of values."""
+
+    def one(row: Array) -> Array:
+        results = measured(free.build(row))
+        return jnp.stack([results[name] for name in measured.names])
+
+    return one(values) if values.ndim == 1 else jax.vmap(one)(values)
+
+
+@eqx.filter_jit
+def _values_and_slopes(
+    measured: Measurement, free: FreeParameters, values: Float[Array, "*lanes free"], of: tuple[str, ...], mode: Mode
+) -> tuple[Array, Array]:
+    """All numbers, shape (*lanes, numbers), and derivatives of some of them, (*lanes, differentiated, free)."""
+    entries = [str(i) for i in range(values.shape[-1])]
+
+    def one(point: dict[str, Array]) -> dict[str, Array]:
+        results = measured(free.build(jnp.stack([point[entry] for entry in entries])))
+        return {name: results[name] for name in measured.names}
+
+    point = {entry: values[..., i] for i, entry in enumerate(entries)}
+    results, slopes = value_and_jacobian(one if values.ndim == 1 else jax.vmap(one), point, mode, of=of)
+    rows = [jnp.stack([slopes[name][entry] for entry in entries], axis=-1) for name in of]
+    return jnp.stack([results[name] for name in measured.names], axis=-1), jnp.stack(rows, axis=-2)
+
+
+class Computed(NamedTuple):
+    """Numbers of points, shape (points, numbers), and derivatives, shape (points, differentiated, free)."""
+
+    values: Float[np.ndarray, "points numbers"]
+    slopes: Float[np.ndarray, "points differentiated free"]
+
+
+@final
+class BatchProgram:
+    """Numbers of many points, simulated a fixed number side by side, so that one program is enough.
+
+    Arguments:
+        measured: the metrics of a vehicle.
+        free: the free parameters.
+        lanes: points side by side; one alone is compiled without a batch.
+
+    Attributes:
+        differentiated: names of the numbers with derivatives: objectives and what is limited.
+        points: number of points computed with derivatives.
+    """
+
+    def __init__(self, measured: Measurement, free: FreeParameters, lanes: int) -> None:
+        self.lanes, self.free, self.points = min(lanes, LANES), free, 0
+        self.measured = measured if lanes == 1 else measured.by(measured.ride.side_by_side())
+        self.differentiated = tuple(dict.fromkeys([*measured.objective.names, *measured.limited_names]))
+        modes, few = measured.ride.derivatives, free.values.size <= FORWARD * len(self.differentiated)
+        mode: Mode = "forward" if few or self.lanes < LANES else "reverse"
+        self._mode: Mode = mode if mode in modes else modes[0]
+
+    def values(self, designs: Float[np.ndarray, "points free"], ride: Ride | ScenarioRide | None = None) -> np.ndarray:
+        """All numbers of designs, by another ride if one is given."""
+        measured = self.measured if ride is None else self.measured.by(ride.side_by_side())
+        parts = [np.asarray(_values(measured, self.free, part), np.float64) for part in self._in_lanes(designs)]
+        return np.concatenate([np.atleast_2d(part) for part in parts])[: len(designs)]
+
+    def at(self, designs: Float[np.ndarray, "points free"]) -> Computed:
+        """All numbers of designs, and derivatives by the physical values."""
+        self.points += len(designs)
+        values, slopes = [], []
+        for part in self._in_lanes(designs):
+            numbers, derivatives = _values_and_slopes(self.measured, self.free, part, self.differentiated, self._mode)
+            values.append(np.atleast_2d(np.asarray(numbers, np.float64)))
+            slopes.append(np.asarray(derivatives, np.float64).reshape(-1, *derivatives.shape[-2:]))
+        return Computed(np.concatenate(values)[: len(designs)], np.concatenate(slopes)[: len(designs)])
+
+    def _in_lanes(self, designs: Float[np.ndarray, "points free"]) -> list[Array]:
+        """Designs in groups, the last one filled up; each alone where there is one lane."""
+        filled = np.concatenate([designs, np.repeat(designs[:1], -len(designs) % self.lanes, axis=0)])
+        filled = filled.astype(self.free.values.dtype)
+        groups = filled if self.lanes == 1 else filled.reshape(-1, self.lanes, designs.shape[1])
+        return [jnp.asarray(group) for group in groups]
 
 
 def _refuse_fixed(ride: ScenarioRide, free: FreeParameters) -> None:

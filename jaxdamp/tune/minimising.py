@@ -1,26 +1,27 @@
 """`minimise`: tune the free parameters of a vehicle for a ride metric, by exact gradients."""
 
-import functools
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Unpack
 
 import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, MetricValues
+from jaxdamp.solve import Evaluation
+from jaxdamp.tune.descending import Descent, Ended, missed, reached
 from jaxdamp.tune.limits import Limit
 from jaxdamp.tune.objective import Function, check_objective
+from jaxdamp.tune.ranges import start_points
 from jaxdamp.tune.rescoring import on_fresh_roads
-from jaxdamp.tune.result import Drive, ScenarioValues, TuneResult, V
+from jaxdamp.tune.result import Attempt, Drive, ScenarioValues, TuneResult, V
 from jaxdamp.tune.risk import exact
 from jaxdamp.tune.scenario_ride import ScenarioRide
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.searching import Ended, Evaluator, many_at_a_time, missed, one_at_a_time, reached, search
-from jaxdamp.tune.shape import Shape
-from jaxdamp.tune.starts import Attempt, Desk, best_of, search_together, start_points
-from jaxdamp.tune.task import DesignTask, check_call
+from jaxdamp.tune.settings import DEFAULTS, Settings, completed
+from jaxdamp.tune.task import DesignTask, Evaluator, check_call, is_white
 from jaxdamp.tune.verdict import lost_limits
 from jaxdamp.tune.wording import (
     active_words,
@@ -41,25 +42,14 @@ from jaxdamp.tune.wording import (
 TIGHTENED = 2  # times that a search is repeated with limits that did not hold on fresh roads
 
 
+@of_known_numbers
 def minimise(
     metric: str | Metric | Function,
     vehicle: V,
     road: Road | Scenarios,
     *,
-    over: Sequence[str] | Mapping[str, Any] | None = None,
-    freeze: Sequence[str] = (),
-    bounds: Mapping[str, Any] | None = None,
-    tie: Mapping[str, str] | None = None,
-    limits: Mapping[Any, Any] | None = None,
-    shape: Sequence[Shape] | Shape = (),
-    metrics: Sequence[str | Metric] = (),
-    starts: int = 1,
-    seed: int = 0,
-    fresh_roads: int = 32,
-    duration: float | None = None,
-    dt: float = 1e-3,
-    max_steps: int = 100,
     progress: Callable[[int, float], None] | None = None,
+    **settings: Unpack[Settings],
 ) -> TuneResult[V]:
     """Minimise a ride metric of a vehicle over its free parameters.
 
@@ -79,36 +69,21 @@ def minimise(
     beyond.
 
     Arguments:
-        metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`; a `metrics.Metric` of any
-            channel; or a differentiable function of the metrics by name, such as
+        metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`, or "comfort", "travel" or
+            "grip" (`vehicle.goal_metrics`; of several metrics their mean); a `metrics.Metric` of any channel; or a
+            differentiable function of the metrics by name, such as
             `lambda m: m["rms_sprung_acceleration"] / 1.5 + m["dynamic_load_coefficient"] / 0.2`, or `Targets(...)`.
         vehicle: the vehicle to start from.
         road: a road for the simulation, the same in every step; `roads.white(...)` for the stationary response with
             equivalent linear laws, which has no peaks; or `Scenarios(...)`, whose metrics are joined by their risk.
-        over: the parameters to change, by path, last part or pattern; all of the dampers that a workshop can change
-            (`Parameter.adjustable`) if left out. A mapping `{parameter: (lower, upper)}` gives their bounds too, as
-            `bounds` does.
-        freeze: parameters among these to hold at their start.
-        bounds: bounds `{parameter: (lower, upper)}` in the unit of the parameter, instead of the default ones; the
-            start must be between them. None removes one bound or both: with `bounds={"*": None}` only the domains
-            remain. If two names match a parameter, the later one counts.
-        tie: parameters that take the values of others, such as `{"front.damper.**": "rear.damper.**"}`: one free value
-            for each group (see `jaxdamp.parameters.free_parameters`).
-        limits: hard limits `{metric: largest value}` or `{metric: (smallest, largest)}` in the metric's unit, such as
-            `{"working_space_peak_to_peak": 0.1}`, with a name or a `metrics.Metric`; in every scenario. `"+10%"` is
-            relative to the start on the same road.
-        shape: constraints on the force-velocity curve: `slope`, `monotone`, `ratio`, `knee`.
-        metrics: further metrics, which the function and the limits can use by name.
-        starts: number of searches, side by side; the first from the vehicle, the others from inside the bounds.
-        seed: of the other starts.
-        fresh_roads: largest number of other realisations of a random road, or of those of the scenarios, on which the
-            result is judged; fewer once the gain and the limits are decided. 0 for none. Where a limit does not hold on
-            them on average, it is tightened for the search by what is missing, and the result judged on new roads.
-        duration: length of the run [s], as in `simulate`.
-        dt: step [s], as in `simulate`.
-        max_steps: largest number of steps of the search.
         progress: called with the number of the step and the metric after each step; a line in the terminal if it is
             left out.
+        settings: keywords, all optional: `over`, `freeze`, `bounds`, `tie`, `limits`, `shape`, `metrics` say what may
+            change and within which limits (see `Design`); `duration`, `dt`, `engine` how it is driven (see `Run`);
+            `starts`, `seed`, `max_steps`, `fresh_roads` how it is searched and judged (see `Search`): from the vehicle
+            only, in 100 steps, on up to 32 fresh roads, fewer once the gain and the limits are decided. Where a limit
+            does not hold on them on average, it is tightened for the search by what is missing, and the result judged
+            on new roads.
 
     Returns:
         The tuned vehicle, all metrics before and after, and the `verdict`: better or not, by how much and at what
@@ -128,113 +103,98 @@ def minimise(
     >>> bounded.parameters[0].note
     'at its upper bound'
     """
+    asked = completed("minimise", settings, DEFAULTS)
     check_objective("metric", metric, "The call is `minimise(metric, vehicle, road)`.")
-    counts = {"max_steps": (max_steps, 1), "starts": (starts, 1), "fresh_roads": (fresh_roads, 0), "seed": (seed, 0)}
-    check_call("minimise(metric, vehicle, road)", vehicle, road, counts)
-    task = DesignTask(
-        [metric], vehicle, road, argument="metric", over=over, freeze=freeze, bounds=bounds, tie=tie, limits=limits,
-        shape=shape, metrics=metrics, duration=duration, dt=dt,
-    )  # fmt: skip
-    space, name, names = task.space, task.objective.name, task.names
-    ride = task.measured.ride if starts == 1 else task.measured.ride.side_by_side()
-    numbers = functools.partial(task.numbers, ride)
-    desk = None if starts == 1 else Desk(many_at_a_time(numbers, space.free, names), starts)
-    evaluate = one_at_a_time(numbers, space.free, names) if desk is None else desk.alone
-    alone = Evaluator(evaluate, names, task.tolerance)
-    all_limits = task.limits(alone.at(space.start)[0])
-    task.refuse_constant(*alone.at(space.start))
+    check_call("minimise(metric, vehicle, road)", vehicle, road, asked)
+    task = DesignTask([metric], vehicle, road, argument="metric", settings=asked)
+    max_steps, fresh_roads, name = asked["max_steps"], asked["fresh_roads"], task.objective.name
+    evaluator = Evaluator(task, asked["starts"])
+    starts = start_points(task.space, asked["starts"], asked["seed"]) / task.space.unit
+    evaluations, limits = evaluator.begin(starts)
+    task.refuse_constant(evaluations[0])
     with Progress("Tuning") as shown:
         progress = progress or (lambda step, value: shown(f"step {step}, {name} {value:.5g}"))
-        if desk is None:
-            ended, attempts = search(alone, space, name, all_limits, max_steps, progress), ()
-        else:
-            points = start_points(space, starts, seed)
-            several = search_together(desk, alone, points, space, name, all_limits, max_steps, progress)
-            ended, attempts = _chosen(several, alone, points, name, all_limits)
-        result = _result(task, alone, ended, attempts, all_limits, all_limits, max_steps, fresh_roads)
-        tighter = all_limits
+        descent = Descent(evaluator, max_steps, progress)
+        several = descent.search(starts, evaluations, limits)
+        ended = min(several, key=lambda one: _rank(task, one, limits))
+        attempts = _attempts(task, starts, several, limits) if len(several) > 1 else ()
+        result = _result(task, evaluations[0], ended, attempts, (limits, limits), max_steps, fresh_roads)
+        tighter = limits
         for again in range(1, TIGHTENED + 1):
             excess = {} if result.violated else lost_limits(result)
             if not excess:
                 break
             tighter = [limit.tightened(excess.get(limit.of, 0.0)) for limit in tighter]
-            ended = search(alone, space, name, tighter, max_steps, progress, ended.values)
-            result = _result(task, alone, ended, attempts, all_limits, tighter, max_steps, fresh_roads, again)
+            (ended,) = descent.search([ended.values / task.space.unit], [ended.evaluation], tighter)
+            result = _result(task, evaluations[0], ended, attempts, (limits, tighter), max_steps, fresh_roads, again)
     return result
 
 
-def _chosen(
-    ended: Sequence[Ended], evaluator: Evaluator, points: np.ndarray, metric: str, limits: Sequence[Limit]
-) -> tuple[Ended, tuple[Attempt, ...]]:
-    """The best of several searches, and all of them."""
-    best, values = best_of(ended, evaluator, metric, limits)
-    attempts = (
+def _rank(task: DesignTask[Any], ended: Ended, limits: Sequence[Limit]) -> tuple[float, float]:
+    """By how much limits are violated at the end of a search, and the metric there."""
+    values = task.numbers(ended.evaluation.values)
+    short = missed(limits, values, task.tolerance)
+    beyond = (max(-limit.margin(values[limit.name]), 0.0) for limit in short)
+    return float(sum(beyond)), values[task.objective.name]
+
+
+def _attempts(
+    task: DesignTask[Any], starts: np.ndarray, several: Sequence[Ended], limits: Sequence[Limit]
+) -> tuple[Attempt, ...]:
+    """The searches from several starts, given by their coordinates."""
+    pairs = zip(starts * task.space.unit, several, strict=True)
+    numbers = [task.numbers(one.evaluation.values) for one in several]
+    return tuple(
         Attempt(
             start,
             one.values,
-            value,
-            not missed(limits, evaluator.at(one.values)[0], evaluator.tolerance),
-            one.slope_left < evaluator.tolerance.slope,
+            values[task.objective.name],
+            not missed(limits, values, task.tolerance),
+            one.slope_left < task.tolerance.slope,
         )
-        for start, one, value in zip(points, ended, values, strict=True)
+        for (start, one), values in zip(pairs, numbers, strict=True)
     )
-    return ended[best], tuple(attempts)
+
+
+def _status(task: DesignTask[Any], ended: Ended, short: Sequence[Limit]) -> Status:
+    if short:
+        return Status.LIMIT_NOT_MET
+    if ended.slope_left < task.tolerance.slope:
+        return Status.CONVERGED
+    return Status.STEP_LIMIT if ended.out_of_steps else Status.NO_BETTER_STEP
 
 
 def _result(
     task: DesignTask[V],
-    evaluator: Evaluator,
+    start: Evaluation,
     ended: Ended,
     attempts: tuple[Attempt, ...],
-    limits: Sequence[Limit],
-    searched: Sequence[Limit],
+    limits: tuple[Sequence[Limit], Sequence[Limit]],
     max_steps: int,
     fresh_roads: int,
     again: int = 0,
 ) -> TuneResult[V]:
     """The result of a tuning, judged: what holds it, what it misses, and what it is worth on fresh roads.
 
-    Limits may have been tighter in the search than they are, after it was repeated so many times.
+    Limits are those of the task and those of the search, which are tighter after it was repeated so many times.
     """
-    vehicle, space, objective, road, units = task.vehicle, task.space, task.objective, task.road, task.units
-    sides = evaluator.at(space.start), evaluator.at(ended.values)
-    before, after = (numbers for numbers, _ in sides)
-    idle = without_effect(space.free.names, (space.start, ended.values), objective.name, sides)
-    short = missed(limits, after, evaluator.tolerance)
-    changes = changes_of(space, ended.values)
-    if short:
-        status = Status.LIMIT_NOT_MET
-    elif ended.slope_left < evaluator.tolerance.slope:
-        status = Status.CONVERGED
-    else:
-        status = Status.STEP_LIMIT if ended.out_of_steps else Status.NO_BETTER_STEP
-    held = reached(searched, after, evaluator.tolerance)
+    vehicle, space, objective, units = task.vehicle, task.space, task.objective, task.units
+    before, after = task.numbers(start.values), task.numbers(ended.evaluation.values)
+    idle = without_effect(space, (start, ended.evaluation), ended.values)
+    short = missed(limits[0], after, task.tolerance)
+    held = reached(limits[1], after, task.tolerance)
+    status, changes = _status(task, ended, short), changes_of(space, ended.values)
     notes = missed_notes(short, after, changes) + true_value_notes(objective, after, before, task.allowed)
-    notes += tightened_notes(limits, searched) + workshop_notes(space) + effect_notes(idle, objective.name)
+    notes += tightened_notes(*limits) + workshop_notes(space) + effect_notes(idle, objective.name)
     notes += bound_notes(space, changes) + start_notes(attempts, objective.name)
     if status in (Status.STEP_LIMIT, Status.NO_BETTER_STEP):
         notes.append(early_end(ended, max_steps))
     tuned = space.free.build(jnp.asarray(ended.values, space.free.values.dtype))
     runs, extrapolated = task.notes_on_runs(tuned)
-    notes += runs
-    reported = [{name: values[name] for name in units} for values in (before, after)]
-    duration, dt = task.run
-    fresh = on_fresh_roads(
-        (vehicle, tuned),
-        road,
-        range(again * fresh_roads, (again + 1) * fresh_roads),
-        task.allowed,
-        objective,
-        units,
-        duration=duration,
-        dt=dt,
-    )
-    each, measured = None, task.measured
-    if isinstance(measured.ride, ScenarioRide):
-        sides = [{name: np.asarray(x, float) for name, x in measured.each(car).items()} for car in (vehicle, tuned)]
-        each = ScenarioValues(measured.scenario_names, *sides)
-        risk, weights = exact(measured.ride.risk), measured.ride.weights
-        reported = [{name: float(risk(jnp.asarray(side[name]), weights)) for name in units} for side in sides]
+    realisations = range(again * fresh_roads, (again + 1) * fresh_roads)
+    fresh = on_fresh_roads((vehicle, tuned), task.road, realisations, task.allowed, objective, units, task.run)
+    each, reported = _in_scenarios(task, tuned, before, after)
+    road = task.road.scenarios[0].road if isinstance(task.road, Scenarios) else task.road
     return TuneResult(
         vehicle=tuned,
         start=vehicle,
@@ -245,7 +205,7 @@ def _result(
         units=units,
         limits=task.shown_limits(before),
         active_limits=tuple(dict.fromkeys(limit.of for limit in held if not limit.is_shape)),
-        warnings=tuple(dict.fromkeys(notes)),
+        warnings=tuple(dict.fromkeys(notes + runs)),
         status=status,
         history=ended.history,
         objective=objective,
@@ -254,7 +214,7 @@ def _result(
         starts=attempts,
         scenarios=each,
         without_effect=idle,
-        drive=Drive(road.scenarios[0].road if isinstance(road, Scenarios) else road, *task.run),
+        drive=Drive(road, task.run),
         violated=violations(short, after),
         extrapolated=tuple(extrapolated),
         allowed=task.allowed,
@@ -262,8 +222,21 @@ def _result(
     )
 
 
+def _in_scenarios(
+    task: DesignTask[Any], tuned: Any, before: dict[str, float], after: dict[str, float]
+) -> tuple[ScenarioValues | None, list[dict[str, float]]]:
+    """All metrics in every scenario, and those that are reported: joined by the true risk, not by a smooth one."""
+    measured, names = task.measured, task.units
+    if not isinstance(measured.ride, ScenarioRide):
+        return None, [{name: values[name] for name in names} for values in (before, after)]
+    sides = [{n: np.asarray(x, float) for n, x in measured.each(car).items()} for car in (task.vehicle, tuned)]
+    risk, weights = exact(measured.ride.risk), measured.ride.weights
+    joined = [{name: float(risk(jnp.asarray(side[name]), weights)) for name in names} for side in sides]
+    return ScenarioValues(measured.scenario_names, *sides), joined
+
+
 def _where(task: DesignTask[Any], fresh_roads: int) -> str:
     """Where the numbers of a tuning hold that was not tried on fresh roads, in words."""
-    if task.measured.white:
+    if is_white(task.road):
         return "in the mean of all such roads"
     return "on the road of the tuning" + (", which cannot be drawn again" if fresh_roads else ", tried on no other")

@@ -1,5 +1,6 @@
-"""The objectives of a search: ride metrics, metrics of any channel, or functions of metrics."""
+"""The objectives of a search: ride metrics, metrics of any channel, smooth ones, functions of metrics, targets."""
 
+import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias, final
 
@@ -9,12 +10,23 @@ import numpy as np
 from jaxtyping import Array
 
 from jaxdamp import _checks
+from jaxdamp._tables import plus_minus
 from jaxdamp._types import Scalar
-from jaxdamp.metrics import Metric, MetricValues, current_name
-from jaxdamp.tune.smooth import exact_counterpart
+from jaxdamp.metrics import (
+    STATISTICS,
+    Metric,
+    MetricValues,
+    Reduction,
+    Statistic,
+    Term,
+    current_name,
+    settling_time,
+    smooth_settling_time,
+)
 from jaxdamp.vehicles import AbstractVehicle, is_stationary
 
 
+DOUBLINGS = 5  # of the exponent: the smooth peak has the power 32
 Function: TypeAlias = Callable[[Mapping[str, Scalar]], Scalar]
 
 
@@ -23,13 +35,13 @@ class Objective(NamedTuple):
 
     Attributes:
         names: of the objectives, each a metric or a function; one for `minimise`, several for `pareto`.
-        functions: of the metrics by name, for those objectives that are no metrics.
+        functions: of the metrics, each with its name, for those objectives that are no metrics.
         metrics: all metrics of the search, those for information included.
         beside: the true peaks and settling times that are shown beside smooth ones.
     """
 
     names: tuple[str, ...]
-    functions: dict[str, Function]
+    functions: tuple[tuple[str, Function], ...]
     metrics: tuple[Metric, ...]
     beside: tuple[Metric, ...] = ()
 
@@ -41,12 +53,12 @@ class Objective(NamedTuple):
     @property
     def function(self) -> Function | None:
         """The function of the first objective; None if it is a metric."""
-        return self.functions.get(self.name)
+        return dict(self.functions).get(self.name)
 
     def of(self, values: Mapping[str, Scalar]) -> dict[str, Scalar]:
         """The metrics, and the values of the functions."""
         known = MetricValues(values)
-        return {**values, **{name: function(known) for name, function in self.functions.items()}}
+        return {**values, **{name: function(known) for name, function in self.functions}}
 
     def of_each(self, values: Mapping[str, Array]) -> dict[str, Array]:
         """The same of several vehicles or scenarios, along the first axis of each value."""
@@ -54,7 +66,7 @@ class Objective(NamedTuple):
 
     def units(self, vehicle: AbstractVehicle) -> dict[str, str]:
         """Unit of each metric; that of a function is unknown."""
-        return {m.name: m.unit(vehicle.units) for m in self.metrics} | dict.fromkeys(self.functions, "")
+        return {m.name: m.unit(vehicle.units) for m in self.metrics} | {name: "" for name, _ in self.functions}
 
 
 @final
@@ -99,7 +111,7 @@ def objective_of(
         ValueError: an unknown metric, one that is not available on this kind of road, or one without a derivative; a
             function that does not return one number; two objectives of one name.
     """
-    extra = vehicle.chosen_metrics(list(more), "metrics") if more else []
+    extra = vehicle.chosen_metrics(list(more), "metrics", white=white) if more else []
     own = [one for one in wanted if isinstance(one, Metric)]
     extra += vehicle.chosen_metrics(own, argument) if own else []
     beside = tuple(exact for exact in map(exact_counterpart, extra) if exact is not None)
@@ -130,7 +142,43 @@ def objective_of(
             _checks.refuse(place, "have a slope", f"{name!r}, a count", remedy)
     # Further metrics for information: those without weightings, counts and means, which may be negative.
     chosen = [m for m in known.values() if m.name in (*used, *limited) or _for_information(m)]
-    return Objective(tuple(names), functions, tuple(chosen), beside)
+    return Objective(tuple(names), tuple(functions.items()), tuple(chosen), beside)
+
+
+def goal_objective(
+    one: str | Metric | Function, vehicle: AbstractVehicle, *, white: bool, argument: str = "metric"
+) -> str | Metric | Function:
+    """An objective with "comfort", "travel" and "grip" spelled out: the metric, or the mean of several."""
+    if not isinstance(one, str):
+        return one
+    names = metrics_of(argument, one, vehicle, white=white)
+    if len(names) == 1:
+        return names[0]
+
+    def mean_of_all(m: Mapping[str, Scalar]) -> Scalar:
+        return sum((m[name] for name in names), jnp.zeros(())) / len(names)
+
+    mean_of_all.__name__ = one
+    return mean_of_all
+
+
+def goal_limits(limits: Any, vehicle: AbstractVehicle, *, white: bool, known: Sequence[str] = ()) -> Any:
+    """Limits with "comfort", "travel" and "grip" spelled out: each metric of a goal gets its limit."""
+    if not isinstance(limits, Mapping):
+        return limits
+    spelled = {}
+    for one, span in limits.items():
+        several = isinstance(one, str) and one not in known
+        for name in metrics_of("limits", one, vehicle, white=white) if several else [one]:
+            spelled[name] = span
+    return spelled
+
+
+def metrics_of(argument: str, one: str, vehicle: AbstractVehicle, *, white: bool) -> list[str]:
+    """The metrics of a name, which may be a short one; an unknown name is refused."""
+    current = current_name(one, vehicle.metric_words)
+    _checks.one_of(argument, current, vehicle.metric_words)
+    return vehicle.goal_metrics(current, white=white)
 
 
 def check_objective(argument: str, one: Any, remedy: str) -> None:
@@ -156,3 +204,131 @@ def _metrics_used_by(function: Function, names: Sequence[str], argument: str) ->
     if np.shape(value) != () or not np.issubdtype(jnp.result_type(value), np.floating):
         _checks.refuse(argument, "give one number", f"{_checks.described(value)} from {_name(function)!r}")
     return list(used.names)
+
+
+@final
+class Targets:
+    """The mean square distance of metrics from their targets, in tolerances: an objective for `minimise`.
+
+    It is at most 1 if all targets are met within their tolerances on average, and 0 if all are met exactly.
+
+    Arguments:
+        targets: `{metric: (value, tolerance)}` in the unit of the metric.
+
+    Raises:
+        ValueError: no target, or one that is no pair of finite numbers with a positive tolerance.
+
+    >>> import jax.numpy as jnp
+    >>> targets = Targets({"rms_sprung_acceleration": (0.9, 0.05), "rms_dynamic_tyre_load": (1450.0, 100.0)})
+    >>> values = {"rms_sprung_acceleration": jnp.asarray(1.0), "rms_dynamic_tyre_load": jnp.asarray(1450.0)}
+    >>> round(float(targets(values)), 6)
+    2.0
+    """
+
+    __name__ = "targets"
+
+    def __init__(self, targets: Mapping[str | Metric, tuple[float, float]]) -> None:
+        if not isinstance(targets, Mapping) or not targets:
+            must = "be a mapping of one or more metrics to a value and a tolerance"
+            remedy = "Write `{'rms_sprung_acceleration': (0.9, 0.05)}`."
+            _checks.refuse("targets", must, _checks.described(targets), remedy)
+        self.metrics = [metric for metric in targets if isinstance(metric, Metric)]
+        self.values = {m.name if isinstance(m, Metric) else m: _pair(m, pair) for m, pair in targets.items()}
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the same targets are given: programs of equal ones are compiled once."""
+        return isinstance(other, Targets) and (self.metrics, self.values) == (other.metrics, other.values)
+
+    def __hash__(self) -> int:
+        return hash((tuple(self.metrics), *self.values.items()))
+
+    def __repr__(self) -> str:
+        return f"Targets({', '.join(f'{name} {v:g} ± {tol:g}' for name, (v, tol) in self.values.items())})"
+
+    def __call__(self, metrics: Mapping[str, Scalar]) -> Scalar:
+        """The mean square distance from the targets, in tolerances."""
+        squares = [((metrics[name] - value) / tolerance) ** 2 for name, (value, tolerance) in self.values.items()]
+        return sum(squares[1:], squares[0]) / len(squares)
+
+    def note(self, name: str, value: float) -> str:
+        """Whether a metric meets its target, in words; empty for one that has none."""
+        if name not in self.values:
+            return ""
+        target, tolerance = self.values[name]
+        off = (value - target) / tolerance
+        met = "met" if abs(off) <= 1.0 else f"missed by {abs(off):.1f} tolerances"
+        return f"target {plus_minus(target, tolerance)}, {met}"
+
+
+def _pair(metric: str | Metric, pair: Any) -> tuple[float, float]:
+    label = f"targets[{metric.name if isinstance(metric, Metric) else metric!r}]"
+    numbers = np.shape(pair) == (2,) and np.asarray(pair).dtype.kind in "iuf"
+    if not numbers or not np.all(np.isfinite(pair)) or not pair[1] > 0:
+        _checks.refuse(label, "be a value and a positive tolerance", pair, "Write (1.2, 0.05).")
+    return float(pair[0]), float(pair[1])
+
+
+def _powers(y: Array, first: Any) -> Array:
+    """An even power, by squaring."""
+    del first
+    for _ in range(DOUBLINGS):
+        y = y * y
+    return y
+
+
+SMOOTH_PEAK = Statistic(
+    "smooth_peak",
+    (Term(Reduction.SUM, _powers), Term(Reduction.SUM, lambda y, first: _powers(y, first) * jnp.abs(y))),
+    lambda sums, count, dt: jnp.where(sums[0] > 0.0, sums[1] / jnp.where(sums[0] > 0.0, sums[0], 1.0), 0.0),
+)
+EXACT = {  # the true statistic of each smooth one
+    SMOOTH_PEAK: STATISTICS["peak"],
+    Statistic(
+        "smooth_settling_time", of_record=lambda record, dt: smooth_settling_time(record, dt), unit=lambda _: "s"
+    ): Statistic("settling_time", of_record=lambda record, dt: settling_time(record, dt), unit=lambda _: "s"),
+}
+SMOOTH_SETTLING = next(smooth for smooth in EXACT if smooth is not SMOOTH_PEAK)
+
+
+def smooth_peak(channel: str, **options: object) -> Metric:
+    """A smooth approximation of the peak of a channel, Σ|y|^33 / Σ|y|^32 over the samples.
+
+    It is never above the peak: 1.5 % below for a sine, and closer for a single event. Where several peaks are about
+    equally high, all of them take part in its derivative, so that a search is not stopped by the kink of `"peak"`. A
+    tuning shows the true peak beside it.
+
+    Arguments:
+        channel: of the vehicle.
+        options: `weighting`, `from_rest`, `window`, `name`, as of `metrics.Metric`.
+
+    >>> smooth_peak("damper_force").name
+    'smooth_peak_damper_force'
+    """
+    return Metric(channel, SMOOTH_PEAK, **options)  # type: ignore[arg-type]
+
+
+def smooth_settling(channel: str, **options: object) -> Metric:
+    """A smooth approximation of the time after which a channel stays within 5 % of its peak [s].
+
+    It is `metrics.smooth_settling_time` of the record; the window should begin at the kick. A tuning shows the true
+    settling time beside it.
+
+    Arguments:
+        channel: of the vehicle; `from_rest=True` for heights and strokes, which do not come to rest at zero.
+        options: `from_rest`, `window`, `name`, as of `metrics.Metric`.
+
+    >>> smooth_settling("pitch_acceleration").name
+    'smooth_settling_time_pitch_acceleration'
+    """
+    return Metric(channel, SMOOTH_SETTLING, **options)  # type: ignore[arg-type]
+
+
+def exact_counterpart(metric: Metric) -> Metric | None:
+    """The metric with the true statistic, for a metric with a smooth one."""
+    exact = EXACT.get(metric.statistic)
+    if exact is None:
+        return None
+    options = {field.name: getattr(metric, field.name) for field in dataclasses.fields(metric)}
+    name = metric.name.replace(metric.statistic.name, exact.name)
+    name = name if name != metric.name else f"exact_{name}"
+    return Metric(**options | {"statistic": exact, "name": name})

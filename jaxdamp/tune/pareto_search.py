@@ -1,54 +1,45 @@
 """`pareto`: the front of two or three ride metrics over the free parameters of a vehicle, by exact gradients."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, current_name
-from jaxdamp.tune.filling import with_designs_between
-from jaxdamp.tune.front import FrontParameter, ParetoFront
+from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, shares_of
 from jaxdamp.tune.front_notes import judged, notes_on_points
-from jaxdamp.tune.limits import limit_ends
+from jaxdamp.tune.limits import Limit, limit_ends, margins
+from jaxdamp.tune.measuring import LANES, ride_on
 from jaxdamp.tune.objective import Function, check_objective
+from jaxdamp.tune.ranges import start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.shape import Shape
-from jaxdamp.tune.side_by_side import BatchEvaluator
-from jaxdamp.tune.starts import start_points
-from jaxdamp.tune.task import DesignTask, check_call
-from jaxdamp.tune.tracing import FrontProblem, trace_front
+from jaxdamp.tune.settings import DEFAULTS, Settings, completed
+from jaxdamp.tune.task import DesignTask, Evaluator, check_call
+from jaxdamp.tune.tracing import FrontProblem, lattice, trace_front
 
 
 BEYOND = 0.1  # distance of the default reference point beyond the worst values, relative to their range
+FRESH_ROADS, MAX_STEPS = 3, 40  # by default
 
 
+@of_known_numbers
 def pareto(
     objectives: Sequence[str | Metric | Function],
     vehicle: V,
     road: Road | Scenarios,
     *,
-    over: Sequence[str] | Mapping[str, Any] | None = None,
-    freeze: Sequence[str] = (),
-    bounds: Mapping[str, Any] | None = None,
-    tie: Mapping[str, str] | None = None,
-    limits: Mapping[Any, Any] | None = None,
-    shape: Sequence[Shape] | Shape = (),
-    metrics: Sequence[str | Metric] = (),
     points: int = 21,
     between: int = 0,
     reference: Mapping[str, float] | None = None,
-    starts: int = 1,
-    seed: int = 0,
-    fresh_roads: int = 3,
-    duration: float | None = None,
-    dt: float = 1e-3,
-    max_steps: int = 40,
     progress: Callable[[int, int], None] | None = None,
+    **settings: Unpack[Settings],
 ) -> ParetoFront[V]:
     """The front of two or three ride metrics: the designs that improve in one only at the expense of another.
 
@@ -66,27 +57,15 @@ def pareto(
         objectives: two or three, each as the `metric` of `minimise`.
         vehicle: the vehicle to start from.
         road: as in `minimise`; of `Scenarios` the metrics are joined by their risk, and limits apply in each of them.
-        over: as in `minimise`.
-        freeze: as in `minimise`.
-        bounds: as in `minimise`.
-        tie: as in `minimise`.
-        limits: hard limits, as in `minimise`; points that violate one are left out.
-        shape: as in `minimise`.
-        metrics: further metrics, which functions and limits can use by name.
         points: number of points; of three objectives the largest triangular number that is not above it.
         between: number of further designs with parameters interpolated between those points. They are simulated without
             derivatives, and fill the front at little cost where it is smooth.
         reference: the point up to which the hypervolume counts, `{objective: value}`; 10 % of the range of each
             objective beyond its worst value on the front if left out.
-        starts: number of searches for each end of the front, the first from the vehicle, the others from inside the
-            bounds; the best one counts.
-        seed: of the other starts.
-        fresh_roads: number of other realisations of a random road, or of those of the scenarios, on which all points
-            are simulated again; 0 for none.
-        duration: length of the run [s], as in `simulate`.
-        dt: step [s], as in `simulate`.
-        max_steps: largest number of steps of each search.
         progress: called with the number of points done and of all points; a line in the terminal if it is left out.
+        settings: keywords of `minimise`: `over`, `limits`, `duration`, `starts` and the others of `Design`, `Run` and
+            `Search`. Points that violate a limit are left out; each end of the front is searched from all starts, in 40
+            steps at most; all points are simulated again on 3 fresh roads.
 
     Returns:
         The designs with all metrics, without those that another one beats; and warnings, also about limits that do not
@@ -101,42 +80,35 @@ def pareto(
     >>> [round(float(rate), -1) for rate in front.designs[[0, -1], 0]]  # the two optima: 4656.4 and 5536.5
     [4660.0, 5540.0]
     """
-    counts = {"points": (points, 1), "between": (between, 0), "max_steps": (max_steps, 1), "starts": (starts, 1)}
-    _check(objectives, vehicle, road, points, counts | {"fresh_roads": (fresh_roads, 0), "seed": (seed, 0)})
-    task = DesignTask(
-        objectives, vehicle, road, argument="objectives", over=over, freeze=freeze, bounds=bounds, tie=tie,
-        limits=limits, shape=shape, metrics=metrics, duration=duration, dt=dt,
-    )  # fmt: skip
-    names, space = task.objective.names, task.space
+    asked = completed("pareto", settings, DEFAULTS | {"fresh_roads": FRESH_ROADS, "max_steps": MAX_STEPS})
+    _check(objectives, vehicle, road, points, asked | {"points": points, "between": between})
+    task = DesignTask(objectives, vehicle, road, argument="objectives", settings=asked)
+    names, space, evaluator = task.objective.names, task.space, Evaluator(task, LANES)
     given = _reference(reference, names)
-    evaluator = BatchEvaluator(task)
-    begun = start_points(space, starts, seed) / space.unit
-    evaluated = evaluator.evaluated(begun)
-    before = dict(zip(task.names, map(float, evaluated[0][0]), strict=True))
-    all_limits = task.limits(before)
-    evaluator.follow(limit_ends(all_limits))
-    usable = [i for i, pair in enumerate(evaluated) if i == 0 or all(np.all(np.isfinite(a)) for a in pair)]
+    starts = start_points(space, asked["starts"], asked["seed"]) / space.unit
+    evaluations, limits = evaluator.begin(starts)
+    usable = [i for i, one in enumerate(evaluations) if i == 0 or all(np.all(np.isfinite(a)) for a in one)]
+    before = task.numbers(evaluations[0].values)
     size = np.abs([before[name] for name in names]) + np.finfo(float).tiny
-    problem = FrontProblem(evaluator, all_limits, max_steps, size)
     with Progress("Tracing the front") as shown:
 
         def report(done: int, total: int) -> None:
             if progress is not None:
                 progress(done, total)
             else:
-                shown(f"{done} of {total} points, {evaluator.points} designs simulated")
+                shown(f"{done} of {total} points, {evaluator.program.points} designs simulated")
 
-        computed = [evaluator.rows_of(*evaluated[i]) for i in usable]
-        lanes = trace_front(problem, begun[usable], computed, points, report)
-    chosen, status, notes = judged(lanes, problem)
-    designs = np.array([np.clip(lane.at * space.unit, space.lower, space.upper) for lane in chosen])
-    numbers = dict(zip(task.names, np.array([lane.now.values for lane in chosen]).T, strict=True))
-    worst = {name: numbers[name].max() + BEYOND * np.ptp(numbers[name]) for name in names}
-    dropped = len(lanes) - len(chosen)
-    if between and len(chosen) > len(names):
-        designs, numbers = with_designs_between(evaluator, designs, numbers, all_limits, between)
+        problem = FrontProblem(evaluator, limits, asked["max_steps"], size, report)
+        states = trace_front(problem, starts[usable], [evaluations[i] for i in usable], points)
+    chosen, status, notes = judged(states, problem)
+    designs = np.array([np.clip(state.y * space.unit, space.lower, space.upper) for state in chosen])
+    numbers = dict(zip(task.names, np.array([state.evaluation.values for state in chosen]).T, strict=True))
+    worst = {name: float(numbers[name].max() + BEYOND * np.ptp(numbers[name])) for name in names}
+    filled = between if len(chosen) > len(names) else 0
+    if filled:
+        designs, numbers = _with_designs_between(evaluator, designs, numbers, limits, between)
     free = zip(space.free.names, space.free.owners, space.start, space.lower, space.upper, strict=True)
-    fresh, start_on_fresh = _on_fresh_roads(evaluator, designs, fresh_roads)
+    fresh, start_on_fresh = _on_fresh_roads(evaluator, designs, asked["fresh_roads"])
     front = ParetoFront[V](
         start=vehicle,
         names=names,
@@ -146,12 +118,12 @@ def pareto(
         parameters=tuple(FrontParameter(n, p.unit, float(a), float(b), float(c)) for n, p, a, b, c in free),
         designs=designs,
         limits=task.shown_limits(before),
-        reference={name: float(value) for name, value in worst.items()} | given,
+        reference=worst | given,
         warnings=tuple(notes),
         status=status,
-        evaluations=evaluator.points,
-        interpolated=between if len(chosen) > len(names) else 0,
-        dropped=dropped,
+        evaluations=evaluator.program.points,
+        interpolated=filled,
+        dropped=len(states) - len(chosen),
         free=space.free,
         measured=task.measured,
         fresh=fresh,
@@ -159,7 +131,7 @@ def pareto(
     return dataclasses.replace(front, warnings=(*notes, *notes_on_points(front, task, start_on_fresh)))
 
 
-def _check(objectives: Any, vehicle: Any, road: Any, points: int, counts: Mapping[str, tuple[int, int]]) -> None:
+def _check(objectives: Any, vehicle: Any, road: Any, points: int, counts: Mapping[str, Any]) -> None:
     call = "pareto([metric, metric], vehicle, road)"
     if isinstance(objectives, str) or not isinstance(objectives, Sequence) or len(objectives) not in (2, 3):
         _checks.refuse(
@@ -185,15 +157,55 @@ def _reference(reference: Mapping[str, float] | None, names: Sequence[str]) -> d
     return {name: float(value) for name, value in given.items()}
 
 
+def _with_designs_between(
+    evaluator: Evaluator,
+    designs: np.ndarray,
+    numbers: dict[str, np.ndarray],
+    limits: Sequence[Limit],
+    count: int,
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """The designs of a front with others between them, as far as no other one beats them and they keep all limits.
+
+    Arguments:
+        evaluator: simulates the designs.
+        designs: of the front, more than objectives.
+        numbers: of these designs, by name.
+        limits: of numbers.
+        count: number of designs to interpolate.
+    """
+    from scipy.interpolate import RBFInterpolator
+
+    space, names = evaluator.task.space, evaluator.task.objective.names
+    shares = shares_of(np.stack([numbers[name] for name in names], axis=1))
+    flat = (shares - shares.mean(axis=1, keepdims=True))[:, :-1]  # the plane through the ends, seen along its normal
+    ends = flat[np.argmin(shares, axis=0)]
+    size = np.where(space.upper - space.lower < np.inf, space.upper - space.lower, 1.0)
+    inside = RBFInterpolator(flat, designs / size, kernel="cubic")(np.array(lattice(len(ends), count)) @ ends)
+    new = np.clip(inside * size, space.lower, space.upper)
+    of_new = dict(zip(evaluator.task.names, evaluator.program.values(new).T, strict=True))
+    ordered = np.array([p.domain.ordered and p.path == q.path for p, q in itertools.pairwise(space.free.owners)], bool)
+    allowed = np.all(np.isfinite(list(of_new.values())), axis=0) & np.all(
+        np.diff(new, axis=1)[:, ordered] > 0.0, axis=1
+    )
+    allowed &= np.all(margins(limit_ends(limits), of_new) >= 0.0, axis=0)
+    designs = np.concatenate([designs, new[allowed]])
+    numbers = {name: np.concatenate([values, of_new[name][allowed]]) for name, values in numbers.items()}
+    objectives = np.stack([numbers[name] for name in names], axis=1)
+    best = np.flatnonzero(non_dominated(objectives))
+    best = best[np.lexsort(objectives[best].T[::-1])]
+    return designs[best], {name: values[best] for name, values in numbers.items()}
+
+
 def _on_fresh_roads(
-    evaluator: BatchEvaluator, designs: np.ndarray, count: int
+    evaluator: Evaluator, designs: np.ndarray, count: int
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """The metrics of designs on other realisations of the road, shape (roads, points), and of the start, (roads,).
 
     Nothing of a road that has no other realisation.
     """
     task = evaluator.task
-    rides = [task.measured.on_road(road).side_by_side() for road in other_roads(task.road, range(count))]
-    runs = [evaluator.numbers_at(np.vstack([designs, task.space.start]), ride) for ride in rides]
+    rides = [ride_on(task.vehicle, road, task.objective, task.run) for road in other_roads(task.road, range(count))]
+    both = np.vstack([designs, task.space.start])
+    runs = [dict(zip(task.names, evaluator.program.values(both, ride).T, strict=True)) for ride in rides]
     values = {name: np.stack([run[name] for run in runs]) for name in task.units if runs}
     return {name: rows[:, :-1] for name, rows in values.items()}, {name: rows[:, -1] for name, rows in values.items()}

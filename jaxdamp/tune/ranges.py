@@ -91,6 +91,30 @@ def search_range(
     return SearchRange(coordinates, start, unit, np.array(lower), np.array(upper), origin)
 
 
+def start_points(space: SearchRange, count: int, seed: int) -> np.ndarray:
+    """So many starts, shape (count, free): the given one, and a Sobol sequence inside the bounds.
+
+    Numbers between positive bounds are uniform in their logarithm. Without a bound, numbers are within three times
+    their unit. The numbers of ordered vectors are sorted.
+    """
+    from scipy.stats import qmc
+
+    lower = np.where(np.isfinite(space.lower), space.lower, space.start - FACTOR * space.unit)
+    upper = np.where(np.isfinite(space.upper), space.upper, space.start + FACTOR * space.unit)
+    options: dict = {"seed": np.random.default_rng(seed)}  # SciPy 1.15 calls it `rng`, and still takes this name
+    unit = qmc.Sobol(len(lower), **options).random_base2(max(count - 2, 0).bit_length())[: count - 1]
+    points = lower + (upper - lower) * unit
+    logarithmic = lower > 0
+    ratio = upper[logarithmic] / lower[logarithmic]
+    points[:, logarithmic] = lower[logarithmic] * ratio ** unit[:, logarithmic]
+    end = 0
+    for p in space.free.chosen:
+        begin, end = end, end + p.value.size
+        if p.domain.ordered:
+            points[:, begin:end] = np.sort(points[:, begin:end], axis=1)
+    return np.concatenate([space.start[None], points])
+
+
 def _adjustable(vehicle: Any) -> list[str]:
     """The parameters of the dampers that a workshop can change."""
     known = {p.path: p for p in parameters(vehicle)}

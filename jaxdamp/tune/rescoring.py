@@ -3,13 +3,14 @@
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, Unpack, final
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
@@ -19,6 +20,7 @@ from jaxdamp.tune.limits import LimitRange
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.risk import exact
 from jaxdamp.tune.scenarios import Scenarios
+from jaxdamp.tune.settings import RUN, Run, completed
 from jaxdamp.tune.verdict import decided, half_interval
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -34,7 +36,7 @@ FIRST_SEED = 4711  # of fresh roads, which are thereby others than those of usua
 
 @final
 @dataclasses.dataclass(frozen=True, repr=False)
-class Rescore:
+class Rescore(AbstractResult):
     """The ride metrics of a vehicle before and after its tuning, on each of several roads.
 
     Attributes:
@@ -100,24 +102,19 @@ class Rescore:
 
         return plots.rescore(self)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """All metrics on each road with units, ready for JSON; numbers that are not finite are None."""
         metrics = {
             name: {"before": plain(before), "after": plain(self.after[name]), "unit": self.units[name]}
             for name, before in self.before.items()
         }
-        return {"summary": self.summary, "metric": self.metric, "roads": self.roads, "metrics": metrics}
-
-    def __repr__(self) -> str:
-        return f"{self.summary}\n{self.table().to_text()}"
+        return {"metric": self.metric, "roads": self.roads, "metrics": metrics}
 
 
 def rescore(
     result: "TuneResult[Any]",
     roads: Sequence[AbstractRoad | Scenarios],
-    *,
-    duration: float | None = None,
-    dt: float = 1e-3,
+    **run: Unpack[Run],
 ) -> Rescore:
     """Compute all ride metrics of the original and the tuned vehicle on other roads.
 
@@ -128,8 +125,7 @@ def rescore(
     Arguments:
         result: result of `minimise`.
         roads: one or more roads, or scenarios, whose metrics are then those of their risk.
-        duration: length of each run [s], as in `simulate`.
-        dt: step [s], as in `simulate`.
+        run: `duration`, `dt` and `engine` of each run, as in `simulate` (see `Run`).
 
     Raises:
         ValueError: no road; what `simulate` refuses.
@@ -155,7 +151,7 @@ def rescore(
     known += [m for m in (objective.metrics if objective else ()) if m not in known]
     units = {m.name: m.unit(result.start.units) for m in known} | (objective.units(result.start) if objective else {})
     cars = (result.start, result.vehicle)
-    return rescored(cars, roads, known, objective, units, result.metric, duration=duration, dt=dt)
+    return rescored(cars, roads, known, objective, units, result.metric, completed("rescore", run, RUN))
 
 
 def rescored(
@@ -165,19 +161,17 @@ def rescored(
     objective: Objective | None,
     units: dict[str, str],
     metric: str,
-    *,
-    duration: float | None,
-    dt: float,
+    run: Mapping[str, Any],
 ) -> Rescore:
     """The metrics of the vehicle before and after on roads or in scenarios."""
 
     def drive(car: AbstractVehicle, road: Any) -> Mapping[str, Scalar]:
         if isinstance(road, Scenarios):
-            ride = road.ride(car, metrics=metrics, duration=duration, dt=dt)
+            ride = road.ride(car, metrics=metrics, **run)
             each = objective.of_each(ride.each()) if objective else ride.each()
             risk = exact(ride.risk)
             return {name: risk(values, ride.weights) for name, values in each.items()}
-        values = Ride(car, road, metrics=metrics, duration=duration, dt=dt)()
+        values = Ride(car, road, metrics=metrics, **run)()
         return objective.of(values) if objective else values
 
     before, after = ([drive(car, road) for road in roads] for car in cars)
@@ -194,9 +188,7 @@ def on_fresh_roads(
     allowed: Mapping[str, LimitRange],
     objective: Objective,
     units: dict[str, str],
-    *,
-    duration: float | None,
-    dt: float,
+    run: Mapping[str, Any],
 ) -> Rescore | None:
     """The vehicle before and after on other realisations of a road, on so many that gain and limits are decided.
 
@@ -207,8 +199,7 @@ def on_fresh_roads(
         allowed: the limits.
         objective: of the tuning.
         units: of its metrics.
-        duration: as in `simulate`.
-        dt: as in `simulate`.
+        run: as in `simulate`.
 
     Returns:
         None where there is no other realisation.
@@ -218,7 +209,7 @@ def on_fresh_roads(
         part = others[first:last]
         if not part:
             break
-        new = rescored(cars, part, objective.metrics, objective, units, objective.name, duration=duration, dt=dt)
+        new = rescored(cars, part, objective.metrics, objective, units, objective.name, run)
         driven = new if driven is None else driven.and_on(new)
         if decided(driven, allowed):
             break

@@ -2,22 +2,21 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_tied, with_unit
 from jaxdamp.tune.limits import LimitRange, written
-from jaxdamp.tune.objective import Objective
+from jaxdamp.tune.objective import Objective, Targets
 from jaxdamp.tune.rescoring import Rescore
 from jaxdamp.tune.scenarios import Road
 from jaxdamp.tune.spectra import Spectrum, spectra
-from jaxdamp.tune.starts import Attempt
-from jaxdamp.tune.targets import Targets
 from jaxdamp.tune.verdict import Verdict, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -73,15 +72,32 @@ class ScenarioValues(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What a tuning drove over: a road, that of the first scenario, for so long [s] with this step [s]."""
+    """What a tuning drove over: a road, that of the first scenario, and how: the keywords of `Run`."""
 
     road: Road
-    duration: float | None
-    dt: float
+    run: Mapping[str, Any]
+
+
+class Attempt(NamedTuple):
+    """The search from one start.
+
+    Attributes:
+        start: the free numbers at its start.
+        end: the free numbers at its end.
+        metric: the metric at its end.
+        meets_limits: whether all limits are met there.
+        converged: whether it ended at an optimum.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    metric: float
+    meets_limits: bool
+    converged: bool
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class TuneResult(Generic[V]):
+class TuneResult(AbstractResult, Generic[V]):
     """A tuned vehicle and the vehicle before the tuning.
 
     Attributes:
@@ -138,11 +154,6 @@ class TuneResult(Generic[V]):
     def verdict(self) -> Verdict:
         """Better or not, by how much and at what price: on fresh roads if there are any."""
         return verdict_of(self)
-
-    @property
-    def converged(self) -> bool:
-        """Whether the search ended at an optimum, by its gradient."""
-        return self.status is Status.CONVERGED
 
     def plot(self, **options: Any) -> "Figure":
         """The laws and the metrics before and after."""
@@ -219,7 +230,7 @@ class TuneResult(Generic[V]):
         """
         if self.drive is None:
             return {}
-        sides = [spectra(car, self.drive.road, channels, *self.drive[1:]) for car in (self.start, self.vehicle)]
+        sides = [spectra(car, self.drive.road, channels, self.drive.run) for car in (self.start, self.vehicle)]
         return {channel: (sides[0][channel], sides[1][channel]) for channel in channels}
 
     def parameter_table(self) -> Table:
@@ -235,15 +246,18 @@ class TuneResult(Generic[V]):
             "Parameters, with the bounds of the search", "parameter", ("before", "after"), rows, more
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def tables(self) -> dict[str, Table]:
+        """Metrics and parameters before and after; metrics in every scenario if there are several."""
+        several = {} if self.scenarios is None else {"scenarios": self.scenario_table()}
+        return {"metrics": self.table(), "parameters": self.parameter_table()} | several
+
+    def content(self) -> dict[str, Any]:
         """The tuning as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         sides = {"before": self.before, "after": self.after}
         return {
-            "summary": self.summary,
             "verdict": self.verdict.outcome.name,
             "violated": self.violated,
             "metric": self.metric,
-            "converged": self.converged,
             "metrics": {
                 name: {side: plain(values[name]) for side, values in sides.items()} | {"unit": unit}
                 for name, unit in self.units.items()
@@ -257,12 +271,10 @@ class TuneResult(Generic[V]):
             "scenarios": None if self.scenarios is None else plain(self.scenarios._asdict()),
             "starts": [plain(attempt._asdict()) for attempt in self.starts],
             "history": plain(self.history),
-            "warnings": list(self.warnings),
         }
 
     def __repr__(self) -> str:
-        tables = [self.table().to_text(), self.parameter_table().to_text()]
-        tables += [] if self.scenarios is None else [self.scenario_table().to_text()]
+        tables = [table.to_text() for table in self.tables().values()]
         return "\n".join([self.summary, *tables, *(f"warning: {warning}" for warning in self.warnings)])
 
 

@@ -1,18 +1,22 @@
 """`robust`: a tuning over scenarios, and what the scatter of its parameters costs."""
 
 import dataclasses
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Generic, final
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Generic, Unpack, final
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._results import AbstractResult
+from jaxdamp._status import Status
 from jaxdamp._tables import Table, plain
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Function
 from jaxdamp.tune.result import TuneResult, V
 from jaxdamp.tune.risk import Risk
 from jaxdamp.tune.scenarios import Scenarios
+from jaxdamp.tune.settings import RUN, Settings
 from jaxdamp.tune.tolerance import ToleranceEffect, check_scatter, tolerance_effects, tolerance_table
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -23,7 +27,7 @@ if TYPE_CHECKING:
 
 @final
 @dataclasses.dataclass(frozen=True, repr=False)
-class RobustResult(Generic[V]):
+class RobustResult(AbstractResult, Generic[V]):
     """A tuning over scenarios with the effects of tolerances.
 
     Attributes:
@@ -38,6 +42,16 @@ class RobustResult(Generic[V]):
     def vehicle(self) -> V:
         """The tuned vehicle."""
         return self.tuning.vehicle
+
+    @property
+    def status(self) -> Status:
+        """How the search of the tuning ended."""
+        return self.tuning.status
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The doubts about the tuning."""
+        return self.tuning.warnings
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -61,19 +75,24 @@ class RobustResult(Generic[V]):
         """The effects of the tolerances."""
         return tolerance_table(self.tolerances, self.tuning.metric)
 
+    def tables(self) -> dict[str, Table]:
+        """Metrics in every scenario, parameters, tolerances."""
+        tolerances = {"tolerances": self.tolerance_table()} if self.tolerances else {}
+        return {"scenarios": self.table(), "parameters": self.tuning.parameter_table()} | tolerances
+
     def plot(self, **options: Any) -> "Figure":
         """The tuning, as of `minimise`."""
         return self.tuning.plot(**options)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """The tuning and the tolerances as plain data, ready for JSON."""
-        effects = [plain(effect._asdict()) for effect in self.tolerances]
-        return self.tuning.to_dict() | {"summary": self.summary, "tolerances": effects}
+        return self.tuning.content() | {"tolerances": [plain(effect._asdict()) for effect in self.tolerances]}
 
     def __repr__(self) -> str:
         return "\n".join([self.summary, repr(self.tuning), *self.sentences])
 
 
+@of_known_numbers
 def robust(
     metric: str | Metric | Function,
     vehicle: V,
@@ -81,9 +100,8 @@ def robust(
     *,
     risk: str | Risk | None = None,
     scatter: Mapping[str, float] | None = None,
-    duration: float | None = None,
-    dt: float = 1e-3,
-    **options: Any,
+    progress: Callable[[int, float], None] | None = None,
+    **settings: Unpack[Settings],
 ) -> RobustResult[V]:
     """Minimise a metric over scenarios by its mean, its worst case or the mean of its worst share.
 
@@ -94,9 +112,8 @@ def robust(
         risk: `"mean"`, `"worst"` or `CVaR(share)`, in place of that of the scenarios.
         scatter: standard deviations, relative to the values, of parameters whose cost is stated at the result, such as
             `{"damper.**_rate": 0.1}`; none if left out.
-        duration: as in `simulate`.
-        dt: as in `simulate`.
-        options: further arguments of `minimise`: `over`, `limits`, `shape`, `starts`, ...
+        progress: as in `minimise`.
+        settings: keywords of `minimise`: `over`, `limits`, `duration`, `starts` and the others.
 
     Raises:
         ValueError: what `minimise` refuses.
@@ -116,8 +133,9 @@ def robust(
     scenarios = scenarios if risk is None else scenarios.with_risk(risk)
     if scatter is not None:
         check_scatter(scatter)
-    tuning = minimise(metric, vehicle, scenarios, duration=duration, dt=dt, **options)
+    tuning = minimise(metric, vehicle, scenarios, progress=progress, **settings)
     effects: tuple[ToleranceEffect, ...] = ()
     if scatter:
-        effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, duration=duration, dt=dt)
+        run: dict[str, Any] = {name: value for name, value in settings.items() if name in RUN}
+        effects = tolerance_effects(metric, tuning.vehicle, scenarios, scatter, **run)
     return RobustResult(tuning, effects)

@@ -2,24 +2,40 @@
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypedDict, TypeVar, Unpack, final
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Number, Scalar, ScalarLike, Vector
+from jaxdamp.dampers import AbstractMemoryless
 from jaxdamp.metrics import Metric
-from jaxdamp.parameters import FreeParameters, free_parameters, get, match_paths, matching, name_patterns, parameters
+from jaxdamp.parameters import (
+    FreeParameters,
+    free_parameters,
+    get,
+    match_paths,
+    matching,
+    name_patterns,
+    parameter,
+    parameters,
+    positive,
+    real,
+    setting,
+)
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
-from jaxdamp.tune.hats import is_hat, with_hats
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.objective import Function, Objective, objective_of
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.sensitivity_result import CurveSensitivity, Sensitivity
+from jaxdamp.tune.settings import RUN, Free, Run, completed
 from jaxdamp.tune.shape import damper_paths, held_force
 from jaxdamp.tune.task import is_white
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind
@@ -27,22 +43,33 @@ from jaxdamp.vehicles import AbstractVehicle, ChannelKind
 
 REACH = 3.0  # RMS values of the damper velocity up to which the curve is looked at
 HATS = 12  # on each side
+V = TypeVar("V", bound=AbstractVehicle)
 
 
+class Curves(TypedDict, total=False):
+    """Which force-velocity curves a sensitivity looks at, and where."""
+
+    dampers: str | None
+    reach: float | None
+    hats: int
+
+
+class SensitivitySettings(Free, Curves, Run, total=False):
+    """All keywords of `sensitivity`: those of `Free`, `Curves` and `Run`."""
+
+
+DEFAULTS: dict[str, Any] = {"over": ("*",), "freeze": (), "dampers": "*damper", "reach": None, "hats": HATS, **RUN}
+
+
+@of_known_numbers
 def sensitivity(
     metric: str | Metric | Function | Sequence[str | Metric],
     vehicle: AbstractVehicle,
     road: Road | Scenarios | Callable[..., Road],
     *,
-    over: Sequence[str] = ("*",),
-    freeze: Sequence[str] = (),
     quantities: Mapping[str, float] | None = None,
-    dampers: str | None = "*damper",
-    reach: float | None = None,
-    hats: int = HATS,
     second_order: bool = False,
-    duration: float | None = None,
-    dt: float = 1e-3,
+    **settings: Unpack[SensitivitySettings],
 ) -> Sensitivity:
     """Exact derivatives of ride metrics by parameters, and by the force at each velocity of the damper curves.
 
@@ -56,16 +83,13 @@ def sensitivity(
         vehicle: where the derivatives are taken.
         road: a road, `roads.white(...)`, or `Scenarios`, whose metrics are joined by their risk; with `quantities` a
             function of these that makes a road: `lambda speed: roads.iso8608("C", speed, seed=1)`.
-        over: the parameters, by path, last part or pattern: masses, stiffnesses and laws; all if left out.
-        freeze: parameters among these to leave out.
         quantities: of the road by name, such as `{"speed": 20.0}`.
-        dampers: the laws whose curves are looked at, by path or pattern; None for none. On a white road there are none,
-            where no run over time is made.
-        reach: largest velocity of the curves [m/s]; three times the largest RMS of a damper velocity if left out.
-        hats: number of velocities on each side.
         second_order: also the second derivatives by the parameters: how flat an optimum is.
-        duration: as in `simulate`.
-        dt: as in `simulate`.
+        settings: keywords, all optional: `over`, all parameters if left out, and `freeze`, as in `minimise`;
+            `dampers`, the laws whose curves are looked at, by path or pattern, None for none, as on a white road;
+            `reach`, the largest velocity of the curves [m/s], three times the largest RMS of a damper velocity if left
+            out; `hats`, the number of velocities on each side, 12 if left out; `duration`, `dt` and `engine` (see
+            `Run`).
 
     Raises:
         ValueError: unknown metrics, parameters or dampers; metrics without derivative; quantities of a road that is no
@@ -77,44 +101,28 @@ def sensitivity(
     >>> {name: round(float(value), 3) for name, value in result.elasticities("rms_sprung_acceleration").items()}
     {'sprung_mass': -0.648, 'damper.rate': -0.276}
     """
+    asked = completed("sensitivity", settings, DEFAULTS)
     wanted = list(metric) if isinstance(metric, Sequence) and not isinstance(metric, str) else [metric]
     given = dict(quantities or {})
     _check(wanted, vehicle, road, given)
-    if hats < 1:
-        _checks.refuse("hats", "be 1 or more", hats, f"{HATS} on each side of zero are usual.")
-    if reach is not None:
-        _checks.positive("reach", reach, "It is a velocity of the damper, such as 0.6 m/s.")
     make: Any = road
-    first = make(**given) if given else make
-    white = is_white(first)
-    objective = objective_of(wanted, vehicle, [], [], white=white)
-    if not objective.functions:  # the metrics that are wanted, and no others
-        objective = objective._replace(metrics=tuple(m for m in objective.metrics if m.name in objective.names))
-    run = {"duration": duration, "dt": dt}
-    paths = [] if dampers is None or white else _curves(vehicle, dampers)
-    hatted = vehicle
-    if paths:
-        reach = reach or _reach(vehicle, first, run)
-        for path in paths:
-            hatted = with_hats(hatted, path, reach, hats)
-    own, free = _free(vehicle, hatted, over, freeze)
+    first, run = (make(**given) if given else make), {name: asked[name] for name in RUN}
+    objective = _objective(wanted, vehicle, white=is_white(first))
+    hatted, paths = _with_curves(vehicle, first, asked, run)
+    own, free = _free(vehicle, hatted, asked["over"], asked["freeze"])
     point = np.array([*np.asarray(free.values, float), *given.values()])
     if given:
         measured = _on_made_roads(hatted, make, list(given), objective, free, run)
     else:
-        fixed = Measurement(hatted, first, objective, free, **run)
+        fixed = Measurement(hatted, first, objective, free, run=run)
         measured = lambda x: fixed(free.build(x))  # noqa: E731
     names = [name for name in objective.units(vehicle) if name in objective.names]
     values, slopes = _derivatives(measured, names, point)
-    parts = [*zip(free.owners, free.names, strict=True)]
-    is_curve = np.array([is_hat(p.path, hatted) for p, _ in parts] + [False] * len(given), bool)
-    own_names = iter([(name, p.unit) for p, name in zip(own.owners, own.names, strict=True)])
-    columns = [next(own_names) for (p, _) in parts if not is_hat(p.path, hatted)]
-    columns += [(name, "m/s" if name == "speed" else "") for name in given]
+    is_curve = np.array([is_hat(p.path, hatted) for p in free.owners] + [False] * len(given), bool)
     chosen = np.flatnonzero(~is_curve)
-    hessian = None
-    if second_order:
-        hessian = dict(zip(names, _second(measured, names, point, chosen), strict=True))
+    columns = [(name, p.unit) for p, name in zip(own.owners, own.names, strict=True)]
+    columns += [(name, "m/s" if name == "speed" else "") for name in given]
+    second = _second(measured, names, point, chosen) if second_order else None
     return Sensitivity(
         values=dict(zip(names, values.tolist(), strict=True)),
         units={name: objective.units(vehicle)[name] for name in names},
@@ -123,8 +131,34 @@ def sensitivity(
         point=point[chosen],
         gradient=dict(zip(names, slopes[:, chosen], strict=True)),
         curves=_curve_parts(vehicle, hatted, paths, names, slopes[:, is_curve]),
-        hessian=hessian,
+        hessian=None if second is None else dict(zip(names, second, strict=True)),
     )
+
+
+def _objective(wanted: Sequence[Any], vehicle: AbstractVehicle, *, white: bool) -> Objective:
+    """The metrics that are wanted, and no others; of a function all that it may use."""
+    objective = objective_of(wanted, vehicle, [], [], white=white)
+    if objective.functions:
+        return objective
+    return objective._replace(metrics=tuple(m for m in objective.metrics if m.name in objective.names))
+
+
+def _with_curves(
+    vehicle: AbstractVehicle, road: Any, asked: Mapping[str, Any], run: Mapping[str, Any]
+) -> tuple[AbstractVehicle, list[str]]:
+    """The vehicle with hats beside the laws whose curves are looked at, and the paths of these laws."""
+    reach, hats = asked["reach"], asked["hats"]
+    if hats < 1:
+        _checks.refuse("hats", "be 1 or more", hats, f"{HATS} on each side of zero are usual.")
+    if reach is not None:
+        _checks.positive("reach", reach, "It is a velocity of the damper, such as 0.6 m/s.")
+    if asked["dampers"] is None or is_white(road):
+        return vehicle, []
+    paths = _curves(vehicle, asked["dampers"])
+    reach = reach or _reach(vehicle, road, run)
+    for path in paths:
+        vehicle = with_hats(vehicle, path, reach, hats)
+    return vehicle, paths
 
 
 def _check(wanted: Sequence[Any], vehicle: Any, road: Any, quantities: Mapping[str, float]) -> None:
@@ -247,3 +281,51 @@ def _curve_parts(
         curves[path] = CurveSensitivity(velocities, force, dict(zip(names, slopes[:, begin:end], strict=True)))
         begin = end
     return curves
+
+
+@final
+class ForceHats(AbstractMemoryless):
+    """A force that is linear between velocities at equal distances, zero at standstill, constant beyond the ends.
+
+    Its derivative by one of its forces is the hat function around that velocity, exactly.
+
+    Arguments:
+        spacing: of the velocities [m/s], which are ±1, ±2, ... times this.
+        forces: at these velocities, increasing [N], shape (2 k,).
+    """
+
+    spacing: Number = setting("m/s", "spacing of the velocities", positive)
+    forces: Vector = parameter("N", "forces at the velocities", real, linear=True)
+
+    @property
+    def velocities(self) -> Float[Array, " points"]:
+        """The velocities [m/s]."""
+        count = self.forces.size // 2
+        steps = np.concatenate([np.arange(-count, 0), np.arange(1, count + 1)])
+        return self.spacing * jnp.asarray(steps, self.forces.dtype)
+
+    def force_velocity(self, v: ScalarLike) -> Scalar:
+        """Force [N] at velocity v [m/s]."""
+        limit = self.forces.size // 2  # its slope by v is not used: it is that of forces of zero
+        place = jnp.clip(v / self.spacing, -limit, limit)
+        weights = jnp.maximum(1.0 - jnp.abs(place - self.velocities / self.spacing), 0.0)
+        return jnp.sum(weights * self.forces)
+
+
+def with_hats(vehicle: V, path: str, reach: float, count: int) -> V:
+    """The vehicle with hats of zero force beside the law at a path.
+
+    Arguments:
+        vehicle: with the law.
+        path: of the law.
+        reach: largest velocity of the hats [m/s].
+        count: number of hats on each side.
+    """
+    hats = ForceHats(reach / count, np.zeros(2 * count))
+    return eqx.tree_at(lambda car: get(car, path), vehicle, get(vehicle, path) + hats)
+
+
+def is_hat(path: str, vehicle: AbstractVehicle) -> bool:
+    """Whether a path is that of the forces of hats."""
+    owner, _, name = path.rpartition(".")
+    return name == "forces" and isinstance(get(vehicle, owner), ForceHats)

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain, typeset_unit
 
 
@@ -34,7 +35,7 @@ class CurveSensitivity(NamedTuple):
 
 @final
 @dataclasses.dataclass(frozen=True, repr=False)
-class Sensitivity:
+class Sensitivity(AbstractResult):
     """Derivatives of ride metrics.
 
     Attributes:
@@ -62,6 +63,25 @@ class Sensitivity:
         _checks.one_of("metric", metric, self.values)
         scaled = self.gradient[metric] * self.point / (self.values[metric] or np.nan)
         return dict(zip(self.parameters, np.where(self.point == 0.0, np.nan, scaled).tolist(), strict=True))
+
+    @property
+    def summary(self) -> str:
+        """The number that changes each metric most, in a sentence."""
+        most = []
+        for metric in self.values:
+            slopes = {name: slope for name, slope in self.elasticities(metric).items() if np.isfinite(slope)}
+            if slopes:
+                name = max(slopes, key=lambda name: abs(slopes[name]))
+                most.append(f"1 % more {name} changes {metric} by {slopes[name]:+.3g} %.")
+        return " ".join(most) or "No parameter differs from zero, so there is no relative change."
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Metrics that no number changes, or that have no derivative."""
+        lost = [name for name, slopes in self.gradient.items() if slopes.size and not np.any(slopes)]
+        odd = [name for name, slopes in self.gradient.items() if not np.all(np.isfinite(slopes))]
+        texts = [f"{name} does not depend on any of these numbers here." for name in lost]
+        return (*texts, *(f"The derivative of {name} is not finite." for name in odd))
 
     def table(self) -> Table:
         """A row for each number, the most effective for the first metric first: percent for each percent."""
@@ -142,7 +162,7 @@ class Sensitivity:
 
         return sensitivity(self, **options)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """All derivatives as plain data, ready for JSON; numbers that are not finite are None."""
         data = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         curves = {path: curve._asdict() for path, curve in self.curves.items()}
@@ -150,4 +170,4 @@ class Sensitivity:
 
     def __repr__(self) -> str:
         flat = [] if self.hessian is None else [s for name in self.values for s in self.flatness(name)]
-        return "\n".join([self.table().to_text(), *flat])
+        return "\n".join([self.table().to_text(), *flat, *(f"warning: {text}" for text in self.warnings)])

@@ -4,7 +4,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import jax
 import jax.numpy as jnp
@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper, laws_inside
 from jaxdamp.parameters import get, matching
@@ -41,7 +42,7 @@ class Shape:
 
     name: str
     unit: str
-    span: tuple[float, float]
+    span: tuple[float, float] = dataclasses.field(compare=False)  # programs do not depend on it
     velocities: tuple[float, ...]
     numbers: Callable[[Curve, Curve], Array]
     places: tuple[str, ...] = ("",)
@@ -52,6 +53,7 @@ class Shape:
         return dataclasses.replace(self, dampers=dampers)
 
 
+@of_known_numbers
 def slope(lower: float | None = None, upper: float | None = None, *, reach: float = 1.0) -> Shape:
     """Limits of the slope of the curve [N s/m].
 
@@ -65,9 +67,10 @@ def slope(lower: float | None = None, upper: float | None = None, *, reach: floa
     velocities = np.concatenate([-half[:0:-1], half])
     places = tuple(f" at {0.5 * (a + b):.2g} m/s" for a, b in itertools.pairwise(velocities))
     span = _span(lower, upper)
-    return Shape("slope", "N s/m", span, tuple(velocities), lambda v, f: jnp.diff(f) / jnp.diff(v), places)
+    return Shape("slope", "N s/m", span, tuple(map(float, velocities)), _slopes, places)
 
 
+@of_known_numbers
 def monotone(*, reach: float = 1.0) -> Shape:
     """A force that never falls as the velocity grows: a slope of zero or more.
 
@@ -77,6 +80,7 @@ def monotone(*, reach: float = 1.0) -> Shape:
     return slope(0.0, reach=reach)
 
 
+@of_known_numbers
 def ratio(lower: float | None = None, upper: float | None = None, *, velocity: float) -> Shape:
     """Limits of the rebound force over the compression force at a velocity, both measured from standstill.
 
@@ -86,14 +90,11 @@ def ratio(lower: float | None = None, upper: float | None = None, *, velocity: f
         velocity: at which the forces are compared [m/s].
     """
     _checks.positive("velocity", velocity)
-
-    def of_forces(v: Curve, f: Curve) -> Array:
-        return ((f[2] - f[1]) / (f[1] - f[0]))[None]
-
     name = f"rebound/compression ratio at {velocity:g} m/s"
-    return Shape(name, "", _span(lower, upper), (-velocity, 0.0, velocity), of_forces)
+    return Shape(name, "", _span(lower, upper), (-velocity, 0.0, velocity), _ratio)
 
 
+@of_known_numbers
 def knee(lower: float | None = None, upper: float | None = None, *, side: str = "rebound", reach: float = 1.0) -> Shape:
     """Limits of the velocity of the knee [m/s], positive on both sides.
 
@@ -110,33 +111,57 @@ def knee(lower: float | None = None, upper: float | None = None, *, side: str = 
     _checks.positive("reach", reach)
     sign = 1.0 if side == "rebound" else -1.0
     velocities = sign * np.linspace(0.0, reach, 2 * POINTS + 1)
+    return Shape(f"{side} knee", "m/s", _span(lower, upper), tuple(map(float, velocities)), _mean_bend)
 
-    def mean_bend(v: Curve, f: Curve) -> Array:
-        bends = jnp.abs(jnp.diff(jnp.diff(f) / jnp.diff(v)))
-        total = jnp.sum(bends)
-        return (jnp.sum(bends * jnp.abs(v[1:-1])) / jnp.where(total > 0.0, total, 1.0))[None]
 
-    return Shape(f"{side} knee", "m/s", _span(lower, upper), tuple(velocities), mean_bend)
+# Functions of the module, so that programs of equal constraints are compiled once.
+
+
+def _slopes(v: Curve, f: Curve) -> Array:
+    return jnp.diff(f) / jnp.diff(v)
+
+
+def _ratio(v: Curve, f: Curve) -> Array:
+    del v
+    return ((f[2] - f[1]) / (f[1] - f[0]))[None]
+
+
+def _mean_bend(v: Curve, f: Curve) -> Array:
+    bends = jnp.abs(jnp.diff(_slopes(v, f)))
+    total = jnp.sum(bends)
+    return (jnp.sum(bends * jnp.abs(v[1:-1])) / jnp.where(total > 0.0, total, 1.0))[None]
 
 
 @final
-class ShapeNumbers:
-    """The numbers that shape constraints limit, as a function of the vehicle."""
+class ShapeNumbers(NamedTuple):
+    """The numbers that shape constraints limit, as a function of the vehicle.
 
-    def __init__(self, vehicle: AbstractVehicle, shapes: Sequence[Shape]) -> None:
-        paths = damper_paths(vehicle)
-        self._pairs: list[tuple[Shape, str]] = []
-        for shape in shapes:
-            _checks.instance("shape", shape, Shape, "be made by `tune.slope`, `monotone`, `knee` or `ratio`")
-            chosen = matching(paths, shape.dampers)
+    Attributes:
+        pairs: each constraint with the path of a law.
+    """
+
+    pairs: tuple[tuple[Shape, str], ...]
+
+    @classmethod
+    def of(cls, vehicle: AbstractVehicle, shape: Sequence[Shape] | Shape) -> "ShapeNumbers":
+        """Those of the laws of a vehicle that the constraints name."""
+        shapes = [shape] if isinstance(shape, Shape) else shape
+        if not isinstance(shapes, Sequence) or isinstance(shapes, str):
+            remedy = "Write `shape=[tune.monotone(), tune.slope(upper=5000.0)]`."
+            _checks.refuse("shape", "be a constraint of `tune`, or a list", _checks.described(shapes), remedy)
+        paths, pairs = damper_paths(vehicle), []
+        for one in shapes:
+            _checks.instance("shape", one, Shape, "be made by `tune.slope`, `monotone`, `knee` or `ratio`")
+            chosen = matching(paths, one.dampers)
             if not chosen:
-                _checks.refuse("shape", f"name a damper of the vehicle ({', '.join(paths)})", repr(shape.dampers))
-            self._pairs += [(shape, path) for path in chosen]
+                _checks.refuse("shape", f"name a damper of the vehicle ({', '.join(paths)})", repr(one.dampers))
+            pairs += [(one, path) for path in chosen]
+        return cls(tuple(pairs))
 
     def __call__(self, vehicle: AbstractVehicle) -> dict[str, Scalar]:
         """The numbers by name."""
         numbers_by_name = {}
-        for shape, path in self._pairs:
+        for shape, path in self.pairs:
             velocities = jnp.asarray(shape.velocities)
             numbers = shape.numbers(velocities, held_force(get(vehicle, path), velocities))
             numbers_by_name |= dict(zip(_names(shape, path), numbers, strict=True))
@@ -145,12 +170,12 @@ class ShapeNumbers:
     @property
     def names(self) -> list[str]:
         """The names of the numbers."""
-        return [name for shape, path in self._pairs for name in _names(shape, path)]
+        return [name for shape, path in self.pairs for name in _names(shape, path)]
 
     def limits(self, start: Mapping[str, float]) -> list[Limit]:
         """The limits of the numbers; their distances are scaled by the largest number of the curve at the start."""
         limits = []
-        for shape, path in self._pairs:
+        for shape, path in self.pairs:
             names = _names(shape, path)
             size = scaled(*shape.span, max(abs(start[name]) for name in names))
             of = f"{shape.name} of {path}"

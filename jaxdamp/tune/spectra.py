@@ -1,8 +1,8 @@
 """Power spectral densities of the channels of a vehicle, on a road that is driven over or on a white one."""
 
 import warnings
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -32,8 +32,7 @@ def spectra(
     vehicle: AbstractVehicle,
     road: AbstractRoad | WhiteRoad,
     channels: Sequence[str],
-    duration: float | None,
-    dt: float,
+    run: Mapping[str, Any],
 ) -> dict[str, Spectrum]:
     """The spectrum of each channel between 0.3 and 30 Hz.
 
@@ -48,7 +47,8 @@ def spectra(
         return {name: Spectrum(frequency, np.abs(np.asarray(gains[name])) ** 2 * height) for name in channels}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the notes of the tuning say it
-        response = simulate(vehicle, road, duration=duration, dt=dt)
+        response = simulate(vehicle, road, **run)
+    dt = float(response.time[1] - response.time[0])
     by_channel = {}
     for name in channels:
         values = np.asarray(response[name])

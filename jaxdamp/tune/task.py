@@ -1,29 +1,39 @@
 """The task of a search over designs of a vehicle: objectives, free parameters, limits and shapes."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Generic, final
+from typing import Any, Generic, NamedTuple, final
 
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import Ride, stationary_notes
-from jaxdamp.tune.limits import Limit, LimitRange, limit_ranges, scaled
-from jaxdamp.tune.measuring import Measurement
-from jaxdamp.tune.objective import Function, objective_of
-from jaxdamp.tune.range_notes import range_notes
+from jaxdamp.simulation import stationary_notes
+from jaxdamp.solve import Evaluation, Region
+from jaxdamp.tune.limits import Limit, LimitRange, limit_ends, limit_ranges, scaled
+from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
+from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import V
-from jaxdamp.tune.scenario_ride import ScenarioRide
+from jaxdamp.tune.run_notes import range_notes, rides_on, step_notes
 from jaxdamp.tune.scenarios import Road, Scenarios
-from jaxdamp.tune.searching import tolerance_of
-from jaxdamp.tune.shape import Shape, ShapeNumbers
-from jaxdamp.tune.step_notes import step_notes
-from jaxdamp.tune.targets import Targets
+from jaxdamp.tune.settings import LEAST, RUN
+from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
+
+
+class Tolerance(NamedTuple):
+    """Tolerances: the scaled gradient at an optimum, the relative distance to a limit, rounding of an objective."""
+
+    slope: float
+    limit: float
+    rounding: float
+
+
+DOUBLE, SINGLE = Tolerance(1e-4, 1e-6, 1e-13), Tolerance(1e-2, 1e-4, 1e-6)
 
 
 @final
@@ -35,7 +45,7 @@ class DesignTask(Generic[V]):
         vehicle: to start from.
         road: as in `minimise`.
         argument: name of the objectives in messages.
-        over: as in `minimise`; the further arguments too.
+        settings: all of them, as in `minimise`.
 
     Attributes:
         objective: all objectives, with their metrics.
@@ -44,7 +54,7 @@ class DesignTask(Generic[V]):
         names: of all numbers that the search computes.
         allowed: the range of each limited metric, as it is written.
         units: of the metrics.
-        run: duration [s] and step [s].
+        run: duration, step and engine.
         tolerance: that the precision of the vehicle permits.
     """
 
@@ -55,49 +65,35 @@ class DesignTask(Generic[V]):
         road: Road | Scenarios,
         *,
         argument: str,
-        over: Sequence[str] | Mapping[str, Any] | None,
-        freeze: Sequence[str],
-        bounds: Mapping[str, Any] | None,
-        tie: Mapping[str, str] | None,
-        limits: Mapping[Any, Any] | None,
-        shape: Sequence[Shape] | Shape,
-        metrics: Sequence[str | Metric],
-        duration: float | None,
-        dt: float,
+        settings: Mapping[str, Any],
     ) -> None:
-        self.vehicle, self.road, self.run, self._argument = vehicle, road, (duration, dt), argument
-        known = [m.name for m in (*vehicle.ride_metrics, *(m for m in metrics if isinstance(m, Metric)))]
+        self.vehicle, self.road, self._argument = vehicle, road, argument
+        self.run = {name: settings[name] for name in RUN}
+        metrics, white = settings["metrics"], is_white(road)
+        further = [m.name for m in metrics if isinstance(m, Metric)]
+        known = [*(m.name for m in vehicle.ride_metrics), *further]
+        objectives = [
+            one if one in further else goal_objective(one, vehicle, white=white, argument=argument)
+            for one in objectives
+        ]
+        limits = goal_limits(settings["limits"], vehicle, white=white, known=further)
         self.allowed = limit_ranges(limits, known)
         limited = [metric for metric in limits or {} if isinstance(metric, Metric)]
-        targets = [one for one in objectives if isinstance(one, Targets)]
-        of_targets = [metric for one in targets for metric in one.metrics]
-        for name in (name for one in targets for name in one.values):
-            with_targets = [*known, *(metric.name for metric in (*limited, *of_targets))]
-            _checks.one_of("targets", current_name(name, known), with_targets)
-        more, white = [*metrics, *limited, *of_targets], is_white(road)
+        of_targets = _metrics_of_targets(objectives, known, limited)
+        more = [*metrics, *limited, *of_targets]
         self.objective = objective_of(objectives, vehicle, more, list(self.allowed), white=white, argument=argument)
         _refuse_negative(self.allowed, self.objective.metrics)
-        self.space = search_range(vehicle, over, freeze, bounds, tie)
-        self.tolerance = tolerance_of(self.space.free)
-        shapes = [shape] if isinstance(shape, Shape) else shape
-        if not isinstance(shapes, Sequence) or isinstance(shapes, str):
-            remedy = "Write `shape=[tune.monotone(), tune.slope(upper=5000.0)]`."
-            _checks.refuse("shape", "be a constraint of `tune`, or a list", _checks.described(shapes), remedy)
-        self._curves = ShapeNumbers(vehicle, shapes)
+        self.space = search_range(vehicle, *(settings[name] for name in ("over", "freeze", "bounds", "tie")))
+        self.tolerance = DOUBLE if self.space.free.values.dtype == np.float64 else SINGLE
         self.measured = Measurement(
-            vehicle, road, self.objective, self.space.free, each=list(self.allowed), duration=duration, dt=dt
-        )
-        self.names = [*self.measured.names, *self._curves.names]
-        self.units = self.objective.units(vehicle)
+            vehicle, road, self.objective, self.space.free,
+            each=list(self.allowed), curves=ShapeNumbers.of(vehicle, settings["shape"]), run=self.run,
+        )  # fmt: skip
+        self.names, self.units = self.measured.names, self.objective.units(vehicle)
 
-    def numbers(self, ride: Ride | ScenarioRide, vehicle: AbstractVehicle) -> dict[str, Scalar]:
-        """The metrics by a ride of `measured`, and the numbers of curves, of a vehicle."""
-        return {**self.measured.by(ride, vehicle), **self._curves(vehicle)}
-
-    @property
-    def limited_names(self) -> list[str]:
-        """The names of the numbers that have limits."""
-        return [*(entry for name in self.allowed for entry in self.measured.entries(name)), *self._curves.names]
+    def numbers(self, values: np.ndarray) -> dict[str, float]:
+        """Numbers of one design by name."""
+        return dict(zip(self.names, map(float, values), strict=True))
 
     def limits(self, before: Mapping[str, float]) -> list[Limit]:
         """All limits, in every scenario, their distances scaled by the numbers of the start.
@@ -116,32 +112,104 @@ class DesignTask(Generic[V]):
             for entry in self.measured.entries(name):
                 span = allowed.at(before[entry])
                 of_metrics.append(Limit(entry, name, *span, scaled(*span, before[entry]), self.units[name]))
-        return of_metrics + self._curves.limits(before)
+        return of_metrics + self.measured.curves.limits(before)
 
     def shown_limits(self, before: Mapping[str, float]) -> dict[str, float | tuple[float, float]]:
         """The limits of metrics as they are shown: the largest value, or the smallest and the largest one."""
         spans = {name: allowed.at(before[name]) for name, allowed in self.allowed.items()}
         return {name: span[1] if np.isinf(span[0]) else span for name, span in spans.items()}
 
-    def refuse_constant(self, before: Mapping[str, float], slopes: Mapping[str, np.ndarray]) -> None:
+    def refuse_constant(self, start: Evaluation) -> None:
         """Refuse objectives that do not depend on what is free."""
-        if not any(np.any(slopes[name]) for name in self.objective.names):
+        if not start.slopes[: len(self.objective.names)].any():
+            before = self.numbers(start.values)
             values = ", ".join(f"{name} = {before[name]:.4g}" for name in self.objective.names)
             remedy = "Free a parameter that it depends on, or take a road on which it does."
             _checks.refuse(self._argument, "depend on what is free", f"{values} whatever they are", remedy)
 
     def notes_on_runs(self, design: AbstractVehicle) -> tuple[list[str], list[str]]:
         """Notes on the step and on the fitted ranges for a design, on every road; and the dampers far outside."""
-        rides, far = list(self.measured.rides_of()), []
-        road = rides[0](design).road if self.measured.white else None
+        rides, far, white = rides_on(self.road, self.objective.metrics, self.run), [], is_white(self.road)
+        road = rides[0](design).road if white else None
         notes = stationary_notes(design, road) if isinstance(road, WhiteRoad) else []
         for ride_of in rides:
-            coarse = [] if self.measured.white else step_notes(self.vehicle, design, ride_of)
+            coarse = [] if white else step_notes(self.vehicle, design, ride_of)
             notes += coarse
             if not any("does not bear" in note for note in coarse):
                 ranges, outside = range_notes(self.vehicle, design, ride_of)
                 notes, far = notes + ranges, far + outside
         return notes, list(dict.fromkeys(far))
+
+
+@final
+class Evaluator:
+    """The rows that a search follows, at points given by their coordinates: objectives, then ends of limits.
+
+    Arguments:
+        task: with the metrics and the free parameters.
+        lanes: points simulated side by side.
+
+    Attributes:
+        program: that computes the numbers.
+    """
+
+    def __init__(self, task: DesignTask[Any], lanes: int) -> None:
+        self.task, self.program = task, BatchProgram(task.measured, task.space.free, lanes)
+        self._signed = [(name, 1.0) for name in task.objective.names]
+
+    def at(self, points: Float[np.ndarray, "points free"]) -> list[Evaluation]:
+        """Numbers, rows and derivatives of the rows by the coordinates."""
+        return self.rows_of(self.computed(points))
+
+    def computed(self, points: Float[np.ndarray, "points free"]) -> Computed:
+        """Numbers, and derivatives by the coordinates."""
+        space = self.task.space
+        values, slopes = self.program.at(np.clip(points * space.unit, space.lower, space.upper))
+        return Computed(values, slopes * space.unit)
+
+    def rows_of(self, computed: Computed) -> list[Evaluation]:
+        """The rows among what was computed."""
+        signs = np.array([sign for _, sign in self._signed])
+        of_values = [self.task.names.index(name) for name, _ in self._signed]
+        of_slopes = [self.program.differentiated.index(name) for name, _ in self._signed]
+        rows, slopes = signs * computed.values[:, of_values], signs[:, None] * computed.slopes[:, of_slopes]
+        return [Evaluation(*one) for one in zip(computed.values, rows, slopes, strict=True)]
+
+    def only_rows(self, points: Float[np.ndarray, "points free"]) -> Float[np.ndarray, "points rows"]:
+        """The rows, without derivatives."""
+        values = self.program.values(points * self.task.space.unit)
+        return np.stack([sign * values[:, self.task.names.index(name)] for name, sign in self._signed], axis=1)
+
+    def begin(self, points: Float[np.ndarray, "points free"]) -> tuple[list[Evaluation], list[Limit]]:
+        """Evaluations of the starts, the first of which is the vehicle's, and the limits, which are followed from here.
+
+        Starts without finite numbers are left out, but for the first.
+        """
+        computed = self.computed(points)
+        limits = self.task.limits(self.task.numbers(computed.values[0]))
+        self._signed += [(end.name, end.sign) for end in limit_ends(limits)]
+        return self.rows_of(computed), limits
+
+    @property
+    def region(self) -> Region:
+        """Where the coordinates may be."""
+        space = self.task.space
+        return Region(space.lower / space.unit, space.upper / space.unit, *space.coordinates.order())
+
+    def vehicle(self, design: np.ndarray) -> Any:
+        """The vehicle of a design."""
+        free = self.task.space.free
+        return free.build(jnp.asarray(design, free.values.dtype))
+
+
+def _metrics_of_targets(objectives: Sequence[Any], known: Sequence[str], limited: Sequence[Metric]) -> list[Metric]:
+    """The metrics that targets are given for, after a check of their names."""
+    targets = [one for one in objectives if isinstance(one, Targets)]
+    of_targets = [metric for one in targets for metric in one.metrics]
+    for name in (name for one in targets for name in one.values):
+        with_targets = [*known, *(metric.name for metric in (*limited, *of_targets))]
+        _checks.one_of("targets", current_name(name, known), with_targets)
+    return of_targets
 
 
 def _refuse_negative(allowed: Mapping[str, LimitRange], metrics: Sequence[Metric]) -> None:
@@ -152,25 +220,28 @@ def _refuse_negative(allowed: Mapping[str, LimitRange], metrics: Sequence[Metric
             _checks.refuse(f"limits[{metric.name!r}]", "not be negative, as the metric never is", upper)
 
 
-def is_white(road: Road | Scenarios) -> bool:
+def is_white(road: Any) -> bool:
     """Whether nothing is driven over."""
     return road.white if isinstance(road, Scenarios) else isinstance(road, WhiteRoad)
 
 
-def check_call(call: str, vehicle: Any, road: Any, counts: Mapping[str, tuple[int, int]]) -> None:
+def check_call(call: str, vehicle: Any, road: Any, counts: Mapping[str, Any]) -> None:
     """Refuse what is no vehicle or no road, and counts below their least value.
 
     Arguments:
         call: as it should be written, for messages.
         vehicle: the argument of this name.
         road: the argument of this name.
-        counts: value and least value by argument.
+        counts: value by argument; the others are not looked at.
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
     _checks.untraced("vehicle", vehicle, "Call it outside `jax.jit` and `jax.grad`; a `Ride` can be traced.")
     if not isinstance(road, Scenarios):
         check_module("road", road, (AbstractRoad, WhiteRoad), call)
-    for name, (count, least) in counts.items():
+    for name, least in LEAST.items():
+        if name not in counts:
+            continue
+        count = counts[name]
         if isinstance(count, bool) or not isinstance(count, int | np.integer):
             _checks.refuse(name, "be a whole number", repr(count), f"Write `{name}={max(least, 1)}`, or more.")
         if count < least:

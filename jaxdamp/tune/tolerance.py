@@ -1,14 +1,16 @@
 """What a scatter of parameters costs: the change of a metric on average, and its own scatter."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import Column, Table
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.parameters import match_paths
 from jaxdamp.tune.sensitivities import sensitivity
+from jaxdamp.tune.settings import RUN, Run, completed
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -34,14 +36,13 @@ class ToleranceEffect(NamedTuple):
         return f"A {100 * self.scatter:g} % scatter of {self.parameter} {cost} {100 * self.deviation:.2g} %."
 
 
+@of_known_numbers
 def tolerance_effects(
     metric: Any,
     vehicle: AbstractVehicle,
     road: Any,
     scatter: Mapping[str, float],
-    *,
-    duration: float | None = None,
-    dt: float = 1e-3,
+    **run: Unpack[Run],
 ) -> tuple[ToleranceEffect, ...]:
     """The effect of the scatter of each parameter on a metric, from its first and second derivatives.
 
@@ -53,8 +54,7 @@ def tolerance_effects(
         vehicle: with all parameters at their nominal values.
         road: as in `sensitivity`.
         scatter: standard deviation of each parameter relative to its value, by path, last part or pattern.
-        duration: as in `simulate`.
-        dt: as in `simulate`.
+        run: `duration`, `dt` and `engine`, as in `simulate` (see `Run`).
 
     Raises:
         ValueError: scatters that are not positive; what `sensitivity` refuses.
@@ -69,7 +69,7 @@ def tolerance_effects(
     if isinstance(metric, Sequence) and not isinstance(metric, str):
         remedy = "Call it once for each metric."
         _checks.refuse("metric", "be a single one", _checks.described(metric), remedy)
-    run: dict[str, Any] = {"duration": duration, "dt": dt}
+    completed("tolerance_effects", run, RUN)
     result = sensitivity(metric, vehicle, road, over=list(scatter), dampers=None, second_order=True, **run)
     ((name, value),) = result.values.items()
     assert result.hessian is not None

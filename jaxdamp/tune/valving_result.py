@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.dampers import MonoTube
@@ -72,7 +73,7 @@ class OutOfReach(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class ValvingResult:
+class ValvingResult(AbstractResult):
     """A mono-tube damper whose valving was chosen for a wanted force.
 
     Attributes:
@@ -116,10 +117,13 @@ class ValvingResult:
         verdict = "reached" if self.feasible else "not reached; this is the nearest force within the bounds"
         texts = [f"The target is {verdict}: error {self.rmse:.3g} N ({self.error_percent:.2g} %)."]
         texts += [f"{p.name} is {p.note}, {p.value:.4g} {p.unit}." for p in self.parameters if p.note]
-        texts += [part.sentence for part in self.out_of_reach]
-        if self.status is not Status.CONVERGED:
-            texts.append(self.status.sentence)
-        return " ".join(texts)
+        return " ".join([*texts, *self.warnings])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The parts of the target out of reach, and a search that did not end at an optimum."""
+        ended = () if self.status is Status.CONVERGED else (self.status.sentence,)
+        return (*(part.sentence for part in self.out_of_reach), *ended)
 
     def table(self) -> Table:
         """The chosen numbers with start, bounds and meaning."""
@@ -127,10 +131,9 @@ class ValvingResult:
         rows = ((p.name, p.unit, p.start, p.value, p.lower, p.upper, p.note, p.meaning) for p in self.parameters)
         return Table("Valving", tuple(map(Column, names)), tuple(rows))
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """The result as numbers with units and words, ready for JSON; the law is written by `export.to_json`."""
         return {
-            "summary": self.summary,
             "feasible": self.feasible,
             "rmse": with_unit(self.rmse, "N"),
             "error": with_unit(self.error_percent, "%"),

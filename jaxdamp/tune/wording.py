@@ -5,13 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jaxdamp._status import Status
+from jaxdamp.solve import Evaluation
+from jaxdamp.tune.descending import Ended
 from jaxdamp.tune.limits import Limit, LimitRange
-from jaxdamp.tune.objective import Objective
+from jaxdamp.tune.objective import Objective, exact_counterpart
 from jaxdamp.tune.ranges import FACTOR, SearchRange
-from jaxdamp.tune.result import Change
-from jaxdamp.tune.searching import Ended
-from jaxdamp.tune.smooth import exact_counterpart
-from jaxdamp.tune.starts import Attempt
+from jaxdamp.tune.result import Attempt, Change
 
 
 _ROUNDING = 1e-12  # of a metric, by which its derivative times the parameter counts as zero
@@ -152,25 +151,19 @@ def workshop_notes(space: SearchRange) -> list[str]:
     return [f"No workshop can change {', '.join(fixed)}: what was tuned cannot be built as it is."] if fixed else []
 
 
-def without_effect(
-    names: Sequence[str],
-    values: Sequence[np.ndarray],
-    metric: str,
-    sides: Sequence[tuple[Mapping[str, float], Mapping[str, np.ndarray]]],
-) -> tuple[str, ...]:
+def without_effect(space: SearchRange, sides: tuple[Evaluation, Evaluation], ended: np.ndarray) -> tuple[str, ...]:
     """The parameters by which the derivative of the metric is zero at the start and at the end, but for rounding.
 
     Arguments:
-        names: of the parameters.
-        values: of the parameters on both sides.
-        metric: what is minimised.
-        sides: metrics and their derivatives at the start and at the end.
+        space: the free parameters.
+        sides: metric and derivatives at the start and at the end.
+        ended: the values at the end.
     """
-    idle = np.ones(len(names), bool)
-    for at, (numbers, slopes) in zip(values, sides, strict=True):
-        rounded = np.abs(slopes[metric] * at) <= _ROUNDING * abs(numbers[metric])
-        idle &= (slopes[metric] == 0.0) | (rounded & (at != 0.0))
-    return tuple(name for name, none in zip(names, idle, strict=True) if none)
+    idle = np.ones(len(ended), bool)
+    for at, (_, rows, slopes) in zip((space.start, ended), sides, strict=True):
+        rounded = np.abs(slopes[0] * at / space.unit) <= _ROUNDING * abs(rows[0])
+        idle &= (slopes[0] == 0.0) | (rounded & (at != 0.0))
+    return tuple(name for name, none in zip(space.free.names, idle, strict=True) if none)
 
 
 def effect_notes(idle: Sequence[str], metric: str) -> list[str]:

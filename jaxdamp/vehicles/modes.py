@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True)
-class Modes:
+class Modes(AbstractResult):
     """Natural modes, lowest frequency first; prints as a table.
 
     Attributes:
@@ -74,7 +75,7 @@ class Modes:
             "Modes", columns, tuple((*plain(row), words) for row, words in zip(numbers, amplitudes, strict=True))
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """Frequencies, damping ratios and shapes with units, ready for JSON; complex shapes as magnitude and phase."""
         magnitude, phase = np.abs(self.damped_shapes), np.angle(self.damped_shapes)
         return {
@@ -87,6 +88,19 @@ class Modes:
             "damped_shapes": {"magnitude": plain(magnitude), "phase": with_unit(phase, "rad")},
             "decays": with_unit(self.decays, "1/s"),
         }
+
+    @property
+    def summary(self) -> str:
+        """Frequencies and damping ratios of the oscillations."""
+        each = zip(self.frequency, self.damping_ratio, strict=True)
+        return "Oscillations: " + (", ".join(f"{f:.3g} Hz (damping ratio {d:.2g})" for f, d in each) or "none") + "."
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Motions that grow."""
+        growing = [f"{f:.3g} Hz" for f, pole in zip(self.frequency, self.poles, strict=True) if pole.real > 0.0]
+        growing += [f"{pole:.3g} 1/s" for pole in self.decays if pole > 0.0]
+        return (f"Unstable: motion grows at {', '.join(growing)}.",) * bool(growing)
 
     def __str__(self) -> str:
         undamped = ", ".join(f"{f:.6g}" for f in self.undamped_frequency)

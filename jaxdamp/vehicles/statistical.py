@@ -83,21 +83,14 @@ def statistical_laws(
         on_road: whether each port is between a wheel and the road, where the rate contains the white noise.
         lifts: whether it is the lift-off of a tyre: linear in its rate.
     """
-    arrays, rest = eqx.partition((system, velocity_psd, delays), eqx.is_array)
+    arrays, static = eqx.partition((system, velocity_psd, delays), eqx.is_array)
     parts = [_side_by_side(law) for law in system.laws]
     owners = tuple(port for port, laws in enumerate(parts) for _ in laws)
     laws = [law for of_port in parts for law in of_port]
-    curved = []
-    for law, port in zip(laws, owners, strict=True):
-        found = nonlinear_variables(law)
-        if on_road[port] and found[:1] == (0,):
-            if not lifts[port]:
-                raise NoiseAtLaw(port)
-            found = found[1:]
-        curved.append(found)
+    curved = [_curved(law, port, on_road[port], lifts[port]) for law, port in zip(laws, owners, strict=True)]
 
     def settings(arrays: Any) -> tuple[System, list[_Kind], Scalar, Array]:
-        system, psd, delays = eqx.combine(arrays, rest)
+        system, psd, delays = eqx.combine(arrays, static)
         return system, _kinds([law for law in system.laws for law in _side_by_side(law)], curved, psd), psd, delays
 
     kinds = settings(arrays)[1]
@@ -114,6 +107,16 @@ def statistical_laws(
 
     solution, found = _fixed_point(again, jax.lax.stop_gradient(start), arrays)
     return _nearest(kinds, unravel(solution), owners), found
+
+
+def _curved(law: AbstractDamper, port: int, on_road: bool, lifts: bool) -> tuple[int, ...]:
+    """Numbers of the variables in which a law is curved; not the rate of a tyre that contains the white noise."""
+    curved = nonlinear_variables(law)
+    if not on_road or curved[:1] != (0,):
+        return curved
+    if not lifts:
+        raise NoiseAtLaw(port)
+    return curved[1:]
 
 
 class NoiseAtLaw(Exception):

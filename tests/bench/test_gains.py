@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from jaxdamp.bench import read
-from jaxdamp.bench.gains import gain_conversion
+from jaxdamp.bench.units import gain_conversion
 
 
 @pytest.mark.parametrize(

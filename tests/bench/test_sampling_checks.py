@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from jaxdamp.bench.sampling import check_order, check_time
+from jaxdamp.bench.clock import check_order, check_time
 
 
 T = np.arange(200) / 300

@@ -5,7 +5,7 @@ import pytest
 
 from jaxdamp import identify
 from jaxdamp.bench import RandomTest, evaluate, preflight, read
-from jaxdamp.bench.integration import integrate_velocity
+from jaxdamp.bench.velocity import integrate_velocity
 from jaxdamp.dampers import Linear, Spring
 
 

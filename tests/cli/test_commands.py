@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from jaxdamp import bench, identify
 from jaxdamp.bench import BenchSet
 from jaxdamp.cli import app
-from jaxdamp.cli.options import law_names, split
+from jaxdamp.cli.records import law_names, split
 from jaxdamp.cli.vehicle_words import presets
 from jaxdamp.dampers import Bilinear, Linear
 from jaxdamp.export import from_json, to_json

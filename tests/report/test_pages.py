@@ -77,7 +77,7 @@ def test_a_page_on_fits_beside_a_baseline(comparison: Comparison) -> None:
     found = bench.preflight(comparison.best.result.runs)
     page = fit_report(comparison, baseline=stiffer, preflight=found)
     html = page.to_html()
-    assert not page.attempts.troubles and f"<p>{found.summary()}.</p>" in html
+    assert not page.attempts.troubles and f"<p>{found.summary}.</p>" in html
     (run,) = comparison.held_out
     share = np.sqrt(np.mean(run.force**2))  # the error of twice the force is the force
     rmse = float(re.findall(r"Baseline on the same records: RMSE ([\d.]+) N", html)[0])
@@ -107,7 +107,7 @@ def test_a_page_on_the_whole_chain(comparison: Comparison, rides: dict[str, Resp
     html = page.to_html()
     assert not page.attempts.troubles
     verdict = html.partition('<div class="verdict">')[2].partition("</div>")[0]
-    for sentence in (found.summary(), *comparison.verdict, *ride_verdict(rides), tuned.summary.replace(">", "&gt;")):
+    for sentence in (found.summary, *comparison.verdict, *ride_verdict(rides), tuned.summary.replace(">", "&gt;")):
         assert sentence in verdict
     sections = re.findall(r'<h2 id="\d+">(.*?)</h2>', html)
     assert sections == [

@@ -138,7 +138,7 @@ def test_ride_means_the_same_and_follows_axles_that_move():
 def test_a_tuning_follows_axles_that_move():
     free = free_parameters(HALF, over=["rear_distance"])
     objective = objective_of([NAMES[0]], HALF, NAMES[1:], [], white=False)
-    measured = Measurement(HALF, GROUND, objective, free, duration=0.5, dt=0.002)
+    measured = Measurement(HALF, GROUND, objective, free, run={"duration": 0.5, "dt": 0.002})
     moved = free.build(jnp.array([2.4]))
     expected = simulate(moved, GROUND, duration=0.5, dt=0.002).metrics(NAMES)
     values = measured(moved)

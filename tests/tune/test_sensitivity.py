@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import Ride, bench, dampers, identify, parameters, plots, roads, tune, vehicles
-from jaxdamp.tune.hats import ForceHats, with_hats
-from jaxdamp.tune.sensitivities import sensitivity
+from jaxdamp.tune.sensitivities import ForceHats, sensitivity, with_hats
 
 
 METRICS = ["rms_sprung_acceleration", "rms_dynamic_tyre_load"]

@@ -8,10 +8,9 @@ import pytest
 
 from jaxdamp import Ride, dampers, metrics, parameters, roads, tune, vehicles
 from jaxdamp.metrics import Metric
-from jaxdamp.tune import smooth as smooth_metrics
-from jaxdamp.tune.ranges import search_range
+from jaxdamp.tune import objective as smooth_metrics
+from jaxdamp.tune.ranges import search_range, start_points
 from jaxdamp.tune.shape import held_force
-from jaxdamp.tune.starts import start_points
 
 
 def exact_counterpart(metric: Metric) -> Any:

@@ -1,5 +1,6 @@
 """The assembled vehicle: matrices and channels by hand, and kinds that no name decides."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -86,6 +87,8 @@ def test_a_channel_is_computed_alone_and_once(monkeypatch):
     other = simulate(CAR, tracks(bumps([0.02], 101)))
     traced = jax.jit(lambda: 2.0 * other["stroke"])()
     np.testing.assert_array_equal(traced, 2.0 * other["stroke"])  # nothing traced was remembered
+    scaled = eqx.tree_at(lambda response: response.motion, run, 2.0 * run.motion)
+    np.testing.assert_allclose(scaled["stroke"], 2.0 * run["stroke"])  # nor what belongs to another response
 
 
 def test_what_is_remembered_compiles_nothing_again():

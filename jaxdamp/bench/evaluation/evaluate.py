@@ -8,13 +8,13 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, percent_change, plain
 from jaxdamp.bench.analysis import FoldedCycles, as_records, fold_cycles
 from jaxdamp.bench.contradictions import same_motion
 from jaxdamp.bench.evaluation import curve
 from jaxdamp.bench.evaluation.limits import Limit, LimitCheck
-from jaxdamp.bench.evaluation.measurements import Measurement, measured
-from jaxdamp.bench.evaluation.record import record_measurements
+from jaxdamp.bench.evaluation.measurements import Measurement, at_velocity, measured, record_measurements
 from jaxdamp.bench.evaluation.separation import GasAndFriction, separate_gas_and_friction
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.settings import by_number, settings_apart
@@ -33,7 +33,7 @@ TABLES = {"peak_forces": (*_PEAKS, *_MIDDLE), "loops": _LOOPS}
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Evaluation:
+class Evaluation(AbstractResult):
     """What records say of a damper at one setting or several.
 
     Attributes:
@@ -55,6 +55,16 @@ class Evaluation:
     notes: tuple[str, ...] = ()
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """`notes`: what could not be evaluated, and why."""
+        return self.notes
+
+    @property
+    def summary(self) -> str:
+        """Numbers of records and of settings."""
+        return f"{len(self.runs)} records at {len(self.settings)} settings, forces by {self.method}."
+
+    @property
     def runs(self) -> tuple[BenchRun, ...]:
         """The records evaluated."""
         return tuple(run for runs in self.settings.values() for run in runs)
@@ -69,22 +79,20 @@ class Evaluation:
         Raises:
             ValueError: none fits, or several do.
         """
-        found = [
+        fitting = [
             m
             for m in self.measurements
             if m.quantity == quantity
-            and (setting is None or m.setting == setting)
-            and (record is None or m.record == record)
-            and (
-                m.velocity is None if velocity is None else m.velocity is not None and np.isclose(m.velocity, velocity)
-            )
+            and setting in (None, m.setting)
+            and record in (None, m.record)
+            and at_velocity(m, velocity)
         ]
-        if not found:
+        if not fitting:
             _checks.one_of("quantity", quantity, dict.fromkeys(m.quantity for m in self.measurements))
-        if len(found) != 1:
+        if len(fitting) != 1:
             asked = f"{quantity!r}, setting {setting!r}, record {record!r}, velocity {velocity!r}"
-            _checks.refuse("quantity", "name one measurement", f"{asked}, of which there are {len(found)}")
-        return found[0]
+            _checks.refuse("quantity", "name one measurement", f"{asked}, of which there are {len(fitting)}")
+        return fitting[0]
 
     def table(self) -> Table:
         """Forces at the stated velocities, and their ratio, a column for each setting."""
@@ -95,23 +103,22 @@ class Evaluation:
 
     def settings_table(self) -> Table:
         """Gas force, friction, rates and knees, a column for each setting."""
-        own = [m.quantity for m in self.measurements if m.quantity not in {q for t in TABLES.values() for q in t}]
-        return self._by_setting("Gas force, friction and rates", [(q, q, None) for q in dict.fromkeys(own)])
+        of_records = {quantity for quantities in TABLES.values() for quantity in quantities}
+        others = dict.fromkeys(m.quantity for m in self.measurements if m.quantity not in of_records)
+        return self._by_setting("Gas force, friction and rates", [(name, name, None) for name in others])
 
     def _by_setting(self, title: str, rows: Sequence[tuple[str, str, float | None]]) -> Table:
         """Quantities (name, quantity, velocity) with a column for each setting and the change over them."""
-        found = {
-            (m.quantity, m.velocity, m.setting): m for m in self.measurements if m.velocity is not None or m.record
-        }
+        chosen = [m for m in self.measurements if m.velocity is not None or m.record]
+        cells = {(m.quantity, m.velocity, m.setting): m.cell for m in chosen}
+        units = {m.quantity: m.unit for m in self.measurements}
         compared = []
         for name, quantity, velocity in rows:
-            here = [found.get((quantity, velocity, setting)) for setting in self.settings]
-            values = [m.cell if m else None for m in here]
+            values = [cells.get((quantity, velocity, setting)) for setting in self.settings]
             numbers = [value for value in values if isinstance(value, float)]
-            change = percent_change(numbers[0], numbers[-1]) if len(numbers) == len(here) else None
-            unit = next((m.unit for m in here if m), "")
+            change = percent_change(numbers[0], numbers[-1]) if len(numbers) == len(values) else None
             if numbers:
-                compared.append(Compared(name, unit, values, change))
+                compared.append(Compared(name, units[quantity], values, change))
         return comparison_table(title, "quantity", [name or "value" for name in self.settings], compared)
 
     def tables(self) -> dict[str, Table]:
@@ -125,7 +132,7 @@ class Evaluation:
     def _records_table(self, title: str, quantities: Sequence[str]) -> Table:
         """A row for each record, a column for each quantity, with the scatter over cycles."""
         several = len(self.settings) > 1
-        found = {(m.record, m.quantity): m for m in self.measurements if m.record and m.velocity is None}
+        measurements = {(m.record, m.quantity): m for m in self.measurements if m.record and m.velocity is None}
         units = {m.quantity: m.unit for m in self.measurements}
         columns = [Column("record"), *([Column("setting")] if several else []), Column("cycles", spec="d")]
         columns += [Column(quantity, units[quantity]) for quantity in quantities]
@@ -133,7 +140,7 @@ class Evaluation:
         for setting, runs in self.settings.items():
             for run in runs:
                 start: tuple[Cell, ...] = (run.name, setting) if several else (run.name,)
-                cells = tuple(found[run.name, quantity].cell for quantity in quantities)
+                cells = tuple(measurements[run.name, quantity].cell for quantity in quantities)
                 rows.append((*start, len(self.cycles[run.name].periods), *cells))
         return Table(f"{title}, mean ± scatter over cycles", tuple(columns), tuple(rows))
 
@@ -164,7 +171,7 @@ class Evaluation:
         """Which measurements lie within limits; see `bench.read_limits`."""
         return LimitCheck.of(self.measurements, limits)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """All measurements as plain data."""
         return {"method": self.method, "notes": list(self.notes), "measurements": plain(self._list().records())}
 
@@ -212,52 +219,87 @@ def evaluate(
     >>> print(f"{ratio.value:.2f}")
     2.17
     """
-    if method is not None:
-        _checks.one_of("method", method, curve.METHODS)
-    _checks.positive("window", window)
-    for velocity in velocities or ():
-        _checks.positive("velocities", velocity, "The direction is in the quantity.")
+    _check_options(velocities, method, window)
     chosen = as_records(runs, "evaluate(runs)")
-    whole = [run for run in chosen if run.cycles]
-    notes = [f"{run.name} has no full cycle: it is not evaluated." for run in chosen if not run.cycles]
-    notes += [
-        f"{run.name}: the stroke was integrated from the velocity, so that forces at mid-stroke and gas force belong "
-        "to the middle of the motion, wherever in the damper that is."
-        for run in whole
-        if run.stroke_is_integrated
-    ]
-    if not whole:
+    cyclic = [run for run in chosen if run.cycles]
+    if not cyclic:
         _checks.refuse("runs", "hold a record with a full cycle", ", ".join(run.name for run in chosen))
-    if by is None and all(run.command is None for run in whole):
-        apart, sentence = settings_apart(whole)
-        notes, by = [sentence, *notes] if sentence else notes, (lambda run: apart[run.name]) if apart else None
-        whole = sorted(whole, key=lambda run: by_number(apart[run.name])) if apart else whole
-    settings: dict[str, tuple[BenchRun, ...]] = {}
-    for run in sorted(whole, key=_command) if by is None else whole:
-        name = _setting(run, by)
-        settings[name] = (*settings.get(name, ()), run)
-    cycles = {run.name: fold_cycles(run) for run in whole}
-    if method is None:
-        method = "interpolation" if all(_several_velocities(group) for group in settings.values()) else "loop"
-    found: list[Measurement] = []
+    settings, notes = _by_settings(cyclic, by)
+    notes += _notes(chosen)
+    cycles = {run.name: fold_cycles(run) for run in cyclic}
+    method = _usual_method(settings) if method is None else method
+    measurements: list[Measurement] = []
     gas: dict[str, GasAndFriction] = {}
     for name, group in settings.items():
-        own = [m for run in group for m in record_measurements(cycles[run.name], name, run.name)]
-        peaks = {direction: _peak_forces(group, own, direction) for direction in curve.DIRECTIONS}
-        fastest = max(group, key=lambda run: run.peak_velocity)
         slowest = min(group, key=lambda run: run.peak_velocity)
-        found += own
-        found += _at_velocities(velocities, peaks, cycles[fastest.name], name, method, window)
-        found += curve.rates_and_knees(cycles[fastest.name], name, fastest.name)
+        measurements += _of_setting(name, group, cycles, velocities, method, window)
         try:
             gas[name] = separate_gas_and_friction(slowest)
         except ArgumentError as error:
             notes.append(f"Gas force and friction were not separated. {error}")
         else:
-            found += [replace(m, setting=name) for m in gas[name].measurements if np.isfinite(m.value)]
+            measurements += [replace(m, setting=name) for m in gas[name].measurements if np.isfinite(m.value)]
             notes += [f"{slowest.name}: {gas[name].note}"] if gas[name].note else []
-    stated = tuple(sorted({m.velocity for m in found if m.velocity is not None}))
-    return Evaluation(tuple(found), settings, cycles, gas, stated, method, tuple(notes))
+    stated = tuple(sorted({m.velocity for m in measurements if m.velocity is not None}))
+    return Evaluation(tuple(measurements), settings, cycles, gas, stated, method, tuple(notes))
+
+
+def _check_options(velocities: Sequence[float] | None, method: str | None, window: float) -> None:
+    if method is not None:
+        _checks.one_of("method", method, curve.METHODS)
+    _checks.positive("window", window)
+    for velocity in velocities or ():
+        _checks.positive("velocities", velocity, "The direction is in the quantity.")
+
+
+def _usual_method(settings: Mapping[str, Sequence[BenchRun]]) -> str:
+    """Interpolation where every setting has motions of different peak velocity, the loop elsewhere."""
+    return "interpolation" if all(len(_repeats(runs)) > 1 for runs in settings.values()) else "loop"
+
+
+def _of_setting(
+    name: str,
+    runs: Sequence[BenchRun],
+    cycles: Mapping[str, FoldedCycles],
+    velocities: Sequence[float] | None,
+    method: str,
+    window: float,
+) -> list[Measurement]:
+    """The figures of the records at one setting, its forces at the stated velocities, its rates and knees."""
+    of_records = [m for run in runs for m in record_measurements(cycles[run.name], name, run.name)]
+    peaks = {direction: _peak_forces(runs, of_records, direction) for direction in curve.DIRECTIONS}
+    fastest = max(runs, key=lambda run: run.peak_velocity).name
+    at_velocities = _at_velocities(velocities, peaks, cycles[fastest], name, method, window)
+    return [*of_records, *at_velocities, *curve.rates_and_knees(cycles[fastest], name, fastest)]
+
+
+def _notes(runs: Sequence[BenchRun]) -> list[str]:
+    """What is not evaluated, and what belongs to no place in the damper."""
+    return [f"{run.name} has no full cycle: it is not evaluated." for run in runs if not run.cycles] + [
+        f"{run.name}: the stroke was integrated from the velocity, so that forces at mid-stroke and gas force belong "
+        "to the middle of the motion, wherever in the damper that is."
+        for run in runs
+        if run.cycles and run.stroke_is_integrated
+    ]
+
+
+def _by_settings(
+    runs: Sequence[BenchRun], by: Callable[[BenchRun], Any] | None
+) -> tuple[dict[str, tuple[BenchRun, ...]], list[str]]:
+    """The records of each setting, and a sentence where they are told apart by what they state or by their names."""
+    notes: list[str] = []
+    if by is None and all(run.command is None for run in runs):
+        apart, sentence = settings_apart(runs)
+        notes += [sentence] if sentence else []
+        if apart:
+            runs, by = sorted(runs, key=lambda run: by_number(apart[run.name])), lambda run: apart[run.name]
+    if by is None:
+        runs = sorted(runs, key=_command)
+    settings: dict[str, tuple[BenchRun, ...]] = {}
+    for run in runs:
+        name = _setting(run, by)
+        settings[name] = (*settings.get(name, ()), run)
+    return settings, notes
 
 
 def _setting(run: BenchRun, by: Callable[[BenchRun], Any] | None) -> str:
@@ -283,13 +325,9 @@ def _repeats(runs: Sequence[BenchRun]) -> list[list[BenchRun]]:
     return groups
 
 
-def _several_velocities(runs: Sequence[BenchRun]) -> bool:
-    return len(_repeats(runs)) > 1
-
-
-def _peak_forces(runs: Sequence[BenchRun], own: Sequence[Measurement], direction: str) -> list[curve.PeakForce]:
+def _peak_forces(runs: Sequence[BenchRun], of_records: Sequence[Measurement], direction: str) -> list[curve.PeakForce]:
     """Force at the peak velocity of a direction, one for each motion: repeated records are averaged."""
-    by = {(m.record, m.quantity): m for m in own}
+    by = {(m.record, m.quantity): m for m in of_records}
     peaks = []
     for group in _repeats(runs):
         velocity = np.array([abs(by[run.name, f"{direction} velocity"].value) for run in group])
@@ -314,7 +352,7 @@ def _at_velocities(
     window: float,
 ) -> list[Measurement]:
     """Forces and their ratio at the stated velocities; without any stated, at those that the records reach."""
-    found = []
+    measurements = []
     for velocity in curve.OEM_VELOCITIES if velocities is None else velocities:
         forces = {}
         for direction, sign in curve.DIRECTIONS.items():
@@ -328,9 +366,9 @@ def _at_velocities(
         if velocities is None and not np.isfinite(values).any():
             continue
         more = {"setting": setting, "velocity": float(velocity)}
-        found += [Measurement(f"{name} force", "N", *force, **more) for name, force in forces.items()]
-        found.append(Measurement("rebound/compression ratio", "", *_ratio(*forces.values()), **more))
-    return found
+        measurements += [Measurement(f"{name} force", "N", *force, **more) for name, force in forces.items()]
+        measurements.append(Measurement("rebound/compression ratio", "", *_ratio(*forces.values()), **more))
+    return measurements
 
 
 def _ratio(
@@ -340,6 +378,6 @@ def _ratio(
     if not other[0]:
         return float("nan"), None, 0
     value = abs(one[0] / other[0])
-    known = one[1] is not None and other[1] is not None and one[0] != 0.0
-    scatter = float(value * np.hypot((one[1] or 0.0) / one[0], (other[1] or 0.0) / other[0])) if known else None
+    has_scatter = one[1] is not None and other[1] is not None and one[0] != 0.0
+    scatter = float(value * np.hypot((one[1] or 0.0) / one[0], (other[1] or 0.0) / other[0])) if has_scatter else None
     return value, scatter, min(one[2], other[2])

@@ -6,14 +6,19 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._documents import read_text
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp.bench.evaluation.measurements import Measurement, at_velocity
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
 
 
 COLUMNS = ("quantity", "minimum", "maximum", "velocity", "setting", "record")
@@ -59,7 +64,7 @@ class Limit:
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class LimitCheck:
+class LimitCheck(AbstractResult):
     """Measurements beside their limits.
 
     Attributes:
@@ -90,6 +95,23 @@ class LimitCheck:
         """Whether all limits are kept; one whose quantity was not measured is not."""
         return all(m is not None and limit.kept_by(m.value) for limit, m in self.results)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The limits that are not kept, or whose quantity was not measured."""
+        rows = (row for row in self.table().records() if row["verdict"] != "passed")
+        return tuple(f"{row['quantity']} of {row['record'] or row['setting']}: {row['verdict']}." for row in rows)
+
+    @property
+    def summary(self) -> str:
+        """How many limits are kept."""
+        return f"{len(self.results) - len(self.warnings)} of {len(self.results)} limits are kept."
+
+    def plot(self) -> "matplotlib.figure.Figure":
+        """Each measured value between its limits (`plots.limit_check`)."""
+        from jaxdamp import plots
+
+        return plots.limit_check(self)
+
     def table(self) -> Table:
         """A row for each limit and measurement, with the verdict."""
         columns = (Column("quantity"), Column("velocity", "m/s"), Column("setting"), Column("record"), Column("unit"))
@@ -102,7 +124,7 @@ class LimitCheck:
             rows.append((*start, m.unit if m else "", limit.minimum, m.cell if m else None, limit.maximum, verdict))
         return Table(f"Limits: {'all passed' if self.passed else 'not all passed'}", columns, tuple(rows))
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """Verdict and rows as plain data."""
         return {"passed": self.passed, "results": plain(self.table().records())}
 

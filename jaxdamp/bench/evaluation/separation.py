@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table
 from jaxdamp.bench.analysis import FoldedCycles, fold_cycles
 from jaxdamp.bench.evaluation.measurements import Measurement, measured
@@ -31,7 +32,7 @@ _BELOW = 0.5  # share of the change from straight lines to parabolas that an unc
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class GasAndFriction:
+class GasAndFriction(AbstractResult):
     """Gas force, its rate over the stroke, friction and bleed rates (damping at low speed) of one record.
 
     Attributes:
@@ -54,6 +55,16 @@ class GasAndFriction:
     record: str
     velocities: tuple[float, float]
     note: str = ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """`note`, if there is one."""
+        return (self.note,) if self.note else ()
+
+    @property
+    def summary(self) -> str:
+        """Gas force and friction."""
+        return f"{self.record}: gas force {self.gas_force:.1f} N, friction {self.friction:.1f} N."
 
     def _value(self, quantity: str) -> float:
         return next(m.value for m in self.measurements if m.quantity == quantity)
@@ -95,7 +106,7 @@ class GasAndFriction:
         columns = (Column("quantity"), Column("unit"), Column("value"), Column("uncertainty", spec=".2g"))
         return Table(title, (*columns, Column("cycles", spec="d")), rows)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """The figures as plain data."""
         return {"record": self.record, "note": self.note, **self.table().to_dict()}
 
@@ -186,14 +197,18 @@ def _fit(
     line, curve = orders[:2]
     ratio = (line.squares - curve.squares) / (2 * len(parts)) / max(curve.squares / max(curve.free, 1), 1e-300)
     best = 1 if curve.free > 0 and ratio > 1 + _CLEAR / np.sqrt(len(parts)) else 0
-    uncertain = {}
-    for name, column in (("gas force", 0), ("friction", 2)):
-        means = [float(fits.values[:, column].mean()) for fits in orders]
-        scatter = float(orders[best].values[:, column].std(ddof=1)) if len(parts) > 1 else 0.0
-        error = max(scatter, float(np.sqrt(np.mean(orders[best].errors[:, column] ** 2)))) / np.sqrt(len(parts))
-        below = _BELOW * (means[best] - means[0])
-        uncertain[name] = float(np.linalg.norm([_SAFE * error, _SAFE * (means[best + 1] - means[best]), below]))
+    uncertain = {name: _uncertainty(orders, best, column) for name, column in (("gas force", 0), ("friction", 2))}
     return orders[best].values, uncertain, ""
+
+
+def _uncertainty(orders: "Sequence[_Fits]", best: int, column: int) -> float:
+    """Of a figure: twice its standard error, twice what the next power changes, half of what the parabolas changed."""
+    count = len(orders[best].values)
+    means = [float(fits.values[:, column].mean()) for fits in orders]
+    scatter = float(orders[best].values[:, column].std(ddof=1)) if count > 1 else 0.0
+    error = max(scatter, float(np.sqrt(np.mean(orders[best].errors[:, column] ** 2)))) / np.sqrt(count)
+    below = _BELOW * (means[best] - means[0])
+    return float(np.linalg.norm([_SAFE * error, _SAFE * (means[best + 1] - means[best]), below]))
 
 
 def _columns(x: Samples, u: Samples, order: int) -> Float[np.ndarray, "time terms"]:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._results import AbstractResult, CallableText
 from jaxdamp._tables import Cell, Column, Table, plain
 from jaxdamp.bench.analysis import as_records
-from jaxdamp.bench.preflight import bench_checks, changes, channel_checks, consistency, motion_checks, sample_checks
+from jaxdamp.bench.preflight import bench_checks, changes, consistency, motion_checks, sample_checks
 from jaxdamp.bench.preflight.finding import SEVERITIES, Examined, Finding
 from jaxdamp.bench.runs import BenchRun
 
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 # In this order; where one family finds an error in a record, the later ones are left out for it.
 FAMILIES = (
     (motion_checks.magnitudes, motion_checks.few_samples, motion_checks.few_cycles, motion_checks.integrated),
-    (sample_checks.repeated, sample_checks.edges, channel_checks.clipping, motion_checks.rest, motion_checks.run_up),
-    (channel_checks.quantisation, channel_checks.ripple, consistency.velocity, consistency.sign),
+    (sample_checks.repeated, sample_checks.edges, sample_checks.clipping, motion_checks.rest, motion_checks.run_up),
+    (sample_checks.quantisation, sample_checks.ripple, consistency.velocity, consistency.sign),
     (
         motion_checks.jitter,
         changes.changes,
@@ -33,7 +34,7 @@ FAMILIES = (
     ),
 )
 # The checks that find errors, which are quick.
-ERRORS = (sample_checks.repeated, sample_checks.edges, channel_checks.clipping, consistency.velocity, consistency.sign)
+ERRORS = (sample_checks.repeated, sample_checks.edges, sample_checks.clipping, consistency.velocity, consistency.sign)
 # What is in the names of warnings, by what it does to results; all others come behind.
 CONSEQUENCE = ("unusual", "changes", "jump", "dropout", "held", "spikes", "velocity", "contradiction", "sign", "delay")
 BAD_RECORDS = ("refuse", "leave_out", "keep")
@@ -42,7 +43,7 @@ BENCH = ((bench_checks.turned_by_the_reader, bench_checks.turned_motion), (bench
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
-class Preflight:
+class Preflight(AbstractResult):
     """The findings on records, errors first.
 
     Attributes:
@@ -75,14 +76,20 @@ class Preflight:
         for f in self.findings:
             start, stop = (None, None) if f.between is None else f.between
             rows.append((f.severity, f.record, start, stop, f.name, f.message, f.size, f.unit, f.remedy))
-        return Table(self.summary(), columns, tuple(rows))
+        return Table(str(self.summary), columns, tuple(rows))
 
-    def summary(self) -> str:
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The errors and warnings in words, worst first."""
+        return tuple(sentence for sentence in self.sentences() if not sentence.startswith("note"))
+
+    @property
+    def summary(self) -> CallableText:
         """How many records were checked, and how much was found, in words."""
         counts = [(len(self.of(severity)), severity) for severity in SEVERITIES]
         words = ", ".join(f"{count} {severity}{'s' * (count > 1)}" for count, severity in counts if count)
         records = f"{len(self.records)} record{'s' * (len(self.records) > 1)}"
-        return f"Preflight of {records}: {words or 'nothing odd'}"
+        return CallableText(f"Preflight of {records}: {words or 'nothing odd'}")
 
     def sentences(self) -> list[str]:
         """Each kind of finding once, worst first: in how many records, and that with the largest size in words."""
@@ -102,7 +109,7 @@ class Preflight:
         left_out = tuple(names)
         return Preflight(tuple(f for f in self.findings if f.name not in left_out), self.records)
 
-    def to_dict(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """All findings as plain data."""
         return {"ok": self.ok, "records": list(self.records), "findings": plain(self.table().records())}
 
@@ -113,7 +120,7 @@ class Preflight:
         return plots.preflight(self)
 
     def __repr__(self) -> str:
-        return "\n".join([self.summary(), *(f"- {sentence}" for sentence in self.sentences())])
+        return "\n".join([self.summary, *(f"- {sentence}" for sentence in self.sentences())])
 
 
 def preflight(runs: BenchRun | Iterable[BenchRun]) -> Preflight:
@@ -189,10 +196,10 @@ def usable(
         return runs  # a fit says itself that no force varies
     errors = [_first_error(run, robust) for run in runs]
     sound = tuple(run for run, error in zip(runs, errors, strict=True) if error is None)
-    found = [error for error in errors if error is not None]
-    if found and (bad_records == "refuse" or not sound):
-        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-        error = found[0]
+    wrong = [error for error in errors if error is not None]
+    if wrong and (bad_records == "refuse" or not sound):
+        more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
+        error = wrong[0]
         ways = '`bad_records="leave_out"` fits the others, `bad_records="keep"` fits them as they are.'
         is_ = f"{error.record}{more}: {error.message}"
         _checks.refuse(argument, "be records without errors", is_, f"{error.remedy} {ways}")

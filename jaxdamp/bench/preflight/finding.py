@@ -9,8 +9,7 @@ from jaxdamp import _checks
 from jaxdamp.bench.analysis import FoldedCycles, fold_cycles, steady_cycles
 from jaxdamp.bench.contradictions import ALIKE, SAME_SHAPE
 from jaxdamp.bench.motion import Samples, moving_span, white_noise
-from jaxdamp.bench.preflight.gaps import gaps
-from jaxdamp.bench.preflight.mains import mains_lines
+from jaxdamp.bench.preflight.artefacts import gaps, mains_lines
 from jaxdamp.bench.runs import BenchRun
 
 

@@ -1,0 +1,111 @@
+"""What every result has: status, warnings, summary, table, plot, plain data, report."""
+
+import warnings
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jaxdamp._status import Status
+from jaxdamp._tables import Table
+
+
+if TYPE_CHECKING:
+    import os
+
+    import matplotlib.figure
+
+
+class Derived:
+    """An attribute that follows from the others, unless a class stores it in a field or defines it anew.
+
+    Unlike a property it is no default of a dataclass field of the same name, and gives way to it.
+    """
+
+    def __init__(self, function: Callable[[Any], Any]) -> None:
+        self.function, self.__doc__ = function, function.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, instance: Any, owner: type | None = None) -> Any:
+        """The value; a class has none."""
+        if instance is None:
+            raise AttributeError(f"{self.name} belongs to a result, not to its class")
+        return self.function(instance)
+
+
+class AbstractResult(ABC):
+    """A result of a fit, a tuning or a study: what code branches on, what a person reads, what a file holds.
+
+    A result declares its summary, its table, its plot and the content of its plain data; everything else follows.
+
+    Attributes:
+        status: how the search ended, `Status.COMPUTED` where there is none; of several fits a tuple with one for each.
+        warnings: doubts about the result, each a sentence.
+    """
+
+    status: Any = Derived(lambda self: Status.COMPUTED)
+    warnings: Any = Derived(lambda self: ())
+
+    @property
+    def converged(self) -> bool:
+        """Whether every search ended by its tolerance."""
+        return worst_status(self.status if isinstance(self.status, tuple) else [self.status]).good
+
+    @property
+    @abstractmethod
+    def summary(self) -> str:
+        """The result in a sentence or a few."""
+
+    @abstractmethod
+    def table(self) -> Table:
+        """The numbers of the result with their units."""
+
+    @abstractmethod
+    def plot(self) -> "matplotlib.figure.Figure":
+        """A picture of the result."""
+
+    def tables(self) -> dict[str, Table]:
+        """All tables of the result by name, the first is `table()`."""
+        return {"table": self.table()}
+
+    def content(self) -> dict[str, Any]:
+        """What `to_dict` holds beside status, summary and warnings: all tables, unless a class says more."""
+        return {name: table.to_dict() for name, table in self.tables().items()}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as numbers with units and words, ready for JSON; numbers that are not finite are None."""
+        status = [s.name.lower() for s in self.status] if isinstance(self.status, tuple) else self.status.name.lower()
+        head = {"summary": self.summary, "status": status, "converged": self.converged, "warnings": [*self.warnings]}
+        return head | self.content()
+
+    def report(self, path: "str | os.PathLike[str]", title: str = "") -> Path:
+        """Write the result as one HTML page: summary, warnings, tables, pictures.
+
+        Arguments:
+            path: of the file.
+            title: of the page; that of its kind if left out.
+        """
+        from jaxdamp.report import result_report
+
+        return result_report(self, title).write(path)
+
+    def __repr__(self) -> str:
+        return "\n".join([self.summary, self.table().to_text(), *(f"warning: {text}" for text in self.warnings)])
+
+
+def worst_status(statuses: Iterable[Status]) -> Status:
+    """The first status that is not good; else the first one."""
+    every = tuple(statuses)
+    return next((status for status in every if not status.good), every[0] if every else Status.COMPUTED)
+
+
+class CallableText(str):
+    """A text that could be called in earlier releases."""
+
+    def __call__(self) -> str:
+        """Deprecated: the text."""
+        text = "`summary` is a property now: write `result.summary` without brackets."
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return str(self)

@@ -1,0 +1,236 @@
+"""From the raw table of a file to a bench record in SI and the library's sign."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp._checks import ArgumentError, Setting
+from jaxdamp.bench import clock, stamps
+from jaxdamp.bench import sign as signs
+from jaxdamp.bench.clock import Part, regular_parts
+from jaxdamp.bench.columns import REQUIRED, Choice, Column, find_columns
+from jaxdamp.bench.motion import Samples, cycle_instants
+from jaxdamp.bench.problems import Problems
+from jaxdamp.bench.raw import RawColumn, RawTable
+from jaxdamp.bench.runs import COMMAND_MARK, FILE_MARK, INTEGRATED_MARK, NOTE_MARK, SETTINGS_MARK, BenchRun
+from jaxdamp.bench.velocity import estimate_velocity, integrate_velocity
+
+
+@dataclass(frozen=True)
+class Interpretation:
+    """What the caller says about the numbers of the files, as `bench.read` describes it."""
+
+    choice: Choice = field(default_factory=Choice)
+    sign: str | None = None
+    force_sign: str | None = None
+    sampling_rate: float | int | None = None
+
+
+def bench_runs(table: RawTable, name: str, how: Interpretation) -> list[BenchRun]:
+    """The record of a table; several if it has gaps in time.
+
+    Raises:
+        ValueError: all that is wrong with the table.
+    """
+    columns, doubts = find_columns(table, how.choice)
+    clock.check_count(len(table), table.where)
+    channels, notes = _channels(table, columns, how.choice)
+    notes = [_columns_note(table, columns), *table.notes, *doubts, *notes]
+    motion = channels["stroke" if "stroke" in channels else "velocity"]
+    parts = _parts(table, channels.pop("time", None), motion, how.sampling_rate)
+    if len(parts) == 1:
+        return [_record(table, columns, channels, parts[0], name, how, notes)]
+    names = [f"{name}_part{number}" for number in range(1, len(parts) + 1)]
+    return [_record(table, columns, channels, part, n, how, notes) for part, n in zip(parts, names, strict=True)]
+
+
+def _channels(table: RawTable, columns: Mapping[str, Column], choice: Choice) -> tuple[dict[str, Samples], list[str]]:
+    """The numbers of every quantity in SI, and notes on those that were left out."""
+    channels, notes, problems = {}, [], Problems()
+    for role, column in columns.items():
+        with problems.collected():
+            try:
+                channels[role], note = _values(table, table.columns[column.index], column)
+            except ValueError as error:
+                if role in REQUIRED or role == "time" or choice.asks_for(role):
+                    raise
+                note = f"{role} left out: {error}"
+            notes += [note] if note else []
+    problems.raise_any()
+    return channels, notes
+
+
+def _values(table: RawTable, raw: RawColumn, column: Column) -> tuple[Samples, str]:
+    """One channel in SI, and a note on time stamps."""
+    where = f"{table.where}, column {column.header!r}"
+    values = np.asarray(raw.values)
+    if raw.faults:
+        row, text = min(raw.faults.items())
+        what = f"{text!r} is not a number" if text else "the value is missing"
+        more = f" ({len(raw.faults)} such values in all)" if len(raw.faults) > 1 else ""
+        raise ValueError(
+            f"{table.where}, {table.place(row)}, column {column.header!r}: {what}{more}. Mend or remove the line."
+        )
+    if column.conversion is None:
+        return stamps.seconds(values, where, table.place)
+    values = column.conversion(np.ascontiguousarray(values))
+    clock.check_numbers(values, f"{column.role} (column {column.header!r})", table.where, table.lines)
+    return values, ""
+
+
+def _columns_note(table: RawTable, columns: Mapping[str, Column]) -> str:
+    used = ", ".join(f"{c.role} from {c.header!r} in {c.unit}" for c in columns.values())
+    taken = {column.index for column in columns.values()}
+    rest = [name for i, name in enumerate(table.names) if i not in taken] if table.is_named else []
+    return f"{used}; brought to SI" + (f"; not used: {', '.join(rest)}" if rest else "")
+
+
+def _parts(table: RawTable, time: Samples | None, motion: Samples, rate: float | int | None) -> list[Part]:
+    """The stretches without gap that hold a full cycle; all of a record that has no gap."""
+    where = table.where
+    if time is None:
+        return [_from_rate(len(table), rate, where)]
+    parts = regular_parts(time, where, table.lines)
+    _check_rate(parts, rate, where)
+    if len(parts) == 1:
+        return parts
+    good = [part for part in parts if _has_cycle(part, motion)]
+    if not good:
+        clock.refuse_gaps(time, clock.gaps(time), where, table.lines)
+    left_out = [part for part in parts if part not in good]
+    samples = sum(len(part.time) for part in left_out)
+    plural = "s" if len(left_out) > 1 else ""
+    note = (f"{len(left_out)} part{plural} without a full cycle left out, {samples} samples",) if left_out else ()
+    return [replace(part, notes=(*part.notes, *note)) for part in good]
+
+
+def _has_cycle(part: Part, motion: Float[np.ndarray, " file_time"]) -> bool:
+    moved = part.of(motion)
+    return len(part.time) >= clock.FEWEST and np.ptp(moved) > 0 and len(cycle_instants(part.time, moved)) > 1
+
+
+def _from_rate(count: int, rate: float | int | None, where: str) -> Part:
+    if rate is None:
+        example, name = Setting("sampling_rate", 1000), Setting("columns", {"time": ...})
+        raise ArgumentError(
+            f"{where} has no time column: pass the rate at which it was sampled, for example {example} "
+            f"[Hz], or name the column with {name}.",
+            example,
+            name,
+        )
+    time = clock.uniform_time(rate, count)
+    return Part(slice(None), time, time, False, (f"time from the sampling rate given, {rate:g} Hz",))
+
+
+def _check_rate(parts: list[Part], rate: float | int | None, where: str) -> None:
+    """Refuse a sampling rate that contradicts the time column."""
+    time = max(parts, key=lambda part: len(part.time)).time
+    own = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else 0.0
+    if rate is not None and abs(rate - own) > 0.01 * rate:
+        given, without = Setting("sampling_rate", rate), Setting("columns", {"time": None})
+        raise ArgumentError(
+            f"{where}: {given} contradicts the time column, which has {own:.6g} Hz. Leave one of "
+            f"them out: {without} leaves out the column.",
+            given,
+            without,
+        )
+
+
+def _record(
+    table: RawTable,
+    columns: Mapping[str, Column],
+    channels: Mapping[str, Samples],
+    part: Part,
+    name: str,
+    how: Interpretation,
+    notes: list[str],
+) -> BenchRun:
+    where = table.where
+    time, force = part.time, part.of(channels["force"])
+    velocity, source = (None if "velocity" not in channels else part.of(channels["velocity"])), ""
+    integrated = "stroke" not in channels
+    if velocity is not None and integrated:
+        stroke, velocity, source = integrate_velocity(time, velocity, where)
+    else:
+        stroke = part.of(channels["stroke"])
+        clock.check_stroke(stroke, f"{where}, column {columns['stroke'].header!r}")
+    own = bool(table.preamble) and table.preamble[0].strip() == FILE_MARK
+    if own:
+        _refuse_signs(how, where)
+        decision = signs.Decision(1.0, 1.0, ("positive stroke is rebound, as the file states",))
+    else:
+        decision = signs.decide(time, stroke, force, how.sign, how.force_sign, where)
+    if velocity is None or not (own or integrated):
+        velocity, source = _velocity(time, stroke, velocity, where)
+    temperature = channels.get("temperature")
+    stated = _stated(table) if own else {}
+    return BenchRun(
+        name,
+        time,
+        _turned(stroke, decision.motion),
+        _turned(velocity, decision.motion),
+        _turned(force, decision.force),
+        temperature=None if temperature is None else part.of(temperature),
+        command=stated.get("command"),
+        settings=stated.get("settings", {}),
+        source=str(table.file),
+        notes=(*stated.get("notes", ()), *notes, *part.notes, *decision.notes, source or "velocity as the file states"),
+        stroke_is_integrated=integrated or stated.get("stroke_is_integrated", False),
+    )
+
+
+def _refuse_signs(how: Interpretation, where: str) -> None:
+    """A file that the library wrote states its sign."""
+    if how.sign == "compression-positive" or how.force_sign == "opposite":
+        words = (("sign", how.sign), ("force_sign", how.force_sign))
+        given = [Setting(name, word) for name, word in words if word]
+        listed = " and ".join(map(str, given))
+        raise ArgumentError(f"{where} states that it is rebound-positive: read it without {listed}.", *given)
+
+
+def _stated(table: RawTable) -> dict:
+    """Command, settings and notes in a file that the library wrote."""
+    after = {
+        mark: [line.strip().removeprefix(mark) for line in table.preamble if line.startswith(mark)]
+        for mark in (COMMAND_MARK, SETTINGS_MARK, NOTE_MARK)
+    }
+    command, settings = after[COMMAND_MARK], after[SETTINGS_MARK]
+    return {
+        "command": float(command[0]) if command else None,
+        "settings": json.loads(settings[0]) if settings else {},
+        "notes": after[NOTE_MARK],
+        "stroke_is_integrated": any(line.strip() == INTEGRATED_MARK for line in table.preamble),
+    }
+
+
+def _turned(values: Samples, factor: float) -> Samples:
+    return values if factor == 1.0 else values * factor
+
+
+def _velocity(time: Samples, stroke: Samples, measured: Samples | None, where: str) -> tuple[Samples, str]:
+    """The velocity column if it is the derivative of the stroke, otherwise the derivative."""
+    derived, how = estimate_velocity(time, stroke)
+    if measured is None:
+        return derived, how
+    without = Setting("columns", {"velocity": None})
+    remedy = f"Mend the column or its unit, or derive the velocity from the stroke: {without}."
+    power = float(np.dot(measured, measured) * np.dot(derived, derived))
+    likeness = float(np.dot(measured, derived)) / np.sqrt(power) if power > 0 else 0.0
+    scale = float(np.dot(measured, derived) / np.dot(derived, derived))
+    if likeness < -0.8:
+        fault = f"has the opposite sign of the stroke's derivative (correlation {likeness:.3f})"
+    elif likeness < 0.8:
+        fault = f"is not the derivative of the stroke (correlation {likeness:.3f})"
+    elif not 0.8 < scale < 1.25:
+        fault = f"is {scale:.4g} times the stroke's derivative: one of the two has a wrong unit"
+    else:
+        fault = ""
+    if fault:
+        raise ArgumentError(f"{where}: the velocity column {fault}. {remedy}", without)
+    doubt = " - they differ, look at both" if likeness < 0.99 or not 0.97 < scale < 1.03 else ""
+    return measured, (
+        f"velocity as measured; it is {scale:.4g} times the stroke's derivative, correlation {likeness:.4f}{doubt}"
+    )

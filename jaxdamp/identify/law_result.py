@@ -1,0 +1,190 @@
+"""Results of fits: the law, its parameters with uncertainty, and its errors."""
+
+import dataclasses
+import functools
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp._results import AbstractResult
+from jaxdamp._status import Status
+from jaxdamp._tables import Table, plain, with_unit
+from jaxdamp._types import VectorLike
+from jaxdamp.bench import BenchRun, as_runs
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.estimates import parameter_table
+from jaxdamp.identify.model import Model, RecordStart, on_rig
+from jaxdamp.identify.predicting import ErrorShares, Score, error_shares, predict_runs, score
+from jaxdamp.identify.propagation import Band, band
+from jaxdamp.identify.record_sensitivity import RecordSensitivity, sensitivity_to_records
+from jaxdamp.identify.result import Fit
+from jaxdamp.rig import Rig
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class AbstractFitted(AbstractResult):
+    """A law fitted to records or trained on them, and how good it is.
+
+    Attributes:
+        law: the fitted law.
+        runs: the records given; those with an infinite weighting were not fitted.
+        fit_percent: 100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all records fitted.
+        rmse: root of the mean squared error over all records fitted [N].
+        scores: the same for each record given.
+        warnings: doubts about the result, in words.
+        status: how the search ended.
+        rig: the fitted test machine, if one was fitted.
+        initial_state: how records start, as in `fit`.
+        record_starts: the states at the first sample of each record if they were estimated, None for one left out.
+    """
+
+    law: AbstractDamper
+    runs: tuple[BenchRun, ...]
+    fit_percent: float
+    rmse: float
+    scores: tuple[Score, ...]
+    warnings: tuple[str, ...]
+    status: Status
+    rig: Rig | None = dataclasses.field(default=None, kw_only=True)
+    initial_state: str = dataclasses.field(default="warm_up", kw_only=True)
+    record_starts: tuple[RecordStart | None, ...] = dataclasses.field(default=(), kw_only=True)
+
+    @property
+    def summary(self) -> str:
+        """Law, number of records and errors."""
+        percent = f"{self.fit_percent:.1f} %"
+        return f"{type(self.law).__name__} on {len(self.runs)} records: {percent}, RMSE {self.rmse:.4g} N"
+
+    @property
+    def model(self) -> Model:
+        """What was fitted to the records: the law, on a machine if that was fitted too."""
+        return on_rig(self.law, self.rig)
+
+    def model_of(self, runs: Sequence[BenchRun]) -> Model:
+        """`model`, with the estimated states at the beginning of those of these records that were fitted."""
+        known = {id(run): start for run, start in zip(self.runs, self.record_starts, strict=False)}
+        return on_rig(self.law, self.rig, [known.get(id(run)) for run in runs] if known else ())
+
+    @overload
+    def respond(self, runs: BenchRun) -> np.ndarray: ...
+    @overload
+    def respond(self, runs: Iterable[BenchRun]) -> list[np.ndarray]: ...
+    def respond(self, runs: BenchRun | Iterable[BenchRun]) -> np.ndarray | list[np.ndarray]:
+        """Force [N] that the fit expects at every sample of a record, old or new, of the same machine.
+
+        It is the force of the law with what the fit found beside it: gas force and zero error of the load cell
+        (`rig`), and the states at the beginning (`initial_state`). `jaxdamp.respond(result.law, ...)` is the damper
+        alone, started at rest.
+
+        Arguments:
+            runs: one record, or several for a list of forces.
+        """
+        records = as_runs(runs)
+        forces = predict_runs(self.model_of(records), records, self.initial_state)
+        return forces[0] if isinstance(runs, BenchRun) else forces
+
+    def predict(self, runs: BenchRun | Iterable[BenchRun]) -> list[np.ndarray]:
+        """Deprecated: `respond` gives the same, without a list for one record."""
+        text = "`predict` is deprecated: `respond(run)` gives the force of one record, `respond(runs)` a list."
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return self.respond(as_runs(runs))
+
+    def score(self, runs: BenchRun | Iterable[BenchRun]) -> tuple[float, float, tuple[Score, ...]]:
+        """Fit percent, RMSE [N] and the scores by record, on records old or new, as `respond` predicts them."""
+        runs = as_runs(runs)
+        return score(self.model_of(runs), runs, initial_state=self.initial_state)
+
+    def content(self) -> dict[str, Any]:
+        """Law, errors and scores as plain data.
+
+        The law itself is written by `export.to_json`.
+        """
+        return {
+            "law": repr(self.law),
+            **({} if self.rig is None else {"rig": repr(self.rig)}),
+            "fit": with_unit(self.fit_percent, "%"),
+            "rmse": with_unit(self.rmse, "N"),
+            "scores": [score.to_dict() for score in self.scores],
+        }
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class FitResult(AbstractFitted, Fit):
+    """A fitted law with its parameters, their uncertainty and its errors: a `Fit` of bench records.
+
+    Attributes:
+        record_laws: the law of each record, if parameters have a value for each record; `law` then has their means.
+        record_rigs: the test machine of each record, as `record_laws`.
+    """
+
+    record_laws: tuple[AbstractDamper, ...] = dataclasses.field(default=(), kw_only=True)
+    record_rigs: tuple[Rig, ...] = dataclasses.field(default=(), kw_only=True)
+
+    @property
+    def initial_states(self) -> tuple[Float[np.ndarray, " states"] | None, ...]:
+        """The states at the first sample of each record, if they were estimated; None for records left out."""
+        return tuple(None if start is None else np.asarray(start.initial_state) for start in self.record_starts)
+
+    @functools.cached_property
+    def error_shares(self) -> ErrorShares:
+        """Shares of the squared error over the records: shape, hysteresis, rest (`identify.error_shares`)."""
+        rigs = self.record_rigs or (None,) * len(self.record_laws)
+        starts = [(start,) for start in self.record_starts] or [()] * len(self.record_laws)
+        models = [on_rig(*each) for each in zip(self.record_laws, rigs, starts, strict=False)]
+        return error_shares(models or self.model_of(self.runs), self.runs, self.initial_state)
+
+    def table(self, truth: AbstractDamper | None = None, *, true_rig: Rig | None = None, title: str = "") -> Table:
+        """The parameters with units, standard errors and meanings, compared with a true law if one is given.
+
+        Arguments:
+            truth: the true law.
+            true_rig: the true test machine, if one was fitted.
+            title: of the table.
+        """
+        title = title or f"Parameters of {type(self.law).__name__}"
+        title += f" ({self.criterion})" if self.criterion else ""
+        true = None if truth is None else on_rig(truth, None if self.rig is None else true_rig or Rig())
+        return parameter_table(title, self.parameters, true)
+
+    def parameters_table(self) -> Table:
+        """`table()`."""
+        return self.table()
+
+    def sensitivity_to_records(self, function: Callable[[Any], Any]) -> RecordSensitivity:
+        """Exact derivatives of a function of the law by the measured forces, through the fit itself.
+
+        What would a ride metric, or the difference from another damper, be if the force of a record were 1 % larger, or
+        10 N higher, and the law were fitted again? Parameters at bounds stay there.
+
+        Arguments:
+            function: of the law, computed by JAX: a number, or a dictionary of numbers such as the metrics of a `Ride`,
+                as in `lambda law: ride.of_vehicle(quarter_car(law))()`.
+
+        Raises:
+            ValueError: a fit with a robust loss or priors; a minimum that the records do not determine.
+        """
+        return sensitivity_to_records(self._evidence, function, self.runs, self.criterion)
+
+    def band(self, velocities: VectorLike) -> Band:
+        """95 % intervals of the force [N] at constant velocities [m/s]; `result.band(velocities).plot()`.
+
+        The states of a law with states are settled, for the derivatives over two seconds at each velocity.
+        """
+        return band(self._evidence, self.law, np.asarray(velocities, float))
+
+    def content(self) -> dict[str, Any]:
+        """Law, errors, scores and parameters as plain data."""
+        return AbstractFitted.content(self) | Fit.content(self) | {"error_shares": plain(self.error_shares._asdict())}
+
+    def plot(self, runs: Iterable[BenchRun] | None = None, **options: Any) -> "Figure":
+        """Loops of force over velocity and over stroke, measured and fitted, with residuals."""
+        from jaxdamp.plots import fit_loops
+
+        return fit_loops(self, runs if runs is None else tuple(runs), **options)

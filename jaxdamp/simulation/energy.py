@@ -1,0 +1,72 @@
+"""Where the energy of a run has gone."""
+
+from typing import TYPE_CHECKING
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from jaxdamp._types import Scalar
+
+
+if TYPE_CHECKING:
+    from jaxdamp.simulation.response import Response
+
+
+def _middle(values: Array) -> Array:
+    """Mean over each step."""
+    return 0.5 * (values[1:] + values[:-1])
+
+
+@eqx.filter_jit
+def energy_balance(response: "Response") -> dict[str, Scalar]:
+    """Where the energy that the road put in has gone [J].
+
+    `road_work` = `stored` (in masses and linear springs, at the end less at the start) + `absorbed` (by the laws;
+    springs among them give it back later, dampers do not: `absorbed_by` takes them apart) + `dashpots` (linear
+    ones, as in the tyre), up to `error`, which falls with the square of the step. All integrals by the trapezoid
+    rule. Heights count from static equilibrium, so that weight and static loads do no work.
+
+    Arguments:
+        response: the run, or a part of it.
+    """
+    form, n = response.system.form, len(response.system.layout.coordinates)
+    q, rate, road, dt = response.motion[:, :n], response.motion[:, n:], response.road, jnp.diff(response.time)
+    slope = jnp.diff(road, axis=0) / dt[:, None]
+
+    def stored(i: int) -> Scalar:
+        spring = 0.5 * form.stiffness @ q[i] - form.road_stiffness @ road[i]
+        ground = 0.5 * road[i] @ form.ground_stiffness @ road[i]
+        return 0.5 * rate[i] @ form.mass @ rate[i] + q[i] @ spring + ground
+
+    push = road @ form.ground_stiffness - q @ form.road_stiffness
+    if form.port_road is not None:
+        push = push - response.port_force @ form.port_road
+    towed = _middle(rate) @ form.road_damping
+    rolled = slope @ form.ground_damping
+    road_work = jnp.sum((_middle(push) + rolled - towed) * slope * dt[:, None])
+    dashpots = _middle(jnp.sum((rate @ form.damping) * rate, axis=1))
+    dashed = jnp.sum((dashpots + jnp.sum((rolled - 2.0 * towed) * slope, axis=1)) * dt)
+    absorbed = sum(absorbed_by(response).values(), jnp.zeros(()))
+    change = stored(-1) - stored(0)
+    parts = {"road_work": road_work, "stored": change, "absorbed": absorbed, "dashpots": dashed}
+    return parts | {"error": road_work - change - absorbed - dashed}
+
+
+@eqx.filter_jit
+def absorbed_by(response: "Response") -> dict[str, Scalar]:
+    """Energy that each element has taken in [J], ∫ F ė dt, by its name.
+
+    Where an element is several dampers that act together, it is that of all; force and power channels are of one.
+
+    Arguments:
+        response: the run, or a part of it.
+    """
+    form, n = response.system.form, len(response.system.layout.coordinates)
+    dt = jnp.diff(response.time)
+    moved = _middle(response.port_force * (response.motion[:, n:] @ form.ports.T))
+    if form.port_road is not None:
+        slope = jnp.diff(response.road, axis=0) / dt[:, None]
+        moved = moved - _middle(response.port_force) * (slope @ form.port_road.T)
+    taken = jnp.sum(moved * dt[:, None], axis=0)
+    return dict(zip(response.system.layout.ports, taken, strict=True))

@@ -1,0 +1,118 @@
+"""Ride metrics and comfort of a response, or of a part of a run."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxdamp import _checks, metrics
+from jaxdamp._types import Scalar, ScalarLike, Signal
+from jaxdamp.metrics import Metric, MetricValues
+from jaxdamp.simulation.equations import settled
+
+
+if TYPE_CHECKING:
+    from jaxdamp.simulation.response import Response
+
+
+class Comfort(NamedTuple):
+    """An acceleration as ISO 2631-1 counts it: RMS and maximum in the unit of its channel, the dose times s^(1/4)."""
+
+    weighted_rms: Scalar
+    max_transient_value: Scalar
+    vibration_dose_value: Scalar
+
+
+def ride_metrics(response: "Response", names: Sequence[str | Metric] | None = None) -> dict[str, Scalar]:
+    """The vehicle's ride metrics by name, or those wanted, over the run or the part of it that the response is.
+
+    Weighted ones take heights by Wk and angles by We, exactly for accelerations straight from sample to sample; the
+    ride starts from rest, so its mean counts. Differentiable but for peaks, which have the slope of one instant,
+    and counts, which have none.
+
+    Arguments:
+        response: the run, or a part of it.
+        names: names of ride metrics, or a `metrics.Metric` of any channel; all of the vehicle if left out.
+
+    Raises:
+        ValueError: a name that is no ride metric, or a window in a run whose times JAX traces.
+    """
+    chosen, dt = response.vehicle.chosen_metrics(names, "names"), _step(response)
+    values = _computed(response, [(metric, _samples(response, metric, dt)) for metric in chosen], dt)
+    return MetricValues.with_units(values, {metric.name: metric.unit(response.units) for metric in chosen})
+
+
+def comfort(response: "Response") -> dict[str, Comfort]:
+    """Weighted RMS, largest second (MTVV) and VDV of every body, seat and place acceleration, by ISO 2631-1.
+
+    Weighted as in `ride_metrics`. Differentiable but for the maximum.
+
+    Arguments:
+        response: the run, or a part of it.
+    """
+    return _comfort(response, _step(response))
+
+
+def _step(response: "Response") -> ScalarLike:
+    """Spacing of the instants [s], as a plain number where it is known: then filters are made by NumPy."""
+    time = response.run.time
+    numbers = _checks.concrete(time)
+    return time[1] - time[0] if numbers is None else float(numbers[1] - numbers[0])
+
+
+def _samples(response: "Response", metric: Metric, dt: ScalarLike) -> tuple[int, int]:
+    """Numbers of the first and the last instant that count."""
+    time = _checks.concrete(response.time)
+    if metric.window is None:
+        return metric.samples(response.time.size, 1.0)
+    if time is None:
+        remedy = "Inside compiled code, take the metric from a `Ride`, or cut the channel."
+        _checks.refuse(f"window of {metric.name!r}", "be asked of a run whose times are known", "traced", remedy)
+    return metric.samples(time.size, float(dt), float(time[0]))
+
+
+@eqx.filter_jit
+def _computed(
+    response: "Response", chosen: Sequence[tuple[Metric, tuple[int, int]]], dt: ScalarLike
+) -> dict[str, Scalar]:
+    """The values of metrics, each over its samples."""
+    values = {}
+    pairs = {(metric.channel, metric.weighting) for metric, _ in chosen if metric.weighting is not None}
+    weighted = {pair: _weighted(response, *pair, dt) for pair in sorted(pairs)}
+    at_rest = _at_rest(response) if any(metric.from_rest for metric, _ in chosen) else jnp.zeros(0)
+    for metric, (first, last) in chosen:
+        weighting = metric.weighting
+        signal = response[metric.channel] if weighting is None else weighted[metric.channel, weighting]
+        if metric.from_rest:
+            signal = signal - at_rest[response.system.layout.numbers[metric.channel]]
+        signal = signal * response[metric.by] if metric.by else signal
+        values[metric.name] = metric.statistic.of(signal[first : last + 1], dt)
+    return values
+
+
+@eqx.filter_jit
+def _comfort(response: "Response", dt: ScalarLike) -> dict[str, Comfort]:
+    numbers, layout = {}, response.system.layout
+    for name in dict.fromkeys(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting):
+        weighted = _weighted(response, name, layout.weighting(name), dt)
+        transient = metrics.max_transient_value(weighted, dt, None)
+        dose = metrics.vibration_dose_value(weighted, dt, None)
+        numbers[name] = Comfort(metrics.rms(weighted), transient, dose)
+    return numbers
+
+
+def _weighted(response: "Response", channel: str, weighting: str, dt: ScalarLike) -> Signal:
+    """An acceleration weighted by ISO 2631-1 from the start of the run."""
+    weighted = metrics.weighted_signal(response.run[channel], dt, weighting, method="step", remove_mean=False)
+    if response.begin is None:
+        return weighted
+    return jax.lax.dynamic_slice_in_dim(weighted, response.begin, response.time.size)
+
+
+def _at_rest(response: "Response") -> Float[Array, " channels"]:
+    """The channels in the static equilibrium on the first heights of the run, forces left out."""
+    road, system = response.run.road[0], response.system
+    return system.outputs(settled(system, road), jnp.zeros(len(system.laws)), road, None)

@@ -1,0 +1,308 @@
+"""Constrained minimisation with a batch axis: sequential quadratic programming within trust regions."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, final
+
+import numpy as np
+from jaxtyping import Float
+
+
+RADIUS = 0.5  # largest change of a coordinate in the first step; coordinates are one at the start
+LEAST_RADIUS = 1e-6
+CURVATURE = 0.1  # second derivative of a row by a coordinate at first, relative to its size
+SHARE = 1e-4  # of the sum of several objectives in each problem: excludes points that others beat in one objective
+FAR_WORSE = -10.0  # loss in units of the promised gain, from which slopes at a point say nothing of those near by
+PENALTY, FURTHER, HIGHEST = 10.0, 10.0, 1e6  # of a violated limit, in units of the objectives: first, factor, highest
+
+
+class Evaluation(NamedTuple):
+    """What is computed at a point.
+
+    Attributes:
+        values: numbers of the caller, which the search hands through.
+        rows: the objectives, then the limited functions.
+        slopes: derivatives of the rows with respect to the coordinates.
+    """
+
+    values: Float[np.ndarray, " numbers"]
+    rows: Float[np.ndarray, " rows"]
+    slopes: Float[np.ndarray, "rows free"]
+
+
+Evaluate = Callable[[Float[np.ndarray, "points free"]], Sequence[Evaluation]]
+
+
+class Scaling(NamedTuple):
+    """Zero and unit of each row: objectives first, then limited functions, which must not be positive when scaled.
+
+    Attributes:
+        zero: what is subtracted from each row.
+        unit: what the difference is divided by.
+        objectives: number of objectives.
+    """
+
+    zero: Float[np.ndarray, " rows"]
+    unit: Float[np.ndarray, " rows"]
+    objectives: int
+
+    def of(self, rows: Float[np.ndarray, " rows"]) -> Float[np.ndarray, " rows"]:
+        """The rows, scaled."""
+        return (rows - self.zero) / self.unit
+
+
+class Region(NamedTuple):
+    """Linear constraints of the coordinates: lower ≤ y ≤ upper, and A y ≥ b.
+
+    Attributes:
+        lower: smallest coordinates.
+        upper: largest coordinates.
+        matrix: A.
+        least: b.
+    """
+
+    lower: Float[np.ndarray, " free"]
+    upper: Float[np.ndarray, " free"]
+    matrix: Float[np.ndarray, "constraints free"]
+    least: Float[np.ndarray, " constraints"]
+
+
+@final
+@dataclasses.dataclass
+class SearchState:
+    """One search: towards an aim for the objectives, by quadratic models of all rows within a trust region.
+
+    Attributes:
+        aim: value of each scaled objective that is aimed at; the largest excess is minimised.
+        y: coordinates.
+        evaluation: numbers and derivatives there.
+        curvature: estimated second derivatives of each row.
+        radius: largest change of a coordinate in the next step.
+        penalty: of a violated limit, in units of the objectives.
+        steps: number of steps tried.
+        open: whether the search goes on.
+        converged: whether the models promise no more improvement.
+    """
+
+    aim: Float[np.ndarray, " objectives"]
+    y: Float[np.ndarray, " free"]
+    evaluation: Evaluation
+    curvature: Float[np.ndarray, "rows free free"]
+    radius: float = RADIUS
+    penalty: float = PENALTY
+    steps: int = 0
+    open: bool = True
+    converged: bool = False
+
+    def neighbour(self, aim: np.ndarray, y: np.ndarray, evaluation: Evaluation) -> "SearchState":
+        """A search that starts from a point near this one, with its curvature."""
+        near = SearchState(aim, self.y, self.evaluation, self.curvature.copy())
+        near.learn(y, evaluation)
+        near.y, near.evaluation = y, evaluation
+        return near
+
+    def reopened(self, radius: float) -> None:
+        """Search on from the present point, with as many steps as at first."""
+        self.open, self.converged, self.steps, self.radius = True, False, 0, radius
+
+    def learn(self, y: np.ndarray, evaluation: Evaluation) -> None:
+        """Update the curvature by the derivatives at another point (damped BFGS, so that it stays positive).
+
+        Source: Nocedal, Wright, Numerical Optimization, 2nd edition, procedure 18.2.
+        """
+        step = y - self.y
+        if not np.all(np.isfinite(evaluation.slopes)) or not step.any():
+            return
+        for matrix, change in zip(self.curvature, evaluation.slopes - self.evaluation.slopes, strict=True):
+            along = matrix @ step
+            old, new = step @ along, step @ change
+            share = 1.0 if new >= 0.2 * old else 0.8 * old / (old - new)
+            damped = share * change + (1.0 - share) * along
+            if old > 0.0 and step @ damped > 0.0:
+                matrix += np.outer(damped, damped) / (step @ damped) - np.outer(along, along) / old
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class SequentialQuadratic:
+    """A constrained minimiser, which drives many searches side by side: their points are evaluated in one batch.
+
+    Each search minimises max_i (f_i(y) − a_i) over the scaled objectives f_i with its own aims a, where the scaled
+    limited functions are not positive, within a region. A step minimises quadratic models of all rows, with exact
+    derivatives and estimated curvatures, in a box around the point; violated limits have a penalty, which grows where a
+    search would end beyond them. As of an `optimistix.AbstractMinimiser` there are `init`, `step` and `terminate`, for
+    all searches at once; `solve` is the loop, on the host.
+
+    Arguments:
+        region: bounds and linear constraints, which always hold.
+        scaling: of the rows.
+        max_steps: of each search.
+        improvement: of the scaled objectives, that a search may leave at its end.
+        rounding: error of the scaled objectives.
+        feasible: violation of a scaled limit up to which the penalty does not grow; infinite for a constant penalty.
+
+    Source: Nocedal, Wright, Numerical Optimization, 2nd edition, sections 18.5 (trust region, exact penalty) and 17.2.
+    """
+
+    region: Region
+    scaling: Scaling
+    max_steps: int
+    improvement: float
+    rounding: float = 1e-13
+    feasible: float = np.inf
+
+    def init(
+        self, aim: Float[np.ndarray, " objectives"], y: Float[np.ndarray, " free"], evaluation: Evaluation
+    ) -> SearchState:
+        """A search without knowledge of curvature: that of a row is taken as a share of its size.
+
+        Arguments:
+            aim: of the scaled objectives.
+            y: coordinates to start from.
+            evaluation: of the start.
+        """
+        size = CURVATURE * np.maximum(np.abs(evaluation.rows), 1e-6 * self.scaling.unit)
+        return SearchState(aim, y, evaluation, size[:, None, None] * np.eye(len(y)))
+
+    def solve(
+        self, evaluate: Evaluate, states: Sequence[SearchState], progress: Callable[[], None] = lambda: None
+    ) -> None:
+        """Run all searches to their ends.
+
+        Arguments:
+            evaluate: rows and derivatives of many points.
+            states: the searches, which are changed.
+            progress: called after each step.
+        """
+        while self.step(evaluate, states):
+            progress()
+
+    def step(self, evaluate: Evaluate, states: Sequence[SearchState]) -> bool:
+        """One step of each open search, evaluated side by side; whether any was open.
+
+        Arguments:
+            evaluate: as in `solve`.
+            states: as in `solve`.
+        """
+        tried = []
+        for state in states:
+            if state.open:
+                step, promised = self._best_step(state)
+                while promised < self.improvement and self._raised_penalty(state):
+                    step, promised = self._best_step(state)
+                if not self.terminate(state, promised):
+                    tried.append((state, state.y + step, promised))
+        if tried:
+            evaluations = evaluate(np.stack([y for _, y, _ in tried]))
+            for (state, y, promised), evaluation in zip(tried, evaluations, strict=True):
+                self._move(state, y, evaluation, promised)
+        return bool(tried)
+
+    def terminate(self, state: SearchState, promised: float) -> bool:
+        """Whether a search has ended: at an optimum of its models, or after all its steps.
+
+        Arguments:
+            state: the search.
+            promised: improvement of its next step.
+        """
+        state.converged = promised < self.improvement
+        state.open = not state.converged and state.steps < self.max_steps
+        return not state.open
+
+    def merit(
+        self, rows: Float[np.ndarray, " rows"], aim: Float[np.ndarray, " objectives"], penalty: float = PENALTY
+    ) -> float:
+        """Largest distance of a scaled objective beyond its aim, with the penalty of violated limits.
+
+        Arguments:
+            rows: at a point, not scaled.
+            aim: of the scaled objectives.
+            penalty: of violated limits.
+        """
+        objectives, limits = np.split(self.scaling.of(rows), [self.scaling.objectives])
+        return float((objectives - aim).max() + self._share * objectives.sum() + penalty * limits.max(initial=0.0))
+
+    @property
+    def _share(self) -> float:
+        return SHARE if self.scaling.objectives > 1 else 0.0
+
+    def _move(self, state: SearchState, y: np.ndarray, evaluation: Evaluation, promised: float) -> None:
+        """Go to a tried point if it is better, and adapt the trust region."""
+        before, after = (self.merit(e.rows, state.aim, state.penalty) for e in (state.evaluation, evaluation))
+        usable = np.isfinite(after) and np.isfinite(evaluation.slopes).all()
+        rounding = self.rounding * (1.0 + abs(before))
+        gain = (before - after + rounding) / (promised + rounding) if usable else -1.0
+        length = float(np.abs(y - state.y).max())
+        if gain > FAR_WORSE:
+            state.learn(y, evaluation)
+        state.steps += 1
+        if gain < 0.25:
+            state.radius = 0.5 * length
+        elif gain > 0.75 and length > 0.99 * state.radius:
+            state.radius *= 2.0
+        if gain > 1e-4:
+            state.y, state.evaluation = y, evaluation
+        state.open = state.radius > LEAST_RADIUS or self._raised_penalty(state)
+
+    def _raised_penalty(self, state: SearchState) -> bool:
+        """Raise the penalty of a search that would end beyond a limit, as far as there is a higher one."""
+        violation = self.scaling.of(state.evaluation.rows)[self.scaling.objectives :].max(initial=0.0)
+        if not violation > self.feasible or state.penalty >= HIGHEST:
+            return False
+        state.penalty, state.radius = FURTHER * state.penalty, max(state.radius, 0.1 * RADIUS)
+        return True
+
+    def _best_step(self, state: SearchState) -> tuple[np.ndarray, float]:
+        """The step to the minimum of the models in the trust region, and the improvement that they promise.
+
+        Solved for the step, the largest excess over the aims and the largest violation of a limit, all relative to
+        their values at the point, so that small improvements are not lost by rounding.
+        """
+        import scipy.optimize
+
+        count, free, region = self.scaling.objectives, len(state.y), self.region
+        lower, upper = (np.clip(end - state.y, -state.radius, state.radius) for end in region[:2])
+        lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
+        unit = self.scaling.unit
+        slopes, curvature = state.evaluation.slopes / unit[:, None], state.curvature / unit[:, None, None]
+        reach = np.abs(slopes[:count]) @ np.maximum(-lower, upper)
+        size = float(np.clip(reach.max(), 1e-12, 1.0))  # of the improvement that a step can bring
+        level = self.scaling.of(state.evaluation.rows)
+        level[:count] -= state.aim
+        level[:count] -= level[:count].max()
+        level, slopes, curvature = level / size, slopes / size, curvature / size
+        slack = np.zeros((len(level), 2))
+        slack[:count, 0] = slack[count:, 1] = 1.0
+        weights, share = np.array([1.0, state.penalty]), self._share
+        gaps = region.least - region.matrix @ state.y
+        order = np.concatenate([region.matrix, np.zeros((len(region.matrix), 2))], axis=1)
+
+        def change(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            bent = curvature @ step
+            return slopes @ step + 0.5 * bent @ step, slopes + bent
+
+        def merit(z: np.ndarray) -> tuple[float, np.ndarray]:
+            value, slope = (a[:count].sum(axis=0) for a in change(z[:free]))
+            return weights @ z[free:] + share * value, np.concatenate([share * slope, weights])
+
+        def room(z: np.ndarray) -> np.ndarray:
+            return np.concatenate([slack @ z[free:] - level - change(z[:free])[0], order @ z - gaps])
+
+        def room_slope(z: np.ndarray) -> np.ndarray:
+            return np.concatenate([np.concatenate([-change(z[:free])[1], slack], axis=1), order])
+
+        violation = level[count:].max(initial=0.0)
+        solved = scipy.optimize.minimize(
+            merit,
+            np.concatenate([np.zeros(free), [0.0, violation]]),
+            jac=True,
+            method="SLSQP",
+            bounds=[*zip(lower, upper, strict=True), (None, None), (0.0, None)],
+            constraints={"type": "ineq", "fun": room, "jac": room_slope},
+            options={"ftol": 1e-12, "maxiter": 100},
+        )
+        step = np.clip(np.nan_to_num(solved.x[:free]), lower, upper)
+        moved = level + change(step)[0]
+        after = moved[:count].max() + share * (moved - level)[:count].sum()
+        after += state.penalty * (moved[count:].max(initial=0.0) - violation)
+        return step, -size * float(after)

@@ -1,0 +1,160 @@
+"""The descent of `minimise`: searches from one or several starts, and how far from an optimum they ended."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple, final
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp.solve import Evaluation, Scaling, SearchState, SequentialQuadratic
+from jaxdamp.tune.limits import Limit, limit_ends
+from jaxdamp.tune.task import Evaluator, Tolerance
+
+
+NEAR = 1e-3  # how far around an end gradients are sampled, relative to the unit of each coordinate
+RESTARTS = 2  # with a new estimate of the curvature, if the search ends before an optimum
+
+
+class Ended(NamedTuple):
+    """Where and how a search ended.
+
+    Attributes:
+        values: of the free parameters.
+        evaluation: numbers and derivatives there.
+        history: the metric after each step.
+        out_of_steps: whether it had used all its steps.
+        slope_left: length of the projected scaled gradient, relative to the metric.
+    """
+
+    values: Float[np.ndarray, " free"]
+    evaluation: Evaluation
+    history: tuple[float, ...]
+    out_of_steps: bool
+    slope_left: float
+
+
+@final
+class Descent:
+    """Searches for the smallest value of one objective, side by side.
+
+    Arguments:
+        evaluator: of rows and derivatives.
+        max_steps: of each search.
+        progress: called with the number of steps and the smallest present value of the objective.
+    """
+
+    def __init__(self, evaluator: Evaluator, max_steps: int, progress: Callable[[int, float], None]) -> None:
+        self._evaluator, self._max_steps, self._progress = evaluator, max_steps, progress
+
+    def search(
+        self, starts: Sequence[np.ndarray] | np.ndarray, evaluations: Sequence[Evaluation], limits: Sequence[Limit]
+    ) -> list[Ended]:
+        """One search from each start.
+
+        If one ends before an optimum, its estimate of the curvature is wrong or a kink has stopped it: it is started
+        again.
+
+        Arguments:
+            starts: coordinates.
+            evaluations: of the starts.
+            limits: that must hold at the end.
+        """
+        tolerance, ends = self._evaluator.task.tolerance, limit_ends(limits)
+        level = abs(float(evaluations[0].rows[0])) or 1.0
+        zeros, units = ([0.0, *(e.sign * e.value for e in ends)], [level, *(e.scale for e in ends)])
+        solver = SequentialQuadratic(
+            self._evaluator.region,
+            Scaling(np.array(zeros), np.array(units), 1),
+            self._max_steps,
+            improvement=0.1 * tolerance.rounding,
+            rounding=tolerance.rounding,
+            feasible=0.1 * tolerance.limit,
+        )
+        aim = np.zeros(1)
+        states = [solver.init(aim, y, now) for y, now in zip(starts, evaluations, strict=True)]
+        histories: list[list[float]] = [[] for _ in states]
+        rounds = 0
+
+        def note() -> None:
+            nonlocal rounds
+            rounds += 1
+            for state, history in zip(states, histories, strict=True):
+                if len(history) < state.steps:
+                    history.append(float(state.evaluation.rows[0]))
+            self._progress(rounds, min(float(state.evaluation.rows[0]) for state in states))
+
+        solver.solve(self._evaluator.at, states, note)
+        for _ in range(RESTARTS):
+            again = [i for i, state in enumerate(states) if self._ended_early(state, solver.scaling)]
+            for i in again:
+                steps, states[i] = states[i].steps, solver.init(aim, states[i].y, states[i].evaluation)
+                states[i].steps = steps
+            if again:
+                solver.solve(self._evaluator.at, states, note)
+        return [self._ended(state, tuple(h), solver.scaling) for state, h in zip(states, histories, strict=True)]
+
+    def _ended_early(self, state: SearchState, scaling: Scaling) -> bool:
+        left = _slope_left(self._evaluator, state, scaling)
+        return not left < self._evaluator.task.tolerance.slope and state.steps < self._max_steps
+
+    def _ended(self, state: SearchState, history: tuple[float, ...], scaling: Scaling) -> Ended:
+        space, tolerance = self._evaluator.task.space, self._evaluator.task.tolerance
+        values = np.clip(state.y * space.unit, space.lower, space.upper)
+        left, out_of_steps = _slope_left(self._evaluator, state, scaling), state.steps >= self._max_steps
+        if left >= tolerance.slope and not out_of_steps:
+            left = min(left, _slope_left_at_kink(self._evaluator, state, scaling))
+        return Ended(values, state.evaluation, history, out_of_steps, left)
+
+
+def reached(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tolerance) -> list[Limit]:
+    """The limits that are met, and hold the search."""
+    return [limit for limit in limits if abs(limit.margin(values[limit.name])) <= tolerance.limit]
+
+
+def missed(limits: Sequence[Limit], values: Mapping[str, float], tolerance: Tolerance) -> list[Limit]:
+    """The violated limits."""
+    return [limit for limit in limits if not limit.margin(values[limit.name]) >= -tolerance.limit]
+
+
+def _slope_left(evaluator: Evaluator, state: SearchState, scaling: Scaling) -> float:
+    """Length of the scaled gradient after projection on bounds and active limits, relative to the metric."""
+    space, (_, rows, slopes) = evaluator.task.space, state.evaluation
+    unbound = np.array([not side for side in space.side(state.y * space.unit)])
+    gradient, walls = slopes[0, unbound], slopes[1:][_tight(evaluator, rows, scaling)][:, unbound].T
+    if walls.size and gradient.size:
+        gradient = gradient - walls @ np.linalg.lstsq(walls, gradient, rcond=None)[0]
+    return float(np.linalg.norm(gradient)) / max(abs(float(rows[0])), 1e-300)
+
+
+def _tight(evaluator: Evaluator, rows: np.ndarray, scaling: Scaling) -> np.ndarray:
+    """Which ends of limits are reached."""
+    return -scaling.of(rows)[1:] < evaluator.task.tolerance.limit
+
+
+def _slope_left_at_kink(evaluator: Evaluator, state: SearchState, scaling: Scaling) -> float:
+    """The slope that is left where the metric or a limit has a kink, relative to the metric.
+
+    The length of the shortest convex combination of gradients sampled around the end, balanced by those of active
+    limits and bounds: zero at a minimum, also of a function whose gradient jumps there. Away from one all sampled
+    gradients point in similar directions, and no combination is short.
+
+    Source: Burke, Lewis, Overton, A robust gradient sampling algorithm for nonsmooth, nonconvex optimization, SIAM J.
+    Optim. 15 (2005).
+    """
+    import scipy.optimize
+
+    space, free, region = evaluator.task.space, len(state.y), evaluator.region
+    size = max(abs(float(state.evaluation.rows[0])), 1e-300)
+    near = state.y + NEAR * np.random.default_rng(0).uniform(-1.0, 1.0, (4 * free + 4, free))
+    sampled = [state.evaluation, *evaluator.at(np.clip(near, region.lower, region.upper))]
+    tight = _tight(evaluator, state.evaluation.rows, scaling)
+    gradients = [one.slopes[0] / size for one in sampled]
+    walls = [wall for one in sampled for wall in one.slopes[1:][tight]]
+    sides = {"lower": -1.0, "upper": 1.0}
+    at_bounds = space.side(state.y * space.unit)
+    walls += [sides[side] * row for side, row in zip(at_bounds, np.eye(free), strict=True) if side]
+    walls = [wall / length for wall in walls if (length := np.linalg.norm(wall)) > 0.0]
+    heavy = 1e3 * max(float(np.linalg.norm(gradient)) for gradient in gradients)  # weights add up to one
+    columns = [np.append(gradient, heavy) for gradient in gradients] + [np.append(wall, 0.0) for wall in walls]
+    weights, _ = scipy.optimize.nnls(np.stack(columns, axis=1), np.append(np.zeros(free), heavy))
+    return float(np.linalg.norm(np.stack(columns, axis=1)[:-1] @ weights))
