@@ -110,8 +110,8 @@ def fit_vehicle(
         samples_per_cycle: of bench records, as in `fit`.
         loss: as in `fit`: "huber", "soft_l1" or "student_t" for channels with spikes and dropouts.
         priors: as in `fit`; one on a mass shows the scale.
-        starts: number of searches, the first from `vehicle`, the others from parameters up to twice and half of it,
-            all with the noise found by the first. The first one counts unless another one fits better; `minima`
+        starts: number of searches, the first from `vehicle`, the others from parameters up to twice and half of those
+            that it ends at, with the noise that it finds. The first one counts unless another one fits better; `minima`
             describes the others.
         seed: of the other starts.
         max_steps: largest number of steps of each search.
