@@ -23,6 +23,7 @@ NOT_OFFERED = {  # arguments of library functions, and why
         "solver": "an object of Python",
         "bad_records": "the preflight refuses them, --skip-bad leaves them out",
     },
+    "identify.fit_vehicle": {"solver": "an object of Python"},
     "simulation.simulate": {
         "engine": "an object of Python",
         "start": "a ride begins at rest; --start is a law",
