@@ -207,7 +207,7 @@ def _accepted(
     dt: float | None,
     how: Mapping[str, Any],
 ) -> tuple[Problem, Solution, list[str]]:
-    """The minimum among the vehicles that `simulate` accepts, as it does the start, with the substeps that they need."""
+    """The minimum among the vehicles that `simulate` accepts, as it does the start, with the substeps they need."""
     notes = list[str]()
 
     def drives_at(values: np.ndarray) -> list[Drive] | None:
