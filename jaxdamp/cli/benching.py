@@ -33,14 +33,8 @@ def bench_command(
     limit is not kept.
 
     Arguments:
-        screen: the terminal.
-        files: files with records (CSV, XLSX, MATLAB, TDMS, MDF4, Parquet), patterns, or folders.
-        reading: how the records are read and processed.
-        how: as in `bench.evaluate`.
-        group_by: setting of the manifest to divide the records by, or "command".
         limits: CSV of limits: quantity, minimum, maximum, velocity, setting, record.
         baseline: to compare with: a law as JSON, or other records, read the same way.
-        output: where results are written.
     """
     reading.processing()
     chosen = None if limits is None else bench.read_limits(limits)

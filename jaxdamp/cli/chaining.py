@@ -43,16 +43,8 @@ def report(
     change and that the records determine. Ends with exit code 1 if a limit is not met.
 
     Arguments:
-        screen: the terminal.
-        files: files with records (CSV, XLSX, MATLAB, TDMS, MDF4, Parquet), patterns, or folders.
-        vehicle: a published vehicle, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.
-        road: iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file of position, height.
         law: names of laws to fit, see "jaxdamp laws": "linear,besinger"; or "all".
         minimise: comfort, travel, grip, or the name of a ride metric.
-        search: as in `tune.minimise`.
-        reading: how the records are read and processed.
-        driving: how the road is driven over.
-        output: where results are written.
     """
     names, make = law_names(law), parse_vehicle(vehicle)
     if road.startswith("white"):

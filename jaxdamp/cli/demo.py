@@ -102,9 +102,7 @@ def demo(screen: Screen, *, seed: int = 0, output: Output) -> None:
     quarter car rides on each law; the damper is tuned for comfort; all is written to a folder.
 
     Arguments:
-        screen: the terminal.
         seed: of the noise of the virtual bench and of the roads.
-        output: where results are written.
     """
     run_demo(screen, Scenario(seed=seed), output)
 

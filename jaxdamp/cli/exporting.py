@@ -52,11 +52,9 @@ def export_command(screen: Screen, law: Path, *, to: str, velocities: str | None
     """Write a law as C, as FMU or as the table of a simulator; or a whole vehicle as C or FMU.
 
     Arguments:
-        screen: the terminal.
         law: a law as JSON, such as best_law.json of jaxdamp fit; or a vehicle, for c and fmu.
         to: adams, assetto-corsa, c, carsim, csv, fmu or matlab.
         velocities: of a table, FROM:TO:POINTS [m/s]; those the law was fitted to, or -1:1:41.
-        output: where the file is written.
     """
     _checks.one_of("to", to, sorted(PROGRAMS | TABLES))
     ending, write = (PROGRAMS | TABLES)[to]
@@ -93,18 +91,11 @@ def explore(
     """Write a law as one page for the browser: sliders, loops, records and a ride, live and without a network.
 
     Arguments:
-        screen: the terminal.
-        law: a law as JSON, such as best_law.json of jaxdamp fit.
         files: files with records to overlay, patterns, or folders.
-        reading: how the records are read and processed.
         vehicle: a quarter car, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.
-        road: iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.
         speed: of the vehicle [m/s].
-        baseline: another law to compare with, as JSON.
         duration: of the ride [s]; the road's own, or 10.
         seed: of random roads.
-        how: as in `export.to_explorer`.
-        output: where the page is written.
     """
     file, damper = output.checked(f"{law.stem}.html"), read_law("law", law)
     kind, _, word = road.partition(":")

@@ -64,18 +64,10 @@ def fit(
     the setting. Laws and tables are in the folder before the first picture is drawn.
 
     Arguments:
-        screen: the terminal.
-        files: files with records (CSV, XLSX, MATLAB, TDMS, MDF4, Parquet), patterns, or folders.
         law: names of laws, see "jaxdamp laws": "linear,besinger"; or "all".
         held_out: records to score on, not to fit: a name or a pattern, such as "30mm_*".
-        reading: how the records are read and processed.
-        how: as in `identify.fit`.
         rig: what the test machine adds.
-        group_by: setting of the manifest to divide the records by, or "command".
         cross_validate: predict each record by the best law fitted to the others.
-        baseline: another law to compare with, as JSON.
-        report: write the page to this file too: fit.html.
-        output: where results are written.
     """
     names, options = law_names(law), how.arguments()
     if isinstance(weighting := options.get("weighting", "samples"), str):

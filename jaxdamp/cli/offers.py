@@ -23,6 +23,7 @@ NOT_OFFERED = {  # arguments of library functions, and why
         "solver": "an object of Python",
         "bad_records": "the preflight refuses them, --skip-bad leaves them out",
     },
+    "identify.fit_vehicle": {"solver": "an object of Python"},
     "simulation.simulate": {
         "engine": "an object of Python",
         "start": "a ride begins at rest; --start is a law",
@@ -114,6 +115,17 @@ TYPES = (  # pattern of one alternative of an annotation, and how it is written;
     (r"tuple\[(float|int)[ |floatin]*, (float|int)[ |floatin]*\]", Written(words.two, "FIRST:SECOND", repeated=False)),
 )
 NAMES_OR_NUMBERS = Written(words.names_or_numbers, "NAME or NUMBER,...")  # of `str | Sequence[float]`
+
+SHARED = {  # help of the words that several commands take, unless the docstring of one says something else
+    "files": "files with records (CSV, XLSX, MATLAB, TDMS, MDF4, Parquet), patterns, or folders.",
+    "law": "a law as JSON, such as best_law.json of jaxdamp fit.",
+    "vehicle": 'a published vehicle, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.',
+    "road": "iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.",
+    "start": "a law as JSON for all dampers, instead of the vehicle's own.",
+    "baseline": "another law to compare with, as JSON.",
+    "report": "write the page to this file too: fit.html.",
+    "group_by": 'setting of the manifest to divide the records by, or "command".',
+}
 
 TEXTS = {  # help where the docstring speaks of Python only, by option, or by command and option
     "manifest": "TOML file that says how to read the files; jaxdamp.toml in a folder is taken by itself.",

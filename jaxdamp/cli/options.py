@@ -187,7 +187,11 @@ def aliases(command: str, target: str) -> dict[str, str]:
 
 def _help(command: str, name: str, argument: Argument, how: Written | type) -> str:
     """The help of an option: the first sentence of what the docstring says, in words of the command line."""
-    text = offers.TEXTS.get(f"{command} {name}") or offers.TEXTS.get(name) or in_words(argument.text)
+    text = (
+        offers.TEXTS.get(f"{command} {name}")
+        or offers.TEXTS.get(name)
+        or in_words(argument.text or offers.SHARED.get(name, ""))
+    )
     example, default = how.example if isinstance(how, Written) else "", argument.default
     if default in (REQUIRED, None, "", (), ...) or isinstance(default, bool):
         shown = ""

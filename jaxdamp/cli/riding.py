@@ -106,16 +106,6 @@ def ride(
     """Ride on a law: metrics, comfort by ISO 2631-1 and pictures, beside a baseline.
 
     The law is at every damper of the vehicle.
-
-    Arguments:
-        screen: the terminal.
-        law: a law as JSON, such as best_law.json of jaxdamp fit.
-        vehicle: a published vehicle, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.
-        road: iso:A to iso:H, bump:HEIGHT:LENGTH [m], or a file: *.crg, or text of position, height.
-        driving: how the road is driven over.
-        how: as in `simulation.simulate`.
-        baseline: another law to compare with, as JSON.
-        output: where results are written.
     """
     make = parse_vehicle(vehicle)
     files = ({} if baseline is None else {"baseline": baseline}) | {"law": law}

@@ -47,16 +47,10 @@ def tune_command(
     limited to +10% of the start by itself; --limit grip=none removes that.
 
     Arguments:
-        screen: the terminal.
-        vehicle: a published vehicle, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.
         road: iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height.
-        start: a law as JSON for all dampers, instead of the vehicle's own.
         minimise: comfort, travel, grip, or the name of a ride metric.
-        search: as in `tune.minimise`.
         roads: realisations of an iso road, driven side by side; their mean counts.
-        driving: how the road is driven over.
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
-        output: where results are written.
     """
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     beside = None if baseline is None else _baseline(baseline, car)
@@ -151,17 +145,11 @@ def sweep_command(
     """Compute ride metrics over a grid of parameters: curves, maps and a table.
 
     Arguments:
-        screen: the terminal.
-        vehicle: a published vehicle, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.
         road: iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height.
         over: axes.
-        start: a law as JSON for all dampers, instead of the vehicle's own.
         metric: comfort, travel, grip, or names of ride metrics.
         limit: limits.
-        driving: how the road is driven over.
-        how: as in `sweep`.
         baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
-        output: where results are written.
     """
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     (surface,), run = driving.over(road)

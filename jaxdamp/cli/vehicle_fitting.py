@@ -46,16 +46,9 @@ def fit_vehicle(
     travels in extension. Writes the vehicle and its laws as JSON, tables, pictures and a page.
 
     Arguments:
-        screen: the terminal.
-        vehicle: a published vehicle, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.
         files: files with records of its motion, patterns, or folders.
-        start: a law as JSON for all dampers, instead of the vehicle's own.
-        reading: as in `bench.read_rides`.
-        how: as in `identify.fit_vehicle`.
         guide: what holds a body to the ground, fitted from these starts: friction [N], stiffness [N/m], damping
             [N s/m]; friction_velocity [m/s] and ahead [m] are held.
-        report: write the page to this file too: fit.html.
-        output: where results are written.
     """
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     _checks.one_of("initial_motion", how.given.get("start", "rest"), ("rest", "free"))

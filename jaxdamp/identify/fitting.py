@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, ParamSpec, Protocol, cast, overload, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Protocol, cast, overload, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -36,6 +36,10 @@ from jaxdamp.parameters import FreeParameters, matched_in_words, parameters
 from jaxdamp.vehicles import AbstractVehicle
 
 
+if TYPE_CHECKING:
+    from jaxdamp.identify.scheduling import ScheduledFit
+
+
 P = ParamSpec("P")
 UNSEEN = 1e-12  # of the largest derivative, up to which one is a rounding error
 # Errors due to a law that does not suit the records, as opposed to a wrong call (`TypeError` and so on).
@@ -55,6 +59,10 @@ class FitCall(Protocol[P]):
     @overload
     def __call__(self, law: Start, runs: Mapping[str, BenchRun | Iterable[BenchRun]], **options: Any) -> ManyFits: ...
     @overload
+    def __call__(
+        self, law: Start, runs: Iterable[BenchRun], *, scheduled: Literal[True], **options: Any
+    ) -> "ScheduledFit": ...
+    @overload
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> FitResult: ...
 
 
@@ -64,13 +72,18 @@ def of_any_records(fit: Callable[P, FitResult]) -> FitCall[P]:
     @functools.wraps(fit)
     def by_kind(*args: Any, **options: Any) -> Any:
         given: dict[str, Any] = dict(zip(("law", "runs"), args, strict=False)) | options
-        model, records = given.pop("law", None), given.pop("runs", None)
-        if "numbers" in options:
+        model = given.pop("law") if "law" in given else given.pop("vehicle", None)
+        records = given.pop("runs") if "runs" in given else given.pop("records", None)
+        if "numbers" in given:
             return fit_targets(given.pop("numbers"), model, cast(Any, records), **given)
-        if isinstance(model if model is not None else options.get("vehicle"), AbstractVehicle):
-            return fit_vehicle(*args, **options)
+        if isinstance(model, AbstractVehicle):
+            return fit_vehicle(model, cast(Any, records), **given)
         if isinstance(records, Mapping):
             return fit_many(cast(Any, model), records, **given)
+        if given.pop("scheduled", False):
+            from jaxdamp.identify.scheduling import fit_scheduled  # which is made of fits of a law
+
+            return fit_scheduled(cast(Any, model), cast(Any, records), **given)
         return fit(*args, **options)
 
     return cast(FitCall[P], by_kind)
@@ -103,7 +116,8 @@ def fit(
     """Fit a damper law to bench records by least squares on the force, or another model to what was measured of it.
 
     `fit(law, runs)` is described here. `fit(vehicle, records)` is `fit_vehicle`, `fit(law, {"A": runs, "B": runs})` of
-    many dampers is `fit_many`, and `fit(model, {"frequency": 1.2}, numbers=function)` is `fit_targets`.
+    many dampers is `fit_many`, `fit(model, {"frequency": 1.2}, numbers=function)` is `fit_targets`, and
+    `fit(law, runs, scheduled=True)` of records at several settings is `fit_scheduled`.
 
     Minimises Σ ((F_law − F_measured)/σ)² over all samples of all records, with Levenberg-Marquardt inside the domains
     of the parameters, and Jacobians by forward-mode differentiation through the law and its states. Where the law is

@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
-from jaxdamp._tables import Column, Table, plain
+from jaxdamp._tables import Column, Table, plain, plus_minus
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
@@ -228,7 +228,7 @@ def _judged(
     estimates = estimate(problem, solution, noise)
     notes = [*on_status(end), *(f"{e.name} = {e.value:.4g} is {e.note}." for e in estimates.estimates if e.note)]
     notes += [
-        f"{t.name} is missed: {t.value:.4g} instead of {t.target:.4g} ± {t.tolerance:.2g}." for t in met if not t.met
+        f"{t.name} is missed: {t.value:.4g} instead of {plus_minus(t.target, t.tolerance)}." for t in met if not t.met
     ]
     notes += _disagreements(free, solution)
     how, main = fields_of_fit(problem, solution, noise, estimates), tuple(notes[:MOST_WARNINGS])

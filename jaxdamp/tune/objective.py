@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array
 
 from jaxdamp import _checks
+from jaxdamp._tables import plus_minus
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import (
     STATISTICS,
@@ -256,7 +257,7 @@ class Targets:
         target, tolerance = self.values[name]
         off = (value - target) / tolerance
         met = "met" if abs(off) <= 1.0 else f"missed by {abs(off):.1f} tolerances"
-        return f"target {target:.4g} ± {tolerance:.2g}, {met}"
+        return f"target {plus_minus(target, tolerance)}, {met}"
 
 
 def _pair(metric: str | Metric, pair: Any) -> tuple[float, float]:

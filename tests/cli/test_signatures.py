@@ -132,6 +132,8 @@ def test_what_is_no_option_is_listed_with_its_reason(command: str) -> None:
         if leaf not in offered and not options.withheld(leaf)
     ]
     assert not silent, f"write how it is written into `offers.WRITTEN`, or why not into NOT_OFFERED: {silent}"
+    built = {str(parameter.name): parameter for parameter in application.command(command).params}
+    assert all(getattr(built[leaf.option], "help", "").rstrip(".") for leaf in offered)
     names = [leaf.option for leaf in offered]
     assert len(names) == len(set(names)), "two arguments would be the same option: rename one in `offers.NAMES`"
 
@@ -142,7 +144,9 @@ def test_the_declared_lists_name_arguments_that_are_there() -> None:
         assert set(reasons) <= there and all(reasons.values()), owner
     names = {leaf.option for target in COMMANDS.values() for leaf in options.leaves(target)}
     python = {leaf.argument.name for target in COMMANDS.values() for leaf in options.leaves(target)}
-    assert {key.split()[-1] for key in offers.TEXTS} | set(offers.WRITTEN) | set(offers.SHORT) <= names
+    assert {key.split()[-1] for key in offers.TEXTS} | set(offers.WRITTEN) | set(offers.SHORT) | set(
+        offers.SHARED
+    ) <= names
     assert {key.split()[-1] for key in offers.NAMES} <= python
 
 

@@ -1,5 +1,7 @@
 """comfort, travel and grip mean the same metrics wherever a metric is named."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -16,14 +18,14 @@ def test_a_short_name_is_its_metrics() -> None:
     assert CAR.goal_metrics("rms_pitch_acceleration") == ["rms_pitch_acceleration"]
     names = [name for goal in ("comfort", "travel", "grip") for name in CAR.goal_metrics(goal, white=True)]
     assert set(Ride(CAR, WHITE, metrics=["comfort", "travel", "grip"])()) == set(names)
-    bump = roads.cosine_bump(0.05, start=0.1, duration=0.2)
+    bump = roads.cosine_bump(0.05, start=0.1, length=4.0, speed=20.0)
     assert set(simulate(CAR, bump, duration=0.5).metrics(["grip"])) == set(CAR.goal_metrics("grip"))
     with pytest.raises(ValueError, match="Did you mean 'comfort'"):
         CAR.goal_metrics("confort")
 
 
 def test_a_tuning_takes_short_names_as_objective_and_limits() -> None:
-    how = {"fresh_roads": 0, "max_steps": 3}
+    how: Any = {"fresh_roads": 0, "max_steps": 3}
     travel = tune.minimise("travel", CAR, WHITE, limits={"grip": "+10%"}, **how)
     front, rear = CAR.goal_metrics("travel", white=True)
     mean = 0.5 * (float(travel.after[front]) + float(travel.after[rear]))
