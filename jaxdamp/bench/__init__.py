@@ -3,6 +3,7 @@
 Stroke and velocity are positive in extension (rebound), force is positive when it resists extension.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp.bench import programmes
 from jaxdamp.bench.analysis import (
     FoldedCycles,
@@ -89,3 +90,5 @@ __all__ = [
     "steady_cycles",
     "usable",
 ]
+
+answer_guesses(__name__, __all__)

@@ -4,6 +4,7 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 `law + law`, `2.0 * law`, `SeriesSpring(law, ...)`, `Lag(law, ...)`, `MotionRatio(law, ...)`.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp.dampers._commands import command_paths
 from jaxdamp.dampers._points import drives_motion
 from jaxdamp.dampers._starts import Reach, from_samples
@@ -150,3 +151,5 @@ __all__ = [
     "with_fitted_range",
     "without_fitted_ranges",
 ]
+
+answer_guesses(__name__, __all__)

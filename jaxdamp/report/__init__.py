@@ -8,6 +8,7 @@
 - Tables of these pages: `records_table`, `ride_records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp._tables import Column, Table
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.benches import add_evaluation, baseline_table, bench_report, law_evaluation
@@ -26,10 +27,8 @@ from jaxdamp.report.ranges import fitted_range_table, range_use_table
 from jaxdamp.report.records import add_records, records_table
 from jaxdamp.report.results import result_report
 from jaxdamp.report.rides import (
-    GOALS,
     add_rides,
     axles_sentence,
-    goal_metrics,
     notes_of,
     ride_report,
     ride_tables,
@@ -41,7 +40,6 @@ from jaxdamp.report.vehicle_fits import ride_records_table, vehicle_fit_report
 
 
 __all__ = [
-    "GOALS",
     "Attempts",
     "Column",
     "Report",
@@ -61,7 +59,6 @@ __all__ = [
     "fit_verdict",
     "fitted_range_table",
     "fitted_velocities",
-    "goal_metrics",
     "law_evaluation",
     "notes_of",
     "parameters_of",
@@ -76,3 +73,5 @@ __all__ = [
     "tuning_report",
     "vehicle_fit_report",
 ]
+
+answer_guesses(__name__, __all__)

@@ -13,7 +13,7 @@
 - `compare_dampers`: differences between dampers with error bars; `valving`: a mono-tube damper for a wanted force.
 """
 
-from jaxdamp._deprecated import old_names
+from jaxdamp._deprecated import answer_old_names
 from jaxdamp._status import Status
 from jaxdamp.tune.comparison import DamperComparison
 from jaxdamp.tune.decisions import compare_dampers
@@ -75,8 +75,9 @@ __all__ = [
     "valving",
 ]
 
-__getattr__ = old_names(
-    "jaxdamp.tune",
+answer_old_names(
+    __name__,
+    __all__,
     {
         "Attempt": "result",
         "Change": "result",

@@ -10,6 +10,7 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.solve import SearchState
 from jaxdamp.tune.descending import missed
@@ -31,6 +32,7 @@ BEYOND = 0.1  # distance of the default reference point beyond the worst values,
 FRESH_ROADS, MAX_STEPS = 3, 40  # by default
 
 
+@of_known_numbers
 def pareto(
     objectives: Sequence[str | Metric | Function],
     vehicle: V,

@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import match_paths
 from jaxdamp.tune.minimising import minimise
@@ -20,6 +21,7 @@ from jaxdamp.tune.settings import RUN, Run, Settings, completed
 from jaxdamp.vehicles import AbstractVehicle
 
 
+@of_known_numbers
 def robust(
     metric: str | Metric | Function,
     vehicle: V,
@@ -68,6 +70,7 @@ def robust(
     return dataclasses.replace(tuning, tolerances=effects)
 
 
+@of_known_numbers
 def tolerance_effects(
     metric: Any,
     vehicle: AbstractVehicle,

@@ -14,6 +14,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, MonoTube
@@ -70,6 +71,7 @@ class _End(NamedTuple):
     status: Status
 
 
+@of_known_numbers
 def valving(
     target: AbstractDamper | BenchRun | Sequence[BenchRun] | tuple[Any, Any],
     start: MonoTube,
@@ -261,7 +263,9 @@ def _search(space: SearchRange, force_of: Any, wanted: np.ndarray, begin: np.nda
     """Least squares within the bounds from one start, and again from lower points beside its end."""
     size = float(np.linalg.norm(wanted))
     precision = float(jnp.finfo(space.free.values.dtype).eps)
-    solver = BoundedLevenbergMarquardt(space.lower / space.unit, space.upper / space.unit, precision=precision)
+    solver = BoundedLevenbergMarquardt(
+        lower=space.lower / space.unit, upper=space.upper / space.unit, precision=precision
+    )
 
     def at(y: np.ndarray, lanes: np.ndarray) -> tuple[Linearisation, np.ndarray]:
         force, slopes = force_of(np.clip(y[0] * space.unit, space.lower, space.upper))

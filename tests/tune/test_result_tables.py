@@ -1,17 +1,19 @@
 """Tunings and their rescoring as tables and plain data; numbers made up, no search."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
 
-from jaxdamp import tune
+from jaxdamp import tune as typed_tune
 from jaxdamp.tune import Rescore, Status, TuneResult
 from jaxdamp.tune.result import Change
 from jaxdamp.vehicles import presets
 
 
 CAR = presets.quarter_car_000()
+tune: Any = typed_tune  # old names, which type checkers do not see
 RESULT = TuneResult(
     vehicle=CAR,
     start=CAR,
