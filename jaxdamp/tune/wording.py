@@ -8,9 +8,10 @@ from jaxdamp._status import Status
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.descending import Ended
 from jaxdamp.tune.limits import Limit, LimitRange
-from jaxdamp.tune.objective import Objective, exact_counterpart
+from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.ranges import FACTOR, SearchRange
 from jaxdamp.tune.result import Attempt, Change
+from jaxdamp.tune.smooth import exact_counterpart
 
 
 _ROUNDING = 1e-12  # of a metric, by which its derivative times the parameter counts as zero
