@@ -59,11 +59,11 @@ class FitCall(Protocol[P]):
     @overload
     def __call__(self, law: Start, runs: Mapping[str, BenchRun | Iterable[BenchRun]], **options: Any) -> ManyFits: ...
     @overload
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> FitResult: ...
+    @overload
     def __call__(
         self, law: Start, runs: Iterable[BenchRun], *, scheduled: Literal[True], **options: Any
     ) -> "ScheduledFit": ...
-    @overload
-    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> FitResult: ...
 
 
 def of_any_records(fit: Callable[P, FitResult]) -> FitCall[P]:

@@ -119,11 +119,11 @@ def search_each(
         max_steps: largest number of steps of each search.
         solver: as in `search`.
     """
-    kept = [v for i, v in enumerate(starts) if i == 0 or keeps_conditions(problem.free.started_at(v).tree)]
-    ends = [search(problem.started_at(values), max_steps, solver=solver) for values in kept]
+    allowed = [v for i, v in enumerate(starts) if i == 0 or keeps_conditions(problem.free.started_at(v).tree)]
+    ends = [search(problem.started_at(values), max_steps, solver=solver) for values in allowed]
     squares = np.array([end.squares if end.finite else np.inf for end in ends])
     best = ends[int(np.argmax(squares <= squares.min() + equally_good(squares.min())))]
-    return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(kept))
+    return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(allowed))
 
 
 def equally_good(squares: float) -> float:

@@ -196,14 +196,14 @@ def fit_targets(
         if count < 1:
             _checks.refuse(name, "be 1 or more", count)
     free = _free(start, over, freeze, bounds, tie)
-    known = priors_on(free, priors or {}, 1.0)
+    expected = priors_on(free, priors or {}, 1.0)
     padding = max(free.values.size + 1 - len(goals), 0)
     wanted, allowed = (jnp.asarray(np.array(column, float)) for column in zip(*goals.values(), strict=True))
     residuals = TargetResiduals(numbers, wanted, allowed, tuple(goals), padding)
     _check_numbers(residuals, free.tree)
     level = float(jnp.linalg.norm(wanted / allowed)) or 1.0
-    owner = np.zeros(len(goals) + padding + sum(part.size for part in known), int)
-    everywhere, parts = Reach(np.inf, np.inf), (residuals, *known)
+    owner = np.zeros(len(goals) + padding + sum(part.size for part in expected), int)
+    everywhere, parts = Reach(np.inf, np.inf), (residuals, *expected)
     problem = Problem(free, parts, level, (), (1.0,), owner, everywhere, free.tree, (), False)
 
     def by_squares(problem: Problem, count: int | None) -> Solution:

@@ -7,6 +7,7 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
@@ -110,8 +111,8 @@ def fit_vehicle(
         samples_per_cycle: of bench records, as in `fit`.
         loss: as in `fit`: "huber", "soft_l1" or "student_t" for channels with spikes and dropouts.
         priors: as in `fit`; one on a mass shows the scale.
-        starts: number of searches, the first from `vehicle`, the others from parameters up to twice and half of it,
-            all with the noise found by the first. The first one counts unless another one fits better; `minima`
+        starts: number of searches, the first from `vehicle`, the others from parameters up to twice and half of those
+            that it ends at, with the noise that it finds. The first one counts unless another one fits better; `minima`
             describes the others.
         seed: of the other starts.
         max_steps: largest number of steps of each search.
@@ -151,8 +152,9 @@ def fit_vehicle(
     scale = free_scale(problem, search(problem, 1))
     problem = problem._replace(free=without(free, scale.held))
     how = {"loss": loss, "starts": starts, "max_steps": max_steps, "seed": seed, "solver": solver}
+    begin = np.asarray(problem.free.values)
     problem, solution = _solved(data, problem, known, expected, **how)
-    problem, solution, refused = _accepted(data, problem, solution, known, expected, dt, how | {"starts": 1})
+    problem, solution, refused = _accepted(data, problem, solution, begin, known, expected, dt, how | {"starts": 1})
     paths = [p.path for p in parameters(model)]
     named = matched_in_words([path for path in paths if path.startswith("vehicle.")], over=over or ())
     others = matched_in_words(paths, freeze=freeze, bounds=bounds or {}, per_record=per_record)
@@ -199,13 +201,14 @@ def _accepted(
     data: VehicleData,
     problem: Problem,
     solution: Solution,
+    start: Float[np.ndarray, " free"],
     known: Mapping[str, float],
     expected: Sequence[Priors],
     dt: float | None,
     how: Mapping[str, Any],
 ) -> tuple[Problem, Solution, list[str]]:
-    """The minimum among the vehicles that `simulate` accepts, by as many substeps as their laws need."""
-    start, notes = np.asarray(problem.free.values), list[str]()
+    """The minimum among the vehicles that `simulate` accepts, as it does the start, with the substeps they need."""
+    notes = list[str]()
 
     def drives_at(values: np.ndarray) -> list[Drive] | None:
         """How the records are simulated with these numbers; None where `simulate` would refuse."""

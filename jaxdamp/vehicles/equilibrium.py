@@ -44,7 +44,7 @@ def rest_position(system: System, road: Float[Array, " wheels"]) -> Float[Array,
         forces = ports.force(still, still, ports.initial())
         return solve(form.stiffness, form.road_stiffness @ road - form.ports.T @ forces)
     scale = jnp.max(jnp.diag(form.stiffness))  # N/m, converts residual forces to lengths
-    solver = _SharedNewton(1e-8 if scale.dtype == jnp.float32 else 1e-14)
+    solver = _SharedNewton(atol=1e-8 if scale.dtype == jnp.float32 else 1e-14)
     setting = form, ports, road, jax.lax.stop_gradient(scale)
     start = varying_as(jnp.zeros_like(form.mass[0]), *eqx.filter(setting, eqx.is_array))
     found = optx.root_find(
