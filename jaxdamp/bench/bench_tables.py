@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench import clock, stamps
-from jaxdamp.bench import sign as signs
+from jaxdamp.bench import clock, sign as signs, stamps
 from jaxdamp.bench.clock import Part, regular_parts
 from jaxdamp.bench.columns import REQUIRED, Choice, Column, find_columns
 from jaxdamp.bench.motion import Samples, cycle_instants

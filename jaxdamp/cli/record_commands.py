@@ -152,7 +152,6 @@ def demo(
     A virtual bench records a known damper; laws are fitted to the files and compared on records that were held out; a
     quarter car rides on each law; the damper is tuned for comfort; all is written to a folder.
     """
-    from jaxdamp.cli import console
-    from jaxdamp.cli import demo as demonstration
+    from jaxdamp.cli import console, demo as demonstration
 
     demonstration.run_demo(console.Screen(), demonstration.Scenario(seed=seed), out=out, replace=replace)
