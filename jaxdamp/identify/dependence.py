@@ -7,8 +7,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jaxdamp import _checks
-from jaxdamp.identify.lanes import Evaluation
+from jaxdamp._triangles import rows_of_products
+from jaxdamp.identify.lanes import Products
 from jaxdamp.parameters import Bounds, FreeParameters, match_paths, name_patterns
+from jaxdamp.solve import Linearisation
 
 
 OWN = -1  # in place of a degree: every damper has its own value
@@ -73,15 +75,26 @@ class Dependence(NamedTuple):
             sides.append(limit)
         return Bounds(*sides)
 
-    def gathered(self, found: Evaluation) -> Evaluation:
-        """The products of all dampers together, by the vector."""
-        gram = np.zeros((self.size + 1, self.size + 1))
-        for damper, own in enumerate(found.gram):
+    def gathered(self, here: Linearisation, products: Products, inside: bool) -> tuple[Linearisation, Products]:
+        """The problem of all dampers together, by the vector.
+
+        Arguments:
+            here: of each damper.
+            products: of each damper.
+            inside: whether all coordinates are within their bounds.
+        """
+        together = np.zeros((self.size + 1, self.size + 1))
+        slopes = np.zeros((*here.margins.shape, self.size))
+        for damper, (own, by_y) in enumerate(zip(products, here.margin_slopes, strict=True)):
             columns, weights = self.rows(damper)
+            slopes[damper][:, columns] = by_y @ weights
             columns, weights = np.append(columns, self.size), np.pad(weights, ((0, 1), (0, 1)))
             weights[-1, -1] = 1.0
-            gram[np.ix_(columns, columns)] += weights.T @ own @ weights
-        return Evaluation(gram[None], np.array([bool(np.all(found.keeps_conditions))]))
+            together[np.ix_(columns, columns)] += weights.T @ own @ weights
+        margins = np.append(np.ravel(here.margins), 1.0 if inside else -1.0)
+        by_vector = np.concatenate([slopes.reshape(-1, self.size), np.zeros((1, self.size))])
+        rows, samples = rows_of_products(together[None]), np.sum(here.samples, keepdims=True)
+        return Linearisation(rows, margins[None], by_vector[None], samples), together[None]
 
 
 def legendre(setting: np.ndarray, ends: tuple[float, float], count: int) -> np.ndarray:

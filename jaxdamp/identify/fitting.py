@@ -10,11 +10,11 @@ import jax
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._one_thread import one_thread
 from jaxdamp._status import Status
+from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify._blas import one_thread
-from jaxdamp.identify._tall import triangle
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
 from jaxdamp.identify.input_noise import input_noise_bias, on_bias
 from jaxdamp.identify.judging import MOST_WARNINGS, judge
@@ -26,7 +26,7 @@ from jaxdamp.identify.model import rig_of
 from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.preparing import prepare, records_in_words
 from jaxdamp.identify.problem import Problem, linearised
-from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.search import SearchEnd, Solver
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.static_force import holds_static_force, static_force_in_words, with_static_force_on_machine
@@ -101,6 +101,7 @@ def fit(
     starts: int | None = None,
     max_steps: int = 200,
     bad_records: str = "refuse",
+    solver: Solver | None = None,
 ) -> FitResult:
     """Fit a damper law to bench records by least squares on the force, or another model to what was measured of it.
 
@@ -165,6 +166,10 @@ def fit(
         max_steps: largest number of steps of each search.
         bad_records: what is done with records in which the preflight finds an error, such as a clipped or lost force:
             "refuse" the fit, "leave_out" these records, or "keep" them. Spikes are no error for a robust `loss`.
+        solver: any least-squares solver or minimiser of optimistix, such as `optimistix.Dogleg(rtol=1e-8, atol=1e-8)`,
+            in place of `jaxdamp.solve.BoundedLevenbergMarquardt()`. It searches in coordinates without bounds, in which
+            an edge of a domain is approached only slowly; a violated condition between parameters is an infinite
+            residual. The standard errors and the checks are the same.
 
     Returns:
         The law with the range of the fitted records (`law.fitted_to`), its parameters with standard errors, scores and
@@ -201,7 +206,7 @@ def fit(
     )
 
     def by_squares(problem: Problem, starts: int | None) -> Solution:
-        return solve(problem, starts=starts, max_steps=max_steps)
+        return solve(problem, starts=starts, max_steps=max_steps, solver=solver)
 
     noise = functools.partial(noise_of, force_noise=force_noise)
     problem, solution = solve_by(problem, by_squares, loss=loss, noise=noise, starts=starts)
@@ -231,24 +236,30 @@ def fit(
 
 
 @one_thread()
-def solve(problem: Problem, *, starts: int | None = None, max_steps: int = 200) -> Solution:
+def solve(
+    problem: Problem, *, starts: int | None = None, max_steps: int = 200, solver: Solver | None = None
+) -> Solution:
     """The second step of `fit`: minimise the sum of squares of a problem.
 
     Arguments:
         problem: result of `prepare`.
         starts: largest number of starts; all that the laws propose if left out.
         max_steps: largest number of steps of each search.
+        solver: as in `fit`; one that is given also solves what could be computed directly.
 
     Raises:
-        ValueError: counts below one.
+        ValueError: counts below one; a solver of another kind.
     """
     for name, count in (("max_steps", max_steps), ("starts", starts)):
         if count is not None and count < 1:
             _checks.refuse(name, "be 1 or more", count)
+    if solver is not None and not isinstance(solver, Solver):
+        remedy = "For example `optimistix.Dogleg(rtol=1e-8, atol=1e-8)`."
+        _checks.refuse("solver", "be a least-squares solver or minimiser of optimistix", solver, remedy)
     rig = rig_of(problem.free.tree)
-    if is_linear(problem.law, problem.free) and not (rig and "heat" in rig.effects()):
+    if solver is None and is_linear(problem.law, problem.free) and not (rig and "heat" in rig.effects()):
         return _solve_linear(problem)
-    return search_from(problem, starts=starts, max_steps=max_steps)
+    return search_from(problem, starts=starts, max_steps=max_steps, solver=solver)
 
 
 def is_linear(law: AbstractDamper, free: FreeParameters) -> bool:

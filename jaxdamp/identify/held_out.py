@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jaxdamp._one_thread import one_thread
 from jaxdamp.bench import BenchRun
-from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.fitting import solve
 from jaxdamp.identify.initial_states import moving_samples
 from jaxdamp.identify.judging import fitted_models

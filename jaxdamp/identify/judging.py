@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._one_thread import one_thread
 from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
 from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, laws_inside, takes_command
-from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.blending import off_span
 from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.estimating import Estimates, estimate, on_misfit

@@ -14,15 +14,20 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from jaxdamp._jacobian import value_and_jacobian
+from jaxdamp._triangles import rows_of_products
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import laws_inside, margins
 from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.model import Model
+from jaxdamp.identify.search import condition_margins
 from jaxdamp.identify.traces import Batch, record_batches
 from jaxdamp.parameters import Coordinates
+from jaxdamp.solve import Linearisation
 
 
 CHUNK_SAMPLES = 32768  # of the records in one call, which should fit into the cache; all calls of a group are alike
+
+
+Products = Float[np.ndarray, "_lanes _columns _columns"]
 
 
 class Group(NamedTuple):
@@ -40,13 +45,6 @@ class Group(NamedTuple):
     def parts(self, count: int) -> list[slice]:
         """Pieces of `count` records for one call each."""
         return [slice(begin, begin + self.chunk) for begin in range(0, count, self.chunk)]
-
-
-class Evaluation(NamedTuple):
-    """Sums over the records of each lane."""
-
-    gram: Float[np.ndarray, "lanes columns columns"]  # (J, r)ᵀ(J, r), relative to the squares of the measured forces
-    keeps_conditions: np.ndarray  # of each lane
 
 
 class LanePriors(NamedTuple):
@@ -81,20 +79,29 @@ class Lanes(NamedTuple):
     damper: Int[np.ndarray, " lanes"]
     priors: LanePriors | None = None
 
-    def evaluate(self, y: Float[np.ndarray, "lanes free"], lanes: Int[np.ndarray, " some"]) -> Evaluation:
-        """Sums of squares and products of some lanes, at the coordinates of all; the other lanes have zeros."""
+    def linearise(
+        self, y: Float[np.ndarray, "some free"], lanes: Int[np.ndarray, " some"]
+    ) -> tuple[Linearisation, Products]:
+        """The problems of some lanes at these coordinates, and the products of their columns.
+
+        The products (J, r)ᵀ(J, r), relative to the squares of the measured forces, are a hundred times less work than
+        a triangle of each Jacobian, and their rounding errors matter only for what the records do not determine.
+        """
         count, size = y.shape[0], y.shape[1] + 1
-        gram, keeps = np.zeros((count, size, size)), np.ones(count, bool)
-        for group in self.groups:
+        products, margins, slopes = np.zeros((count, size, size)), np.zeros((count, 0)), np.zeros((count, 0, size - 1))
+        for number, group in enumerate(self.groups):
             lane, record = self._pairs(group, lanes)
-            for part, (products, margin, *_) in self._chunks(group, y, lane, record):
-                np.add.at(gram, lane[part], products)
-                keeps[lane[part]] &= margin > 0
+            for part, (sums, of_law, by_y, *_) in self._chunks(group, y, lane, record):
+                if not number and not part.start and of_law.shape[1]:
+                    margins, slopes = np.zeros((count, of_law.shape[1])), np.zeros((count, *by_y.shape[1:]))
+                np.add.at(products, lane[part], sums)
+                margins[lane[part]], slopes[lane[part]] = of_law, by_y
         if self.priors is not None:
-            rows = np.asarray(_prior_rows(self.coordinates, jnp.asarray(y[lanes]), self.priors.priors), np.float64)
+            rows = np.asarray(_prior_rows(self.coordinates, jnp.asarray(y), self.priors.priors), np.float64)
             rows = rows * (self.priors.noise / self.levels())[self.damper[lanes], None, None]
-            gram[lanes] += rows.transpose(0, 2, 1) @ rows
-        return Evaluation(gram, keeps)
+            products += rows.transpose(0, 2, 1) @ rows
+        samples = self.samples()[self.damper[lanes]]
+        return Linearisation(rows_of_products(products), margins, slopes, samples), products
 
     def residuals(self, y: Float[np.ndarray, "dampers free"]) -> list[Float[np.ndarray, "records time"]]:
         """Weighted residual of every record of each group, with one lane for each damper."""
@@ -104,7 +111,7 @@ class Lanes(NamedTuple):
         found = []
         for group in self.groups:
             parts = [own for _, own in self._chunks(group, y, group.damper, np.arange(group.damper.size))]
-            residual, drift = (np.concatenate([own[k] for own in parts]) for k in (2, 3))
+            residual, drift = (np.concatenate([own[k] for own in parts]) for k in (3, 4))
             found.append((residual * group.level[:, None], drift))
         return found
 
@@ -134,10 +141,10 @@ class Lanes(NamedTuple):
         return counts
 
     def _pairs(self, group: Group, lanes: Int[np.ndarray, " some"]) -> tuple[np.ndarray, np.ndarray]:
-        """Each record of a group with each of these lanes of its damper, as numbers of lane and record."""
+        """Each record of a group with each of these lanes of its damper: the place of the lane, and the record."""
         fits = self.damper[lanes][:, None] == group.damper[None, :]
         which, record = np.nonzero(fits)
-        return lanes[which], record
+        return which, record
 
     def _chunks(
         self, group: Group, y: np.ndarray, lane: np.ndarray, record: np.ndarray
@@ -199,12 +206,11 @@ def _compared(
     y: Any,  # Float[Array, "pairs free"]
     record: Any,  # Int[Array, " pairs"]
     level: Any,  # Float[Array, " pairs"]
-) -> tuple[Array, Array, Array, Array]:
-    """For each pair of a lane and a record: products of Jacobian and residual, least margin, residual, drift."""
+) -> tuple[Array, Array, Array, Array, Array]:
+    """For each pair of a lane and a record: products of Jacobian and residual, margins and slopes, residual, drift."""
     shape, rest, others = structure
     coordinates, batch = eqx.combine(jax.tree.unflatten(shape, arrays), jax.tree.unflatten(rest, others))
     free = coordinates.free
-    has_conditions = any(law.has_conditions() for _, law in laws_inside(free.tree))
     fields = ("dt", "stroke", "velocity", "force", "weight", "number", "fixed", "temperature", "cycle")
     rows = {name: jax.tree.map(lambda a: a[record][:, None], getattr(batch, name)) for name in fields}
 
@@ -212,17 +218,14 @@ def _compared(
         missed, drift = dataclasses.replace(batch, **row).missed_and_drift(free.build(coordinates.to_physical(y)))
         return {"missed": missed / level, "drift": drift[0]}
 
-    def least_margin(y: Array) -> Array:
-        return jnp.min(margins(free.build(coordinates.to_physical(y))))
-
     def side_by_side(point: dict[str, Array]) -> dict[str, Array]:
         return jax.vmap(compared)(jnp.stack(list(point.values()), axis=1), rows, level)
 
     columns = {f"{i:03}": column for i, column in enumerate(y.T)}
     values, slopes = value_and_jacobian(side_by_side, columns, of=["missed"])
     both = jnp.stack([*slopes["missed"].values(), values["missed"]], axis=1)
-    margin = jax.vmap(least_margin)(y) if has_conditions else jnp.ones(len(y), y.dtype)
-    return both @ both.transpose(0, 2, 1), margin, values["missed"], values["drift"]
+    of_law, by_y = jax.vmap(lambda y: condition_margins(coordinates, y))(y)
+    return both @ both.transpose(0, 2, 1), of_law, by_y, values["missed"], values["drift"]
 
 
 def grouped_records(

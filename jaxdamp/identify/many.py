@@ -9,14 +9,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._one_thread import one_thread
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import Reach
-from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.criteria import FIRST_NOISE, LOSSES, priors_on
 from jaxdamp.identify.dependence import Dependence, dependence
 from jaxdamp.identify.initial_states import INITIAL_STATES
-from jaxdamp.identify.lanes import Evaluation, LanePriors, Lanes, grouped_records
-from jaxdamp.identify.lanes_search import LanesEnd, search_lanes
+from jaxdamp.identify.lanes import LanePriors, Lanes, Products, grouped_records
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
 from jaxdamp.identify.many_criteria import Fitted, by_rounds, noise_level
 from jaxdamp.identify.many_result import ManyFits
@@ -25,6 +24,7 @@ from jaxdamp.identify.preparing import weights
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
 from jaxdamp.parameters import Coordinates, free_parameters
+from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, SearchLanes, least_squares_on_host
 
 
 STARTED_FROM = 12  # dampers whose records give the start of a law class
@@ -141,7 +141,10 @@ def fit_many(
     lanes, begin = _with_other_starts(lanes, records, starts)
     end, best, vector = _solved(lanes, begin, depends, max_steps)
     lanes = lanes._replace(damper=np.arange(len(names)))
-    found = by_rounds(lanes, end.of(best), loss, lambda some, y: _solved(some, y, None, max_steps)[0])
+    if depends is None:
+        found = by_rounds(lanes, end.of(best), loss, lambda some, y: _solved(some, y, None, max_steps)[0])
+    else:
+        found = Fitted(lanes, end, np.ones(len(names)), np.zeros(len(names)))
     end, fitted = found.end, _physical(coordinates, found.end.y)
     errors, percent, rmse, record_rmse, drift = _judged(found, depends, [len(runs) for runs in records])
     return ManyFits(
@@ -211,36 +214,36 @@ def _physical(coordinates: Coordinates, y: Float[np.ndarray, "lanes free"]) -> F
 
 def _solved(
     lanes: Lanes, begin: Float[np.ndarray, "lanes free"], depends: Dependence | None, max_steps: int
-) -> tuple[LanesEnd, np.ndarray, np.ndarray | None]:
+) -> tuple[SearchLanes, np.ndarray, np.ndarray | None]:
     """The ends of all lanes, the best lane of each damper, and the vector of shared parameters."""
     bounds, precision = lanes.coordinates.bounds(), float(jnp.finfo(lanes.coordinates.free.values.dtype).eps)
-    samples = lanes.samples()
     if depends is None:
         dampers = np.unique(lanes.damper)
-        end = search_lanes(lanes.evaluate, begin, bounds, samples[lanes.damper], max_steps, precision)
-        squares = [s if np.isfinite(s) else np.inf for s in end.gram[:, -1, -1]]
+        solver = BoundedLevenbergMarquardt(*bounds, precision=precision)
+        end = least_squares_on_host(lanes.linearise, solver, begin, max_steps)
+        squares = [s if np.isfinite(s) else np.inf for s in end.aux[:, -1, -1]]
         best = [min(np.flatnonzero(lanes.damper == i), key=lambda lane: squares[lane]) for i in dampers]
         return end, np.array(best), None
-    everyone = np.arange(samples.size)
+    everyone = np.arange(len(begin))
 
-    def evaluate(vector: np.ndarray, _: np.ndarray) -> Evaluation:
+    def linearise(vector: np.ndarray, _: np.ndarray) -> tuple[Linearisation, Products]:
         y = depends.at_dampers(vector[0])
-        found = depends.gathered(lanes.evaluate(y, everyone))
         inside = np.all((y >= bounds.lower) & (y <= bounds.upper))
-        return found._replace(keeps_conditions=found.keeps_conditions & inside)
+        return depends.gathered(*lanes.linearise(y, everyone), bool(inside))
 
-    inner = depends.bounds(bounds)
-    end = search_lanes(evaluate, depends.start(begin)[None], inner, samples.sum(keepdims=True), max_steps, precision)
-    y, count = depends.at_dampers(end.y[0]), samples.size
-    whole = LanesEnd(y, end.gram.repeat(count, 0), end.status * count, end.steps.repeat(count))
-    return whole, everyone, end.y[0]
+    solver = BoundedLevenbergMarquardt(*depends.bounds(bounds), precision=precision)
+    end = least_squares_on_host(linearise, solver, depends.start(begin)[None], max_steps)
+    y, count = depends.at_dampers(end.y[0]), len(begin)
+    products = np.broadcast_to(end.aux, (count, *end.aux.shape[1:]))
+    together = SearchLanes(y, products, end.status * count, end.steps.repeat(count))
+    return together, everyone, end.y[0]
 
 
 def _judged(
     found: Fitted, depends: Dependence | None, counts: Sequence[int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, ...], np.ndarray]:
     """Of each damper: standard errors [dampers, free], fit percent, RMSE [N], RMSE of each of its records, drift."""
-    lanes, y, gram = found.lanes, found.end.y, found.end.gram
+    lanes, y, gram = found.lanes, found.end.y, found.end.aux
     count, free = y.shape
     errors, percent, rmse = np.full((count, free), np.inf), np.zeros(count), np.zeros(count)
     drift = np.zeros(count)

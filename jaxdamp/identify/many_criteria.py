@@ -8,9 +8,9 @@ from jaxtyping import Bool, Float
 
 from jaxdamp.identify.criteria import HALF, LOSSES, ROUNDS, SETTLED, noise_factor
 from jaxdamp.identify.lanes import Lanes
-from jaxdamp.identify.lanes_search import LanesEnd
 from jaxdamp.identify.noise import CORRELATED, correlation_time
 from jaxdamp.identify.problem import ROUNDING
+from jaxdamp.solve import SearchLanes
 
 
 class Fitted(NamedTuple):
@@ -24,7 +24,7 @@ class Fitted(NamedTuple):
     """
 
     lanes: Lanes
-    end: LanesEnd
+    end: SearchLanes
     factor: Float[np.ndarray, " dampers"]
     share_left_out: Float[np.ndarray, " dampers"]
 
@@ -43,7 +43,7 @@ def noise_level(weighted: list[np.ndarray], free: float | int) -> float:
 
 
 def by_rounds(
-    plain: Lanes, end: LanesEnd, loss: str, solve: Callable[[Lanes, Float[np.ndarray, "lanes free"]], LanesEnd]
+    plain: Lanes, end: SearchLanes, loss: str, solve: Callable[[Lanes, Float[np.ndarray, "lanes free"]], SearchLanes]
 ) -> Fitted:
     """Least squares again with new weights, until each damper moves no more; each ends by itself.
 
@@ -56,7 +56,7 @@ def by_rounds(
     count, free = end.y.shape
     lanes, factor, share = plain, np.ones(count), np.zeros(count)
     roots, levels = [np.ones(np.shape(group.batch.weight)) for group in plain.groups], plain.levels()
-    y, gram, status, steps = end.y.copy(), end.gram.copy(), list(end.status), end.steps.copy()
+    y, gram, status, steps = end.y.copy(), end.aux.copy(), list(end.status), end.steps.copy()
     still = np.isfinite(gram[:, -1, -1]) & (gram[:, -1, -1] > ROUNDING**2)
     for _ in range(ROUNDS if loss != "squares" or plain.priors is not None else 0):
         weighted, noise = lanes.residuals(y), np.ones(count)
@@ -83,14 +83,14 @@ def by_rounds(
         )
         lanes = plain._replace(groups=groups, priors=priors)
         found = solve(lanes._replace(damper=moving), y[moving])
-        length = np.sqrt(np.maximum(np.diagonal(found.gram, axis1=1, axis2=2)[:, :-1], 0.0)) * levels[moving, None]
+        length = np.sqrt(np.maximum(np.diagonal(found.aux, axis1=1, axis2=2)[:, :-1], 0.0)) * levels[moving, None]
         settled = np.all(np.abs(found.y - y[moving]) * length < SETTLED * noise[moving, None], axis=1)
-        y[moving], gram[moving] = found.y, found.gram
+        y[moving], gram[moving] = found.y, found.aux
         steps[moving] += found.steps
         for i, own in zip(moving, found.status, strict=True):
             status[i] = own
         still[moving[settled]] = False
-    return Fitted(lanes, LanesEnd(y, gram, status, steps), factor, share)
+    return Fitted(lanes, SearchLanes(y, gram, status, steps), factor, share)
 
 
 def _own(lanes: Lanes, damper: int, group: int) -> list[tuple[int, Bool[np.ndarray, " time"]]]:

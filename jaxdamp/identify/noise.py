@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import scipy.signal
 from jaxtyping import Bool, Float, Int
 
-from jaxdamp.identify._tall import orthonormal
+from jaxdamp._triangles import orthonormal
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 
@@ -17,6 +16,7 @@ REPEATED = 0.3  # correlation of the residual with itself one cycle later above 
 LEAST_OVERLAP = 0.5  # of a cycle, of a record with itself one cycle later
 MOST_COEFFICIENTS = 30  # of an autoregression
 FEWEST_SAMPLES = 10  # for each coefficient
+BLOCK = 64  # lags of an autocorrelation that follow from the last ones in one product
 PENALTY = 2.0  # decrease of the deviance that each coefficient must give, in logarithms of the number of samples
 
 
@@ -206,8 +206,21 @@ def autocorrelation(residual: Float[np.ndarray, " samples"]) -> Float[np.ndarray
     if best.size == 1:
         return best
     known = known[: best.size]  # the first lags are those of the residual, the others follow from them
-    begin = scipy.signal.lfiltic([1.0], best, known[:0:-1])
-    return np.append(known, scipy.signal.lfilter([1.0], best, np.zeros(count - best.size), zi=begin)[0])
+    return _continued(known, best, count)
+
+
+def _continued(
+    first: Float[np.ndarray, " _"], coefficients: Float[np.ndarray, " _"], count: int
+) -> Float[np.ndarray, " lags"]:
+    """Numbers that go on as an autoregression without noise, Σ a(j) x(k − j) = 0, in blocks."""
+    order = coefficients.size - 1
+    by_last = np.vstack([np.eye(order), np.zeros((BLOCK, order))])  # each number as a sum of the last ones before it
+    for k in range(order, order + BLOCK):
+        by_last[k] = -coefficients[:0:-1] @ by_last[k - order : k]
+    values = np.append(first, np.zeros(-(-(count - first.size) // BLOCK) * BLOCK))
+    for begin in range(first.size, values.size, BLOCK):
+        values[begin : begin + BLOCK] = by_last[order:] @ values[begin - order : begin]
+    return values[:count]
 
 
 def correlation_time(residuals: Sequence[Float[np.ndarray, " _"]]) -> float:

@@ -8,11 +8,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optimistix as optx
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import Reach
+from jaxdamp.dampers import Reach, laws_inside, margins
 from jaxdamp.parameters import Coordinates, FreeParameters
+from jaxdamp.solve import BoundedLevenbergMarquardt, ImplicitWithinBounds
 
 
 ROUNDING = 1e-8  # residual, relative to the force, below which there is nothing left to explain
@@ -33,13 +35,24 @@ class AbstractResiduals(eqx.Module):
         """The same with every weight times a factor."""
         raise NotImplementedError(f"{type(self).__name__} cannot be reweighted.")
 
+    def measurements(self) -> Float[Array, " numbers"]:
+        """The measured numbers, as the residuals are compared with them; none where they cannot be exchanged."""
+        return jnp.zeros(0)
+
+    def with_measurements(self, numbers: Float[Array, " numbers"]) -> "AbstractResiduals":
+        """The same with other measured numbers."""
+        return self
+
     @abstractmethod
     def total_weight(self) -> Float[Array, ""]:
         """Sum of the squared weights, the number of samples as measured where all weigh the same."""
 
 
 class Problem(NamedTuple):
-    """A fit to be solved, and its residuals for a program of your own (`docs/from_jax.md`).
+    """A fit to be solved, a pytree, and its residual function for a program of your own (`docs/from_jax.md`).
+
+    `optimistix.least_squares(problem, problem.solver(), problem.start)` is the fit as a part of a JAX program, in the
+    coordinates of `fit`; `problem.minimum(force)` gives the physical values for other measured forces.
 
     Attributes:
         free: the free parameters of the model, with their start.
@@ -89,6 +102,84 @@ class Problem(NamedTuple):
         model = self.free.build(values)
         return jnp.concatenate([part(model) for part in self.residuals])
 
+    def __call__(
+        self, y: Float[Array, " free"], force: Float[Array, " numbers"] | None = None
+    ) -> Float[Array, " rows"]:
+        """All weighted residuals at coordinates of the search, with a row for each number that has an anchor.
+
+        Arguments:
+            y: values of `coordinates`, as `start`.
+            force: forces [N] in place of the measured ones, like `measured`; weights and starts stay.
+        """
+        problem, values = self if force is None else self.with_measured(force), self.coordinates.to_physical(y)
+        residual = problem.residual(values)
+        if self.anchor is None:
+            return residual
+        at, weight = self.anchor
+        return jnp.concatenate([residual, weight * (values - at)])
+
+    @property
+    def start(self) -> Float[Array, " free"]:
+        """The coordinates to start from."""
+        return jnp.asarray(self.coordinates.from_physical(self.free.values))
+
+    @property
+    def measured(self) -> Float[Array, " numbers"]:
+        """Measured forces [N] that the residuals are compared with: averaged blocks and padding as in `residual`."""
+        return jnp.concatenate([part.measurements() for part in self.residuals])
+
+    def with_measured(self, force: Float[Array, " numbers"]) -> "Problem":
+        """The same with other measured forces [N], for derivatives and batches; `runs` and `sigma` stay."""
+        ends = np.cumsum([part.measurements().size for part in self.residuals])[:-1]
+        parts = zip(self.residuals, jnp.split(force, ends), strict=True)
+        return self._replace(residuals=tuple(part.with_measurements(own) for part, own in parts))
+
+    def margins(self, y: Float[Array, " free"]) -> Float[Array, " conditions"]:
+        """By how much the law keeps its conditions between parameters at coordinates of the search."""
+        return margins(self.coordinates.free.build(self.coordinates.to_physical(y)))
+
+    @property
+    def has_conditions(self) -> bool:
+        """Whether the law has conditions between parameters."""
+        return any(law.has_conditions() for _, law in laws_inside(self.free.tree))
+
+    def solver(self, tolerance: float = 1e-4) -> BoundedLevenbergMarquardt:
+        """The solver of `fit` inside a JAX program, with the bounds and conditions of this problem.
+
+        Arguments:
+            tolerance: length of the last step, in standard errors.
+        """
+        lower, upper = (jnp.asarray(side) for side in self.coordinates.bounds())
+        conditions = self.margins if self.has_conditions else None
+        return BoundedLevenbergMarquardt(lower, upper, conditions, tolerance=tolerance, level=self.level)
+
+    def minimum(
+        self, force: Float[Array, " numbers"] | None = None, *, tolerance: float = 1e-4, max_steps: int = 200
+    ) -> Float[Array, " free"]:
+        """The fitted physical values, as a part of a JAX program: for `jax.jit`, `jax.vmap` and derivatives.
+
+        One search from the start, as `fit` with `starts=1`. Derivatives follow from the implicit function theorem, with
+        numbers at bounds held there. The law is `free.build(values)`.
+
+        Arguments:
+            force: forces [N] in place of the measured ones, like `measured`.
+            tolerance: length of the last step, in standard errors.
+            max_steps: largest number of points tried.
+
+        Returns:
+            The values; not numbers where the search did not converge.
+
+        >>> from jaxdamp import bench, dampers, identify
+        >>> runs = bench.VirtualDyno(dampers.Linear(1500.0)).run([bench.SineTest(amplitude=0.02, frequency=2.0)])
+        >>> problem = identify.prepare(dampers.Linear(1000.0), runs)
+        >>> jax.vmap(problem.minimum)(jnp.outer(jnp.array([1.0, 1.1]), problem.measured)).round(3).tolist()
+        [[1500.0], [1650.0]]
+        """
+        solver, adjoint = self.solver(tolerance), ImplicitWithinBounds()
+        end = optx.least_squares(self, solver, self.start, force, max_steps=max_steps, adjoint=adjoint, throw=False)
+        values = self.coordinates.to_physical(end.value)
+        return jnp.where(end.result == optx.RESULTS.successful, values, jnp.nan)
+
     @property
     def coordinates(self) -> Coordinates:
         """The coordinates of a search within bounds."""
@@ -130,6 +221,29 @@ class Problem(NamedTuple):
     def is_rounding(self, squares: float) -> bool:
         """Whether a sum of squares is so small that it consists of rounding errors, not of noise."""
         return squares <= (ROUNDING * self.level) ** 2
+
+
+NUMBERS = ("free", "residuals", "level", "law", "anchor")  # fields of a problem that a program may trace
+
+
+class _Fixed:
+    """The other fields, the same only if they are the same objects."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.fields = {name: value for name, value in problem._asdict().items() if name not in NUMBERS}
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Fixed) and all(self.fields[name] is other.fields[name] for name in self.fields)
+
+    def __hash__(self) -> int:
+        return hash(tuple(map(id, self.fields.values())))
+
+
+jax.tree_util.register_pytree_node(
+    Problem,
+    lambda problem: (tuple(getattr(problem, name) for name in NUMBERS), _Fixed(problem)),
+    lambda fixed, numbers: Problem(**dict(zip(NUMBERS, numbers, strict=True)), **fixed.fields),
+)
 
 
 @eqx.filter_jit

@@ -13,10 +13,11 @@ from jaxtyping import Bool, Float
 from jaxdamp.dampers import keeps_conditions
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, search
+from jaxdamp.solve import BoundedLevenbergMarquardt
 
 
 STEPS = 15  # of each search; an incomplete search makes an error smaller, never larger
-TOLERANCE = 0.1  # last step of a search, in standard errors: 0.01 in chi-square
+LOOSE = BoundedLevenbergMarquardt(tolerance=0.1)  # standard errors: 0.01 in chi-square
 MOST_STEPS = 250  # of all searches together; parameters after that have their linear errors
 CHI_SQUARE = 9.0  # increase up to which a moved parameter still fits: three standard errors
 GROWTH = 4.0  # of the distance, from one step to the next
@@ -60,7 +61,7 @@ def profile(
             moved = moved_to(problem, end, i, found.values[i] + side * distance)
             if moved is None:
                 break
-            end = search(moved, STEPS, held=i, tolerance=TOLERANCE)
+            end = search(moved, STEPS, held=i, solver=LOOSE)
             left -= end.steps
             rise = (end.squares - found.squares) / variance
             if not rise < CHI_SQUARE:

@@ -11,6 +11,7 @@ from jaxdamp._tables import Column, Table, plain
 from jaxdamp.identify.profile import moved_to
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.search import SearchEnd, search
+from jaxdamp.solve import BoundedLevenbergMarquardt
 
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 STEPS = 60  # of each search
-STEP_TOLERANCE = 0.01  # last step of a search, in standard errors
+COARSE = BoundedLevenbergMarquardt(tolerance=0.01)  # standard errors
 FIRST = 0.5  # first distance, in standard errors
 GROWTH = 1.5  # of the distance, from one point to the next
 MOST_POINTS = 24  # on each side
@@ -114,7 +115,7 @@ class _Side:
         moved = moved_to(self.evidence.problem, start, self.index, value)
         if moved is None:
             return None
-        end = search(moved, STEPS, held=self.index, tolerance=STEP_TOLERANCE)
+        end = search(moved, STEPS, held=self.index, solver=COARSE)
         return max(end.squares - self.evidence.minimum.squares, 0.0) / self.one, end
 
     def walk(self, way: float, level: float) -> tuple[list[tuple[float, float]], float]:

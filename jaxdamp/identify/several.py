@@ -14,7 +14,7 @@ from jaxtyping import Float
 from jaxdamp.dampers import Reach, keeps_conditions, laws_inside
 from jaxdamp.identify.estimates import Minimum
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.search import SearchEnd, search
+from jaxdamp.identify.search import SearchEnd, Solver, search
 from jaxdamp.parameters import FreeParameters
 
 
@@ -62,7 +62,7 @@ def other_starts(free: FreeParameters, reach: Reach) -> list[Float[np.ndarray, "
     return starts
 
 
-def search_from(problem: Problem, *, starts: int | None, max_steps: int) -> Solution:
+def search_from(problem: Problem, *, starts: int | None, max_steps: int, solver: Solver | None = None) -> Solution:
     """Search from the start of the problem and from the further starts that its laws propose.
 
     If another start leads to a better end, new proposals are made from there, so that more than one parameter can be
@@ -72,8 +72,9 @@ def search_from(problem: Problem, *, starts: int | None, max_steps: int) -> Solu
         problem: the problem with its start.
         starts: largest number of starts; all proposed ones if `None`.
         max_steps: largest number of steps of each search.
+        solver: as in `search`.
     """
-    best = search(problem, max_steps)
+    best = search(problem, max_steps, solver=solver)
     ends, tried = [best], [np.asarray(problem.free.values)]
     for _ in range(ROUNDS):
         if best.finite and problem.is_rounding(best.squares):
@@ -82,7 +83,7 @@ def search_from(problem: Problem, *, starts: int | None, max_steps: int) -> Solu
             v for v in other_starts(problem.free, problem.reach) if not any(np.array_equal(v, known) for known in tried)
         ]
         others = others[: None if starts is None else starts - len(tried)]
-        tried, ends = [*tried, *others], [*ends, *_follow(problem, others, best, max_steps)]
+        tried, ends = [*tried, *others], [*ends, *_follow(problem, others, best, max_steps, solver)]
         before, known = best.squares, best.finite
         best = min(
             (end for end in ends if end.finite),
@@ -127,16 +128,18 @@ def equally_good(squares: float) -> float:
     return ALIKE * max(squares, 1.0)
 
 
-def _follow(problem: Problem, others: Sequence[np.ndarray], best: SearchEnd, max_steps: int) -> list[SearchEnd]:
+def _follow(
+    problem: Problem, others: Sequence[np.ndarray], best: SearchEnd, max_steps: int, solver: Solver | None
+) -> list[SearchEnd]:
     """The ends of a few steps from each of several starts, and of the whole search from the most promising."""
-    looks = [search(problem.started_at(values), min(FIRST_LOOK, max_steps)) for values in others]
+    looks = [search(problem.started_at(values), min(FIRST_LOOK, max_steps), solver=solver) for values in others]
     most = PROMISING * min([found.squares for found in (best, *looks) if found.finite], default=np.inf)
     open_ended = (found for found in looks if not found.converged and found.finite and found.squares < most)
     promising = sorted(open_ended, key=lambda end: end.squares)
     ends = [found for found in looks if found.converged]
     for found in promising[:FOLLOWED]:
         left = min(max_steps - found.steps, FOLLOWED_STEPS)
-        on = search(problem.started_at(found.values), left) if left else found._replace(steps=0)
+        on = search(problem.started_at(found.values), left, solver=solver) if left else found._replace(steps=0)
         ends.append(on._replace(steps=found.steps + on.steps))
     return ends
 

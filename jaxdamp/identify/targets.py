@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._one_thread import one_thread
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp.dampers import Reach, without_fitted_ranges
-from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status

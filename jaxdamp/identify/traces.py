@@ -95,6 +95,14 @@ class Batch(AbstractResiduals):
         """The same with every weight times a factor."""
         return dataclasses.replace(self, weight=self.weight * jnp.asarray(factor.reshape(self.weight.shape)))
 
+    def measurements(self) -> Float[Array, " samples"]:
+        """The measured forces [N] of all samples, padding too."""
+        return jnp.ravel(self.force)
+
+    def with_measurements(self, numbers: Float[Array, " samples"]) -> "Batch":
+        """The same with other measured forces."""
+        return dataclasses.replace(self, force=numbers.reshape(self.force.shape))
+
     def used(self) -> Bool[np.ndarray, " samples"]:
         """Which samples count."""
         return np.ravel(self.weight) > 0

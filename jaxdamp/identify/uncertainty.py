@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp.identify._tall import determined, triangle, unit_columns
+from jaxdamp._triangles import determined, triangle, unit_columns
 from jaxdamp.identify.noise import Noise
 
 

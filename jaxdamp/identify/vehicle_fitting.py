@@ -1,15 +1,17 @@
 """`fit_vehicle`: masses, rates, friction and damper laws of a vehicle from its records."""
 
 import dataclasses
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._one_thread import one_thread
 from jaxdamp.bench import BenchRun, RideRecord
-from jaxdamp.identify._blas import one_thread
 from jaxdamp.identify.criteria import LOSSES, Priors, criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
@@ -25,14 +27,17 @@ from jaxdamp.identify.vehicle_preparing import (
     checked_benches,
     checked_records,
     drives_of,
+    first_refused,
     free_scale,
     frozen_paths,
     in_units,
     known_noise,
+    mean_over_records,
     per_record_paths,
     vehicle_test,
     without,
 )
+from jaxdamp.identify.vehicle_residuals import Drive
 from jaxdamp.identify.vehicle_result import VehicleFit, channel_scores
 from jaxdamp.parameters import free_parameters, get, matched_in_words, parameters, with_values
 from jaxdamp.rig import Sensor
@@ -41,6 +46,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 ALIKE = 0.05  # relative change of the estimated noise below which the weights are final
 MOST_ROUNDS = 6
+MOST_CHECKS = 4  # of whether `simulate` accepts the vehicle at the minimum
 
 
 @one_thread()
@@ -142,10 +148,11 @@ def fit_vehicle(
     problem = problem._replace(free=without(free, scale.held))
     how = {"loss": loss, "starts": starts, "max_steps": max_steps, "seed": seed}
     problem, solution = _solved(data, problem, known, expected, **how)
+    problem, solution, refused = _accepted(data, problem, solution, known, expected, dt, how | {"starts": 1})
     paths = [p.path for p in parameters(model)]
     named = matched_in_words([path for path in paths if path.startswith("vehicle.")], over=over or ())
     others = matched_in_words(paths, freeze=freeze, bounds=bounds or {}, per_record=per_record)
-    result = _judged(data, problem, solution, scale)
+    result = _judged(data, problem, solution, scale, refused)
     criterion = criterion_in_words(problem, loss, priors or {})
     return dataclasses.replace(result, patterns="; ".join(filter(None, (named, others))), criterion=criterion)
 
@@ -181,7 +188,55 @@ def _solved(
     return solve_by(problem.started_at(end.values), by_squares, loss=loss, noise=noise, starts=starts)
 
 
-def _judged(data: VehicleData, problem: Problem, solution: Solution, scale: FreeScale) -> VehicleFit:
+def _accepted(
+    data: VehicleData,
+    problem: Problem,
+    solution: Solution,
+    known: Mapping[str, float],
+    expected: Sequence[Priors],
+    dt: float | None,
+    how: Mapping[str, Any],
+) -> tuple[Problem, Solution, list[str]]:
+    """The minimum among the vehicles that `simulate` accepts, by as many substeps as their laws need."""
+    start, notes = np.asarray(problem.free.values), list[str]()
+
+    def drives_at(values: np.ndarray) -> list[Drive] | None:
+        """How the records are simulated with these numbers; None where `simulate` would refuse."""
+        vehicle = mean_over_records(problem.free.started_at(values).tree, data.per_record).vehicle
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                return drives_of(vehicle, data.rides, dt)
+            except ValueError:
+                return None
+
+    for _ in range(MOST_CHECKS):
+        end = solution.best
+        drives = drives_at(end.values) if end.finite else data.drives
+        if drives is not None:
+            if all(new.engine == old.engine for new, old in zip(drives, data.drives, strict=True)):
+                break
+            data = data._replace(drives=drives)
+        else:
+            limited = first_refused(problem.free, start, end.values, lambda values: drives_at(values) is not None)
+            if limited is None:
+                notes.append("`simulate` refuses the fitted vehicle: start nearer to the records, or give `bounds`.")
+                break
+            index, value, problem = limited[0], limited[1], problem._replace(free=limited[2])
+            name, unit = problem.free.names[index], problem.free.owners[index].unit
+            notes.append(
+                f"{name} was held at {value:.4g} {unit} or on this side of it: `simulate` refuses the vehicle beyond,"
+                " whose laws are too steep for its steps."
+            )
+        sigma = dict(zip(data.channels, problem.sigma, strict=True))
+        begin = problem.free if drives is None else problem.free.started_at(end.values)
+        problem, solution = _solved(data, data.problem(begin, sigma, expected), known, expected, **how)
+    return problem, solution, notes
+
+
+def _judged(
+    data: VehicleData, problem: Problem, solution: Solution, scale: FreeScale, refused: Sequence[str]
+) -> VehicleFit:
     """The result at the minimum."""
     end = solution.best
     if not end.finite:
@@ -191,10 +246,9 @@ def _judged(data: VehicleData, problem: Problem, solution: Solution, scale: Free
     model, held = problem.free.tree, (scale.held_name,) if scale.held_name else ()
     noise = channel_noise(problem, end.residual, end.values.size)
     estimates = estimate(problem, solution, noise)
-    own = {path: get(model, path) for path in data.per_record}
-    model = with_values(model, {path: jnp.mean(values) for path, values in own.items()})
+    model = mean_over_records(model, data.per_record)
     scores = channel_scores(problem, end.residual, data.rides)
-    notes = [*on_status(end), *on_free_scale(scale, model), *on_signs(scores), *estimates.notes]
+    notes = [*on_status(end), *refused, *on_free_scale(scale, model), *on_signs(scores), *estimates.notes]
     notes += on_sensors(problem, end, data.rides, data.channels, model.sensors)
     if noise.inflation > 1.0:
         notes.append(

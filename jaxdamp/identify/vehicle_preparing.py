@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -20,7 +20,7 @@ from jaxdamp.identify.preparing import not_chosen
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.vehicle_residuals import Drive, bench_parts, driven, finer_heights, ride_batches
-from jaxdamp.parameters import FreeParameters, get, match_paths, name_patterns, parameters
+from jaxdamp.parameters import FreeParameters, get, interval, match_paths, name_patterns, parameters, with_values
 from jaxdamp.rig import Rig, Sensor
 from jaxdamp.simulation import Exponential, RunCheck
 from jaxdamp.vehicles import AbstractVehicle
@@ -30,6 +30,9 @@ FIRST_GUESS = 0.1  # noise of a channel at first, relative to its standard devia
 MEDIAN = 1.4826  # standard deviation of normal noise, relative to the median of its magnitude
 LEAST_NOISE = 1e-4  # the same at the end, so that records without noise can be fitted
 UNSEEN = 1e-6  # change of the channels when the scale is doubled, relative to them, that counts as none
+FAR = 1e3  # times a limited number, to which it may go away from its limit
+INWARD = 0.1  # of the way from its limit back to the start, where the search begins anew
+BISECTIONS = 10  # of the range in which a number stops to be accepted
 EVERYWHERE = Reach(np.inf, np.inf)  # laws of a vehicle: no number is outside the records
 
 
@@ -188,6 +191,46 @@ def drives_of(vehicle: AbstractVehicle, rides: Sequence[RideRecord], dt: float |
         check = RunCheck(system, jnp.asarray(heights, float), half, ride.dt / finer)
         drives.append(Drive(heights, ride.dt / finer, finer, Exponential().prepared(check)))
     return drives
+
+
+def mean_over_records(model: VehicleTest, paths: Sequence[str]) -> VehicleTest:
+    """The model with the mean of each parameter that has a value for each record."""
+    return with_values(model, {path: jnp.mean(get(model, path)) for path in paths})
+
+
+def first_refused(
+    free: FreeParameters,
+    start: Float[np.ndarray, " free"],
+    end: Float[np.ndarray, " free"],
+    accepted: Callable[[Float[np.ndarray, " free"]], bool],
+) -> tuple[int, float, FreeParameters] | None:
+    """The number by which the end of a search is refused; None if no single number makes the difference.
+
+    Arguments:
+        free: the free parameters.
+        start: values that are accepted.
+        end: values that are not.
+        accepted: whether `simulate` takes a vehicle with these values.
+
+    Returns:
+        Its index, its last accepted value, and the free parameters with this value as limit.
+    """
+    for index, p in enumerate(free.owners):
+        moved = end.copy()
+        moved[index] = start[index]
+        if p.value.ndim or not accepted(moved):
+            continue
+        good, bad = float(start[index]), float(end[index])
+        for _ in range(BISECTIONS):
+            moved[index] = np.sqrt(good * bad) if good * bad > 0 else 0.5 * (good + bad)
+            good, bad = (moved[index], bad) if accepted(moved) else (good, moved[index])
+        lower, upper = (float(side[index]) for side in free.limits())
+        lower, upper = (np.clip(side, -FAR * abs(good), FAR * abs(good)) for side in (lower, upper))
+        limits = (float(good), float(upper)) if good > bad else (float(lower), float(good))
+        chosen = tuple(dataclasses.replace(q, domain=interval(*limits)) if q.path == p.path else q for q in free.chosen)
+        moved[index] = good + INWARD * (start[index] - good)
+        return index, float(good), FreeParameters(free.tree, chosen, free.ties).started_at(moved)
+    return None
 
 
 def known_noise(data: VehicleData, noise: Mapping[str, float]) -> dict[str, float]:

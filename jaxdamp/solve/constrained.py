@@ -34,7 +34,13 @@ Evaluate = Callable[[Float[np.ndarray, "points free"]], Sequence[Evaluation]]
 
 
 class Scaling(NamedTuple):
-    """Zero and unit of each row: objectives first, then limited functions, which must not be positive when scaled."""
+    """Zero and unit of each row: objectives first, then limited functions, which must not be positive when scaled.
+
+    Attributes:
+        zero: what is subtracted from each row.
+        unit: what the difference is divided by.
+        objectives: number of objectives.
+    """
 
     zero: Float[np.ndarray, " rows"]
     unit: Float[np.ndarray, " rows"]
@@ -46,12 +52,19 @@ class Scaling(NamedTuple):
 
 
 class Region(NamedTuple):
-    """Linear constraints of the coordinates: lower ≤ y ≤ upper, and A y ≥ b."""
+    """Linear constraints of the coordinates: lower ≤ y ≤ upper, and A y ≥ b.
+
+    Attributes:
+        lower: smallest coordinates.
+        upper: largest coordinates.
+        matrix: A.
+        least: b.
+    """
 
     lower: Float[np.ndarray, " free"]
     upper: Float[np.ndarray, " free"]
-    a: Float[np.ndarray, "constraints free"]
-    b: Float[np.ndarray, " constraints"]
+    matrix: Float[np.ndarray, "constraints free"]
+    least: Float[np.ndarray, " constraints"]
 
 
 @final
@@ -261,8 +274,8 @@ class SequentialQuadratic:
         slack = np.zeros((len(level), 2))
         slack[:count, 0] = slack[count:, 1] = 1.0
         weights, share = np.array([1.0, state.penalty]), self._share
-        gaps = region.b - region.a @ state.y
-        order = np.concatenate([region.a, np.zeros((len(region.a), 2))], axis=1)
+        gaps = region.least - region.matrix @ state.y
+        order = np.concatenate([region.matrix, np.zeros((len(region.matrix), 2))], axis=1)
 
         def change(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             bent = curvature @ step

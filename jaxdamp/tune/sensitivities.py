@@ -86,7 +86,8 @@ def sensitivity(
         settings: keywords, all optional: `over`, all parameters if left out, and `freeze`, as in `minimise`;
             `dampers`, the laws whose curves are looked at, by path or pattern, None for none, as on a white road;
             `reach`, the largest velocity of the curves [m/s], three times the largest RMS of a damper velocity if left
-            out; `hats`, the number of velocities on each side, 12 if left out; `duration`, `dt` and `engine` (see `Run`).
+            out; `hats`, the number of velocities on each side, 12 if left out; `duration`, `dt` and `engine` (see
+            `Run`).
 
     Raises:
         ValueError: unknown metrics, parameters or dampers; metrics without derivative; quantities of a road that is no

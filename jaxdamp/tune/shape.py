@@ -41,7 +41,7 @@ class Shape:
 
     name: str
     unit: str
-    span: tuple[float, float]
+    span: tuple[float, float] = dataclasses.field(compare=False)  # programs do not depend on it
     velocities: tuple[float, ...]
     numbers: Callable[[Curve, Curve], Array]
     places: tuple[str, ...] = ("",)

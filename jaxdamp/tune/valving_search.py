@@ -14,10 +14,12 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
+from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, MonoTube
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import march, quasi_static, respond
+from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_squares_on_host
 from jaxdamp.tune.ranges import INSIDE, SearchRange, search_range
 from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
 
@@ -60,6 +62,14 @@ class Wanted(NamedTuple):
         return np.concatenate([self.velocity, *(loop.velocity[loop.first :] for loop in self.loops)])
 
 
+class _End(NamedTuple):
+    """Where a search ended."""
+
+    values: np.ndarray
+    squares: float
+    status: Status
+
+
 def valving(
     target: AbstractDamper | BenchRun | Sequence[BenchRun] | tuple[Any, Any],
     start: MonoTube,
@@ -76,9 +86,9 @@ def valving(
 ) -> ValvingResult:
     """Find the valving of a mono-tube damper that gives a wanted force, or the nearest one within its bounds.
 
-    Least squares of the force with exact derivatives, in logarithms of the parameters, from several starts. If the
-    remaining error is above the tolerance, the result says in which range of velocity, by how much, and which bound
-    prevents more.
+    Least squares of the force with exact derivatives by `jaxdamp.solve.BoundedLevenbergMarquardt`, from several starts.
+    If the remaining error is above the tolerance, the result says in which range of velocity, by how much, and which
+    bound prevents more.
 
     The force has kinks where valves open, and rises within a sample or two where a cavity closes, so the sum of squares
     has narrow local minima. Where a search ends, each parameter is therefore changed by 1 and 10 %, up and down, and
@@ -124,22 +134,24 @@ def valving(
     cavity = (1.0 + INSIDE) * float(start.cavitation_pressure)
     space = dataclasses.replace(space, lower=np.where(charge, np.maximum(space.lower, cavity), space.lower))
     force_of = _forces(space.free, wanted, substeps)
-    best: Any = None
+    best: _End | None = None
     with Progress("Choosing the valving") as shown:
         for number, begin in enumerate(_starts(space, starts)):
             shown(f"start {number + 1} of {starts}")
             end = _search(space, force_of, wanted.all_forces, begin, max_steps)
-            if np.isfinite(end.cost) and (best is None or end.cost < best.cost):
+            if np.isfinite(end.squares) and (best is None or end.squares < best.squares):
                 best = end
-            if best is not None and np.sqrt(2 * best.cost / len(wanted.all_forces)) < CLOSE_ENOUGH * tolerance * size:
+            if best is not None and np.sqrt(best.squares / len(wanted.all_forces)) < CLOSE_ENOUGH * tolerance * size:
                 break
     if best is None:
         _checks.refuse("start", "give a finite force", start, "Widen its valves, or shorten the motion.")
-    values = _physical(space, best.x)
+    values = best.values
     reached, slopes = force_of(values)
     error = reached - wanted.all_forces
     parameters = tuple(
-        ValveParameter(name, p.unit, float(a), float(b), float(low), float(high), side, p.meaning)
+        ValveParameter(
+            name, p.unit, float(a), float(b), float(low), float(high), f"at its {side} bound" if side else "", p.meaning
+        )
         for name, p, a, b, low, high, side in zip(
             space.free.names,
             space.free.owners,
@@ -147,7 +159,7 @@ def valving(
             values,
             space.lower,
             space.upper,
-            _sides(space, values),
+            space.side(values),
             strict=True,
         )
     )
@@ -167,7 +179,7 @@ def valving(
         out_of_reach=_out_of_reach(wanted, error, slopes, parameters, tolerance, size)
         if rmse > tolerance * size
         else (),
-        status=Status.CONVERGED if best.status > 0 else Status.STEP_LIMIT,
+        status=best.status,
     )
 
 
@@ -238,23 +250,6 @@ def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> Any:
     return evaluate
 
 
-def _in_logarithms(space: SearchRange) -> np.ndarray:
-    """Which numbers are searched by their logarithm: those that stay positive."""
-    return space.lower > 0.0
-
-
-def _physical(space: SearchRange, y: np.ndarray) -> np.ndarray:
-    """Physical values of coordinates."""
-    log = _in_logarithms(space)
-    return np.clip(np.where(log, np.exp(np.where(log, y, 0.0)), y * space.unit), space.lower, space.upper)
-
-
-def _coordinates(space: SearchRange, values: np.ndarray) -> np.ndarray:
-    """Coordinates of physical values."""
-    log = _in_logarithms(space)
-    return np.where(log, np.log(np.where(log, values, 1.0)), values / space.unit)
-
-
 def _starts(space: SearchRange, count: int) -> list[np.ndarray]:
     """The given start, and others around it by a factor of up to `APART`, the same ones each time."""
     shares = np.random.default_rng(0).uniform(size=(count - 1, len(space.start)))
@@ -262,45 +257,32 @@ def _starts(space: SearchRange, count: int) -> list[np.ndarray]:
     return [space.start, *np.clip(moved, space.lower, space.upper)]
 
 
-def _search(space: SearchRange, force_of: Any, wanted: np.ndarray, begin: np.ndarray, max_steps: int) -> Any:
+def _search(space: SearchRange, force_of: Any, wanted: np.ndarray, begin: np.ndarray, max_steps: int) -> _End:
     """Least squares within the bounds from one start, and again from lower points beside its end."""
-    import scipy.optimize
+    size = float(np.linalg.norm(wanted))
+    precision = float(jnp.finfo(space.free.values.dtype).eps)
+    solver = BoundedLevenbergMarquardt(space.lower / space.unit, space.upper / space.unit, precision=precision)
 
-    log = _in_logarithms(space)
-    last: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+    def at(y: np.ndarray, lanes: np.ndarray) -> tuple[Linearisation, np.ndarray]:
+        force, slopes = force_of(np.clip(y[0] * space.unit, space.lower, space.upper))
+        rows = np.concatenate([slopes * space.unit, (force - wanted)[:, None]], axis=1) / size
+        free = np.zeros((1, 0)), np.zeros((1, 0, y.shape[1]))
+        return Linearisation(triangle(rows)[None], *free, np.array([float(wanted.size)])), (force - wanted)[None]
 
-    def at(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if y.tobytes() not in last:
-            values = _physical(space, y)
-            force, slopes = force_of(values)
-            last.clear()
-            last[y.tobytes()] = force - wanted, slopes * np.where(log, values, space.unit)
-        return last[y.tobytes()]
+    def squares(values: np.ndarray) -> float:
+        return float(np.sum((force_of(values)[0] - wanted) ** 2))
 
-    lower, upper = _coordinates(space, space.lower), _coordinates(space, space.upper)
-    margin = 1e-9 * np.minimum(upper - lower, 1.0)
-    options: dict[str, Any] = {"bounds": (lower, upper), "x_scale": "jac", "ftol": 1e-12, "xtol": 1e-12, "gtol": 1e-12}
-    steps = np.array([*HOPS, *(-hop for hop in HOPS)])[:, None, None] * np.eye(len(begin))
-    y = _coordinates(space, begin)
-    jacobian: Any = lambda y: at(y)[1]  # noqa: E731
+    changes = 1.0 + np.array([*HOPS, *(-hop for hop in HOPS)])[:, None, None] * np.eye(len(begin))
+    values = begin
     while True:
-        inside = np.clip(y, lower + margin, upper - margin)
-        end = scipy.optimize.least_squares(lambda y: at(y)[0], inside, jac=jacobian, max_nfev=max_steps, **options)
-        beside = np.clip(end.x + steps.reshape(-1, len(begin)), lower + margin, upper - margin)
-        costs = [0.5 * float(np.sum(at(point)[0] ** 2)) for point in beside]
-        if not min(costs) < (1.0 - LOWER) * end.cost:
-            return end
-        y = beside[int(np.argmin(costs))]
-
-
-def _sides(space: SearchRange, values: np.ndarray) -> list[str]:
-    """The bound that each value is at, in words; the search approaches bounds from inside."""
-    y, lower, upper = (_coordinates(space, a) for a in (values, space.lower, space.upper))
-    near = 1e-3
-    return [
-        "at its lower bound" if at - low < near else "at its upper bound" if high - at < near else ""
-        for at, low, high in zip(y, lower, upper, strict=True)
-    ]
+        end = least_squares_on_host(at, solver, (values / space.unit)[None], max_steps)
+        values = np.clip(end.y[0] * space.unit, space.lower, space.upper)
+        reached = float(np.sum(end.aux**2))
+        beside = np.clip(values * changes.reshape(-1, len(begin)), space.lower, space.upper)
+        others = [squares(point) for point in beside]
+        if not min(others) < (1.0 - LOWER) * reached:
+            return _End(values, reached, end.status[0])
+        values = beside[int(np.argmin(others))]
 
 
 def _out_of_reach(

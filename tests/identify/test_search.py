@@ -8,7 +8,6 @@ from jaxdamp._status import Status
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import Besinger, CoulombFriction, Lag, Linear, PiecewiseLinear, PowerLaw
 from jaxdamp.identify import fit, fit_many
-from jaxdamp.identify.search import _Model
 from jaxdamp.parameters import free_parameters, replace
 
 
@@ -187,14 +186,6 @@ def test_a_start_beside_the_minimum_reaches_it_where_the_records_hardly_tell(sin
         status, reached = result.status, np.array([p.value for p in result.parameters])
     assert status is Status.CONVERGED
     np.testing.assert_allclose((reached - values) / errors, 0.0, atol=0.01)
-
-
-def test_a_singular_model_has_no_step():
-    """A column without any effect, once the damping has become zero: no step, which `search` reports, and no crash."""
-    wide = np.full(2, np.inf)
-    model = _Model(np.diag([1.0, 0.0]), np.array([1.0, 0.0]), np.ones(2), -wide, wide, np.zeros((0, 2)), np.zeros(0))
-    assert np.isfinite(model.step(1.0)).all()
-    assert np.isnan(model.step(np.inf)).any()
 
 
 def test_a_start_whose_squares_overflow_is_refused(sines):

@@ -6,7 +6,7 @@ import pytest
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import Besinger, Bilinear, Linear
 from jaxdamp.identify import fit
-from jaxdamp.identify.noise import Noise, autocorrelation, correlation_time
+from jaxdamp.identify.noise import Noise, _corrected, autocorrelation, correlation_time
 from jaxdamp.identify.uncertainty import uncertainty, weak_directions
 
 
@@ -93,3 +93,17 @@ def test_a_weak_direction_names_those_who_take_part(rng):
     (direction,) = weak_directions(jacobian, 1.0, np.array([1.0, 1e-4, 1e3, 1.0]), 0.5)
     assert np.flatnonzero(direction).tolist() == [2, 3] and direction[2] * direction[3] < 0
     assert weak_directions(jacobian[:, :3], 1.0, np.array([1.0, 1e-4, 1e3]), 0.5) == []
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.8])
+def test_degrees_of_freedom_without_what_the_fit_has_removed(rng, memory):
+    """Satterthwaite's, by dense matrices: (tr Σ − tr PΣ) tr Σ / tr Σ², which is N − p for white noise."""
+    lags = memory ** np.arange(60.0) if memory else np.ones(1)
+    noise = Noise(np.full(60, 2.0), (np.arange(60),), (lags,), 0.0, 1.0)
+    basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, 60), 5))[0]
+    covariance = 4.0 * memory ** np.abs(np.subtract.outer(np.arange(60), np.arange(60)))
+    whole, removed = np.trace(covariance), np.trace(basis.T @ covariance @ basis)
+    corrected = _corrected(noise, basis)
+    assert corrected.dof == pytest.approx((whole - removed) * whole / np.sum(covariance**2))
+    assert corrected.dof == pytest.approx(55.0) or memory
+    np.testing.assert_allclose(corrected.sigma, 2.0 * np.sqrt(whole / (whole - removed)))

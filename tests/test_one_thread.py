@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from jaxdamp.identify._blas import one_thread
+from jaxdamp._one_thread import one_thread
 
 
 def threads() -> set[int]:

@@ -23,6 +23,22 @@ def triangle(tall: Any) -> Any:
     return xp.linalg.qr(tall, mode="r")
 
 
+def rows_of_products(
+    products: Float[np.ndarray, "lanes columns columns"],
+) -> Float[np.ndarray, "lanes columns columns"]:
+    """Rows A with these products of columns AᵀA: triangles, or by eigenvectors where some columns depend on others."""
+    norms = np.sqrt(np.maximum(np.diagonal(products, axis1=1, axis2=2), 0.0))
+    scale = np.where(norms > 0, norms, 1.0)[:, None, :]
+    finite = np.all(np.isfinite(products), axis=(1, 2))[:, None, None]
+    unit = np.where(finite, products / (scale * scale.transpose(0, 2, 1)), np.eye(scale.shape[2]))
+    try:
+        rows = np.linalg.cholesky(unit).transpose(0, 2, 1)
+    except np.linalg.LinAlgError:
+        squares, directions = np.linalg.eigh(unit)
+        rows = np.sqrt(np.maximum(squares, 0.0))[:, :, None] * directions.transpose(0, 2, 1)
+    return np.where(finite, rows * scale, np.nan)
+
+
 def determined(
     scaled: Float[np.ndarray, "rows free"],
 ) -> tuple[Float[np.ndarray, " rank"], Float[np.ndarray, "rank free"]]:

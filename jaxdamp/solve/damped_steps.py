@@ -1,0 +1,257 @@
+"""The rules of a step of Levenberg-Marquardt within bounds and conditions, over NumPy or `jax.numpy`.
+
+All arrays have the axes of the lanes first: one in a loop on the host, none inside JAX, where `jax.vmap` adds them.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+
+
+WORTHWHILE = 1e-3  # of the predicted decrease, for a step to be accepted
+MOST_GROWTH = 5.0  # of the step size, from one step to the next
+FIRST_DAMPING = 1e-2  # of the squared norms of the Jacobian's columns
+LEAST_DAMPING = 1e-13  # of the same: keeps singular systems solvable
+LARGEST_STEP_SIZE = FIRST_DAMPING / LEAST_DAMPING
+MOST_OF_THE_WAY = 0.9  # to an edge, in one step
+NEAR = 1e-3  # coordinates so near an edge may go all the way
+AT_EDGE = 1e-6  # coordinates so near their lower bound end on it; also the distance to conditions
+FIRM = 1e6  # weight of a limit of several coordinates, relative to the data's
+ROUNDING = 500.0  # rounding errors of a sum of squares, in those of one number
+
+
+class Linearisation(NamedTuple):
+    """A least-squares problem linearised at a point, or at one for each lane.
+
+    Attributes:
+        rows: the Jacobian with the residual as its last column, relative to the size of the data, or any rows with the
+            same products of columns, shape (*lanes, rows, unknowns + 1).
+        margins: by how much each condition between unknowns holds, shape (*lanes, conditions).
+        margin_slopes: their derivatives by the unknowns, shape (*lanes, conditions, unknowns).
+        samples: number of residuals, for the tolerance in standard errors, shape (*lanes,).
+    """
+
+    rows: Any
+    margins: Any
+    margin_slopes: Any
+    samples: Any
+
+
+class State(NamedTuple):
+    """The accepted point with its linearised problem, and the point to be tried next; all with the axes of the lanes.
+
+    Attributes:
+        trial: the point to be tried.
+        triangle: of the rows of the accepted point.
+        scale: of the damping: the largest norms of the Jacobian's columns so far (as in MINPACK).
+        conditions: slopes of the conditions, of length one.
+        least: of the conditions times a step.
+        step_size: inverse of the damping.
+        predicted: decrease of half the sum of squares at the point to be tried.
+        floor: of a decrease that counts.
+        short: whether the step is shorter than the tolerances.
+        whole: whether it is the step without damping.
+        steps: points tried.
+        converged: whether the search has ended by its tolerance.
+        stuck: whether there is no further step.
+        aux: what the residual gives beside its value at the accepted point.
+    """
+
+    trial: Any
+    triangle: Any
+    scale: Any
+    conditions: Any
+    least: Any
+    step_size: Any
+    predicted: Any
+    floor: Any
+    short: Any
+    whole: Any
+    steps: Any
+    converged: Any
+    stuck: Any
+    aux: Any
+
+
+class _Proposal(NamedTuple):
+    """A step with what decides whether the search would end by it."""
+
+    step: Any
+    predicted: Any
+    short: Any
+    small: Any  # whether the search would end by it; true of one that is not finite
+
+
+class Rules(NamedTuple):
+    """Bounds as vectors, and the tolerances of a `BoundedLevenbergMarquardt`."""
+
+    lower: Any
+    upper: Any
+    tolerance: float
+    precision: float
+    rtol: float
+    atol: float
+
+
+def at_edges(flat: Any, rules: Rules) -> Any:
+    """The vector of unknowns with those very near their lower bound on it."""
+    xp: Any = np if isinstance(flat, np.ndarray) else jnp
+    return xp.where(xp.abs(flat - rules.lower) < AT_EDGE, rules.lower, flat)
+
+
+def judged(xp: Any, state: State, here: Linearisation, aux: Any) -> tuple[Any, State]:
+    """Whether the point tried is accepted, and the state with its linearised problem if it is."""
+    first, tried = state.steps == 0, _triangle(xp, here.rows)
+    old, new = _half_squares(state.triangle), _half_squares(tried)
+    finite = xp.all(xp.isfinite(tried), axis=(-2, -1))
+    negligible = (state.predicted < state.floor) & (new - old < state.floor)
+    ratio = (old - new) / xp.where(state.predicted > 0, state.predicted, 1.0)
+    keeps_conditions = xp.all(here.margins > 0, axis=-1)
+    accepted = first | (finite & keeps_conditions & (negligible | (ratio > WORTHWHILE)))
+    # Beyond 2 the growth is at its limit; the cube of a huge ratio would overflow.
+    growth = xp.maximum(1.0 / MOST_GROWTH, 1.0 - (2.0 * xp.clip(ratio, -1e6, 2.0) - 1.0) ** 3)
+    divisor = xp.where(accepted, growth, xp.where(state.whole, 1.0, MOST_GROWTH))
+    length = xp.sqrt(xp.sum(here.margin_slopes**2, axis=-1))
+    length = xp.where(length > 0, length, 1.0)
+    room = here.margins / length - AT_EDGE
+    changed = {
+        "triangle": tried,
+        "scale": xp.maximum(state.scale, xp.sqrt(xp.sum(tried[..., :-1] ** 2, axis=-2))),
+        "conditions": here.margin_slopes / length[..., None],
+        "least": -xp.where(room > NEAR, MOST_OF_THE_WAY * room, room),
+        "aux": aux,
+    }
+    chosen = {name: where(xp, accepted, value, getattr(state, name)) for name, value in changed.items()}
+    step_size = xp.where(first, state.step_size, state.step_size / divisor)
+    converged = ~first & (negligible | state.short)
+    return accepted, state._replace(step_size=step_size, steps=state.steps + 1, converged=converged, **chosen)
+
+
+def with_proposal(xp: Any, rules: Rules, state: State, y: Any, samples: Any, accepted: Any) -> State:
+    """The state with the next point to be tried."""
+    rounding = ROUNDING * rules.precision
+    floor = xp.maximum(rounding, rules.tolerance**2 / samples) * _half_squares(state.triangle) + rounding**2
+    limits = (rules.lower - y, rules.upper - y)
+    lower, upper = (xp.where(xp.abs(a) > NEAR, MOST_OF_THE_WAY * a, a) for a in limits)
+
+    def at(step_size: Any) -> _Proposal:
+        step = _damped_step(xp, state, step_size, lower, upper)
+        predicted = _decrease(state.triangle, step)
+        short = xp.all(xp.abs(step) <= rules.atol + rules.rtol * xp.abs(y), axis=-1)
+        return _Proposal(step, predicted, short, ~(predicted >= floor) | short)
+
+    def longer(carry: tuple[Any, Any, _Proposal]) -> tuple[Any, Any, _Proposal]:
+        size, again, proposal = carry
+        size = xp.where(again, size * MOST_GROWTH, size)
+        proposal = where(xp, again, at(size), proposal)
+        return size, again & proposal.small & (size < LARGEST_STEP_SIZE), proposal
+
+    size, proposal = state.step_size, at(state.step_size)
+    again = ~accepted & state.whole & proposal.small & (size < LARGEST_STEP_SIZE)
+    size, _, proposal = _while(xp, lambda carry: xp.any(carry[1]), longer, (size, again, proposal))
+    whole = accepted & proposal.small & ~state.converged
+    if xp is jnp or np.any(whole):
+        undamped = at(xp.full_like(size, LARGEST_STEP_SIZE))
+        whole = whole & ~undamped.small
+        proposal = where(xp, whole, undamped, proposal)
+    return state._replace(
+        trial=y + proposal.step,
+        step_size=size,
+        predicted=proposal.predicted,
+        floor=floor,
+        short=proposal.short,
+        whole=whole,
+        stuck=~state.converged & ~xp.all(xp.isfinite(proposal.step), axis=-1),
+    )
+
+
+def where(xp: Any, mask: Any, new: Any, old: Any) -> Any:
+    """A tree with leaves of one or the other for each lane."""
+    if xp is np and np.all(mask):
+        return new
+    if xp is np and not np.any(mask):
+        return old
+
+    def chosen(new: Any, old: Any) -> Any:
+        return xp.where(mask.reshape(mask.shape + (1,) * (new.ndim - mask.ndim)), new, old)
+
+    return jtu.tree_map(chosen, new, old)
+
+
+def _while(xp: Any, condition: Any, body: Any, carry: Any) -> Any:
+    if xp is jnp:
+        return jax.lax.while_loop(condition, body, carry)
+    while condition(carry):
+        carry = body(carry)
+    return carry
+
+
+def _triangle(xp: Any, rows: Any) -> Any:
+    """The triangle of rows, with as many rows as columns."""
+    missing = max(rows.shape[-1] - rows.shape[-2], 0)
+    rows = xp.concatenate([rows, xp.zeros((*rows.shape[:-2], missing, rows.shape[-1]), rows.dtype)], axis=-2)
+    return xp.linalg.qr(rows, mode="r")
+
+
+def _half_squares(triangle: Any) -> Any:
+    return 0.5 * (triangle[..., -1] ** 2).sum(axis=-1)
+
+
+def _times(matrix: Any, vector: Any) -> Any:
+    return (matrix @ vector[..., None])[..., 0]
+
+
+def _decrease(triangle: Any, step: Any) -> Any:
+    """Predicted decrease of half the sum of squares over a step."""
+    q = triangle[..., :-1, -1]
+    return 0.5 * ((q**2).sum(axis=-1) - ((_times(triangle[..., :-1, :-1], step) + q) ** 2).sum(axis=-1))
+
+
+def _damped_step(xp: Any, state: State, step_size: Any, lower: Any, upper: Any) -> Any:
+    """Min ‖R d + q‖² + ‖D d‖² λ/step_size within limits of d and of C d; NaN where there is none.
+
+    A coordinate that would leave its limits is put on the nearer one, and the rest is solved again. Limits of C d
+    are rows of a great weight.
+    """
+    n = state.scale.shape[-1]
+    r, q, conditions = state.triangle[..., :n, :n], state.triangle[..., :n, n], state.conditions
+    scale = xp.where(state.scale > 0, state.scale, 1.0)
+    share = xp.maximum(FIRST_DAMPING / xp.maximum(step_size, jnp.finfo(scale.dtype).tiny), LEAST_DAMPING)
+    damping = xp.sqrt(share)[..., None] * scale
+    firm = FIRM * xp.maximum(xp.max(scale, axis=-1), 1.0)[..., None]
+    low = xp.concatenate([xp.broadcast_to(lower, scale.shape), state.least], axis=-1)
+    high = xp.concatenate([xp.broadcast_to(upper, scale.shape), xp.full_like(state.least, np.inf)], axis=-1)
+
+    def solved(held: Any, at: Any) -> Any:
+        own, rows, values = held[..., :n], held[..., n:], xp.where(held[..., :n], at[..., :n], 0.0)
+        firmly = xp.where(rows, firm, 0.0)
+        blocks = [
+            xp.where(own[..., None, :], 0.0, r),
+            xp.eye(n, dtype=r.dtype) * xp.where(own, 1.0, damping)[..., None],
+        ]
+        blocks += [xp.where(own[..., None, :], 0.0, firmly[..., None] * conditions)]
+        aims = [-q - _times(r, values), values, firmly * (at[..., n:] - _times(conditions, values))]
+        matrix, target = xp.concatenate(blocks, axis=-2), xp.concatenate(aims, axis=-1)
+        whole = xp.linalg.qr(xp.concatenate([matrix, target[..., None]], axis=-1), mode="r")
+        return _back_substituted(xp, whole[..., :n, :n], whole[..., :n, n])
+
+    def body(carry: tuple[Any, ...]) -> tuple[Any, ...]:
+        held, at, _, _ = carry
+        step = solved(held, at)
+        both = xp.concatenate([step, _times(conditions, step)], axis=-1)
+        outside = ~held & ((both < low) | (both > high))
+        return held | outside, xp.where(outside, xp.clip(both, low, high), at), step, xp.any(outside)
+
+    begin = (xp.zeros(low.shape, bool), xp.zeros(low.shape, low.dtype), xp.zeros_like(scale), xp.asarray(True))
+    return xp.clip(_while(xp, lambda carry: carry[3], body, begin)[2], lower, upper)
+
+
+def _back_substituted(xp: Any, triangle: Any, right: Any) -> Any:
+    """X of R x = b; NaN where R is singular."""
+    if xp is jnp:
+        return jax.scipy.linalg.solve_triangular(triangle, right)
+    regular = np.all(np.diagonal(triangle, axis1=-2, axis2=-1) != 0.0, axis=-1)[..., None, None]
+    return np.linalg.solve(np.where(regular, triangle, np.nan), right[..., None])[..., 0]

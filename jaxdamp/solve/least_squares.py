@@ -1,0 +1,204 @@
+"""Levenberg-Marquardt within bounds and conditions, as a solver of optimistix.
+
+The rules of a step are written once, over NumPy or `jax.numpy`. A fit runs them in NumPy by a loop on the host
+(`least_squares_on_host`): only the residual and its Jacobian are compiled, since the algebra of a step, which is small,
+takes longer to compile than the forces of most laws. `optimistix.least_squares` runs them inside a JAX program.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import lineax as lx
+import numpy as np
+import optimistix as optx
+from jax.flatten_util import ravel_pytree
+
+from jaxdamp._triangles import triangle
+from jaxdamp.solve.damped_steps import AT_EDGE, Linearisation, Rules, State, at_edges, judged, where, with_proposal
+
+
+class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
+    """Least squares within bounds and conditions between the unknowns.
+
+    Nielsen's rule for the damping 1/step_size, by the ratio of actual to predicted decrease. A step whose predicted
+    decrease is less than `tolerance` standard errors, or below rounding errors, is accepted and ends the search; if
+    refused, it would only become shorter and shorter. A step shorter than `rtol` and `atol` also ends the search: kinks
+    of a residual are kinks of the sum of squares, near which the predicted decrease is wrong. A step that violates a
+    condition is refused. The damping holds back what the data hardly determine, so that a step is small far from the
+    minimum too: before the search ends by a small step, the whole step, without damping, is tried, and if it is
+    refused, the most damped one that is not small.
+
+    Towards an edge that is not near, a step goes at most nine tenths of the way, since many models degenerate at their
+    edges. Conditions are edges too, linearised at each accepted point. A step is solved by orthogonal triangles, so
+    that unknowns which the data hardly tell apart lose no digits to products of the Jacobian.
+
+    Unknowns should be numbers of order one, as those of `jaxdamp.parameters.Coordinates` are. For use by
+    `optimistix.least_squares`, under `jax.jit`, `jax.vmap` and derivatives; `adjoint=ImplicitWithinBounds()` gives
+    right derivatives where an unknown is at a bound. Every step evaluates the residual and its Jacobian once, in
+    forward mode, and the first one those of the start.
+
+    Sources: K. Madsen, H. B. Nielsen, O. Tingleff, Methods for non-linear least squares problems, IMM 2004; J. J. Moré,
+    The Levenberg-Marquardt algorithm: implementation and theory, 1978, for the scales of the damping.
+
+    Attributes:
+        lower: lower bounds, one number or a tree like the unknowns.
+        upper: upper bounds.
+        conditions: unknowns → vector of numbers that must stay positive; None for none.
+        tolerance: length of the last step, in standard errors of the unknowns.
+        level: size of the data in the units of the residual, root of the sum of squares, below whose rounding errors
+            there is nothing left to explain.
+        precision: relative rounding error of the residual; that of the type of the unknowns if left out.
+        rtol: largest step that counts as short, relative to each unknown.
+        atol: the same added to it.
+        norm: the largest of all unknowns decides whether a step is short.
+
+    >>> time = jnp.linspace(0.0, 2.0, 50)
+    >>> misses = lambda y, data: y[0] * jnp.exp(-y[1] * time) - data
+    >>> solver = BoundedLevenbergMarquardt(lower=0.0, upper=jnp.array([10.0, 1.2]))
+    >>> found = optx.least_squares(misses, solver, jnp.ones(2), 3.0 * jnp.exp(-1.5 * time))
+    >>> found.value.round(3).tolist(), int(found.stats["num_steps"]) < 12
+    ([2.692, 1.2], True)
+    """
+
+    lower: Any = -np.inf
+    upper: Any = np.inf
+    conditions: Callable[[Any], Any] | None = None
+    tolerance: float = 1e-4
+    level: Any = 1.0
+    precision: float | None = None
+    rtol: float = 1e-6
+    atol: float = 1e-9
+    norm: Callable[[Any], Any] = optx.max_norm
+
+    def init(
+        self, fn: Any, y: Any, args: Any, options: dict[str, Any], f_struct: Any, aux_struct: Any, tags: Any
+    ) -> State:
+        """The state before the start has been evaluated."""
+        if "linearise" in options:
+            xp, flat, conditions, aux = np, y, 0, None
+        else:
+            xp, (flat, _) = jnp, ravel_pytree(y)
+            conditions = 0 if self.conditions is None else jax.eval_shape(self.conditions, y).size
+            aux = jtu.tree_map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), aux_struct)
+        rules = rules_of(self, xp, y)
+        lanes, (n,), kind = flat.shape[:-1], flat.shape[-1:], flat.dtype
+        zeros, no = xp.zeros(lanes, kind), xp.zeros(lanes, bool)
+        return State(
+            trial=xp.clip(flat, rules.lower, rules.upper),
+            triangle=xp.zeros((*lanes, n + 1, n + 1), kind),
+            scale=xp.zeros((*lanes, n), kind),
+            conditions=xp.zeros((*lanes, conditions, n), kind),
+            least=xp.zeros((*lanes, conditions), kind),
+            step_size=xp.ones(lanes, kind),
+            predicted=zeros,
+            floor=zeros,
+            short=no,
+            whole=no,
+            steps=xp.zeros(lanes, int),
+            converged=no,
+            stuck=no,
+            aux=aux,
+        )
+
+    def step(
+        self, fn: Any, y: Any, args: Any, options: dict[str, Any], state: State, tags: Any
+    ) -> tuple[Any, State, Any]:
+        """Evaluate the point to be tried, accept or refuse it, and choose the next."""
+        if "linearise" in options:
+            xp, flat, unravel = np, y, lambda flat: flat
+            here, aux = options["linearise"](state.trial, args)
+        else:
+            xp, (flat, unravel) = jnp, ravel_pytree(y)
+            here, aux = _linearised(self, lambda flat: fn(unravel(flat), args), state.trial, unravel)
+        accepted, state = judged(xp, state, here, aux)
+        flat = where(xp, accepted, state.trial, flat)
+        state = with_proposal(xp, rules_of(self, xp, y), state, flat, here.samples, accepted)
+        return unravel(flat), state, state.aux
+
+    def terminate(
+        self, fn: Any, y: Any, args: Any, options: dict[str, Any], state: State, tags: Any
+    ) -> tuple[Any, optx.RESULTS]:
+        """Whether a search has ended, by its tolerance or because there is no step."""
+        done = state.converged | state.stuck
+        if "linearise" in options:
+            return done, optx.RESULTS.successful
+        return done, optx.RESULTS.where(state.stuck, optx.RESULTS.nonfinite, optx.RESULTS.successful)
+
+    def postprocess(
+        self, fn: Any, y: Any, aux: Any, args: Any, options: dict[str, Any], state: State, tags: Any, result: Any
+    ) -> tuple[Any, Any, dict[str, Any]]:
+        """Unknowns very near their lower bound end on it."""
+        flat, unravel = ravel_pytree(y)
+        return unravel(at_edges(flat, rules_of(self, jnp, y))), aux, {}
+
+
+class ImplicitWithinBounds(optx.AbstractAdjoint):
+    """Derivatives of a least-squares solution by the implicit function theorem, with unknowns at bounds held there.
+
+    `optimistix.ImplicitAdjoint` takes the gradient as zero for all unknowns, which it is not for one at a bound. Where
+    a condition of a `BoundedLevenbergMarquardt` holds the solution back, the derivatives are not a number.
+
+    Attributes:
+        linear_solver: for the matrix of second derivatives.
+    """
+
+    linear_solver: lx.AbstractLinearSolver = lx.AutoLinearSolver(well_posed=None)
+
+    def apply(self, primal_fn: Any, rewrite_fn: Any, inputs: Any, tags: frozenset[object]) -> Any:
+        """The solution, with these derivatives in place of those of the loop."""
+        return optx.ImplicitAdjoint(self.linear_solver).apply(primal_fn, _pull_within_bounds, inputs, tags)
+
+
+def _pull_within_bounds(optimum: Any, _: Any, inputs: Any) -> Any:
+    """What is zero at the solution: the gradient, or the distance from a bound."""
+    fn, solver, _, args, *_ = inputs
+    flat, unravel = ravel_pytree(optimum)
+
+    def half_squares(flat: Any) -> Any:
+        return 0.5 * jnp.sum(ravel_pytree(fn(unravel(flat), args)[0])[0] ** 2)
+
+    pull = jax.grad(half_squares)(flat)
+    if isinstance(solver, BoundedLevenbergMarquardt):
+        lower, upper, *_ = rules_of(solver, jnp, optimum)
+        pull = jnp.where(flat - lower < AT_EDGE, flat - lower, jnp.where(upper - flat < AT_EDGE, flat - upper, pull))
+        if solver.conditions is not None:
+            pull = jnp.where(jnp.all(solver.conditions(optimum) > 2 * AT_EDGE), pull, jnp.nan * flat)
+    return unravel(pull)
+
+
+def rules_of(solver: BoundedLevenbergMarquardt, xp: Any, like: Any) -> Rules:
+    """The rules of a solver, with its bounds as vectors like some unknowns."""
+    if xp is np:
+        lower, upper = solver.lower, solver.upper
+        dtype = like.dtype
+    else:
+        flat, _ = ravel_pytree(like)
+        same, dtype = jtu.tree_structure(like), flat.dtype
+        sides = (
+            ravel_pytree(side)[0] if jtu.tree_structure(side) == same else jnp.asarray(side)
+            for side in (solver.lower, solver.upper)
+        )
+        lower, upper = (jnp.broadcast_to(side.astype(dtype), flat.shape) for side in sides)
+    precision = solver.precision or float(jnp.finfo(dtype).eps)
+    return Rules(lower, upper, solver.tolerance, precision, solver.rtol, solver.atol)
+
+
+def _linearised(solver: BoundedLevenbergMarquardt, fn: Any, flat: Any, unravel: Any) -> tuple[Linearisation, Any]:
+    """The problem at a point, inside JAX."""
+
+    def residual(flat: Any) -> tuple[Any, Any]:
+        missed, aux = fn(flat)
+        missed = ravel_pytree(missed)[0]
+        return missed, (missed, aux)
+
+    jacobian, (missed, aux) = jax.jacfwd(residual, has_aux=True)(flat)
+    rows = triangle(jnp.concatenate([jacobian, missed[:, None]], axis=1) / solver.level)
+    conditions = solver.conditions
+    if conditions is None:
+        none = jnp.zeros((0, flat.size), flat.dtype)
+        return Linearisation(rows, none[:, 0], none, missed.size), aux
+    slopes, margins = jax.jacfwd(lambda flat: (conditions(unravel(flat)),) * 2, has_aux=True)(flat)
+    return Linearisation(rows, margins, slopes, missed.size), aux

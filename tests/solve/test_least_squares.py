@@ -1,0 +1,120 @@
+"""Bounded Levenberg-Marquardt on the host and inside JAX: the same ends, bounds, conditions, gradients."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+import pytest
+
+from jaxdamp._status import Status
+from jaxdamp.solve import BoundedLevenbergMarquardt, ImplicitWithinBounds, Linearisation, least_squares_on_host
+
+
+TIME = jnp.linspace(0.0, 2.0, 50)
+DATA = 3.0 * jnp.exp(-1.5 * TIME) + 0.01 * jnp.sin(40.0 * TIME)
+
+
+def misses(y, data):
+    return y[0] * jnp.exp(-y[1] * TIME) - data
+
+
+@jax.jit
+def linearised(y, data):
+    return misses(y, data), jax.jacfwd(misses)(y, data)
+
+
+def on_host(data, solver, conditions=None, max_steps=100, start=(1.0, 1.0), record=None):
+    def at(y, lanes):
+        points = [linearised(jnp.asarray(point), data[lane]) for point, lane in zip(y, lanes, strict=True)]
+        rows = np.stack([np.concatenate([np.asarray(j), np.asarray(r)[:, None]], axis=1) for r, j in points])
+        margins = np.zeros((len(y), 0)) if conditions is None else np.stack([conditions(p) for p in y])
+        if record is not None:
+            record.append((list(lanes), margins))
+        slopes = np.zeros((*margins.shape, 2))
+        if conditions is not None:
+            slopes = np.stack([np.asarray(jax.jacfwd(conditions)(jnp.asarray(p))) for p in y])
+        return Linearisation(rows, margins, slopes, np.full(len(y), 50.0)), y
+
+    return least_squares_on_host(at, solver, np.tile(start, (len(data), 1)), max_steps)
+
+
+@pytest.mark.parametrize("upper", [10.0, (10.0, 1.2)], ids=["inside", "at a bound"])
+def test_host_and_jax_take_the_same_steps(upper):
+    solver = BoundedLevenbergMarquardt(np.zeros(2), np.broadcast_to(upper, 2))
+    end = on_host(DATA[None], solver)
+    inside = optx.least_squares(misses, BoundedLevenbergMarquardt(0.0, jnp.asarray(upper)), jnp.ones(2), DATA)
+    np.testing.assert_allclose(inside.value, end.y[0], rtol=1e-9)
+    assert int(inside.stats["num_steps"]) == end.steps[0] and end.status == [Status.CONVERGED]
+
+
+def test_lanes_end_by_themselves_and_are_computed_no_more():
+    data, seen = jnp.stack([DATA, 3.0 * jnp.exp(-1.0 * TIME), 0.01 * DATA]), []
+    end = on_host(data, BoundedLevenbergMarquardt(np.zeros(2), np.full(2, np.inf)), record=seen)
+    alone = [on_host(row[None], BoundedLevenbergMarquardt(np.zeros(2), np.full(2, np.inf))) for row in data]
+    for lane, single in enumerate(alone):
+        np.testing.assert_allclose(end.y[lane], single.y[0], rtol=1e-10)
+        assert end.steps[lane] == single.steps[0] == sum(lane in lanes for lanes, _ in seen)
+    assert len(set(end.steps)) > 1
+    together = jax.jit(
+        jax.vmap(lambda d: optx.least_squares(misses, BoundedLevenbergMarquardt(0.0), jnp.ones(2), d).value)
+    )
+    np.testing.assert_allclose(together(data), end.y, rtol=1e-7)
+
+
+def test_a_condition_that_bends_within_a_step_is_kept():
+    """The linearised condition lets a step pass that breaks the bent one: such a step must be refused."""
+
+    def allowed(y):
+        return (4.0 - y[0] ** 2 - (y[1] - 1.0) ** 2)[None]  # the minimum, near (3, 1.5), is outside
+
+    solver = BoundedLevenbergMarquardt(np.zeros(2), np.full(2, 10.0))
+    tried = []
+    ends = [on_host(DATA[None], solver, allowed, max_steps=steps, record=tried) for steps in (2, 3, 4, 5, 6, 100)]
+    assert min(float(margins[0, 0]) for _, margins in tried) < 0.0  # a step did break it
+    assert all(float(allowed(end.y[0])[0]) > 0.0 for end in ends)  # but was not accepted
+    assert ends[-1].status == [Status.CONVERGED] and float(allowed(ends[-1].y[0])[0]) < 1e-3
+    inside = optx.least_squares(misses, BoundedLevenbergMarquardt(0.0, 10.0, allowed), jnp.ones(2), DATA)
+    np.testing.assert_allclose(inside.value, ends[-1].y[0], rtol=1e-6)
+
+
+def test_the_gradient_of_a_solution_is_that_of_differences():
+    def rate(data, upper):
+        solver = BoundedLevenbergMarquardt(0.0, jnp.asarray([10.0, upper]), tolerance=1e-9)
+        return optx.least_squares(misses, solver, jnp.ones(2), data, adjoint=ImplicitWithinBounds()).value
+
+    along = jnp.cos(7.0 * TIME)
+    for upper in (10.0, 1.2):  # inside, and with the second number at its bound
+        slope = jax.jit(jax.grad(lambda d, upper=upper: rate(d, upper) @ jnp.asarray([1.0, 2.0])))(DATA) @ along
+        ends = [rate(DATA + h * along, upper) @ jnp.asarray([1.0, 2.0]) for h in (1e-4, -1e-4)]
+        np.testing.assert_allclose(slope, (ends[0] - ends[1]) / 2e-4, rtol=1e-5)
+    assert float(jax.jacfwd(rate, argnums=1)(DATA, 1.2)[1]) == pytest.approx(1.0)  # it follows its bound
+
+
+def test_unknowns_and_residuals_may_be_trees():
+    def fn(y, _):
+        return {"a": y["level"] * jnp.exp(-y["rate"] * TIME) - DATA, "b": 1e-6 * y["rate"]}
+
+    solver = BoundedLevenbergMarquardt({"level": 0.0, "rate": 0.0}, {"level": 10.0, "rate": 1.2})
+    found = optx.least_squares(fn, solver, {"level": jnp.asarray(1.0), "rate": jnp.asarray(1.0)})
+    assert float(found.value["rate"]) == pytest.approx(1.2) and found.value["level"].shape == ()
+
+
+def test_a_column_without_effect_leaves_a_finite_step():
+    """However long the search: the least damping keeps the system solvable."""
+    solver = BoundedLevenbergMarquardt(np.full(2, -np.inf), np.full(2, np.inf))
+    rows = np.array([[[1.0, 0.0, 1.0], [0.0, 0.0, 0.5]]])
+    nothing = np.zeros((1, 0)), np.zeros((1, 0, 2)), np.ones(1)
+    state = solver.init(None, np.zeros((1, 2)), None, {"linearise": None}, None, None, frozenset())
+    state = state._replace(step_size=np.full(1, np.inf))
+    options = {"linearise": lambda y, lanes: (Linearisation(rows, *nothing), None)}
+    _, state, _ = solver.step(None, np.zeros((1, 2)), np.arange(1), options, state, frozenset())
+    np.testing.assert_allclose(state.trial, [[-1.0, 0.0]], atol=1e-9)
+    assert not state.stuck[0]
+
+
+def test_a_start_without_finite_residual_has_no_step():
+    end = on_host(DATA[None] * np.nan, BoundedLevenbergMarquardt(np.zeros(2), np.full(2, np.inf)))
+    assert end.status == [Status.NO_STEP] and end.steps[0] == 1
+    solver = BoundedLevenbergMarquardt(0.0)
+    lost = optx.least_squares(misses, solver, jnp.ones(2), DATA * jnp.nan, throw=False)
+    assert lost.result == optx.RESULTS.nonfinite
