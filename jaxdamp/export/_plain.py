@@ -24,21 +24,21 @@ BORROWED = ("equinox", "lineax", "optimistix", "diffrax")  # whose modules are n
 
 def known_classes() -> dict[str, type[eqx.Module]]:
     """All modules by the name of their class: those of this package first, of others the one defined last."""
-    found: list[type[eqx.Module]] = []
+    classes: list[type[eqx.Module]] = []
     waiting: list[type[eqx.Module]] = [eqx.Module]
     while waiting:
         subclasses = waiting.pop().__subclasses__()
         waiting += subclasses
-        found += [c for c in subclasses if not inspect.isabstract(c) and c.__module__.split(".")[0] not in BORROWED]
-    ours = [c for c in found if c.__module__.startswith("jaxdamp.")]
-    return {c.__name__: c for c in [*found, *ours] if not c.__name__.startswith("Abstract")}
+        classes += [c for c in subclasses if not inspect.isabstract(c) and c.__module__.split(".")[0] not in BORROWED]
+    ours = [c for c in classes if c.__module__.startswith("jaxdamp.")]
+    return {c.__name__: c for c in [*classes, *ours] if not c.__name__.startswith("Abstract")}
 
 
 def known_functions() -> dict[str, Any]:
     """The functions of the roads of this package, of which a road can hold one, by name."""
     modules = [module for name, module in list(sys.modules.items()) if name.startswith("jaxdamp.roads.")]
-    found = [f for module in modules for f in vars(module).values() if inspect.isfunction(f)]
-    return {f.__name__: f for f in found if f.__module__.startswith("jaxdamp.roads.")}
+    functions = [f for module in modules for f in vars(module).values() if inspect.isfunction(f)]
+    return {f.__name__: f for f in functions if f.__module__.startswith("jaxdamp.roads.")}
 
 
 def declared(field: Any) -> dict[str, Any] | None:

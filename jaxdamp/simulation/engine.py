@@ -181,10 +181,10 @@ def chosen_engine(
     elif substeps is not None:
         remedy = "Write `engine=simulation.Exponential(substeps=...)`."
         _checks.refuse("substeps", "be left out beside an engine, which has its own", substeps, remedy)
-    own = engine.spacing
+    spacing = engine.spacing
     if dt is None:
-        return engine, 1e-3 if own is None else own
+        return engine, 1e-3 if spacing is None else spacing
     dt = _checks.plain_number("dt", dt)
-    if own is not None and own != dt:
-        _checks.refuse("dt", f"be left out, or be that of the engine, {own:g} s", dt)
+    if spacing is not None and spacing != dt:
+        _checks.refuse("dt", f"be left out, or be that of the engine, {spacing:g} s", dt)
     return engine, dt

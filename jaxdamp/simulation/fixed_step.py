@@ -142,10 +142,10 @@ class AbstractFixedStep(AbstractEngine):
             blocks = road[:whole].reshape(-1, BLOCK, *road.shape[1:])
             carry, saved = jax.lax.scan(jax.checkpoint(drive), carry, blocks)
             parts.append(jax.tree.map(lambda y: y.reshape(-1, *y.shape[2:]), saved))
-        rest = road[whole:]
+        remaining = road[whole:]
         if observer.every > 1:
-            rest = rest.reshape(-1, observer.every, *rest.shape[1:])
-        carry, saved = drive(carry, rest)
+            remaining = remaining.reshape(-1, observer.every, *remaining.shape[1:])
+        carry, saved = drive(carry, remaining)
         records = jax.tree.map(lambda *ys: jnp.concatenate(ys), *parts, saved)
         return self._outcome(carry, records, equations)
 

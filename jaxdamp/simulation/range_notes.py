@@ -40,12 +40,12 @@ def range_uses(
     position, rate = jnp.split(motion, 2, axis=1)
     strokes, velocities = (np.asarray(form.at_ports(*at), dtype=float) for at in ((position, road), (rate, road_rate)))
     forces = np.asarray(port_force, dtype=float)
-    found = {}
+    uses_of = {}
     for i, (name, law) in enumerate(named_laws(vehicle).items()):
         uses = range_use(law, Motion(strokes[:, i], velocities[:, i], forces[:, i]))
         if uses:
-            found[name] = uses
-    return found
+            uses_of[name] = uses
+    return uses_of
 
 
 def named_laws(vehicle: AbstractVehicle) -> dict[str, AbstractDamper]:
@@ -63,5 +63,5 @@ def range_sentences(uses: dict[str, Sequence[RangeUse]] | dict[str, list[RangeUs
     Arguments:
         uses: by the name of the damper.
     """
-    texts = (sentence(name.replace("_", " "), found) for name, found in uses.items())
+    texts = (sentence(name.replace("_", " "), of_damper) for name, of_damper in uses.items())
     return tuple(text for text in texts if text)

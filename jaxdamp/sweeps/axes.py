@@ -100,11 +100,11 @@ def points(values: Mapping[str, Any]) -> Points:
     >>> points({"rate": [1000.0, 2000.0], "mass": [300.0, 250.0]}).count
     2
     """
-    found = Points(_columns("values", values))
-    lengths = {name: len(column) for name, column in found.values.items()}
+    listed = Points(_columns("values", values))
+    lengths = {name: len(column) for name, column in listed.values.items()}
     if len(set(lengths.values())) > 1:
         _checks.refuse("values", "have equally many numbers for each axis", lengths, "A mapping by itself is a grid.")
-    return found
+    return listed
 
 
 def random(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str] = False) -> Points:
@@ -160,7 +160,7 @@ def _columns(argument: str, values: Mapping[str, Any]) -> Columns:
     """The numbers of each axis as float64, checked."""
     if not values:
         _checks.refuse(argument, "have at least one axis", values)
-    found = {}
+    columns = {}
     for name, numbers in values.items():
         _check_name(argument, name)
         try:
@@ -172,8 +172,8 @@ def _columns(argument: str, values: Mapping[str, Any]) -> Columns:
             remedy = "Write [1.0, 2.0] or `numpy.linspace(1.0, 2.0, 11)`; one value alone is [1.0]."
             _checks.refuse(f"{argument}[{name!r}]", "be a sequence of one or more numbers", repr(numbers), remedy)
         _checks.finite(f"{argument}[{name!r}]", column)
-        found[name] = column
-    return found
+        columns[name] = column
+    return columns
 
 
 def _check_name(argument: str, name: Any) -> None:
