@@ -1,12 +1,11 @@
 """By how much a run takes the laws of a vehicle outside the ranges that they were fitted to."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.dampers import AbstractDamper, Motion, RangeUse, has_fitted_range, range_use, sentence
@@ -34,7 +33,7 @@ def range_uses(
     Returns:
         The dampers whose law has a range; empty if none has one, or while JAX traces the run.
     """
-    tree: Any = (vehicle, motion)
+    tree: PyTree = (vehicle, motion)
     if not has_fitted_range(vehicle) or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(tree)):
         return {}
     position, rate = jnp.split(motion, 2, axis=1)

@@ -146,7 +146,7 @@ def sobol(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str
     return _stretch(ranges, unit, log)
 
 
-def as_points(over: Any) -> AbstractPoints:
+def as_points(over: object) -> AbstractPoints:
     """What `sweep` takes as `over`: points as they are, a mapping as a grid."""
     if isinstance(over, AbstractPoints):
         return over
@@ -176,7 +176,7 @@ def _columns(argument: str, values: Mapping[str, Any]) -> Columns:
     return columns
 
 
-def _check_name(argument: str, name: Any) -> None:
+def _check_name(argument: str, name: object) -> None:
     if not isinstance(name, str) or not name or "/" in name or name in (POINT, PARAMETER):
         must = f"have names without '/' as keys, other than {POINT!r} and {PARAMETER!r}"
         _checks.refuse(argument, must, f"one with {name!r}")
