@@ -1,10 +1,11 @@
-"""Rides in programs of one's own: a batch by plain `jax.vmap`, and a step of optax through a long ride.
+"""Rides and fits in programs of one's own: a batch by plain `jax.vmap`, a step of optax, a batch of least squares.
 
-    python -m benchmarks.from_jax [--cars 32768]
+    python -m benchmarks.from_jax [--cars 32768] [--records 64]
 
-Half cars drive 1 s at 1 kHz, all ride metrics. Plain `jax.vmap` chooses the form for many cars by itself; a function
-that is compiled before it is batched cannot. The step of optax follows the gradient of one metric of a quarter car by
-the parameters of its damper over 60 s; memory is what the compiled step needs beside its arguments.
+Half cars drive 1 s at 1 kHz, all ride metrics: a plain `jax.vmap` of a ride, which chooses the form for many cars by
+itself, against the ride compiled for many. The step of optax follows the gradient of one metric of a quarter car by the
+parameters of its damper over 60 s; memory is what the compiled step needs beside its arguments. Records of one motion
+with other noise are fitted by `jax.vmap` of the least squares of a `Problem`, and by `fit_many`.
 """
 
 import argparse
@@ -12,6 +13,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import optax
 from jaxtyping import Array
 
@@ -21,7 +23,7 @@ from jaxdamp import configure
 configure(cpu_devices=1, cache=False)
 
 from benchmarks._timing import first_and_warm, report  # noqa: E402
-from jaxdamp import Ride, dampers, roads  # noqa: E402
+from jaxdamp import Ride, bench, dampers, identify, roads  # noqa: E402
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000  # noqa: E402
 
 
@@ -31,16 +33,10 @@ METRIC = "rms_sprung_acceleration"
 
 
 def batches(cars: int) -> list[list[Any]]:
-    """A batch of half cars, compiled as one function and called as it is."""
+    """A batch of half cars."""
     ride = Ride(half_car_002(LAW), ROAD, duration=1.0)
     point = {"sprung_mass": jnp.linspace(500.0, 900.0, cars)}
-    ways = {
-        "jit(vmap(ride))": jax.jit(jax.vmap(ride)),
-        "jit(vmap(ride.side_by_side()))": jax.jit(jax.vmap(ride.side_by_side())),
-        "vmap(ride)": jax.vmap(ride),
-        "vmap(ride.side_by_side())": jax.vmap(ride.side_by_side()),
-        "vmap(jit(ride))": jax.vmap(jax.jit(ride)),
-    }
+    ways = {"jit(vmap(ride))": jax.jit(jax.vmap(ride)), "side by side": jax.jit(jax.vmap(ride.side_by_side()))}
     return [[name, cars, *first_and_warm(lambda way=way: way(point), 2), None] for name, way in ways.items()]
 
 
@@ -62,12 +58,29 @@ def step_of_optax(seconds: float) -> list[Any]:
     return [f"optax step through {seconds:g} s", 1, first, warm, needed.temp_size_in_bytes / 2**20]
 
 
+def fits(records: int) -> list[list[Any]]:
+    """The same motion measured so many times, fitted together."""
+    law = dampers.Lag(dampers.Bilinear(2600.0, 1200.0), 0.004)
+    start = dampers.Lag(dampers.Bilinear(2000.0, 1500.0), 0.008)
+    tests = [bench.SineTest(amplitude=0.01, frequency=4.0)]
+    runs = [bench.VirtualDyno(law, force_noise=5.0, seed=seed).run(tests) for seed in range(records)]
+    problem = identify.prepare(start, runs[0])
+    forces = jnp.stack([identify.prepare(start, run).measured for run in runs])
+    minima = jax.jit(jax.vmap(problem.minimum))
+    alone = first_and_warm(lambda: minima(forces), 3)
+    together = first_and_warm(lambda: identify.fit_many(start, runs, starts=1).values, 3)
+    apart = np.max(np.abs(minima(forces) / identify.fit_many(start, runs, starts=1).values - 1.0))
+    print(f"largest relative difference of a number between the two: {apart:.1e}")
+    return [["vmap(problem.minimum)", records, *alone, None], ["fit_many", records, *together, None]]
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--cars", type=int, default=32_768)
-    cars = options.parse_args().cars
-    rows = [*batches(cars), step_of_optax(6.0), step_of_optax(60.0)]
-    report("from_jax", "In a program of one's own, one core", ["work", "cars", "first, s", "then, s", "MiB"], rows)
+    options.add_argument("--records", type=int, default=64)
+    given = options.parse_args()
+    rows = [step_of_optax(60.0), *fits(given.records), *batches(given.cars)]
+    report("from_jax", "In a program of one's own, one core", ["work", "size", "first, s", "then, s", "MiB"], rows)
 
 
 if __name__ == "__main__":

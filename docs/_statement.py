@@ -19,27 +19,50 @@ class Statement(NamedTuple):
         place: equation, table, figure or section.
         statement: what the paper says.
         verdict: one of `VERDICTS`.
-        comment: how it is reproduced, why it is corrected, or what is missing; the notebook that computes it.
+        comment: what the number of jaxdamp is, why the statement is corrected, or what is missing.
+        ours: the number of jaxdamp; a test fails where the code computes another one.
+        by: the function that computes it, or its name among the numbers that the notebook of the paper computes.
         printed: the number in the paper, if it is one.
-        computed: the number of jaxdamp.
-        tolerance: largest relative difference of a reproduced number.
         unit: of both numbers.
+        spread: half the width of the 95 % interval of `ours`, by the same function or notebook.
+        tolerance: largest relative difference between printed and computed number where they agree.
+        repeat: largest relative difference between `ours` and what is computed later, on another computer.
     """
 
     place: str
     statement: str
     verdict: str
     comment: str
+    ours: float | None = None
+    by: Callable[[], float] | str | None = None
     printed: float | None = None
-    computed: Callable[[], float] | None = None
-    tolerance: float = 0.01
     unit: str = ""
+    spread: float | None = None
+    tolerance: float = 0.01
+    repeat: float = 5e-3
 
-    def row(self) -> str:
-        """The row of the table, with the numbers beside each other."""
-        numbers = ""
-        if self.computed is not None:
-            numbers = f"{self.computed():.4g} {self.unit}".strip()
-            if self.printed is not None:
-                numbers += f" (printed {self.printed:.4g})"
-        return f"| {self.place} | {self.statement} | {numbers} | {self.verdict} | {self.comment} |"
+    def agrees(self) -> bool:
+        """Whether the two numbers are the same within the tolerance or the spread."""
+        if self.ours is None or self.printed is None:
+            return False
+        return abs(self.ours - self.printed) <= max(self.tolerance * abs(self.printed), self.spread or 0.0)
+
+    def source(self, notebook: str) -> str:
+        """Where the number is computed."""
+        if self.by is None:
+            return ""
+        return f"`{notebook}`" if isinstance(self.by, str) else "this page"
+
+    def numbers(self) -> tuple[str, str]:
+        """The number of the paper and that of jaxdamp, in words."""
+        printed = "" if self.printed is None else f"{short(self.printed)} {self.unit}".strip()
+        if self.ours is None:
+            return printed, ""
+        spread = "" if self.spread is None else f" ± {self.spread:.2g}"
+        return printed, f"{short(self.ours)}{spread} {self.unit}".strip()
+
+
+def short(value: float) -> str:
+    """Four figures, without a power of ten between 0.001 and 100 000."""
+    text = f"{value:.4g}" if not 1e4 <= abs(value) < 1e5 else f"{value:.0f}"
+    return text.replace("-", "−")

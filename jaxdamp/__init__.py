@@ -84,7 +84,9 @@ def __getattr__(name: str) -> Any:
     elif name in __all__:
         value = import_module(f"jaxdamp.{name}")
     else:
-        raise AttributeError(f"module 'jaxdamp' has no attribute {name!r}")
+        from jaxdamp._guesses import answer
+
+        answer(__name__, name, __all__)
     globals()[name] = value
     return value
 

@@ -1,12 +1,15 @@
-"""Root of an increasing scalar function, with the derivative of the implicit function theorem."""
+"""Roots with the derivatives of the implicit function theorem: of an increasing function, and of optimistix."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, final
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
+import optimistix as optx
 from jaxtyping import Array, Bool
 
+from jaxdamp._matrices import solve
 from jaxdamp._sharded import varying_as
 from jaxdamp._types import Scalar
 from jaxdamp.configuration import target
@@ -91,3 +94,47 @@ def increasing_root(
         return jax.lax.while_loop(going, again, begin)[2][0]
 
     return jax.lax.custom_root(function, jax.lax.stop_gradient(guess), solve, tangent_solve)
+
+
+@final
+class ImplicitDerivatives(optx.AbstractAdjoint):
+    """`optimistix.ImplicitAdjoint` for a few unknowns in one array, of vehicles that run side by side.
+
+    The linear system of the derivative is solved by elimination, without the routines of LAPACK (`jaxdamp._matrices`
+    says why) and without the host callback by which lineax reports a singular matrix; the derivative is then NaN.
+    """
+
+    def apply(self, primal_fn: Any, rewrite_fn: Any, inputs: Any, tags: frozenset[object]) -> Any:
+        """The solution of the solver, with derivatives of any order, forward and reverse."""
+        del tags
+        return _implicit(primal_fn, rewrite_fn, (*inputs, _while_loop))
+
+
+def _while_loop(going: Any, step: Any, begin: Any, *, max_steps: int) -> Any:
+    """A loop of at most so many steps."""
+
+    def both(now: tuple[Array, Any]) -> tuple[Array, Any]:
+        return now[0] + 1, step(now[1])
+
+    start = jnp.zeros((), int), varying_as(begin)
+    return jax.lax.while_loop(lambda now: going(now[1]) & (now[0] < max_steps), both, start)[1]
+
+
+@eqx.filter_custom_jvp
+def _implicit(primal_fn: Any, rewrite_fn: Any, inputs: Any) -> Any:
+    del rewrite_fn
+    return jax.tree.map(jnp.asarray, primal_fn(inputs))
+
+
+@_implicit.def_jvp
+def _implicit_jvp(primals: Any, tangents: Any) -> Any:
+    primal_fn, rewrite_fn, inputs = primals
+    root, others = _implicit(primal_fn, rewrite_fn, inputs)
+    fixed, moving = eqx.partition(inputs, jax.tree.map(lambda t: t is None, tangents[2], is_leaf=lambda t: t is None))
+
+    def missing(moving: Any) -> Array:
+        return rewrite_fn(root, others, eqx.combine(moving, fixed))
+
+    _, change = jax.jvp(missing, (moving,), (tangents[2],))
+    slopes = jax.jacfwd(lambda root: rewrite_fn(root, others, inputs))(root)
+    return (root, others), (-solve(slopes, change), jax.tree.map(lambda _: None, others))

@@ -4,18 +4,23 @@ Under `jax.grad`, `jax.jvp`, `jax.linearize` and `jax.vmap` a number is traced, 
 `jax.jit`, `jax.lax.scan` and the like it is not. Nothing here may enter a result: derivatives would not pass.
 """
 
+import functools
+import inspect
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jax.extend.core import unsafe_am_i_under_a_jit_DO_NOT_USE  # pyright: ignore[reportPrivateImportUsage]
 from jaxtyping import PyTree
 
 
 Tree = TypeVar("Tree")
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class Behind(NamedTuple):
@@ -53,7 +58,7 @@ def is_traced(tree: PyTree) -> bool:
 
 def at_compile_time() -> AbstractContextManager[None]:
     """Inside `jax.jit`: compute with known numbers now, rather than in the program."""
-    return jax.ensure_compile_time_eval() if is_traced(jnp.zeros(())) else nullcontext()
+    return jax.ensure_compile_time_eval() if unsafe_am_i_under_a_jit_DO_NOT_USE() else nullcontext()
 
 
 def is_batched(tree: PyTree) -> bool:
@@ -106,3 +111,22 @@ def row(tree: Tree, values: list[np.ndarray], index: int) -> Tree:
     arrays, rest = eqx.partition(tree, eqx.is_array)
     chosen = [np.asarray(value[index]) for value in values]
     return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), chosen), rest)
+
+
+def of_known_numbers(function: Function) -> Function:
+    """A function that needs known numbers: it refuses traced ones by argument, and works at once inside `jax.jit`."""
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        if is_traced((args, kwargs)):
+            from jaxdamp import _checks
+
+            outside = f"Call `{function.__name__}` outside `jax.jit`, `jax.grad` and `jax.vmap`"
+            remedy = f"{outside}: docs/from_jax.md says what can be traced in its place."
+            for name, value in signature.bind(*args, **kwargs).arguments.items():
+                _checks.untraced(name, value, remedy)
+        with at_compile_time():
+            return function(*args, **kwargs)
+
+    return cast(Function, call)

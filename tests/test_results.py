@@ -75,7 +75,7 @@ def _fits() -> list[AbstractResult]:
         identify.compare({"linear": dampers.Linear}, runs),
         identify.cross_validate({"linear": dampers.Linear}, runs),
         identify.fit_many(dampers.Linear, {"a": runs[:1], "b": runs[1:]}),
-        identify.fit_scheduled(dampers.Linear, runs),
+        identify.fit(law=dampers.Linear, runs=runs, scheduled=True),
         identify.fit_targets(lambda n: {"y": n["x"] ** 2}, {"x": 1.0}, {"y": 4.0}),
     ]
 

@@ -3,6 +3,7 @@
 Stroke and velocity are positive in extension (rebound), force is positive when it resists extension.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp.bench import programmes
 from jaxdamp.bench.analysis import (
     FoldedCycles as FoldedCycles,
@@ -96,3 +97,5 @@ __shared__ = [
     "moving_part",
     "steady_cycles",
 ]
+
+answer_guesses(__name__, __all__)

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench.motion import Samples, cycle_instants, moving_span
 
 
@@ -105,6 +106,7 @@ def processed(raw: "BenchRun", steps: Steps) -> "BenchRun":
     return _mean_cycle(run) if steps.mean_cycle else run
 
 
+@of_known_numbers
 def low_pass_gain(frequency: float, cutoff: float, sampling_rate: float) -> float:
     """What the zero-phase filter leaves of a sine: 1 / (1 + (tan(π f / f_s) / tan(π f_c / f_s))^8), all in Hz.
 

@@ -69,6 +69,7 @@ class RideRecord:
         if not self.channels:
             remedy = "Write `channels={'sprung_acceleration': values}`."
             _checks.refuse("channels", "hold at least one measured channel", "empty", remedy)
+        _checks.untraced("channels", (self.time, self.road, dict(self.channels)))
         time, road = np.array(self.time, np.float64), np.array(self.road, np.float64)
         road = road[:, None] if road.ndim == 1 else road
         clock.check_count(len(time), where)

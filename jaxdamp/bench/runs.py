@@ -27,11 +27,13 @@ NOTE_MARK = "# note: "
 COMMAND_MARK = "# command: "
 SETTINGS_MARK = "# settings: "
 INTEGRATED_MARK = "# stroke: integrated from the velocity"
+MEASURED = "A record is measured: keep it out of the arguments of `jax.jit`, and trace the law (`jaxdamp.respond`)."
 _HEADERS = {"time": "time [s]", "stroke": "stroke [m]", "velocity": "velocity [m/s]", "force": "force [N]"}
 
 
 def _column(channel: str, values: ArrayLike, count: int) -> Float[np.ndarray, " time"]:
     """A copy of a channel, of the length of the time."""
+    _checks.untraced(channel, values, MEASURED)
     column = np.array(values, dtype=np.float64)
     if column.ndim != 1 or len(column) != count:
         _checks.refuse(channel, f"be a column of as many samples as the time, {count}", f"of shape {column.shape}")

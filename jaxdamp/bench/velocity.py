@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import clock
 from jaxdamp.bench.motion import Samples, cycle_instants, dominant_frequency
 
@@ -27,6 +28,7 @@ _LAST_SHARE = 0.005  # of the highest harmonics in the velocity, relative to the
 _QUIET = 0.03  # residual, relative to the amplitude, that is taken for ripple and noise of any colour
 
 
+@of_known_numbers
 def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None = None) -> tuple[Samples, str]:
     """Velocity of a uniformly sampled stroke, and a sentence that says how it was found.
 

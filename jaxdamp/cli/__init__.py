@@ -7,7 +7,7 @@ from jaxdamp.cli import interrupt
 
 
 if TYPE_CHECKING:
-    from jaxdamp.cli.commands import app
+    from jaxdamp.cli.application import app
 
 
 __all__ = ["app", "main"]
@@ -16,7 +16,7 @@ __all__ = ["app", "main"]
 def main() -> None:
     """Run the command line as a program of its own; Ctrl-C is answered from the first import on."""
     with interrupt.watched(then=signal.SIG_IGN):  # nothing is left to stop while the process ends
-        from jaxdamp.cli.commands import app
+        from jaxdamp.cli.application import app
 
         app(prog_name="jaxdamp")
 
@@ -24,7 +24,7 @@ def main() -> None:
 def __getattr__(name: str) -> Any:
     """The application is loaded when it is first used, so that `main` comes before all other imports."""
     if name == "app":
-        from jaxdamp.cli.commands import app
+        from jaxdamp.cli.application import app
 
         return app
     raise AttributeError(f"module 'jaxdamp.cli' has no attribute {name!r}")

@@ -1,14 +1,91 @@
-"""The application, its help and its version."""
+"""The application: its help and version, and its commands, whose options are made when they are asked for."""
 
 import functools
 import inspect
-from collections.abc import Callable
+import shlex
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-from jaxdamp.cli.option_types import Commands, Debug
-from jaxdamp.cli.record_options import spread
+
+COMMANDS = {  # along the chain from records to a damper: name and function
+    "demo": "cli.demo.demo",
+    "bench": "cli.benching.bench_command",
+    "fit": "cli.fitting.fit",
+    "fit-vehicle": "cli.vehicle_fitting.fit_vehicle",
+    "ride": "cli.riding.ride",
+    "tune": "cli.tuning.tune_command",
+    "sweep": "cli.tuning.sweep_command",
+    "report": "cli.chaining.report",
+    "explore": "cli.exporting.explore",
+    "export": "cli.exporting.export_command",
+    "laws": "cli.vehicle_words.list_laws",
+    "vehicles": "cli.vehicle_words.list_vehicles",
+}
+
+_typed: list[str] = []  # the command that is running, as it was typed
+_words: dict[str, str] = {}  # of its arguments and options: what they are called there, by their name in Python
+DEBUG = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+
+
+class Command(TyperCommand):
+    """A command whose options have other names that work too."""
+
+    aliases: dict[str, str]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words after the name of the command."""
+        names = {option for parameter in self.params for option in parameter.opts}
+        replaced = []
+        for word in args:
+            option, equals, value = word.partition("=")
+            known = self.aliases.get(option, option) if option not in names else option
+            replaced.append(f"{known}{equals}{value}")
+        return super().parse_args(ctx, replaced)
+
+
+class Commands(TyperGroup):
+    """All commands; keeps the words typed, for the last lines of a page and for messages."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """The names in the order of the help."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of a name."""
+        return command(cmd_name) if cmd_name in COMMANDS else None
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words after the name of the program."""
+        _typed[:] = [shlex.join(["jaxdamp", *args])]
+        ctx.call_on_close(_typed.clear)
+        return super().parse_args(ctx, args)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command of the first word."""
+        name, chosen, rest = super().resolve_command(ctx, args)
+        if chosen is not None:
+            from jaxdamp.cli import options
+
+            called = {str(p.name): (str(p.name).upper(), p.opts[0], p.param_type_name) for p in chosen.params}
+            for option, (word, flag, kind) in called.items():
+                _words[option] = word if kind == "argument" else f"Option {flag}"
+            for leaf in options.offered(COMMANDS[str(name)]):
+                _words.setdefault(leaf.argument.name, _words[leaf.option])
+        ctx.call_on_close(_words.clear)
+        return name, chosen, rest
+
+
+def command_line() -> str:
+    """The command that is running, as it was typed; empty if a function was called from Python."""
+    return "".join(_typed)
+
+
+def own_words() -> dict[str, str]:
+    """What the arguments and options of the running command are called there, by their name in Python."""
+    return _words
 
 
 app = typer.Typer(
@@ -45,30 +122,33 @@ def common(
     """Options before a command. The help of the application stands above."""
 
 
-def command(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make a function a command: its words are checked before JAX is loaded, and errors are said in one sentence.
+@functools.cache
+def command(name: str) -> Command:
+    """A command: its words are checked before JAX is loaded, and errors are said in one sentence."""
+    from jaxdamp.cli import options
+    from jaxdamp.cli.signatures import description
 
-    Parameters whose types are dataclasses of options become options of their own; `--debug` is added.
-    """
+    target = COMMANDS[name]
 
-    def register(function: Callable[..., None]) -> Callable[..., None]:
-        options = spread(function)
+    def run(*, debug: bool = False, **given: Any) -> None:
+        from jaxdamp.cli import console, early
 
-        signature = inspect.signature(options)
-        switch = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Debug)
+        with console.plain_errors(debug):
+            early.check(name, given)
+            read = options.values(target, given)
+            console.prepare()
+            module, _, function = target.rpartition(".")
+            screen = {("screen",): console.Screen()}
+            getattr(import_module(f"jaxdamp.{module}"), function)(**options.build(target, screen | read))
 
-        @functools.wraps(options)
-        def run(**given: Any) -> None:
-            from jaxdamp.cli import console, early
-
-            with console.plain_errors(given.pop("debug")):
-                early.check(name, given)
-                console.prepare()
-                options(**given)
-
-        run.__signature__ = signature.replace(parameters=[*signature.parameters.values(), switch])  # pyright: ignore[reportAttributeAccessIssue]
-        run.__annotations__ = {**options.__annotations__, "debug": Debug}
-        app.command(name)(run)
-        return function
-
-    return register
+    switch = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=DEBUG)
+    made = [*options.parameters(name, target), switch]
+    run.__signature__ = inspect.Signature(made)  # pyright: ignore[reportFunctionMemberAccess]
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in made}
+    run.__doc__ = description(target)
+    single = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False, add_completion=False)
+    single.command(name, cls=Command)(run)
+    built = typer.main.get_command(single)
+    assert isinstance(built, Command)
+    built.aliases = options.aliases(name, target)
+    return built

@@ -1,118 +1,112 @@
 """`jaxdamp report`: bench records, a vehicle and a road in; laws, rides, a tuned damper and one page out."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Annotated, Any
 
 from jaxdamp import _checks, simulate
 from jaxdamp.bench import BenchSet
-from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.fitting import fit_laws, show, write_fits, write_table
-from jaxdamp.cli.option_types import command_line
-from jaxdamp.cli.options import decisions, law_names
-from jaxdamp.cli.preflighting import checked
-from jaxdamp.cli.record_options import ProcessOptions, ReadOptions
-from jaxdamp.cli.results import results_folder
-from jaxdamp.cli.run_warnings import with_step_warnings, without_range_warnings
-from jaxdamp.cli.tuning import RoadOptions, TuneOptions, tuned, tuning_arguments, write_tuning
-from jaxdamp.cli.unusual import unusual
+from jaxdamp.cli.fitting import fit_laws, show, write_fits
+from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
+from jaxdamp.cli.options import Call
+from jaxdamp.cli.records import Reading, decisions, law_names
+from jaxdamp.cli.riding import Driving, unusual
+from jaxdamp.cli.tuning import exit_code_of, tuned, tuning_arguments, write_tuning
 from jaxdamp.cli.vehicle_words import parse_vehicle
-from jaxdamp.cli.wording import message
 from jaxdamp.identify import FitResult
 from jaxdamp.parameters import parameters
-from jaxdamp.report import Attempts, chain_report, records_table, ride_tables
+from jaxdamp.report import chain_report, records_table, ride_tables
+from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
-from jaxdamp.tune import TuneResult
 from jaxdamp.vehicles import AbstractVehicle
 
 
-def run_report(
+def report(
     screen: Screen,
     files: Sequence[Path],
-    reading: ReadOptions,
-    processing: ProcessOptions,
-    on: RoadOptions,
-    options: TuneOptions,
     *,
-    laws: Sequence[str],
-    out: Path,
-    replace: bool = False,
-) -> TuneResult | None:
-    """Fit laws to records, ride on the best one, tune it, and write all of it with one page.
+    vehicle: str = "quarter_car_000",
+    road: str = "iso:C",
+    law: Sequence[str] = ("all",),
+    minimise: str = "comfort",
+    search: Annotated[Call, "tune.minimise"],
+    reading: Reading,
+    driving: Driving,
+    output: Output,
+) -> None:
+    """The whole chain on one page: bench records, fitted laws, rides on the best one, and its tuning.
 
-    The vehicle rides with its own dampers, with the fitted law at all of them, and with the tuned laws. Nothing is
-    tuned if the law has no parameter that a workshop can change and that the records determine.
+    Writes the laws, the tuned vehicle, tables, pictures and the page. The vehicle rides with its own dampers, with the
+    fitted law at all of them, and with the tuned laws. Nothing is tuned if the law has no parameter that a workshop can
+    change and that the records determine. Ends with exit code 1 if a limit is not met.
 
-    Raises:
-        ValueError: what the library refuses; a white road, on which nothing rides.
+    Arguments:
+        law: names of laws to fit, see "jaxdamp laws": "linear,besinger"; or "all".
+        minimise: comfort, travel, grip, or the name of a ride metric.
     """
-    names, make = law_names(laws), parse_vehicle(on.vehicle)
-    if on.road.startswith("white"):
-        _checks.refuse("road", "be one to ride on", repr(on.road), "Take iso:CLASS.")
-    screen.points(unusual(on.road, on.speed), style="yellow")
-    attempts = Attempts(interrupt.check, message)
-    with results_folder(out, "report", replace=replace) as results:
+    names, make = law_names(law), parse_vehicle(vehicle)
+    if road.startswith("white"):
+        _checks.refuse("road", "be one to ride on", repr(road), "Take iso:CLASS.")
+    (surface,), run = driving.over(road)
+    screen.points(unusual(road, driving.speed), style="yellow")
+    with job(screen, "report", output) as work:
         with screen.stage("Reading the records"):
-            raw = reading.read(files)
-        sound, preflight = checked(screen, raw, reading, processing, refuse=True)
-        runs = processing.apply(sound)
-        remarks = decisions(tuple(runs)) + [f"left out: {sentence}" for sentence in runs.left_out]
+            raw = reading.raw(files)
+        sound, preflight = reading.checked(screen, raw, refuse=True)
+        runs = reading.processed(sound)
+        remarks = decisions(runs)
         screen.table(records_table(tuple(runs)))
         screen.points(remarks)
         car = make(None)
         fits = fit_laws(screen, names, runs, BenchSet())
         show(screen, fits)
-        with interrupt.saving(), screen.stage("Laws and tables"):
-            write_fits(results.draft, fits.comparison, runs, attempts)
-            write_table(results.draft, "preflight", preflight.table())
-            results.publish("the rides, the tuning and the report")
+        with work.saving("Laws and tables", "the rides, the tuning and the report") as draft:
+            write_fits(draft, fits.comparison, runs, work.attempts)
+            write_tables(draft / "tables", {"preflight": preflight.table()})
         best = fits.comparison.best.result
         fitted = make(best.law)
-        result, sentences = _tuned(screen, fitted, best, on, options)
+        result, cars = None, {"vehicle as it is": car, "fitted law": fitted}
+        adjusting, sentences = _what_can_be_tuned(best, search)
+        if adjusting is None:
+            screen.points(sentences)
+        else:
+            call, chosen = tuning_arguments(fitted, minimise, [surface], adjusting, driving.seed, run)
+            sentences = [*chosen, *sentences]
+            screen.points(sentences)
+            result = tuned(screen, call)
+            cars["tuned law"] = result.vehicle
         remarks += sentences
-        cars = {"vehicle as it is": car, "fitted law": fitted}
-        rides = _rides(screen, cars if result is None else cars | {"tuned law": result.vehicle}, on)
-        title = f"{on.vehicle} on {on.road} at {on.speed:g} m/s"
-        for table in ride_tables(rides).values():
+        rides = _rides(screen, cars, surface, run)
+        tables = ride_tables(rides)
+        for table in tables.values():
             screen.table(table)
-        with interrupt.saving(), screen.stage("Tuned law, vehicle and tables"):
+        with work.saving("Tuned law, vehicle and tables") as draft:
             if result is not None:
-                write_tuning(results.draft, result)
-            for name, table in ride_tables(rides).items():
-                (results.draft / f"ride_{name}.csv").write_text(table.to_csv(), encoding="utf-8")
-            results.publish("the pictures and the report")
-        with screen.stage("Pictures and report"):
-            words = {"title": f"Bench records to a better damper: {title}", "remarks": remarks, "runs": tuple(runs)}
-            page = chain_report(
-                fits.comparison, {title: rides}, result, preflight=preflight, **words,
-                folder=results.draft, attempts=attempts,
-            )  # fmt: skip
-            page.write(results.draft / "report.html", command_line())
-    screen.files(out, results.published)
-    screen.points(attempts.troubles, style="yellow")
-    return result
+                write_tuning(draft, result)
+            write_tables(draft, {f"ride_{name}": table for name, table in tables.items()})
+        title = f"{vehicle} on {road} at {driving.speed:g} m/s"
+        words = {"title": f"Bench records to a better damper: {title}", "remarks": remarks, "runs": tuple(runs)}
+        work.page(chain_report, fits.comparison, {title: rides}, result, preflight=preflight, **words)
+    exit_code_of(result)
 
 
-def _tuned(
-    screen: Screen, car: AbstractVehicle, fit: FitResult, on: RoadOptions, options: TuneOptions
-) -> tuple[TuneResult | None, list[str]]:
-    """The tuning of what can be built and was identified, unless the options name other parameters; and remarks."""
-    unknown, sentences = not_identified(fit), []
+def _what_can_be_tuned(fit: FitResult, search: Call) -> tuple[Call | None, list[str]]:
+    """The tuning of what can be built and was identified, unless other parameters are named; and remarks."""
+    if "over" in search.given:
+        return search, []
+    unknown = not_identified(fit)
     adjustable = [p.path for p in parameters(fit.law) if p.adjustable]
-    if not options.over and not set(adjustable) - set(unknown):
-        sentence = (
-            "Nothing is tuned: the law has no parameter that a workshop can change and that the records determine."
-        )
-        screen.say(sentence)
-        return None, [sentence]
-    left_alone = [path for path in adjustable if path in unknown and not options.over]
-    if left_alone:
-        options = dataclasses.replace(options, freeze=(*options.freeze, *(f"*damper.{path}" for path in left_alone)))
-        sentences.append(f"Not tuned, since the records do not determine it: {', '.join(left_alone)}.")
-    call, more = tuning_arguments(car, on, options)
-    screen.points([*more, *sentences])
-    return tuned(screen, call), [*more, *sentences]
+    if not set(adjustable) - set(unknown):
+        sentence = "the law has no parameter that a workshop can change and that the records determine."
+        return None, [f"Nothing is tuned: {sentence}"]
+    left_alone = [path for path in adjustable if path in unknown]
+    if not left_alone:
+        return search, []
+    held = [*search.given.get("freeze", ()), *(f"*damper.{path}" for path in left_alone)]
+    less = dataclasses.replace(search, given={**search.given, "freeze": held})
+    return less, [f"Not tuned, since the records do not determine it: {', '.join(left_alone)}."]
 
 
 def not_identified(fit: FitResult) -> list[str]:
@@ -126,9 +120,10 @@ def not_identified(fit: FitResult) -> list[str]:
     return [path for path, unknown in notes.items() if all(unknown)]
 
 
-def _rides(screen: Screen, cars: dict[str, AbstractVehicle], on: RoadOptions) -> dict[str, Response]:
+def _rides(
+    screen: Screen, cars: dict[str, AbstractVehicle], road: AbstractRoad, run: Mapping[str, Any]
+) -> dict[str, Response]:
     """Each vehicle on the road."""
-    (road,), run = on.roads()
     rides: dict[str, Response] = {}
     with screen.stage("Driving", total=len(cars)) as advance:
         for name, car in cars.items():

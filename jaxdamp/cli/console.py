@@ -59,14 +59,14 @@ class Screen:
         self.console.print(Padding(shown, (0, 0, 0, 2), expand=False))
 
     def files(self, folder: Path, names: Sequence[str]) -> None:
-        """The files written, those of one folder and ending on one line."""
-        groups: dict[tuple[str, str], list[str]] = {}
-        for name in names:
-            groups.setdefault((str(Path(name).parent), Path(name).suffix), []).append(name)
-        self.heading(f"Written to {folder}")
-        for members in groups.values():
-            more = f" and {len(members) - 3} more" if len(members) > 3 else ""
-            self.points([", ".join(members[:3]) + more])
+        """The files written, in one line: pages, laws and vehicles first."""
+        order = [".html", ".json", ".csv", ".png"]
+        first = sorted(
+            names, key=lambda name: (name.count("/"), order.index(end) if (end := Path(name).suffix) in order else 9)
+        )
+        more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+        self.say()
+        self.say(f"Written to {folder}: {', '.join(first[:3])}{more}", "bold")
 
     def times_table(self) -> Table:
         """How long each stage took."""

@@ -8,15 +8,20 @@ from typing import TYPE_CHECKING
 from jaxdamp import bench, export, plots, roads, simulate, tune, vehicles
 from jaxdamp._tables import Table
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
-from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.demo_rides import TRUE, add_rides, ride_table, ride_verdict, show_rides
-from jaxdamp.cli.demo_tuning import COMFORT, GRIP, outcome, purpose
-from jaxdamp.cli.fitting import Fitted, fit_laws, show, write_fits, write_table
-from jaxdamp.cli.option_types import command_line
-from jaxdamp.cli.results import Results, results_folder
-from jaxdamp.cli.run_warnings import without_range_warnings
-from jaxdamp.cli.wording import message
+from jaxdamp.cli.demo_words import (
+    COMFORT,
+    GRIP,
+    TRUE,
+    add_rides,
+    outcome,
+    purpose,
+    ride_table,
+    ride_verdict,
+    show_rides,
+)
+from jaxdamp.cli.fitting import Fitted, fit_laws, show, write_fits
+from jaxdamp.cli.jobs import Job, Output, job, without_range_warnings, write_tables
 from jaxdamp.dampers import AbstractDamper, Besinger, SeriesSpring
 from jaxdamp.identify import FitResult
 from jaxdamp.report import (
@@ -90,49 +95,73 @@ ISO = "ISO 8608 class C at 20 m/s"
 BUMP = "a bump, 60 mm high and 2 m long, at 10 m/s"
 
 
-def run_demo(screen: Screen, scenario: Scenario, *, out: Path, replace: bool = False) -> None:
+def demo(screen: Screen, *, seed: int = 0, output: Output) -> None:
+    """Run the whole chain on a damper whose truth is known. Needs no input.
+
+    A virtual bench records a known damper; laws are fitted to the files and compared on records that were held out; a
+    quarter car rides on each law; the damper is tuned for comfort; all is written to a folder.
+
+    Arguments:
+        seed: of the noise of the virtual bench and of the roads.
+    """
+    run_demo(screen, Scenario(seed=seed), output)
+
+
+def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
     """Records, fits, rides, a tuning, and a folder with all of it: laws and tables first, then the pictures."""
-    attempts = Attempts(interrupt.check, message)
-    with results_folder(out, "demo", replace=replace) as results:
-        runs = record(screen, scenario, results.draft)
+    with job(screen, "demo", output) as work:
+        runs = record(screen, scenario, work.results.draft)
         held = runs.select(scenario.held_out)
         fits = fit_laws(screen, scenario.laws, runs.without(scenario.held_out), held)
         truth = _fit_of_truth(fits, scenario)
         show_fits(screen, fits, truth, scenario)
-        with interrupt.saving(), screen.stage("Laws and tables"):
-            write_fits(results.draft, fits.comparison, runs, attempts)
-            _write_truth(results.draft, truth, scenario, attempts)
-            results.publish(f"the rides, the tuning, {fits.missing}")
+        with work.saving("Laws and tables", f"the rides, the tuning, {fits.missing}") as draft:
+            write_fits(draft, fits.comparison, runs, work.attempts)
+            _write_truth(draft, truth, scenario, work.attempts)
         rides = {name: ride(screen, name, road, fits, scenario) for name, road in _roads(scenario).items()}
         show_rides(screen, rides)
         tuned = None if truth is None else improve(screen, truth, scenario)
         if tuned is not None:
             show_tuning(screen, tuned, scenario)
-        _save_rides(results, rides, tuned, fits, attempts)
-        with screen.stage("Pictures and report"):
-            report = Report("jaxdamp demo: from bench records to a better damper", results.draft, attempts)
-            preflight = bench.preflight(runs)
-            report.verdict(
-                f"{preflight.summary}.",
-                *fit_verdict(report, fits.comparison),
-                "" if truth is None else truth_verdict(scenario, truth),
-                *(f"{name}: {ride_verdict(responses)}" for name, responses in rides.items()),
-                *([] if tuned is None else [tuned.verdict.sentence, outcome(tuned)]),
-            )
-            _introduce(report, scenario)
-            add_records(report, tuple(runs), tuple(held), preflight=preflight)
-            add_fits(report, fits.comparison, fits.failures, others=False)
-            _report_truth(truth, scenario, report)
-            add_rides(report, rides)
-            if tuned is not None:
-                _report_tuning(tuned, rides[ISO][scenario.true_name], scenario, report)
-            add_other_fits(report, fits.comparison)
-            report.write(results.draft / "report.html", command_line())
-    screen.files(out, results.published)
-    screen.points(attempts.troubles, style="yellow")
+        _save_rides(work, rides, tuned, fits)
+        work.page(_page, scenario, runs, held, fits, truth, rides, tuned)
+        target = work.results.target
     screen.table(screen.times_table())
-    screen.say(f"Open {out / 'report.html'}. The records are files like those of a real bench; fit them yourself:")
-    screen.say(f'  jaxdamp fit {out / "records"} --held-out "{scenario.held_out}" --sign rebound-positive', "bold")
+    screen.say(f"Open {target / 'report.html'}. The records are files like those of a real bench; fit them yourself:")
+    screen.say(f'  jaxdamp fit {target / "records"} --held-out "{scenario.held_out}" --sign rebound-positive', "bold")
+
+
+def _page(
+    scenario: Scenario,
+    runs: BenchSet,
+    held: BenchSet,
+    fits: Fitted,
+    truth: FitResult | None,
+    rides: Mapping[str, Mapping[str, Response]],
+    tuned: TuneResult | None,
+    *,
+    folder: Path,
+    attempts: Attempts,
+) -> Report:
+    """The page of the demonstration."""
+    report = Report("jaxdamp demo: from bench records to a better damper", folder, attempts)
+    preflight = bench.preflight(runs)
+    report.verdict(
+        f"{preflight.summary}.",
+        *fit_verdict(report, fits.comparison),
+        "" if truth is None else truth_verdict(scenario, truth),
+        *(f"{name}: {ride_verdict(responses)}" for name, responses in rides.items()),
+        *([] if tuned is None else [tuned.verdict.sentence, outcome(tuned)]),
+    )
+    _introduce(report, scenario)
+    add_records(report, tuple(runs), tuple(held), preflight=preflight)
+    add_fits(report, fits.comparison, fits.failures, others=False)
+    _report_truth(truth, scenario, report)
+    add_rides(report, rides)
+    if tuned is not None:
+        _report_tuning(tuned, rides[ISO][scenario.true_name], scenario, report)
+    add_other_fits(report, fits.comparison)
+    return report
 
 
 # ---- the steps
@@ -253,33 +282,23 @@ def _write_truth(folder: Path, truth: FitResult | None, scenario: Scenario, atte
     with attempts.part("true_law.json"):
         export.to_json(scenario.law, folder / "true_law.json")
     if truth is not None:
-        write_table(folder, "parameters_and_truth", truth_table(scenario, truth))
+        write_tables(folder / "tables", {"parameters_and_truth": truth_table(scenario, truth)})
 
 
-def _save_rides(
-    results: Results,
-    rides: Mapping[str, Mapping[str, Response]],
-    tuned: TuneResult | None,
-    fits: Fitted,
-    attempts: Attempts,
-) -> None:
+def _save_rides(work: Job, rides: Mapping[str, Mapping[str, Response]], tuned: TuneResult | None, fits: Fitted) -> None:
     """Put the tables of the rides and the tuning into place, and the tuned law."""
-    with interrupt.saving():
-        (results.draft / "tables").mkdir()
-        for index, (title, responses) in enumerate(rides.items()):
-            write_table(results.draft, f"ride_{index + 1}", ride_table(title, responses))
+    tables = {f"ride_{i}": ride_table(title, ride) for i, (title, ride) in enumerate(rides.items(), 1)}
+    with work.saving("Rides and tuning") as draft:
         if tuned is not None:
-            write_table(results.draft, "tuned_parameters", tuned.parameter_table())
-            write_table(results.draft, "tuned_metrics", tuned.table())
+            tables |= {"tuned_parameters": tuned.parameter_table(), "tuned_metrics": tuned.table()}
             if tuned.fresh is not None:
-                write_table(results.draft, "tuned_on_fresh_roads", tuned.fresh.table())
+                tables["tuned_on_fresh_roads"] = tuned.fresh.table()
             law = tuned.vehicle.elements()[0]
-            with attempts.part("tuned_law.json"):
-                export.to_json(law, results.draft / "tuned_law.json")
-            with attempts.part("tuned_law_force_velocity.csv"):
-                velocities = fitted_velocities(fits.comparison)
-                export.to_csv(law, results.draft / "tuned_law_force_velocity.csv", velocities)
-        results.publish("the pictures and the report")
+            with work.attempts.part("tuned_law.json"):
+                export.to_json(law, draft / "tuned_law.json")
+            with work.attempts.part("tuned_law_force_velocity.csv"):
+                export.to_csv(law, draft / "tuned_law_force_velocity.csv", fitted_velocities(fits.comparison))
+        write_tables(draft / "tables", tables)
 
 
 def _report_truth(truth: FitResult | None, scenario: Scenario, report: Report) -> None:

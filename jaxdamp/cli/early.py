@@ -27,8 +27,8 @@ def check(command: str, given: Mapping[str, Any]) -> None:
     Raises:
         ValueError: such a path, file or folder.
     """
-    if isinstance(given.get("out"), Path) and command not in ("export", "explore"):  # which write a file
-        refuse_target(given["out"], command, replace=given.get("replace", False))
+    if "out" in given:
+        refuse_target(given["out"] or Path(f"jaxdamp-{command}"), command, replace=bool(given["replace"]))
     if given.get("files"):
         find_files(given["files"], FOLDER_SUFFIXES)
     for name in ("law", "start", "baseline"):

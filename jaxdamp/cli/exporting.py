@@ -1,14 +1,18 @@
-"""`jaxdamp export`: the file of a law or a vehicle in, C, an FMU or the table of a simulator out."""
+"""`jaxdamp export`: a law or a vehicle as C, FMU or the table of a simulator; `jaxdamp explore`: as a page."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from jaxdamp import _checks, export
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.vehicle_words import read_law, read_module
+from jaxdamp.cli.options import Call
+from jaxdamp.cli.records import Reading
+from jaxdamp.cli.riding import USUAL, parse_road
+from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -24,17 +28,37 @@ TABLES: dict[str, tuple[str, Callable[..., Any]]] = {
 _USUAL, _POINTS = (-1.0, 1.0), 41  # m/s
 
 
-def run_export(
-    screen: Screen, law: Path, to: str, *, out: Path | None, velocities: str | None, replace: bool = False
-) -> None:
-    """Write a law, or a vehicle as a program, in another format.
+@dataclass(frozen=True)
+class OneFile:
+    """The file that a command writes.
 
-    Raises:
-        ValueError: what the library refuses; a file that exists, unless it is to be replaced.
+    Arguments:
+        file: file to write; the name of the law with another ending if left out.
+        replace: write --file although it is there.
+    """
+
+    file: Path | None = None
+    replace: bool = False
+
+    def checked(self, name: str) -> Path:
+        """The file to write, refused if it exists and is not to be replaced; by this name if none is given."""
+        file = Path(name) if self.file is None else self.file
+        if file.exists() and not self.replace and not file.is_dir():
+            _checks.refuse("file", "be a new file", file, "Give another name, or --replace.")
+        return file
+
+
+def export_command(screen: Screen, law: Path, *, to: str, velocities: str | None = None, output: OneFile) -> None:
+    """Write a law as C, as FMU or as the table of a simulator; or a whole vehicle as C or FMU.
+
+    Arguments:
+        law: a law as JSON, such as best_law.json of jaxdamp fit; or a vehicle, for c and fmu.
+        to: adams, assetto-corsa, c, carsim, csv, fmu or matlab.
+        velocities: of a table, FROM:TO:POINTS [m/s]; those the law was fitted to, or -1:1:41.
     """
     _checks.one_of("to", to, sorted(PROGRAMS | TABLES))
     ending, write = (PROGRAMS | TABLES)[to]
-    file = new_file(Path(law.stem.replace("-", "_") + ending) if out is None else out, replace)
+    file = output.checked(law.stem.replace("-", "_") + ending)
     if to in PROGRAMS:
         if velocities is not None:
             _checks.refuse("velocities", f"be left out for {to}", velocities, "It has the law itself, not a table.")
@@ -49,11 +73,47 @@ def run_export(
     screen.points([f"written: {each}" for each in files])
 
 
-def new_file(file: Path, replace: bool) -> Path:
-    """A file to write, refused if it exists and is not to be replaced."""
-    if file.exists() and not replace and not file.is_dir():
-        _checks.refuse("out", "be a new file", file, "Give another name, or --replace.")
-    return file
+def explore(
+    screen: Screen,
+    law: Path,
+    files: Sequence[Path] = (),
+    *,
+    reading: Reading,
+    vehicle: str = "quarter_car_000",
+    road: str = "iso:C",
+    speed: float = 20.0,
+    baseline: Path | None = None,
+    duration: float | None = None,
+    seed: int = 0,
+    how: Annotated[Call, "export.to_explorer"],
+    output: OneFile,
+) -> None:
+    """Write a law as one page for the browser: sliders, loops, records and a ride, live and without a network.
+
+    Arguments:
+        files: files with records to overlay, patterns, or folders.
+        vehicle: a quarter car, see "jaxdamp vehicles"; or a file of one, *.json or *.toml.
+        speed: of the vehicle [m/s].
+        duration: of the ride [s]; the road's own, or 10.
+        seed: of random roads.
+    """
+    file, damper = output.checked(f"{law.stem}.html"), read_law("law", law)
+    kind, _, word = road.partition(":")
+    how_long = duration or USUAL
+    written = export.to_explorer(
+        damper,
+        file,
+        **how.arguments(
+            records=reading.processed(reading.raw(files)) if files else (),
+            vehicle=parse_vehicle(vehicle)(damper),
+            road=word if kind == "iso" else parse_road(road, speed=speed, duration=how_long, seed=seed),
+            speed=speed,
+            baseline=None if baseline is None else read_law("baseline", baseline),
+            duration=duration,
+            seed=seed,
+        ),
+    )
+    screen.points([f"written: {written}; open it in a browser"])
 
 
 def _grid(law: AbstractDamper, text: str | None) -> np.ndarray:

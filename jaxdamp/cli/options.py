@@ -1,113 +1,224 @@
-"""What the words on the command line mean: columns, units, laws, records to hold out."""
+"""Options of a command, made from the signature and the docstring of its function.
 
+The annotation of an argument says how it is written and read, its default is the default, and the section `Arguments:`
+of the docstring is the help. An argument whose type is a class of options becomes an option for each of its fields. An
+argument of the type `Annotated[Call, "bench.read"]` becomes an option for each argument of that library function: one
+that the function gets is on the command line by itself. `offers` lists what is not taken as it is.
+"""
+
+import ast
+import functools
+import inspect
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
+from typing import Annotated, Any, NamedTuple
 
-from jaxdamp import _checks, bench, identify
-from jaxdamp._checks import Setting
-from jaxdamp.bench import BenchRun, BenchSet
-from jaxdamp.cli.wording import in_options
+import typer
 
-
-_COMPRESSION = Setting("sign", "compression-positive")  # what the reader proposes in its notes
-ROLES = ("time", "stroke", "velocity", "force", "temperature")
-NAME = r"[\w.]+"  # of any channel
+from jaxdamp.cli import offers
+from jaxdamp.cli.offers import Written
+from jaxdamp.cli.signatures import REQUIRED, Argument, arguments, options_class
 
 
-def law_names(asked: Sequence[str]) -> list[str]:
-    """The laws to fit: all that are not optional, or those named, each once; "linear,besinger" names two.
+PLAIN = {"str": str, "int": int, "float": float, "bool": bool}
+PLAIN |= dict.fromkeys(("Path", "os.PathLike[str]", "Sequence[Path]"), Path)
+LONGEST = 200  # characters of a first sentence; a longer one ends at its first semicolon
+_DICTIONARY = re.compile(r"\{[^{}]*\}")
+_PYTHON = re.compile(r"\b(None|True|False|lambda)\b|\bas in `")
+_LIMITS = re.compile(r"\{(\w+): \((\w+), ([\w ]+)\)\}")
 
-    >>> law_names(["linear, besinger", "linear"])
-    ['linear', 'besinger']
+
+@dataclass(frozen=True)
+class Call:
+    """The arguments of a library function that were given as options.
+
+    Attributes:
+        target: dotted name of the function inside the package.
+        given: values by the name of the argument, wherever it is nested in objects of options.
     """
-    asked = [name.strip() for text in asked for name in text.split(",") if name.strip()]
-    if not asked:
-        _checks.refuse("law", "name a law", "empty", 'See "jaxdamp laws".')
-    for name in asked:
-        _checks.one_of("law", name, ("all", *identify.NAMED_LAWS))
-    return list(identify.LAWS) if "all" in asked else list(dict.fromkeys(asked))
+
+    target: str
+    given: Mapping[str, Any] = field(default_factory=dict)
+
+    def arguments(self, **more: Any) -> dict[str, Any]:
+        """All of these, and more, as the function takes them: those of nested options in objects of their classes."""
+        values = {**self.given, **more}
+        paths = {leaf.argument.name: leaf.path for leaf in _leaves(self.target)}
+        return build(self.target, {paths.get(name, (name,)): value for name, value in values.items()})
 
 
-def assignments(option: str, texts: Sequence[str], roles: Sequence[str] | None = ROLES) -> dict[str, str]:
-    """What "stroke=x_mm,force=Load, N" assigns to the quantities of a record; any names if `roles` is None.
+class Leaf(NamedTuple):
+    """An argument that is written as one option.
 
-    >>> assignments("columns", ["time=t,stroke=Displacement, in", "force=2"])
-    {'time': 't', 'stroke': 'Displacement, in', 'force': '2'}
+    Attributes:
+        path: the names of the arguments that hold it, one inside the other, and its own.
+        argument: with type, default and text.
+        owner: the function or class whose argument it is.
     """
-    assigned = {}
-    for text in texts:
-        for part in re.split(rf",(?=\s*(?:{'|'.join(roles or [NAME])})\s*=)", text):
-            role, equals, value = (piece.strip() for piece in part.partition("="))
-            if not equals or not value:
-                raise ValueError(f"Option --{option} must read like stroke=..., but is {part!r}.")
-            if roles is not None:
-                _checks.one_of(option, role, roles)
-            assigned[role] = value
-    return assigned
+
+    path: tuple[str, ...]
+    argument: Argument
+    owner: str
+
+    @property
+    def option(self) -> str:
+        """The name of the option, with underscores."""
+        name = self.argument.name
+        return offers.NAMES.get(f"{self.owner} {name}") or offers.NAMES.get(name, name)
 
 
-def column_numbers(columns: Mapping[str, str]) -> dict[str, str | int | None]:
-    """Headers stay, digits are numbers of columns, "none" leaves a quantity out."""
-    special: dict[str, None] = {"none": None}
-    return {
-        role: int(value) if value.isdigit() else special.get(value.lower(), value) for role, value in columns.items()
-    }
+def _leaves(target: str, path: tuple[str, ...] = ()) -> Iterator[Leaf]:
+    """The arguments of a function, those of nested classes of options one by one, those of called functions not."""
+    for argument in arguments(target):
+        here = (*path, argument.name)
+        if not argument.callee and not _written(argument) and (nested := _nested(argument)):
+            yield from _leaves(nested, here)
+        else:
+            yield Leaf(here, argument, target)
 
 
-def commands(texts: Sequence[str]) -> Mapping[str, float] | None:
-    """What "*_0.5A=0.5,*_1A=1" states of the records; None where nothing is stated.
+def _nested(argument: Argument) -> str:
+    return next((kind for kind in argument.kinds if options_class(kind)), "")
 
-    >>> commands(["*_0.5A=0.5,*_1A=1"])
-    {'*_0.5A': 0.5, '*_1A': 1.0}
+
+@functools.cache
+def leaves(target: str) -> tuple[Leaf, ...]:
+    """All that a command could offer: its own arguments, and those of the functions that it calls.
+
+    What a called function must have is the business of the command; so are arguments of the names of its own.
     """
-    stated = {}
-    for part in (part for text in texts for part in text.split(",")):
-        pattern, _, number = part.rpartition("=")
-        try:
-            stated[pattern.strip()] = float(number)
-        except ValueError:
-            pattern = ""
-        if not pattern:
-            raise ValueError(f"Option --command must read like '*_0.5A=0.5', but is {part!r}.")
-    return stated or None
+    own = [leaf for leaf in _leaves(target) if leaf.argument.name != "screen"]
+    names = {leaf.option for leaf in own if not leaf.argument.callee}
+    found = []
+    for leaf in own:
+        callee = leaf.argument.callee
+        called = [inner for inner in _leaves(callee) if inner.argument.default is not REQUIRED] if callee else []
+        placed = [inner._replace(path=(*leaf.path, *inner.path)) for inner in called if inner.option not in names]
+        found += placed if callee else [leaf]
+    return tuple(found)
 
 
-def split(runs: BenchSet, patterns: Sequence[str]) -> tuple[BenchSet, BenchSet]:
-    """The records to fit and those to hold out, which are named by name, file or pattern."""
-    if not patterns:
-        return runs, BenchSet()
-    names = [name for pattern in patterns for name in _names_of(runs, pattern)]
+def offered(target: str) -> dict[Leaf, Written | type]:
+    """The options of a command, and how each is written."""
+    return {leaf: how for leaf in leaves(target) if not withheld(leaf) and (how := _written(leaf.argument, leaf))}
+
+
+def withheld(leaf: Leaf) -> str:
+    """Why an argument is no option; empty for those that are one."""
+    return offers.NOT_OFFERED.get(leaf.owner, {}).get(leaf.argument.name, "")
+
+
+def _written(argument: Argument, leaf: Leaf | None = None) -> Written | type | None:
+    """How the values of an argument are written; None where its type has no words."""
+    name, kinds = leaf.option if leaf else offers.NAMES.get(argument.name, argument.name), argument.kinds
+    many = [written for kind in kinds for pattern, written in offers.TYPES if re.match(pattern, kind)]
+    plain = [PLAIN[kind] for kind in kinds if kind in PLAIN]
+    if name in offers.WRITTEN:
+        return offers.WRITTEN[name]
+    if many:
+        return offers.NAMES_OR_NUMBERS if str in plain and "Sequence[float]" in kinds else many[0]
+    for kind in (Path, float, int, str, bool):
+        if kind in plain:
+            return kind
+    return None
+
+
+def parameters(command: str, target: str) -> list[inspect.Parameter]:
+    """The options of a command as Typer takes them; what is not given is None."""
+    made = []
+    for leaf, how in offered(target).items():
+        name, argument = leaf.option, leaf.argument
+        positional = argument.positional and len(leaf.path) == 1
+        default = argument.default
+        words: dict[str, Any] = {"help": _help(command, name, argument, how)}
+        if isinstance(how, Written):
+            kind, words["metavar"] = list[str] if how.repeated else str, how.metavar
+        else:
+            kind = list[Path] if how is Path and "Sequence[Path]" in argument.kinds else how
+        if positional:
+            words.pop("metavar", None)
+            mark = typer.Argument(**words)
+        else:
+            flag, short = f"--{name.replace('_', '-')}", offers.SHORT.get(name)
+            texts = [flag] if kind is not bool else [f"{flag}/--no-{flag[2:]}" if default is True else flag]
+            mark = typer.Option(*texts, *([short] if short else []), show_default=False, **words)
+        wanted = kind if default is REQUIRED else kind | None
+        kinds = inspect.Parameter.KEYWORD_ONLY
+        empty = inspect.Parameter.empty if default is REQUIRED else None
+        made.append(inspect.Parameter(name, kinds, default=empty, annotation=Annotated[wanted, mark]))
+    return made
+
+
+def values(target: str, given: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
+    """The values of the options that were given, by the path of each argument."""
+    read: dict[tuple[str, ...], Any] = {}
+    for leaf, how in offered(target).items():
+        text = given.get(leaf.option)
+        if text not in (None, []):
+            read[leaf.path] = how.read(leaf.option, text) if isinstance(how, Written) else text
+    return read
+
+
+def build(target: str, read: Mapping[tuple[str, ...], Any]) -> dict[str, Any]:
+    """The arguments of a function: plain ones, objects of nested classes, and `Call` of what it calls."""
+    made: dict[str, Any] = {path[0]: value for path, value in read.items() if len(path) == 1}
+    for argument in arguments(target):
+        inside = {path[1:]: value for path, value in read.items() if path[0] == argument.name and len(path) > 1}
+        nested = "" if argument.callee else _nested(argument)
+        if argument.callee:
+            made[argument.name] = Call(argument.callee, {path[-1]: value for path, value in inside.items()})
+        elif nested and (inside or argument.default is REQUIRED):
+            module, _, name = nested.rpartition(".")
+            made[argument.name] = getattr(import_module(f"jaxdamp.{module}"), name)(**build(nested, inside))
+    return made
+
+
+def aliases(command: str, target: str) -> dict[str, str]:
+    """Other names of options that work: those of before, and those of the arguments in Python."""
+    names = {leaf.argument.name: leaf.option for leaf in offered(target)}
+    taken = set(names.values())
+    python = {name: option for name, option in names.items() if name != option and name not in taken}
+    spelled = {f"--{old.replace('_', '-')}": f"--{new.replace('_', '-')}" for old, new in python.items()}
+    return spelled | offers.ALIASES | offers.ALIASES_OF.get(command, {})
+
+
+def _help(command: str, name: str, argument: Argument, how: Written | type) -> str:
+    """The help of an option: the first sentence of what the docstring says, in words of the command line."""
+    text = (
+        offers.TEXTS.get(f"{command} {name}")
+        or offers.TEXTS.get(name)
+        or in_words(argument.text or offers.SHARED.get(name, ""))
+    )
+    example, default = how.example if isinstance(how, Written) else "", argument.default
+    if default in (REQUIRED, None, "", (), ...) or isinstance(default, bool):
+        shown = ""
+    else:
+        shown = f" [default: {','.join(map(str, default)) if isinstance(default, tuple | list) else default}]"
+    return f"{text}{f' Write {example}.' if example else ''}{shown}"
+
+
+def in_words(text: str) -> str:
+    """The first sentence of a text on an argument, with dictionaries as they are written on the command line.
+
+    >>> in_words('gains of sensors: `{"force": "500 N/V"}`. More.')
+    'Gains of sensors: force=500 N/V.'
+    """
+    text = _LIMITS.sub(lambda found: f"{found[1]}={found[2]}:{found[3]}".upper(), text)
+    text = _DICTIONARY.sub(_assignments, text)
+    text = re.sub(r" \(see [^)]*\)", "", text)
+    sentence = re.split(r"(?<=[\w\])`\"]{2})\.\s", f"{text} ")[0].strip().rstrip(".")
+    clauses = [clause for clause in sentence.split("; ") if not _PYTHON.search(clause)]
+    text = "; ".join(clauses if len(sentence) <= LONGEST else clauses[:1]).replace("`", "")
+    first = text.split(" ")[0].rstrip(",:;")
+    return f"{text[:1].upper() if first.isalpha() else text[:1]}{text[1:]}." if text else ""
+
+
+def _assignments(found: re.Match[str]) -> str:
     try:
-        held, fitted = runs.select(names), runs.without(names)
-    except KeyError as error:
-        raise ValueError(f"Option --held-out: {error.args[0]}") from error
-    if not len(fitted):
-        raise ValueError("Option --held-out leaves no record to fit: hold out fewer.")
-    return fitted, held
-
-
-def _names_of(runs: BenchSet, pattern: str) -> list[str]:
-    """The records of a file, or the pattern without the ending of a file."""
-    path = Path(pattern).expanduser()
-    if path.is_file():
-        here = [run.name for run in runs if Path(run.source).resolve() == path.resolve()]
-        if here:
-            return here
-    suffix = path.suffix
-    return [pattern.removesuffix(suffix) if suffix.lower() in bench.READERS else pattern]
-
-
-def decisions(runs: Sequence[BenchRun]) -> list[str]:
-    """What the reader decided; notes that differ only in their numbers are said once, with those of the first."""
-    kinds: dict[str, list[str]] = {}
-    for run in runs:
-        for text in run.notes:
-            note = in_options(text, (_COMPRESSION,))
-            kinds.setdefault(re.sub(r"[+-]?\d[\d.]*(?:e[+-]?\d+)?", "#", note), []).append(note)
-    sentences = []
-    for notes in kinds.values():
-        who = "all records" if len(notes) == len(runs) else f"{len(notes)} records"
-        alike = "" if len(set(notes)) == 1 else ", numbers of the first"
-        sentences.append(notes[0] if len(runs) == 1 else f"{notes[0]} ({who}{alike})")
-    return sentences
+        given = ast.literal_eval(found[0])
+    except (ValueError, SyntaxError):
+        return found[0]
+    return ",".join(f"{name}={value}" for name, value in given.items()) if isinstance(given, dict) else found[0]

@@ -1,82 +1,129 @@
-"""`jaxdamp ride`: a law in a vehicle on a road, beside a baseline."""
+"""`jaxdamp ride`: a law in a vehicle on a road, beside a baseline; and what words mean as roads."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any
 
 from jaxdamp import _checks, export, roads, simulate
-from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.early import refuse_road
-from jaxdamp.cli.option_types import command_line
-from jaxdamp.cli.results import results_folder
-from jaxdamp.cli.run_warnings import with_step_warnings, without_range_warnings
-from jaxdamp.cli.unusual import unusual
+from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
+from jaxdamp.cli.options import Call
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law
-from jaxdamp.cli.wording import message
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.report import Attempts, Table, axles_sentence, notes_of, ride_report, ride_tables
+from jaxdamp.report import axles_sentence, notes_of, ride_report, ride_tables
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
 
 
 USUAL = 10.0  # s, a ride on a road without an end of its own
+FASTEST = 70.0  # m/s, 252 km/h
+HIGHEST_BUMP = 0.3  # m
+LONGEST_BUMP = 50.0  # m
 
 
-def parse_road(text: str, *, speed: float, duration: float, seed: int, white: bool = False) -> AbstractRoad:
+@dataclass(frozen=True)
+class Driving:
+    """How a road is driven over.
+
+    Arguments:
+        speed: of the vehicle [m/s].
+        duration: of each ride [s]; the road's own, or 10.
+        dt: step [s]; 1 ms is right for cars, a coarse one is warned of or refused.
+        seed: of random roads.
+    """
+
+    speed: float = 20.0
+    duration: float | None = None
+    dt: float = 1e-3
+    seed: int = 0
+
+    def over(self, word: str, count: int = 1) -> tuple[list[Any], dict[str, Any]]:
+        """So many realisations of the road that a word means, and the options of a run over them."""
+        _checks.positive("speed", self.speed)
+        kind, _, rest = word.partition(":")
+        if kind == "white":
+            if self.duration is not None:
+                _checks.refuse("duration", "be left out on a white road", self.duration)
+            return [roads.white(rest, self.speed)] * count, {}
+        length = self.duration or USUAL
+        seeds = range(self.seed, self.seed + count)
+        realisations = [parse_road(word, speed=self.speed, duration=length, seed=seed) for seed in seeds]
+        return realisations, {"duration": self.duration or realisations[0].duration or USUAL, "dt": self.dt}
+
+
+def parse_road(word: str, *, speed: float, duration: float, seed: int) -> AbstractRoad:
     """The road that a word on the command line means.
 
     "iso:C" is an ISO 8608 class, "bump:0.06:5" a cosine bump of height and length in metres that begins after a second,
     anything else a file: OpenCRG (*.crg), or text with positions [m] and heights [m].
     """
-    kind, _, rest = text.partition(":")
+    kind, _, rest = word.partition(":")
     if kind == "iso":
-        road: AbstractRoad = roads.iso8608(rest, speed, duration, seed=seed)
-    elif kind == "bump":
+        return roads.iso8608(rest, speed, duration, seed=seed)
+    if kind == "bump":
         try:
-            height, length = (float(number) for number in rest.split(":"))
+            height, length = map(float, rest.split(":"))
         except ValueError:
-            _checks.refuse("road", "read like bump:HEIGHT:LENGTH with numbers in metres", repr(text))
-        road = roads.cosine_bump(height, start=1.0, length=length, speed=speed)
-    elif Path(text).is_file():
-        road = roads.read_crg(text, speed) if text.endswith(".crg") else roads.read_profile(text, speed)
-    else:
-        refuse_road(text)
-    return road
+            _checks.refuse("road", "read like bump:HEIGHT:LENGTH with numbers in metres", repr(word))
+        return roads.cosine_bump(height, start=1.0, length=length, speed=speed)
+    if Path(word).is_file():
+        return roads.read_crg(word, speed) if word.endswith(".crg") else roads.read_profile(word, speed)
+    refuse_road(word)
 
 
-def run_ride(
+def unusual(road: str, speed: float) -> list[str]:
+    """Sentences on a speed [m/s] or a bump that no road vehicle meets every day, as where another unit was meant.
+
+    >>> unusual("iso:C", 72.0)
+    ['unusual: --speed 72 is 259 km/h. It is in m/s: if km/h was meant, write --speed 20.']
+    """
+    notes = []
+    if speed > FASTEST:
+        remedy = f"It is in m/s: if km/h was meant, write --speed {speed / 3.6:.3g}."
+        notes.append(f"unusual: --speed {speed:g} is {3.6 * speed:.0f} km/h. {remedy}")
+    kind, *size = road.split(":")
+    if kind == "bump" and len(size) == 2:
+        height, length = map(float, size)
+        if height > HIGHEST_BUMP or length > LONGEST_BUMP:
+            remedy = f"Both are in m: if mm were meant, write bump:{1e-3 * height:g}:{1e-3 * length:g}."
+            notes.append(f"unusual: --road {road} is {height:g} m high and {length:g} m long. {remedy}")
+    return notes
+
+
+def ride(
     screen: Screen,
     law: Path,
     *,
-    vehicle: str,
-    road: str,
-    speed: float,
+    vehicle: str = "quarter_car_000",
+    road: str = "iso:C",
+    driving: Driving,
+    how: Annotated[Call, "simulation.simulate"],
     baseline: Path | None = None,
-    duration: float | None = None,
-    dt: float = 1e-3,
-    seed: int = 0,
-    out: Path,
-    replace: bool = False,
-) -> dict[str, Response]:
-    """Ride on a law and a baseline, compare their metrics, and write tables, then pictures, into a folder."""
+    output: Output,
+) -> None:
+    """Ride on a law: metrics, comfort by ISO 2631-1 and pictures, beside a baseline.
+
+    The law is at every damper of the vehicle.
+    """
     make = parse_vehicle(vehicle)
-    _checks.positive("speed", speed)
     files = ({} if baseline is None else {"baseline": baseline}) | {"law": law}
     laws = {name: read_law(name, path) for name, path in files.items()}
-    screen.points(unusual(road, speed), style="yellow")
-    attempts = Attempts(interrupt.check, message)
-    with results_folder(out, "ride", replace=replace) as results:
+    (surface,), run = driving.over(road)
+    if not isinstance(surface, AbstractRoad):
+        refuse_road(road)
+    screen.points(unusual(road, driving.speed), style="yellow")
+    with job(screen, "ride", output) as work:
         responses: dict[str, Response] = {}
         remarks: list[str] = []
         with screen.stage("Driving", total=len(laws)) as advance:
             for done, (name, damper) in enumerate(laws.items()):
                 advance(name, done)
                 car = make(damper)
-                under = parse_road(road, speed=speed, duration=duration or USUAL, seed=seed)
-                length = duration or under.duration or USUAL
                 with without_range_warnings():
                     responses[name], warned = with_step_warnings(
-                        lambda car=car, u=under, t=length: simulate(car, u, duration=t, dt=dt)
+                        lambda car=car: simulate(car, surface, **how.arguments(**run))
                     )
                 remarks += [f"{name}: {text}" for text in warned]
             tables = ride_tables(responses)
@@ -84,30 +131,19 @@ def run_ride(
         for table in tables.values():
             screen.table(table)
         screen.points(remarks, style="yellow")
-        interrupt.keep()
         axles = axles_sentence(responses)
         if axles:
             screen.say(axles)
-        with interrupt.saving(), screen.stage("Tables and channels"):
-            _write(results.draft, laws, responses, tables)
-            results.publish("the pictures and the report")
-        with screen.stage("Pictures and report"):
-            title = f"{vehicle} on {road} at {speed:g} m/s"
-            options = {"title": title, "laws": laws, "remarks": remarks}
-            report = ride_report(responses, **options, folder=results.draft, attempts=attempts)
-            report.write(results.draft / "report.html", command_line())
-    screen.files(out, results.published)
-    screen.points(attempts.troubles, style="yellow")
-    return responses
+        with work.saving("Tables and channels") as draft:
+            _write(draft, laws, responses)
+            write_tables(draft, tables)
+        title = f"{vehicle} on {road} at {driving.speed:g} m/s"
+        work.page(ride_report, responses, title=title, laws=laws, remarks=remarks)
 
 
-def _write(
-    folder: Path, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response], tables: Mapping[str, Table]
-) -> None:
-    """Laws, tables and channels."""
+def _write(folder: Path, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response]) -> None:
+    """Laws and channels."""
     for name, law in laws.items():
         export.to_json(law, folder / f"{name}.json")
-    for file, table in tables.items():
-        (folder / f"{file}.csv").write_text(table.to_csv(), encoding="utf-8")
     for name, response in responses.items():
         response.to_xarray().to_dataframe().to_csv(folder / f"channels_{name}.csv")

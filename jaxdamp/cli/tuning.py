@@ -1,23 +1,23 @@
 """`jaxdamp tune`: the free parameters of a vehicle for a ride metric, with limits; and `jaxdamp sweep`."""
 
+import json
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from jaxdamp import Ride, _checks, export, roads, sweep, tune
-from jaxdamp.cli import interrupt
+import numpy as np
+import typer
+
+from jaxdamp import Ride, _checks, export, sweep, tune
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.metric_words import axis_words, default_limits, limit_words, metric_names, objective_word, pairs, span
-from jaxdamp.cli.option_types import command_line
-from jaxdamp.cli.results import results_folder
-from jaxdamp.cli.riding import USUAL, parse_road
-from jaxdamp.cli.unusual import unusual
+from jaxdamp.cli.jobs import Output, job, write_tables
+from jaxdamp.cli.options import Call
+from jaxdamp.cli.riding import Driving, unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
-from jaxdamp.cli.wording import in_command_line, message
+from jaxdamp.cli.wording import in_command_line
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.report import Attempts, sweep_report, tuning_report
+from jaxdamp.report import sweep_report, tuning_report
 from jaxdamp.roads import WhiteRoad
 from jaxdamp.simulation import stationary_notes
 from jaxdamp.sweeps import without_effect
@@ -25,104 +25,69 @@ from jaxdamp.tune import Status, TuneResult, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
 
-@dataclass(frozen=True)
-class RoadOptions:
-    """A vehicle with its law on a road, as the command line says it."""
-
-    vehicle: str
-    road: str
-    start: Path | None = None
-    speed: float = 20.0
-    duration: float | None = None
-    dt: float = 1e-3
-    seed: int = 0
-
-    def car(self) -> AbstractVehicle:
-        """The vehicle, with the law at each damper if one is given."""
-        return parse_vehicle(self.vehicle)(None if self.start is None else read_law("start", self.start))
-
-    def roads(self, count: int = 1) -> tuple[list[Any], dict[str, Any]]:
-        """So many realisations of the road, and the options of a run over them."""
-        _checks.positive("speed", self.speed)
-        kind, _, rest = self.road.partition(":")
-        if kind == "white":
-            if self.duration is not None:
-                _checks.refuse("duration", "be left out on a white road", self.duration)
-            return [roads.white(rest, self.speed)] * count, {}
-        length = self.duration or USUAL
-        seeds = range(self.seed, self.seed + count)
-        realisations = [parse_road(self.road, speed=self.speed, duration=length, seed=seed) for seed in seeds]
-        own = length if self.duration or kind == "iso" else realisations[0].duration or length
-        return realisations, {"duration": own, "dt": self.dt}
+GRIP = "+10%"  # how much more a tyre load may vary after a tuning, by default
 
 
-@dataclass(frozen=True)
-class TuneOptions:
-    """What is tuned, as the command line says it."""
-
-    minimise: str = "comfort"
-    limit: tuple[str, ...] = ()
-    over: tuple[str, ...] = ()  # what a workshop can change
-    freeze: tuple[str, ...] = ()
-    bound: tuple[str, ...] = ()
-    tie: tuple[str, ...] = ()
-    roads: int = 1
-    starts: int = 1
-    max_steps: int = 100
-
-
-def run_tune(
+def tune_command(
     screen: Screen,
-    on: RoadOptions,
-    options: TuneOptions,
+    vehicle: str,
+    road: str,
     *,
+    start: Path | None = None,
+    minimise: str = "comfort",
+    search: Annotated[Call, "tune.minimise"],
+    roads: int = 1,
+    driving: Driving,
     baseline: Path | None = None,
-    out: Path,
-    replace: bool = False,
-) -> TuneResult[Any]:
-    """Tune a vehicle, and write the law, the vehicle, tables, then pictures and a page."""
-    car = on.car()
+    output: Output,
+) -> None:
+    """Tune the dampers of a vehicle for a ride metric within limits.
+
+    Writes the law, the vehicle, tables, pictures and a page. Ends with exit code 1 if a limit is not met. Grip is
+    limited to +10% of the start by itself; --limit grip=none removes that.
+
+    Arguments:
+        road: iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height.
+        minimise: comfort, travel, grip, or the name of a ride metric.
+        roads: realisations of an iso road, driven side by side; their mean counts.
+        baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
+    """
+    car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     beside = None if baseline is None else _baseline(baseline, car)
-    call, remarks = tuning_arguments(car, on, options)
+    surfaces, run = _realisations(road, driving, roads)
+    call, remarks = tuning_arguments(car, minimise, surfaces, search, driving.seed, run)
     screen.points(remarks)
-    screen.points(unusual(on.road, on.speed), style="yellow")
-    attempts = Attempts(interrupt.check, message)
-    with results_folder(out, "tune", replace=replace) as results:
+    screen.points(unusual(road, driving.speed), style="yellow")
+    with job(screen, "tune", output) as work:
         result = tuned(screen, call)
-        interrupt.keep()
-        with interrupt.saving(), screen.stage("Law, vehicle and tables"):
-            write_tuning(results.draft, result)
-            results.publish("the pictures and the report")
-        with screen.stage("Pictures and report"):
-            page = tuning_report(result, baseline=beside, folder=results.draft, attempts=attempts)
-            page.write(results.draft / "report.html", command_line())
-    screen.files(out, results.published)
-    screen.points(attempts.troubles, style="yellow")
-    return result
+        with work.saving("Law, vehicle and tables") as draft:
+            write_tuning(draft, result)
+        work.page(tuning_report, result, baseline=beside)
+    exit_code_of(result)
 
 
-def tuning_arguments(car: AbstractVehicle, on: RoadOptions, options: TuneOptions) -> tuple[dict[str, Any], list[str]]:
+def _realisations(road: str, driving: Driving, count: int) -> tuple[list[Any], dict[str, Any]]:
+    """The roads to tune on, and the options of a run over them."""
+    if count < 1:
+        _checks.refuse("roads", "be 1 or more", count)
+    if count > 1 and not road.startswith("iso:"):
+        _checks.refuse("roads", "be 1 for a road that is not random", count, "Take iso:CLASS.")
+    return driving.over(road, count)
+
+
+def tuning_arguments(
+    car: AbstractVehicle, metric: str, roads: Sequence[Any], search: Call, seed: int, run: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[str]]:
     """The arguments of `tune.minimise`, and what was chosen by default, in words."""
-    if options.roads < 1:
-        _checks.refuse("roads", "be 1 or more", options.roads)
-    roads_driven, run = on.roads(options.roads)
-    white = isinstance(roads_driven[0], WhiteRoad)
-    if options.roads > 1 and (white or not on.road.startswith("iso:")):
-        _checks.refuse("roads", "be 1 for a road that is not random", options.roads, "Take iso:CLASS.")
-    limits = limit_words(options.limit, car, white=white)
-    more, sentence = default_limits(options.limit, options.minimise, car, white=white)
-    return run | {
-        "metric": objective_word(options.minimise, car, white=white),
-        "vehicle": car,
-        "road": roads_driven[0] if len(roads_driven) == 1 else tune.Scenarios(roads_driven),
-        "over": options.over or None,
-        "freeze": options.freeze,
-        "bounds": {name: span("bound", value) for name, value in pairs("bound", options.bound)},
-        "tie": dict(pairs("tie", options.tie)),
-        "limits": limits | more,
-        "starts": options.starts,
-        "max_steps": options.max_steps,
-    }, [sentence] * bool(sentence)
+    limits, white = dict(search.given.get("limits", {})), isinstance(roads[0], WhiteRoad)
+    grip, remarks = car.goal_metrics("grip", white=white), []
+    if not {"grip", *grip} & {*limits, metric}:
+        limits["grip"] = GRIP
+        sentence = f"Limited by default: grip (RMS variation of each tyre load) to {GRIP} of the start"
+        remarks = [f"{sentence}; --limit grip=none removes it."]
+    limits = {name: limit for name, limit in limits.items() if limit is not None}
+    road = roads[0] if len(roads) == 1 else tune.Scenarios(roads)
+    return search.arguments(metric=metric, vehicle=car, road=road, limits=limits, seed=seed, **run), remarks
 
 
 def tuned(screen: Screen, call: Mapping[str, Any]) -> TuneResult[Any]:
@@ -143,15 +108,14 @@ def _baseline(path: Path, car: AbstractVehicle) -> AbstractVehicle:
     return with_law(car, module) if isinstance(module, AbstractDamper) else module
 
 
-def meets_limits(result: TuneResult[Any] | None) -> bool:
-    """Whether all limits are met, or nothing was tuned."""
-    return result is None or result.status is not Status.LIMIT_NOT_MET
+def exit_code_of(result: TuneResult[Any] | None) -> None:
+    """End with exit code 1 if a limit is not met."""
+    if result is not None and result.status is Status.LIMIT_NOT_MET:
+        raise typer.Exit(1)
 
 
 def write_tuning(folder: Path, result: TuneResult[Any]) -> None:
     """The tuned laws, the vehicle, tables, and all of it as JSON."""
-    import json
-
     write_laws(folder, result.vehicle)
     export.to_json(result.vehicle, folder / "vehicle.json")
     tables = {"parameters": result.parameter_table(), "metrics": result.table()}
@@ -159,58 +123,72 @@ def write_tuning(folder: Path, result: TuneResult[Any]) -> None:
         tables["scenarios"] = result.scenario_table()
     if result.fresh is not None:
         tables["fresh_roads"] = result.fresh.table()
-    for name, table in tables.items():
-        (folder / f"{name}.csv").write_text(table.to_csv(), encoding="utf-8")
+    write_tables(folder, tables)
     text = json.dumps(result.to_dict(), indent=1, ensure_ascii=False) + "\n"
     (folder / "tuning.json").write_text(text, encoding="utf-8")
 
 
-def run_sweep(
+def sweep_command(
     screen: Screen,
-    on: RoadOptions,
+    vehicle: str,
+    road: str,
     *,
-    over: Sequence[str],
-    metrics: str,
-    limit: Sequence[str] = (),
+    over: Mapping[str, np.ndarray],
+    start: Path | None = None,
+    metric: Sequence[str] = ("comfort", "travel", "grip"),
+    limit: Mapping[str, Any] | None = None,
+    driving: Driving,
+    how: Annotated[Call, "sweeps.sweep"],
     baseline: Path | None = None,
-    out: Path,
-    replace: bool = False,
-) -> Any:
-    """Ride metrics over a grid of parameters: a table, a netCDF file, pictures and a page."""
-    car = on.car()
-    (road,), run = on.roads()
-    white = isinstance(road, WhiteRoad)
-    words = [word.strip() for word in metrics.split(",")]
-    limits = limit_words(limit, car, white=white)
-    names = [n for word in words for n in metric_names("metric", word, car, white=white)]
+    output: Output,
+) -> None:
+    """Compute ride metrics over a grid of parameters: curves, maps and a table.
+
+    Arguments:
+        road: iso:A to iso:H, white:A to white:H, bump:HEIGHT:LENGTH [m], or a file of position, height.
+        over: axes.
+        metric: comfort, travel, grip, or names of ride metrics.
+        limit: limits.
+        baseline: to compare with: another law, or another tuning's vehicle.json, as JSON.
+    """
+    car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
+    (surface,), run = driving.over(road)
+    white = isinstance(surface, WhiteRoad)
+    limits = {
+        name: span
+        for word, span in (limit or {}).items()
+        if span is not None
+        for name in _metrics_of("limit", word, car, white=white)
+    }
+    names = [name for word in metric for name in _metrics_of("metric", word, car, white=white)]
     names = list(dict.fromkeys([*names, *limits]))
     limit_spans(limits, names, dict.fromkeys(names, 1.0))  # refuses what is no limit before anything is driven
     beside = None if baseline is None else _baseline(baseline, car)
-    axes = axis_words(over)
-    ride = Ride(car, road, metrics=names, **run)
-    ride({name: values[0] for name, values in axes.items() if not ride.out_of_domain({name: values[:1]})[0]})
-    screen.points(unusual(on.road, on.speed), style="yellow")
-    attempts = Attempts(interrupt.check, message)
-    with results_folder(out, "sweep", replace=replace) as results:
+    ride = Ride(car, surface, metrics=names, **run)
+    ride({name: values[0] for name, values in over.items() if not ride.out_of_domain({name: values[:1]})[0]})
+    screen.points(unusual(road, driving.speed), style="yellow")
+    with job(screen, "sweep", output) as work:
         with screen.stage("Driving") as advance, warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            data = sweep(ride, axes, progress=lambda done, total: advance(f"{done} of {total} points", done))
+            shown = {"progress": lambda done, total: advance(f"{done} of {total} points", done)}
+            data = sweep(ride, over, **how.arguments(**shown))
         remarks = [str(warning.message) for warning in caught]
         screen.table(data.jaxdamp.table())
-        remarks += stationary_notes(ride.vehicle, road) if isinstance(road, WhiteRoad) else []
+        remarks += stationary_notes(ride.vehicle, surface) if isinstance(surface, WhiteRoad) else []
         remarks += [f"No effect on {name}: {', '.join(flat)}." for name, flat in without_effect(data).items()]
         screen.points(remarks, style="yellow")
-        with interrupt.saving(), screen.stage("Tables"):
-            (results.draft / "sweep.csv").write_text(data.jaxdamp.table().to_csv(), encoding="utf-8")
-            data.to_netcdf(results.draft / "sweep.nc", engine="scipy")
-            results.publish("the pictures and the report")
-        with screen.stage("Pictures and report"):
-            drawn = {"folder": results.draft, "attempts": attempts}
-            if limits:
-                limits = limit_spans(limits, names, {name: float(value) for name, value in ride().items()})
-            marks = {"limits": limits, "baseline": None if beside is None else dict(ride.of_vehicle(beside)())}
-            page = sweep_report(data, remarks=remarks, **marks, **drawn)
-            page.write(results.draft / "report.html", command_line())
-    screen.files(out, results.published)
-    screen.points(attempts.troubles, style="yellow")
-    return data
+        with work.saving("Tables") as draft:
+            write_tables(draft, {"sweep": data.jaxdamp.table()})
+            data.to_netcdf(draft / "sweep.nc", engine="scipy")
+        at_start = {name: float(value) for name, value in ride().items()} if limits else {}
+        marks = {
+            "limits": limit_spans(limits, names, at_start),
+            "baseline": None if beside is None else dict(ride.of_vehicle(beside)()),
+        }
+        work.page(sweep_report, data, remarks=remarks, **marks)
+
+
+def _metrics_of(option: str, word: str, car: AbstractVehicle, *, white: bool) -> list[str]:
+    """The ride metrics that a word means."""
+    _checks.one_of(option, word, car.metric_words)
+    return car.goal_metrics(word, white=white)

@@ -1,4 +1,4 @@
-"""What a vehicle is called on the command line: a published one, or a file of one's own."""
+"""What vehicles and laws are called on the command line: `jaxdamp vehicles`, `jaxdamp laws`, and files."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -8,8 +8,10 @@ from typing import Any
 import equinox as eqx
 
 from jaxdamp import _checks, export, vehicles
+from jaxdamp.cli.console import Screen
 from jaxdamp.cli.early import EXAMPLE, FROM_FIT, FROM_LIST, read_json, read_vehicle
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify import laws_table
 from jaxdamp.parameters import get, matching, replace
 from jaxdamp.report import Column, Table
 from jaxdamp.tune import damper_paths
@@ -29,6 +31,16 @@ def vehicles_table() -> Table:
     """The published vehicles that take a damper, with a line of meaning."""
     rows = tuple((name, (inspect.getdoc(make) or "").partition("\n")[0]) for name, make in presets().items())
     return Table("Vehicles", (Column("vehicle"), Column("what it is")), rows)
+
+
+def list_vehicles(screen: Screen) -> None:
+    """List the vehicles that a law can be put into."""
+    screen.table(vehicles_table())
+
+
+def list_laws(screen: Screen) -> None:
+    """List the laws that can be fitted by name."""
+    screen.table(laws_table())
 
 
 def parse_vehicle(word: str) -> MakeCar:

@@ -5,56 +5,9 @@ import shlex
 from typing import Any
 
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.cli.option_types import own_words
+from jaxdamp.cli.application import own_words
 
 
-OPTIONS = (
-    "baseline",
-    "bench",
-    "between",
-    "bound",
-    "columns",
-    "command",
-    "delimiter",
-    "dt",
-    "duration",
-    "force_sign",
-    "gains",
-    "group_by",
-    "guide",
-    "held_out",
-    "initial_motion",
-    "law",
-    "limit",
-    "limits",
-    "manifest",
-    "max_steps",
-    "metric",
-    "minimise",
-    "noise",
-    "over",
-    "out",
-    "per_record",
-    "report",
-    "rig",
-    "road",
-    "roads",
-    "sampling_rate",
-    "seed",
-    "sensor",
-    "settling",
-    "sign",
-    "skip_bad",
-    "speed",
-    "starts",
-    "stroke_from_velocity",
-    "tie",
-    "to",
-    "units",
-    "vehicle",
-    "velocities",
-    "weighting",
-)
 OTHER_WORDS = {
     "last_cycles": "Option --cycles",
     "low_pass": "Option --filter",
@@ -68,6 +21,8 @@ OTHER_WORDS = {
     "start": "The beginning in --between",
 }
 CALLS = {
+    r" It is in `result\.rig`, not in the law,": " It is in machines/, not in the law,",
+    r"; `law \+ dampers\.Spring\([^`]*` is the damper if it is gas": "",
     r'add "(\w+)" or "(\w+)" to the machine \(`rig`\)': r"add --rig \1 or --rig \2",
     r'add "(\w+)" to the machine \(`rig`\)': r"add --rig \1",
     r"or a `Spring` to the law": "or fit a law with a spring",
@@ -85,6 +40,7 @@ CALLS = {
     r"`process\(skip_cycles=[^)]*\)`": "--cycles skip:1",
     r"subtract it, `process\(without=[^`]*`": "fit it beside the law, --rig gas",
     r"`bounds=\{[^`]*`": "--bound",
+    r"`dt=([^`]*)`": r"`--dt \1`",
     r"`process\(delay=[^)]*\)`": "fit with --rig delay",
 }
 """Calls of Python in the sentences of the library, as patterns, and what the command line says instead."""
@@ -121,22 +77,30 @@ def _word(value: Any) -> str:
 def in_options(text: str, settings: tuple[Setting, ...] = ()) -> str:
     """A sentence of the library with its settings as options."""
     for setting in settings:
-        if setting.argument in OPTIONS:
+        words = own_words().get(setting.argument, "")
+        if words.startswith("Option "):
             text = text.replace(str(setting), option_text(setting))
     return text
 
 
 def in_command_line(text: str) -> str:
-    """A sentence of the library that names calls of Python, with options instead."""
+    """A sentence of the library that names calls and arguments of Python, with options instead."""
     for python, words in CALLS.items():
         text = re.sub(python, words, text)
-    return text
+    return re.sub(r"`(\w+)`", lambda found: _word_of(found[1]), text)
+
+
+def _word_of(argument: str) -> str:
+    """An argument as the running command calls it; in quotes of code if it has none of this name."""
+    return own_words().get(argument, f"`{argument}`").removeprefix("Option ")
 
 
 def message(error: Exception) -> str:
     """What an error says, in the language of the command line."""
     if not isinstance(error, ArgumentError):
-        return str(error)
-    text, name = in_options(str(error), error.settings), error.argument
-    words = own_words().get(name) or OTHER_WORDS.get(name) or (f"Option {option(name)}" if name in OPTIONS else "")
-    return text.replace(f"Argument `{name}`", words) if words else text
+        return in_command_line(str(error))
+    text, (name, bracket, item) = in_options(str(error), error.settings), error.argument.partition("[")
+    words = own_words().get(name) or OTHER_WORDS.get(name, "")
+    if words:
+        text = text.replace(f"Argument `{error.argument}`", f"{words}{' of ' * bool(bracket)}{item.rstrip(']')}")
+    return in_command_line(text)

@@ -4,6 +4,7 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 `law + law`, `2.0 * law`, `SeriesSpring(law, ...)`, `Lag(law, ...)`, `MotionRatio(law, ...)`.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp.dampers._commands import command_paths as command_paths
 from jaxdamp.dampers._points import drives_motion as drives_motion
 from jaxdamp.dampers._starts import Reach as Reach, from_samples as from_samples
@@ -159,3 +160,5 @@ __shared__ = [
     "warn_outside",
     "without_fitted_ranges",
 ]
+
+answer_guesses(__name__, __all__)

@@ -4,11 +4,10 @@ import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import jax
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jaxdamp import _checks
+from jaxdamp._traced import is_traced, of_known_numbers
 from jaxdamp.dampers._commands import commands_of
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.fitted_range import OutsideFittedRangeWarning, has_fitted_range, shown_unit, span
@@ -76,6 +75,7 @@ def _percent(share: float) -> str:
     return "less than 1 %" if percent < 1.0 else f"{percent:.0f} %"
 
 
+@of_known_numbers
 def range_use(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
     """Every quantity of a motion beside the range of the law, and of each law inside that has a range of its own.
 
@@ -84,9 +84,9 @@ def range_use(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
     motion: behind a `MotionRatio` by the damper's stroke and velocity, in a `Scaled` law by the force before scaling.
     Inside a `SeriesSpring`, a `Bushing` or a `Lag` the motion of the whole stands for it, which is mostly more.
 
-    Empty where no law has a range, or while JAX traces the law.
+    Empty where no law has a range, or while JAX traces the law or its motion.
     """
-    if not has_fitted_range(law) or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(law)):
+    if not has_fitted_range(law) or is_traced((law, *vars(motion).values())):
         return []
     return list(dict.fromkeys(_uses(law, motion)))
 
@@ -151,6 +151,7 @@ def warn_outside(sentences: Sequence[str], stacklevel: int = 3) -> None:
         warnings.warn(f"Extrapolated: {text}", OutsideFittedRangeWarning, stacklevel=stacklevel)
 
 
+@of_known_numbers
 def extrapolated(law: AbstractDamper, velocities: Float[np.ndarray, " points"]) -> Bool[np.ndarray, " points"]:
     """At which velocities [m/s] the law, or a law inside, is outside the velocities that it was fitted to.
 

@@ -5,6 +5,7 @@ from typing import final
 import jax.numpy as jnp
 import numpy as np
 
+from jaxdamp._guesses import Elsewhere
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers._guesses import velocity_grid
 from jaxdamp.dampers._hinges import hinges
@@ -34,6 +35,8 @@ class Table(AbstractMemoryless):
 
     velocity: Vector = setting("m/s", "velocities of the points", increasing)
     force_points: Vector = parameter("N", "forces at the points", linear=True)
+
+    from_csv = Elsewhere("`Table(*numpy.loadtxt(path, delimiter=',', skiprows=1, usecols=(0, 1)).T)`, in m/s and N")
 
     def __init__(self, velocity: VectorLike, force: VectorLike, *, allow_active: bool = False) -> None:
         self.velocity = as_float(velocity, "velocity")

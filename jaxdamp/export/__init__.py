@@ -1,5 +1,6 @@
 """Laws, vehicles and roads written to files and read back; laws as C, as FMU, as tables of simulators and as a page."""
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp.export.c_source import to_c
 from jaxdamp.export.explorer_page import to_explorer
 from jaxdamp.export.fmu import to_fmu
@@ -20,3 +21,5 @@ __all__ = [
     "to_json",
     "to_matlab",
 ]
+
+answer_guesses(__name__, __all__)

@@ -9,12 +9,14 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import VectorLike
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper, extrapolated
 from jaxdamp.rig import quasi_static
 
 
+@of_known_numbers
 def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: VectorLike) -> Path:
     """Write the force of a law over velocity as a table in SI units, one point per line.
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import VectorLike
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
@@ -18,6 +19,7 @@ _FREQUENCIES = (1.5, 12.0)  # Hz, near the natural frequencies of body and wheel
 _CYCLES, _SAMPLES = 3, 200  # cycles of a sine, samples of each
 
 
+@of_known_numbers
 def to_adams(law: AbstractDamper, path: str | os.PathLike[str], velocities: VectorLike) -> Path:
     """Write a law as damper property file (TeimOrbit format, `.dpr`) for Adams/Car, MotionView or SIMPACK.
 
@@ -59,6 +61,7 @@ def to_adams(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vect
     return _written(path, lines, table)
 
 
+@of_known_numbers
 def to_carsim(law: AbstractDamper, path: str | os.PathLike[str], velocities: VectorLike) -> Path:
     """Write a law as table of force [N] over compression rate [mm/s] for CarSim and TruckSim, both positive in jounce.
 
@@ -90,6 +93,7 @@ def to_carsim(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vec
     return _written(path, lines, table)
 
 
+@of_known_numbers
 def to_matlab(law: AbstractDamper, path: str | os.PathLike[str], velocities: VectorLike) -> Path:
     """Write a law as MATLAB file (`.mat`) for a 1-D Lookup Table of Simulink or a table of Simscape.
 
@@ -133,6 +137,7 @@ class _Side(NamedTuple):
         return self.slow * np.minimum(speed, self.threshold) + self.fast * np.maximum(speed - self.threshold, 0.0)
 
 
+@of_known_numbers
 def to_assetto_corsa(
     law: AbstractDamper, path: str | os.PathLike[str], velocities: VectorLike, *, motion_ratio: float = 1.0
 ) -> Path:

@@ -1,38 +1,35 @@
 """From bench records to a damper law: `fit` one law, `compare` many, and say how well the records determine them."""
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp._status import Status
 from jaxdamp.identify.bayes import Posterior, Spread
-from jaxdamp.identify.candidates import MachineLimits
 from jaxdamp.identify.comparing import Comparison, compare, fit_each
 from jaxdamp.identify.cross_validation import CrossValidation, cross_validate
+from jaxdamp.identify.design_goal import MachineLimits
 from jaxdamp.identify.designing import ExperimentDesign, design_experiment, extent
 from jaxdamp.identify.estimates import Estimate, rounded
 from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import judge
-from jaxdamp.identify.ladder import LAWS, default_ladder, ladder_starts
+from jaxdamp.identify.ladder import LAWS, NAMED_LAWS, LearntStart, NamedLaw, default_ladder, ladder_starts, laws_table
 from jaxdamp.identify.law_result import FitResult
-from jaxdamp.identify.laws import NAMED_LAWS, NamedLaw, laws_table
-from jaxdamp.identify.learnt import LearntStart
 from jaxdamp.identify.machine import OFFSET, machine_names, without_machine
 from jaxdamp.identify.many import fit_many
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import InitialMotion, VehicleTest
-from jaxdamp.identify.predicting import predict_runs
+from jaxdamp.identify.predicting import ErrorShares, Score, error_shares, fit_percent, predict_runs
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals, Problem
-from jaxdamp.identify.profile_curve import ProfileCurve
+from jaxdamp.identify.profile import ProfileCurve
 from jaxdamp.identify.propagation import Band, Evidence, Propagated
 from jaxdamp.identify.record_sensitivity import RecordSensitivity
-from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.result import Fit
 from jaxdamp.identify.rungs import Failure, Rung
 from jaxdamp.identify.scheduling import LeftOutSetting, ScheduledFit, fit_scheduled
-from jaxdamp.identify.scoring import Score, fit_percent
 from jaxdamp.identify.targets import TargetFit, fit_targets
 from jaxdamp.identify.training import Training, train
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
+from jaxdamp.identify.vehicle_residuals import virtual_ride
 from jaxdamp.identify.vehicle_result import ChannelScore, VehicleFit
-from jaxdamp.identify.virtual_ride import virtual_ride
 
 
 __all__ = [
@@ -96,3 +93,5 @@ __all__ = [
     "virtual_ride",
     "without_machine",
 ]
+
+answer_guesses(__name__, __all__)

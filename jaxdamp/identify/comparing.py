@@ -14,16 +14,15 @@ from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Table, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine
-from jaxdamp.identify.recommending import Recommendation, recommendation
-from jaxdamp.identify.rungs import Failure, Rung, ladder_table
+from jaxdamp.identify.rungs import Failure, Recommendation, Rung, ladder_table, recommendation, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
 from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts
-from jaxdamp.identify.verdict import verdict
 
 
 if TYPE_CHECKING:
@@ -159,6 +158,7 @@ class Comparison(AbstractResult):
         return "\n".join([*lines, *about_records, answer, f"best: {self.best.name}"])
 
 
+@of_known_numbers
 def compare(
     laws: Mapping[str, Start],
     runs: Iterable[BenchRun],

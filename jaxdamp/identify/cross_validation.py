@@ -12,13 +12,14 @@ from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, worst_status
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import fit
 from jaxdamp.identify.law_result import AbstractFitted
 from jaxdamp.identify.machine import OFFSET, Machine
 from jaxdamp.identify.preparing import weights
+from jaxdamp.identify.rungs import cannot_choose
 from jaxdamp.identify.starting import Start, check_starts
-from jaxdamp.identify.verdict import cannot_choose
 from jaxdamp.parameters import parameters
 
 
@@ -198,6 +199,7 @@ class CrossValidation(AbstractResult):
         return f"{self.table().to_text()}\nbest: {self.best}"
 
 
+@of_known_numbers
 def cross_validate(
     laws: Mapping[str, Start],
     runs: Iterable[BenchRun],

@@ -1,8 +1,8 @@
-"""What a design of an experiment minimises, and the search for the runs that do."""
+"""What a design of experiments makes small, the runs that it chooses from, and the information of a run."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple, final
 
 import jax
 import jax.numpy as jnp
@@ -10,13 +10,23 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp.bench import BenchRun, Excitation, MultiSineTest, RandomTest, SineTest, TriangleTest
+from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.model import law_of
+from jaxdamp.identify.preparing import prepare
+from jaxdamp.identify.problem import linearised
+from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters, match_paths
+from jaxdamp.rig import Rig
 
 
 VAGUE = 1e3  # standard deviation of a parameter without a prior, relative to its value
 ROUNDS = 20  # of exchanges at most
 WORTH = 1e-9  # relative decrease of a criterion that counts as one
+SPREAD = (1.0, 2.3, 5.3)  # frequencies of a multi-sine, relative to the lowest
+OCTAVES = 3.0  # width of the band of a random test
+FEWEST_CYCLES = 3  # of a run, however slow
+LEAST_STROKE = 1e-4  # m, that a machine moves well
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,3 +113,169 @@ class Goal:
             left.remove(best)
             order.append(best)
         return order
+
+
+class Information(NamedTuple):
+    """What tests say of the free parameters.
+
+    Attributes:
+        free: the free parameters.
+        matrices: Fisher information of each test, in the units of the parameters.
+        force: largest |F| in each test [N].
+        power: mean F v of each test [W].
+    """
+
+    free: FreeParameters
+    matrices: Float[np.ndarray, "tests free free"]
+    force: Float[np.ndarray, " tests"]
+    power: Float[np.ndarray, " tests"]
+
+
+def information(
+    law: AbstractDamper,
+    tests: Sequence[Excitation],
+    *,
+    rig: Rig | None,
+    freeze: Sequence[str],
+    tie: Mapping[str, str] | None,
+    sampling_rate: float,
+    force_noise: float,
+) -> Information:
+    """What tests would say of the free parameters of a law on a machine, by the model that a fit would use.
+
+    Arguments:
+        law: the law, with the values that are expected.
+        tests: the tests.
+        rig: as in `fit`.
+        freeze: as in `fit`.
+        tie: as in `fit`.
+        sampling_rate: of the records [Hz].
+        force_noise: standard deviation of a sample of the force [N], as white noise.
+    """
+    runs = [_motion(test, number, sampling_rate) for number, test in enumerate(tests)]
+    problem = prepare(law, runs, rig=rig, freeze=freeze, tie=tie)
+    residual, jacobian = map(np.asarray, linearised(problem.free, problem.free.values, problem.residuals))
+    batches = [part for part in problem.residuals if isinstance(part, Batch)]
+    weight, measured, velocity = (
+        np.concatenate([np.ravel(getattr(batch, name)) for batch in batches])
+        for name in ("weight", "force", "velocity")
+    )
+    force = np.divide(residual, weight, out=np.zeros_like(residual), where=weight > 0) + measured
+    rows = [np.flatnonzero(problem.used & (problem.owner == i)) for i in range(len(runs))]
+    matrices = np.stack([jacobian[k].T @ jacobian[k] for k in rows]) / force_noise**2
+    largest = np.array([np.max(np.abs(force[k])) for k in rows])
+    power = np.array([np.mean(force[k] * velocity[k]) for k in rows])
+    return Information(problem.free, matrices, largest, power)
+
+
+def _motion(test: Excitation, number: int, sampling_rate: float) -> BenchRun:
+    """A test as a record whose force does not matter."""
+    time = np.arange(round(test.duration * sampling_rate)) / sampling_rate
+    velocity = test.velocity(time)
+    return BenchRun(f"{number}", time, test.stroke(time), velocity, velocity)
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class MachineLimits:
+    """What a test machine can do, and what a damper bears.
+
+    Arguments:
+        stroke: largest |x| [m], zero to peak.
+        velocity: largest |v| [m/s].
+        force: largest |F| [N] of the law on its machine.
+        power: largest mean power ⟨F v⟩ [W] that a run may turn into heat.
+        frequencies: lowest and highest frequency [Hz].
+
+    Raises:
+        ValueError: a limit that is not positive; frequencies that do not increase.
+    """
+
+    stroke: float | int
+    velocity: float | int
+    force: float | int = np.inf
+    power: float | int = np.inf
+    frequencies: tuple[float | int, float | int] = (0.5, 15.0)
+
+    def __post_init__(self) -> None:
+        for name in ("stroke", "velocity", "frequencies"):
+            _checks.positive(name, np.asarray(getattr(self, name), float))
+        for name in ("force", "power"):
+            if not getattr(self, name) > 0:
+                _checks.refuse(name, "be positive", getattr(self, name))
+        if not self.frequencies[0] < self.frequencies[1]:
+            _checks.refuse("frequencies", "increase", self.frequencies)
+
+
+class Point(NamedTuple):
+    """Where a candidate lies in the plane of the limits."""
+
+    waveform: str
+    stroke: float  # m, zero to peak
+    frequency: float  # Hz, the lowest
+
+
+WAVEFORMS = ("sine", "triangle", "random", "multisine")
+
+
+def excitation_at(point: Point, limits: MachineLimits, duration: float) -> Any | None:
+    """The test at a point; `None` if it is outside the limits.
+
+    Arguments:
+        point: where.
+        limits: of the machine.
+        duration: of the run [s]; longer where this is less than `FEWEST_CYCLES`.
+    """
+    waveform, stroke, frequency = point
+    low, high = limits.frequencies
+    cycles = max(int(duration * frequency), FEWEST_CYCLES)
+    name = f"{waveform}_{1e3 * stroke:.3g}mm_{frequency:.3g}Hz"
+    widest = {"sine": 1.0, "triangle": 1.0, "random": 2.0**OCTAVES, "multisine": SPREAD[-1]}[waveform]
+    if not (LEAST_STROKE <= stroke <= limits.stroke and low <= frequency and frequency * widest <= high):
+        return None
+    if waveform == "random":
+        band = (frequency, frequency * widest)
+        return RandomTest(stroke, limits.velocity, cycles / frequency, band, warm_up=1.0 / frequency, name=name)
+    if waveform == "multisine":
+        lines = tuple(frequency * factor for factor in SPREAD)
+        return MultiSineTest(stroke, limits.velocity, lines, cycles / frequency, warm_up=1.0 / frequency, name=name)
+    test = (SineTest if waveform == "sine" else TriangleTest)(stroke, frequency, cycles, name=name)
+    return test if test.peak_velocity <= limits.velocity * (1.0 + 1e-9) else None
+
+
+def grid(
+    limits: MachineLimits, waveforms: Sequence[str], duration: float, strokes: int, frequencies: int
+) -> dict[Point, Excitation]:
+    """Tests over the range of a machine: strokes and frequencies in equal ratios, and on the limit of velocity."""
+    for waveform in waveforms:
+        _checks.one_of("waveforms", waveform, WAVEFORMS)
+    rates = np.geomspace(*limits.frequencies, frequencies)
+    slowest = limits.velocity / (2 * np.pi * limits.frequencies[1])
+    sizes = np.geomspace(max(min(limits.stroke / 10, slowest), LEAST_STROKE), limits.stroke, strokes)
+    points = [
+        Point(waveform, float(stroke), float(rate))
+        for waveform in waveforms
+        for rate in rates
+        for stroke in dict.fromkeys([*sizes, min(limits.velocity / (2 * np.pi * rate), limits.stroke)])
+    ]
+    return _within(points, limits, duration)
+
+
+def near(points: Sequence[Point], ratio: float, limits: MachineLimits, duration: float) -> dict[Point, Excitation]:
+    """Tests around some points: strokes and frequencies a ratio larger and smaller, moved inside the limits."""
+    factors = (1.0 / ratio, 1.0, ratio)
+    around = [
+        point._replace(
+            stroke=min(point.stroke * a, limits.stroke),
+            frequency=float(np.clip(point.frequency * b, *limits.frequencies)),
+        )
+        for point in dict.fromkeys(points)
+        for a in factors
+        for b in factors
+    ]
+    return _within(around, limits, duration)
+
+
+def _within(points: Sequence[Point], limits: MachineLimits, duration: float) -> dict[Point, Excitation]:
+    tests = {point: excitation_at(point, limits, duration) for point in points}
+    return {point: test for point, test in tests.items() if test is not None}

@@ -10,11 +10,10 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import Excitation
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify.candidates import WAVEFORMS, MachineLimits, Point, grid, near
-from jaxdamp.identify.design_goal import Goal
-from jaxdamp.identify.information import Information, information
+from jaxdamp.identify.design_goal import WAVEFORMS, Goal, Information, MachineLimits, Point, grid, information, near
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import Rig
 
@@ -133,6 +132,7 @@ def extent(test: Excitation) -> tuple[float, float]:
     return 1e3 * float(np.max(np.abs(test.stroke(time)))), float(np.max(np.abs(test.velocity(time))))
 
 
+@of_known_numbers
 def design_experiment(
     law: AbstractDamper,
     limits: MachineLimits | None = None,

@@ -3,13 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
-from jaxdamp._tables import Cell, Column, Shown, Table, with_tied
+from jaxdamp._tables import Cell, Column, Shown, Table, rounded, with_tied
 from jaxdamp.parameters import Module, free_parameters
-
-
-PLACES = 3  # decimal places of values in exponential form
 
 
 class Estimate(NamedTuple):
@@ -63,28 +58,6 @@ def describe(minima: Sequence[Minimum], starts: int) -> str:
     parts += [f"{m.starts} in another minimum, chi-square {m.chi_square:.3g} higher" for m in others]
     left = starts - sum(m.starts for m in minima)
     return f"{starts} starts: " + "; ".join([*parts, *[f"{left} given up as worse"] * bool(left)])
-
-
-def rounded(value: float, error: float) -> tuple[str, str]:
-    """A value and its standard error as text, with the significant digits.
-
-    The error has two digits, the value the digits down to the second digit of the error, but at least one.
-
-    Arguments:
-        value: the number.
-        error: its standard error, in the same unit.
-
-    >>> rounded(14361.27, 61.8), rounded(0.9035, 0.2912), rounded(3.2, float("inf"))
-    (('14361', '62'), ('0.90', '0.29'), ('3.2', 'inf'))
-    """
-    if not (np.isfinite(error) and np.isfinite(value) and error > 0):
-        return f"{value:.5g}", f"{error:.2g}"
-    place = int(np.floor(np.log10(error))) - 1
-    place_of_value = min(place, int(np.floor(np.log10(abs(value))))) if value else place
-    if max(abs(value), error) >= 1e9 or place_of_value < -9:
-        return f"{value:.{PLACES}e}", f"{error:.1e}"
-    texts = (f"{round(number, -at):.{max(-at, 0)}f}" for number, at in ((value, place_of_value), (error, place)))
-    return next(texts), next(texts)
 
 
 def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | None = None) -> Table:

@@ -3,13 +3,14 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import jax
 import numpy as np
 import scipy.special
 from jaxtyping import Bool, Float
 
-from jaxdamp.dampers import Reach
+from jaxdamp._triangles import determined, triangle, unit_columns
+from jaxdamp.dampers import Reach, laws_inside
 from jaxdamp.identify.criteria import Priors
-from jaxdamp.identify.ends import at_ends
 from jaxdamp.identify.estimates import Estimate, Minimum
 from jaxdamp.identify.identifiability import on_identifiability
 from jaxdamp.identify.model import START_PATH
@@ -18,14 +19,15 @@ from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.profile import Profile, profile
 from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.several import Solution, minima_of
-from jaxdamp.identify.uncertainty import uncertainty, weak_directions
-from jaxdamp.parameters import FreeParameters
+from jaxdamp.parameters import Coordinates, FreeParameters
 
 
 WEAK = 0.5  # standard error, relative to the value or to the force, above which a parameter is not identifiable
 BOUND_Z_SCORE = 3.0  # standard errors beyond an edge from which a parameter counts as limited by it
 NEARLY = 9.0  # largest increase in chi-square of another minimum that is reported: three standard errors
 APART = 3.0  # standard errors beyond which a parameter of another minimum counts as different
+TAKES_PART = 0.1  # force of a parameter in a direction, relative to the largest, above which it belongs to it
+AT_LIMIT = 1e-4  # distance from a limit given by other parameters, relative to the start, that counts as zero
 
 
 class Estimates(NamedTuple):
@@ -217,3 +219,90 @@ def on_misfit(noise: Noise) -> list[str]:
         " errors count that as noise with the correlation of the residual, which makes them"
         f" {noise.inflation:.3g} times those of independent noise."
     ]
+
+
+class Uncertainty(NamedTuple):
+    """The uncertainty of the parameters due to noise."""
+
+    covariance: Float[np.ndarray, "free free"]
+    unconstrained_step: Float[np.ndarray, " free"]  # step to the minimum without any bounds, in standard errors
+
+
+def uncertainty(
+    jacobian: Float[np.ndarray, "samples free"], residual: Float[np.ndarray, " samples"], noise: Noise
+) -> Uncertainty:
+    """Covariance at a minimum, (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with the covariance Σ of the noise, without edges of parameters.
+
+    A parameter at an edge of its range thus counts as unknown in the errors of the others; if it were taken as fixed,
+    their errors would be too small. A direction with a singular value below `RANK_TOLERANCE` of the largest does not
+    change the force: its parameters get an infinite variance instead of a result of rounding errors.
+
+    Arguments:
+        jacobian: derivatives of the weighted residual by the parameters.
+        residual: the weighted residual.
+        noise: of the weighted residual.
+    """
+    scaled, scale = unit_columns(jacobian)
+    singular, directions = determined(scaled)
+    inverse = (directions.T / singular**2) @ directions
+    lost = np.sum(directions**2, axis=0) < 1.0 - 1e-3
+    whole = inverse @ noise.covariance_of(scaled) @ inverse
+    whole[lost, :] = whole[:, lost] = 0.0
+    whole[lost, lost] = np.inf
+    errors = np.sqrt(np.diag(whole))
+    step = -inverse @ (scaled.T @ residual)
+    steps = np.divide(step, errors, out=np.zeros_like(step), where=errors > 0)
+    return Uncertainty(whole / np.outer(scale, scale), steps)
+
+
+def weak_directions(
+    jacobian: Float[np.ndarray, "samples free"],
+    noise: float,
+    large: Float[np.ndarray, " free"],
+    weak: float,
+) -> list[Float[np.ndarray, " free"]]:
+    """Directions in which parameters change the force separately, but hardly if changed together.
+
+    Arguments:
+        jacobian: derivatives of the weighted residual by the parameters.
+        noise: standard deviation of a weighted sample.
+        large: a large change of each parameter.
+        weak: standard error along a direction, relative to `large`, above which it counts as undetermined.
+
+    Returns:
+        For each direction, changes relative to `large`; zero for parameters with little force in this direction.
+    """
+    reduced = triangle(jacobian * large)
+    _, singular, directions = np.linalg.svd(reduced)
+    singular = np.concatenate([singular, np.zeros(len(directions) - singular.size)])
+    undetermined = directions[singular * weak < noise]
+    forces = np.abs(undetermined) * np.linalg.norm(reduced, axis=0)
+    pairs = zip(undetermined, forces, strict=True)
+    return [np.where(force > TAKES_PART * force.max(), row, 0.0) for row, force in pairs]
+
+
+def at_ends(coordinates: Coordinates, values: Float[np.ndarray, " free"]) -> Float[np.ndarray, " free"]:
+    """−1 for a number at the lower end of its range, 1 at the upper, else 0.
+
+    Neighbours of ordered numbers are ends too, and so are limits that depend on other parameters of a law.
+    """
+    sides = coordinates.at_ends(values)
+    limited = np.isin(coordinates.free.names, list(_at_conditions(coordinates, values)))
+    return np.where(limited & (sides == 0), -1.0, sides)
+
+
+def _at_conditions(coordinates: Coordinates, values: Float[np.ndarray, " free"]) -> set[str]:
+    """Parameters at a limit given by other parameters."""
+    free = coordinates.free
+    scales = {p.path: float(np.max(np.abs(np.asarray(p.value)))) or 1.0 for p in free.chosen}
+    found = set()
+    for prefix, law in laws_inside(free.started_at(values).tree):
+        if not law.has_conditions():
+            continue
+        plain = jax.tree.map(np.asarray, law)
+        for condition in plain.conditions():
+            path = prefix + condition.parameter
+            margin = np.min(getattr(plain, condition.parameter) - condition.least)
+            if path in scales and margin < AT_LIMIT * scales[path]:
+                found.add(path)
+    return found

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, ParamSpec, Protocol, cast, overload, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Protocol, cast, overload, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -12,14 +12,14 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
-from jaxdamp.identify.input_noise import input_noise_bias, on_bias
-from jaxdamp.identify.judging import MOST_WARNINGS, judge
+from jaxdamp.identify.judging import MOST_WARNINGS, input_noise_bias, judge, on_bias
 from jaxdamp.identify.law_result import FitResult
-from jaxdamp.identify.machine import Machine
+from jaxdamp.identify.machine import Machine, holds_static_force, static_force_in_words, with_static_force_on_machine
 from jaxdamp.identify.many import fit_many
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import rig_of
@@ -29,12 +29,15 @@ from jaxdamp.identify.problem import Problem, linearised
 from jaxdamp.identify.search import SearchEnd, Solver
 from jaxdamp.identify.several import Solution, search_from
 from jaxdamp.identify.starting import Start
-from jaxdamp.identify.static_force import holds_static_force, static_force_in_words, with_static_force_on_machine
 from jaxdamp.identify.targets import TargetFit, fit_targets
 from jaxdamp.identify.vehicle_fitting import fit_vehicle
 from jaxdamp.identify.vehicle_result import VehicleFit
 from jaxdamp.parameters import FreeParameters, matched_in_words, parameters
 from jaxdamp.vehicles import AbstractVehicle
+
+
+if TYPE_CHECKING:
+    from jaxdamp.identify.scheduling import ScheduledFit
 
 
 P = ParamSpec("P")
@@ -56,6 +59,10 @@ class FitCall(Protocol[P]):
     @overload
     def __call__(self, law: Start, runs: Mapping[str, BenchRun | Iterable[BenchRun]], **options: Any) -> ManyFits: ...
     @overload
+    def __call__(
+        self, law: Start, runs: Iterable[BenchRun], *, scheduled: Literal[True], **options: Any
+    ) -> "ScheduledFit": ...
+    @overload
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> FitResult: ...
 
 
@@ -64,23 +71,26 @@ def of_any_records(fit: Callable[P, FitResult]) -> FitCall[P]:
 
     @functools.wraps(fit)
     def by_kind(*args: Any, **options: Any) -> Any:
-        names = ("law", "runs")
-        given = dict(zip(names, args, strict=False)) | {name: options[name] for name in names if name in options}
-        model, records = given.get("law", options.get("vehicle")), given.get("runs", options.get("records"))
-        if isinstance(model, AbstractVehicle) and "numbers" not in options:
-            return fit_vehicle(*args, **options)
-        if "numbers" in options:
-            rest = {name: value for name, value in options.items() if name not in (*names, "numbers")}
-            return fit_targets(options["numbers"], model, records, **rest)
+        given: dict[str, Any] = dict(zip(("law", "runs"), args, strict=False)) | options
+        model = given.pop("law") if "law" in given else given.pop("vehicle", None)
+        records = given.pop("runs") if "runs" in given else given.pop("records", None)
+        if "numbers" in given:
+            return fit_targets(given.pop("numbers"), model, cast(Any, records), **given)
+        if isinstance(model, AbstractVehicle):
+            return fit_vehicle(model, cast(Any, records), **given)
         if isinstance(records, Mapping):
-            rest = {name: value for name, value in options.items() if name not in names}
-            return fit_many(model, records, **rest)
+            return fit_many(cast(Any, model), records, **given)
+        if given.pop("scheduled", False):
+            from jaxdamp.identify.scheduling import fit_scheduled  # which is made of fits of a law
+
+            return fit_scheduled(cast(Any, model), cast(Any, records), **given)
         return fit(*args, **options)
 
     return cast(FitCall[P], by_kind)
 
 
 @of_any_records
+@of_known_numbers
 def fit(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],
@@ -106,7 +116,8 @@ def fit(
     """Fit a damper law to bench records by least squares on the force, or another model to what was measured of it.
 
     `fit(law, runs)` is described here. `fit(vehicle, records)` is `fit_vehicle`, `fit(law, {"A": runs, "B": runs})` of
-    many dampers is `fit_many`, and `fit(model, {"frequency": 1.2}, numbers=function)` is `fit_targets`.
+    many dampers is `fit_many`, `fit(model, {"frequency": 1.2}, numbers=function)` is `fit_targets`, and
+    `fit(law, runs, scheduled=True)` of records at several settings is `fit_scheduled`.
 
     Minimises Σ ((F_law − F_measured)/σ)² over all samples of all records, with Levenberg-Marquardt inside the domains
     of the parameters, and Jacobians by forward-mode differentiation through the law and its states. Where the law is

@@ -17,10 +17,9 @@ from jaxdamp.identify.initial_states import moving_samples
 from jaxdamp.identify.judging import fitted_models
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.model import Model, is_memoryless
-from jaxdamp.identify.predicting import predict_by_record, used_samples
+from jaxdamp.identify.predicting import Score, predict_by_record, score_of, used_samples
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
-from jaxdamp.identify.scoring import Score, score_of
 
 
 PARTS = 4  # into which records, or the time of each record, are divided

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp._tables import plus_minus
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.estimates import Estimate
 from jaxdamp.identify.model import STARTS
@@ -17,6 +18,7 @@ from jaxdamp.identify.traces import Batch
 MOST = 0.95  # part of the squared effect on the force that counts as all of it
 RARE = 0.15  # share of the samples that show an effect below which this is the reason
 FAST, SLOW = 0.8, 0.25  # of the largest velocity: above, or below, which an effect is one of fast or slow motion
+SPREAD = 0.8  # share of the velocities of the records that counts as all of them
 ALIKE = 0.1  # relative difference below which frequencies or amplitudes of records count as one
 
 
@@ -29,11 +31,17 @@ class Effect(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The reason why so few samples cannot determine the parameter; empty if they are not few."""
+        """The reason why so few samples cannot determine the parameter; empty if they are not few.
+
+        >>> Effect(0.09, (-1.57, 1.46), 1.6).words
+        'only 9 % of the samples show it, at all velocities'
+        """
         if self.share >= RARE:
             return ""
         low, high = self.velocities
-        return f"only {100 * self.share:.2g} % of the samples show it, at velocities from {low:.3g} to {high:.3g} m/s"
+        everywhere = high - low > SPREAD * 2.0 * self.largest
+        where = "all velocities" if everywhere else f"velocities from {low:.3g} to {high:.3g} m/s"
+        return f"only {100 * self.share:.2g} % of the samples show it, at {where}"
 
     @property
     def remedy(self) -> str:
@@ -100,7 +108,7 @@ def on_identifiability(
             remedy = (effect and effect.remedy) or "Freeze it or add records that excite it."
             remedy = "It keeps the value that is expected from the motion." if e.name.startswith(STARTS) else remedy
             notes.append(
-                f"{e.name} is not identifiable from these records ({e.value:.3g} ± {e.standard_error:.2g}{unit})"
+                f"{e.name} is not identifiable from these records ({plus_minus(e.value, e.standard_error)}{unit})"
                 + f": {reason}" * bool(reason)
                 + f". {remedy}"
             )

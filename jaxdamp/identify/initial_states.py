@@ -1,14 +1,17 @@
 """The states of a law at the start of a record: at rest, after a warm-up cycle, periodic, or estimated."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias, final
 from weakref import WeakKeyDictionary
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
+from jaxdamp._root import ImplicitDerivatives
 from jaxdamp._types import Scalar, State
 from jaxdamp.bench import BenchRun, moving_part
 from jaxdamp.dampers import AbstractDamper
@@ -103,13 +106,73 @@ def repeated_motion(run: BenchRun, channels: Sequence[np.ndarray], step: float) 
     return lambda times: np.asarray(spline(times))
 
 
-class _Round(NamedTuple):
-    """A round of the search for the periodic solution."""
+_Setting: TypeAlias = tuple[AbstractDamper, Cycle]
 
-    state: State
-    otherwise: State  # the states a cycle after those before, if `state` is further from the periodic solution
-    error: Scalar  # of those before
-    rounds: Scalar
+
+def _a_cycle_later(state: State, setting: _Setting) -> tuple[State, State]:
+    """The states after a cycle, and their largest values on the way."""
+    law, cycle = setting
+
+    def step(now: tuple[State, State], ends: tuple[Array, ...]) -> tuple[tuple[State, State], None]:
+        x0, v0, x1, v1 = ends
+        state = law.advance(x0, v0, x1, v1, now[0], cycle.dt)
+        return (state, jnp.maximum(now[1], jnp.abs(state))), None
+
+    ends = (cycle.stroke[:-1], cycle.velocity[:-1], cycle.stroke[1:], cycle.velocity[1:])
+    return jax.lax.scan(step, (state, jnp.abs(state)), ends)[0]
+
+
+def _linearised(state: State, setting: _Setting) -> tuple[State, Float[Array, "state state"], Scalar]:
+    """P(s), J and the relative change."""
+
+    def both(state: State) -> tuple[State, tuple[State, State]]:
+        later, largest = _a_cycle_later(state, setting)
+        return later, (later, largest)
+
+    slopes, (later, largest) = jax.jacfwd(both, has_aux=True)(state)
+    scale = jnp.where(largest > 0, largest, 1.0)
+    return later, slopes, jnp.max(jnp.abs(later - state) / scale)
+
+
+class _Before(NamedTuple):
+    """What the search for the periodic solution remembers of the states before."""
+
+    otherwise: State  # a cycle after them, if the present ones are further from the periodic solution
+    error: Scalar
+
+
+@final
+class _Extrapolation(optx.AbstractFixedPointSolver):
+    """From P(s) − s over 2²⁰ cycles; by single cycles where that leads away."""
+
+    atol: float = SETTLED
+    rtol: float = 0.0
+    norm: Callable[[Any], Array] = eqx.field(static=True, default=optx.max_norm)
+
+    def init(self, fn: Any, y: Any, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any) -> _Before:
+        """Nothing is known of the first states."""
+        return _Before(y, jnp.full((), jnp.inf, y.dtype))
+
+    def step(self, fn: Any, y: Any, args: Any, options: Any, state: _Before, tags: Any) -> tuple[State, _Before, None]:
+        """One extrapolation, or a cycle after the states before if these were better."""
+        later, slopes, error = _linearised(y, args)
+        worse = ~(error < state.error)
+        ahead = y + _sums_of_powers(slopes)[0] @ (later - y)
+        ahead = jnp.where(jnp.all(jnp.isfinite(ahead)), ahead, later)
+        before = _Before(jnp.where(worse, state.otherwise, later), jnp.where(worse, jnp.inf, error))
+        return jnp.where(worse, state.otherwise, ahead), before, None
+
+    def terminate(
+        self, fn: Any, y: Any, args: Any, options: Any, state: _Before, tags: Any
+    ) -> tuple[Bool[Array, ""], optx.RESULTS]:
+        """Where a cycle changes nothing, or cannot be computed."""
+        return ~(state.error > self.atol), optx.RESULTS.successful
+
+    def postprocess(
+        self, fn: Any, y: Any, aux: Any, args: Any, options: Any, state: Any, tags: Any, result: Any
+    ) -> tuple[Any, Any, dict[str, Any]]:
+        """As it is."""
+        return y, aux, {}
 
 
 def periodic_state(law: AbstractDamper, cycle: Cycle) -> tuple[State, Scalar]:
@@ -118,58 +181,27 @@ def periodic_state(law: AbstractDamper, cycle: Cycle) -> tuple[State, Scalar]:
     With the states s, the map P over one cycle and J = ∂P/∂s, the search extrapolates from P(s) − s over 2²⁰ cycles,
     Σ Jᵏ (P(s) − s), which is Newton's method for P(s) = s where states are forgotten, and leaves alone what a law
     conserves. Where that leads away, it goes on by single cycles. The derivatives are those of the implicit function
-    theorem, in the same sum.
+    theorem, in the same sum: 1 − J, which `optimistix.ImplicitAdjoint` would invert, is singular for such a law.
 
     Returns:
         The states at the first instant of the cycle, and their change over a cycle relative to their largest values.
     """
-
-    def a_cycle_later(law: AbstractDamper, state: State) -> tuple[State, State]:
-        def step(now: tuple[State, State], ends: tuple[Array, ...]) -> tuple[tuple[State, State], None]:
-            x0, v0, x1, v1 = ends
-            state = law.advance(x0, v0, x1, v1, now[0], cycle.dt)
-            return (state, jnp.maximum(now[1], jnp.abs(state))), None
-
-        ends = (cycle.stroke[:-1], cycle.velocity[:-1], cycle.stroke[1:], cycle.velocity[1:])
-        return jax.lax.scan(step, (state, jnp.abs(state)), ends)[0]
-
-    fixed = jax.lax.stop_gradient(law)
-    begin = law.initial_state()
-
-    def linearised(state: State) -> tuple[State, Float[Array, "state state"], Scalar]:
-        """P(s), J and the relative change."""
-
-        def both(state: State) -> tuple[State, tuple[State, State]]:
-            later, largest = a_cycle_later(fixed, state)
-            return later, (later, largest)
-
-        slopes, (later, largest) = jax.jacfwd(both, has_aux=True)(state)
-        scale = jnp.where(largest > 0, largest, 1.0)
-        return later, slopes, jnp.max(jnp.abs(later - state) / scale)
-
-    def going(now: _Round) -> Bool[Array, ""]:
-        return (now.error > SETTLED) & (now.rounds < MOST_ROUNDS)
-
-    def again(now: _Round) -> _Round:
-        later, slopes, error = linearised(now.state)
-        worse = ~(error < now.error)
-        sums = _sums_of_powers(slopes)[0]
-        ahead = now.state + sums @ (later - now.state)
-        ahead = jnp.where(jnp.all(jnp.isfinite(ahead)), ahead, later)
-        return _Round(
-            jnp.where(worse, now.otherwise, ahead),
-            jnp.where(worse, now.otherwise, later),
-            jnp.where(worse, jnp.inf, error),
-            now.rounds + 1,
-        )
-
+    setting, begin = (jax.lax.stop_gradient(law), cycle), law.initial_state()
     first = jax.lax.stop_gradient(begin)
-    start = a_cycle_later(fixed, first)[0]
-    begun = _Round(start, start, jnp.full((), jnp.inf, start.dtype), jnp.zeros((), int))
-    state = jax.lax.stop_gradient(jax.lax.while_loop(going, again, begun).state)
-    _, slopes, error = jax.lax.stop_gradient(linearised(state))
+    start = _a_cycle_later(first, setting)[0]
+    found = optx.fixed_point(
+        lambda state, setting: _a_cycle_later(state, setting)[0],
+        _Extrapolation(),
+        start,
+        setting,
+        max_steps=MOST_ROUNDS,
+        adjoint=ImplicitDerivatives(),
+        throw=False,
+    )
+    state = jax.lax.stop_gradient(found.value)
+    _, slopes, error = jax.lax.stop_gradient(_linearised(state, setting))
     sums, last = _sums_of_powers(slopes)
-    return state + sums @ (a_cycle_later(law, state)[0] - state) + last @ (begin - first), error
+    return state + sums @ (_a_cycle_later(state, (law, cycle))[0] - state) + last @ (begin - first), error
 
 
 def _sums_of_powers(slopes: Float[Array, "state state"]) -> tuple[Float[Array, "state state"], ...]:

@@ -1,11 +1,15 @@
-"""The ladder: laws from simple to complex, each with a start from the records."""
+"""The ladder of laws: their names, their starts, and starts that are learnt from the records."""
 
+import dataclasses
 import functools
 from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple, final
 
+import jax
 import numpy as np
 
-from jaxdamp import _checks
+from jaxdamp import _checks, dampers
+from jaxdamp._tables import Column, Table
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import (
     AbstractDamper,
@@ -18,6 +22,7 @@ from jaxdamp.dampers import (
     Lag,
     Linear,
     LuGre,
+    NeuralHysteresis,
     PiecewiseLinear,
     Play,
     Polynomial,
@@ -25,14 +30,19 @@ from jaxdamp.dampers import (
     SegmentedPolynomial,
     SeriesSpring,
     Spring,
-    Table,
     ViscoPlastic,
 )
 from jaxdamp.identify.fitting import NUMERICAL
-from jaxdamp.identify.laws import NAMED_LAWS
-from jaxdamp.identify.learnt import LearntStart
 from jaxdamp.identify.machine import OFFSET, Machine, lag_time, started_on
-from jaxdamp.identify.starting import Start
+from jaxdamp.identify.starting import AbstractTrainedStart, Start
+from jaxdamp.identify.training import Training, train
+
+
+WEIGHTS = ("hidden_weights", "hidden_biases", "output_weights", "output_biases")
+KEYS = 3
+STEPS, PATIENCE, LEARNING_RATE = 300, 100, 0.05  # of the training
+SAMPLES_PER_CYCLE = 100
+FEWEST = 2  # records: one to stop by, the others to train on
 
 
 def _friction(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
@@ -54,12 +64,51 @@ _MEMORYLESS = {
     "polynomial": Polynomial.guess,
     "segmented_polynomial": SegmentedPolynomial.guess,
     "piecewise_linear": PiecewiseLinear.guess,
-    "table": Table.guess,
+    "table": dampers.Table.guess,
     "besinger": Besinger.guess,
     "linear_friction": _friction,
 }
 _BESIDE_SPRING = {"lugre_spring": LuGre.guess, "visco_plastic_spring": ViscoPlastic.guess}
 LEARNT = "neural_hysteresis_spring"
+
+
+class NamedLaw(NamedTuple):
+    """A law that can be fitted by name.
+
+    Attributes:
+        hysteresis: whether the law has states.
+        meaning: of the law, in words.
+        optional: fitted only where it is asked for by name.
+    """
+
+    hysteresis: bool
+    meaning: str
+    optional: bool = False
+
+
+NAMED_LAWS = {
+    "linear": NamedLaw(False, "one damping coefficient"),
+    "bilinear": NamedLaw(False, "one coefficient in rebound, one in compression"),
+    "power_law": NamedLaw(False, "power of the velocity with an offset, on each side"),
+    "polynomial": NamedLaw(False, "odd and even powers of the velocity, up to the fifth"),
+    "segmented_polynomial": NamedLaw(False, "five polynomials that join, monotone"),
+    "piecewise_linear": NamedLaw(False, "straight lines between knees"),
+    "table": NamedLaw(False, "forces at fixed velocities, straight lines between them"),
+    "besinger": NamedLaw(False, "smooth change from compression to rebound, with a blow-off valve"),
+    "linear_friction": NamedLaw(False, "one coefficient and smooth Coulomb friction"),
+    "besinger_lag": NamedLaw(True, "besinger behind a first-order lag"),
+    "besinger_series_spring": NamedLaw(True, "besinger in series with a spring: mount, bushing or oil column"),
+    "linear_friction_lag": NamedLaw(True, "linear_friction behind a first-order lag"),
+    "bouc_wen": NamedLaw(True, "one coefficient, friction that gives before it slides, a spring"),
+    "lugre_spring": NamedLaw(True, "friction that sticks, breaks away and slides, one coefficient, a spring"),
+    "besinger_play": NamedLaw(True, "besinger behind a clearance: worn joint, loose mount, void in the oil"),
+    "series_spring_dahl": NamedLaw(True, "piecewise_linear in series with a spring, elastic friction, a spring"),
+    "visco_plastic_spring": NamedLaw(True, "concave viscous force, two yielding elements, a spring"),
+    "neural_hysteresis_spring": NamedLaw(
+        True, "one coefficient, hysteresis learnt by a network, a spring; takes minutes, only by name", optional=True
+    ),
+}
+
 LAWS = tuple(name for name, law in NAMED_LAWS.items() if not law.optional)
 
 
@@ -154,3 +203,66 @@ def _start(name: str, runs: Sequence[BenchRun]) -> AbstractDamper:
 def _stiffness(law: AbstractMemoryless, lag: float, velocity: np.ndarray) -> float:
     """Stiffness [N/m] in series with which a law has this lag [s]."""
     return max(_rate(law, velocity), 1.0) / lag
+
+
+def laws_table() -> Table:
+    """The laws of `default_ladder`, from simple to complex: name, hysteresis, description."""
+    columns = (Column("law"), Column("hysteresis"), Column("what it is"))
+    rows = ((name, "yes" if law.hysteresis else "no", law.meaning) for name, law in NAMED_LAWS.items())
+    return Table("Laws", columns, tuple(rows))
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class LearntStart(AbstractTrainedStart):
+    """`Linear + NeuralHysteresis + Spring`, trained on the records that a fit gives it, as a start for this fit.
+
+    The record of middle peak velocity decides, as a whole, when to stop the training and which key of the random
+    weights is best; the law is trained on all others. A fit that starts from here changes only the coefficient, the
+    stiffnesses and the spring; the weights stay, since a fit to all records would undo the early stopping. The same
+    records and keys give the same law. `cross_validate` trains without the record that it holds out.
+
+    Arguments:
+        keys: number of random starts, keys 0, 1, ....
+        options: passed on to `train`.
+
+    >>> LearntStart(keys=2).freeze[0]
+    'hidden_weights'
+    """
+
+    keys: int = KEYS
+    options: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    @property
+    def freeze(self) -> tuple[str, ...]:
+        """The parameters that a fit holds at the values of the training."""
+        return WEIGHTS
+
+    def __call__(self, runs: Sequence[BenchRun]) -> AbstractDamper:
+        """The law of the key with the smallest error on the record to stop by."""
+        return min(self.trainings(runs), key=lambda training: training.held_out_rmse).law
+
+    def trainings(self, runs: Sequence[BenchRun]) -> list[Training]:
+        """The training from each key.
+
+        Raises:
+            ValueError: fewer than two records.
+        """
+        if len(runs) < FEWEST:
+            must = "hold two records or more, as one of them decides when the training stops"
+            _checks.refuse("runs", must, f"{len(runs)}", "Take a law with few parameters.")
+        stop = sorted(range(len(runs)), key=lambda i: runs[i].peak_velocity)[len(runs) // 2]
+        rest = [run for i, run in enumerate(runs) if i != stop]
+        how: dict[str, Any] = {"steps": STEPS, "patience": PATIENCE, "learning_rate": LEARNING_RATE}
+        how |= {"weighting": "runs", "samples_per_cycle": SAMPLES_PER_CYCLE} | self.options
+        return [train(self.untrained(rest, key), rest, held_out=runs[stop], **how) for key in range(self.keys)]
+
+    def untrained(self, runs: Sequence[BenchRun], key: int = 0) -> AbstractDamper:
+        """A third of the damping in one coefficient, random weights, and the spring of the records."""
+        velocity, force, stroke = (
+            np.concatenate([getattr(run, channel) for run in runs]) for channel in ("velocity", "force", "stroke")
+        )
+        speed, level = (float(np.sqrt(np.mean(values**2))) for values in (velocity, force))
+        network = NeuralHysteresis.random(jax.random.key(key), velocity_scale=speed, force_scale=level)
+        rate = float(np.asarray(Linear.guess(velocity, force).rate)) / 3.0
+        return Linear(rate) + network + Spring.guess(velocity, force, stroke)

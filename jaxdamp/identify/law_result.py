@@ -17,12 +17,10 @@ from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.estimates import parameter_table
 from jaxdamp.identify.model import Model, RecordStart, on_rig
-from jaxdamp.identify.predicting import predict_runs
+from jaxdamp.identify.predicting import ErrorShares, Score, error_shares, predict_runs, score
 from jaxdamp.identify.propagation import Band, band
 from jaxdamp.identify.record_sensitivity import RecordSensitivity, sensitivity_to_records
-from jaxdamp.identify.residual import ErrorShares, error_shares
 from jaxdamp.identify.result import Fit
-from jaxdamp.identify.scoring import Score, score
 from jaxdamp.rig import Rig
 
 

@@ -1,6 +1,8 @@
 """`fit_many`: one law fitted to many dampers, clicks or temperatures in one call."""
 
+import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -10,20 +12,21 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
-from jaxdamp.dampers import Reach
-from jaxdamp.identify.criteria import FIRST_NOISE, LOSSES, priors_on
-from jaxdamp.identify.dependence import Dependence, dependence
+from jaxdamp.dampers import AbstractDamper, Reach
+from jaxdamp.identify.criteria import FIRST_NOISE, LOSSES, Priors, priors_on
+from jaxdamp.identify.dependence import OWN, Dependence, dependence
 from jaxdamp.identify.initial_states import INITIAL_STATES
 from jaxdamp.identify.lanes import LanePriors, Lanes, Products, grouped_records
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
 from jaxdamp.identify.many_criteria import Fitted, by_rounds, noise_level
 from jaxdamp.identify.many_result import ManyFits
-from jaxdamp.identify.model import on_rig
+from jaxdamp.identify.model import initial_state_for, on_rig, rig_of
 from jaxdamp.identify.preparing import weights
 from jaxdamp.identify.several import other_starts
 from jaxdamp.identify.starting import Start
-from jaxdamp.parameters import Coordinates, free_parameters
+from jaxdamp.parameters import Coordinates, FreeParameters, free_parameters
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, SearchLanes, least_squares_on_host
 
 
@@ -32,6 +35,7 @@ BLIND = 1e-12  # eigenvalue of JᵀJ, relative to the largest, below which a dir
 CALL = 'fit_many(law, {"A": runs_of_a, "B": runs_of_b})'
 
 
+@of_known_numbers
 @one_thread()
 def fit_many(
     law: Start,
@@ -55,8 +59,8 @@ def fit_many(
     """Fit one law to many dampers at once: the same least squares as `fit`, for all of them side by side.
 
     All records are computed in one compiled call for each step, and each damper ends by itself. Standard errors are
-    those of the linearised problem, increased where the residual is correlated; the further checks of `fit` (other
-    minima, profiles, groups of undetermined parameters) are left to `fit` of single dampers.
+    those of the linearised problem, increased where the residual is correlated; `many.fit(name)` is the fit of one
+    damper with the further checks (other minima, profiles, groups of undetermined parameters).
 
     With `shared`, parameters are common to all dampers or polynomials of a setting, such as the clicks of an adjuster
     or the temperature. All dampers are then one problem, in which each counts relative to the level of its force, and
@@ -74,11 +78,13 @@ def fit_many(
         settings: one number for each damper.
         weighting: of the records of a damper: `"samples"` or `"runs"`, as in `fit`.
         loss: as in `fit`; each damper has its own weights.
-        priors: as in `fit`, the same for every damper; they count against the noise that the standard errors assume.
-        initial_state: of a law with states, as in `fit`, but not "estimated"; dampers whose states drift in a motion
-            that is said to be periodic have a remark.
+        priors: as in `fit`, the same for every damper, once for all of a shared parameter; they count against the noise
+            that the standard errors assume.
+        initial_state: of a law with states, as in `fit`; dampers whose states drift in a motion that is said to be
+            periodic have a remark. With "estimated" the dampers are fitted one after the other.
         samples_per_cycle: slow records are averaged in blocks down to this number.
-        starts: largest number of starts of each damper, side by side: `law`, then those that it proposes.
+        starts: largest number of starts of each damper, side by side: `law`, then those that it proposes. Shared
+            parameters then begin where the fits of single dampers end.
         max_steps: largest number of steps of each search.
         bad_records: "refuse", "leave_out" or "keep" records with an error, as in `fit`; a damper keeps one at least.
 
@@ -108,9 +114,6 @@ def fit_many(
     _checks.one_of("weighting", weighting, ["samples", "runs"])
     _checks.one_of("loss", loss, LOSSES)
     _checks.one_of("initial_state", initial_state, INITIAL_STATES)
-    if initial_state == "estimated":
-        remedy = 'Fit one damper: `fit(law, runs, initial_state="estimated")`.'
-        _checks.refuse("initial_state", "need no numbers of each record", "'estimated'", remedy)
     for name, count in (("max_steps", max_steps), ("starts", starts)):
         if count < 1:
             _checks.refuse(name, "be 1 or more", count)
@@ -123,34 +126,38 @@ def fit_many(
     model, absent = on_rig(begun, machine), [*absent_paths(machine), *held]
     free = free_parameters(model, freeze=[*freeze, *absent], bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
+    depends = dependence(free, shared, settings, len(names))
+    how = {"rig": rig, "freeze": freeze, "bounds": bounds, "tie": tie, "weighting": weighting, "loss": loss}
+    how |= {"priors": priors, "initial_state": initial_state, "samples_per_cycle": samples_per_cycle}
+    how |= {"max_steps": max_steps, "bad_records": "keep"}
+    stated = None if settings is None else tuple(float(s) for s in settings)
+    if initial_state == "estimated" and initial_state_for(model, initial_state) == initial_state:
+        if depends is not None:
+            remedy = "Leave out `shared`, or take another `initial_state`."
+            _checks.refuse("initial_state", "be the same for dampers that share parameters", "'estimated'", remedy)
+        return _one_by_one(names, records, stated, begun, free, how | {"starts": starts})
     coordinates = Coordinates(free, smooth="ordered")
     sigma = [weights(weighting, runs) for runs in records]
-    groups = grouped_records(model, records, sigma, samples_per_cycle, initial_state)
+    groups = grouped_records(model, records, sigma, samples_per_cycle, initial_state_for(model, initial_state))
     lanes = Lanes(coordinates, groups, np.arange(len(names)))
-    depends = dependence(free, shared, settings, len(names))
-    if depends is not None and starts > 1:
-        _checks.refuse("starts", "be 1 with shared parameters", starts, "Fit the dampers apart first.")
-    if depends is not None and (loss != "squares" or priors):
-        name, value = ("loss", loss) if loss != "squares" else ("priors", ", ".join(priors or {}))
-        _checks.refuse(
-            name, "be left out with shared parameters", value, "Fit the dampers apart, or leave out `shared`."
-        )
     if priors:
         noise = FIRST_NOISE * lanes.levels() / np.sqrt(lanes.samples())
-        lanes = lanes._replace(priors=LanePriors(priors_on(free, priors, 1.0)[0], noise))
+        lanes = lanes._replace(priors=LanePriors(_once(priors_on(free, priors, 1.0)[0], free, depends), noise))
     lanes, begin = _with_other_starts(lanes, records, starts)
+    if depends is not None and starts > 1:  # each alone first, from where all together begin
+        alone, best, _ = _solved(lanes, begin, None, max_steps)
+        lanes, begin = lanes._replace(damper=np.arange(len(names))), alone.y[best]
     end, best, vector = _solved(lanes, begin, depends, max_steps)
     lanes = lanes._replace(damper=np.arange(len(names)))
-    if depends is None:
-        found = by_rounds(lanes, end.of(best), loss, lambda some, y: _solved(some, y, None, max_steps)[0])
-    else:
-        found = Fitted(lanes, end, np.ones(len(names)), np.zeros(len(names)))
+    found = by_rounds(lanes, end.of(best), loss, lambda some, y: _solved(some, y, depends, max_steps)[0], depends)
+    if depends is not None and (loss != "squares" or priors):
+        vector = depends.start(found.end.y)
     end, fitted = found.end, _physical(coordinates, found.end.y)
     errors, percent, rmse, record_rmse, drift = _judged(found, depends, [len(runs) for runs in records])
     return ManyFits(
         names=tuple(names),
         records=tuple(records),
-        settings=None if settings is None else tuple(float(s) for s in settings),
+        settings=stated,
         values=fitted,
         standard_errors=errors,
         fit_percent=percent,
@@ -163,7 +170,48 @@ def fit_many(
         record_rmse=record_rmse,
         share_left_out=found.share_left_out,
         drift=drift,
+        options=how,
     )
+
+
+def _one_by_one(
+    names: Sequence[str],
+    records: Sequence[tuple[BenchRun, ...]],
+    settings: tuple[float, ...] | None,
+    law: AbstractDamper,
+    free: FreeParameters,
+    how: dict[str, Any],
+) -> ManyFits:
+    """Each damper by a fit of its own, where records have numbers of their own: states at their beginning."""
+    from jaxdamp.identify.fitting import fit  # which hands many dampers to this file
+
+    results = [fit(law, runs, **how) for runs in records]
+    paths = free.names if rig_of(free.tree) else [f"law.{name}" for name in free.names]
+    estimates = [[result.estimate(path) for path in paths] for result in results]
+    return ManyFits(
+        names=tuple(names),
+        records=tuple(records),
+        settings=settings,
+        values=np.array([[e.value for e in row] for row in estimates]),
+        standard_errors=np.array([[e.standard_error for e in row] for row in estimates]),
+        fit_percent=np.array([result.fit_percent for result in results]),
+        rmse=np.array([result.rmse for result in results]),
+        status=tuple(result.status for result in results),
+        steps=np.array([result.steps for result in results]),
+        free=free,
+        record_rmse=tuple(np.array([score.rmse for score in result.scores]) for result in results),
+        share_left_out=np.array([result.evidence.problem.share_left_out for result in results if result.evidence]),
+        options=how,
+    )
+
+
+def _once(priors: Priors, free: FreeParameters, depends: Dependence | None) -> Priors:
+    """Priors that count once for all dampers together where a parameter is shared."""
+    if depends is None:
+        return priors
+    shared = {p.path for p, degree in zip(free.owners, depends.degree, strict=True) if degree != OWN}
+    count = np.array([len(depends.column) if path in shared else 1 for path in priors.paths])
+    return dataclasses.replace(priors, deviation=priors.deviation * jnp.asarray(np.sqrt(count)))
 
 
 def _named(dampers: object) -> tuple[list[str], list[tuple[BenchRun, ...]]]:

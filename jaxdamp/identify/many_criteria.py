@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp.identify.criteria import HALF, LOSSES, ROUNDS, SETTLED, noise_factor
+from jaxdamp.identify.dependence import Dependence
 from jaxdamp.identify.lanes import Lanes
 from jaxdamp.identify.noise import CORRELATED, correlation_time
 from jaxdamp.identify.problem import ROUNDING
@@ -43,7 +44,11 @@ def noise_level(weighted: list[np.ndarray], free: float | int) -> float:
 
 
 def by_rounds(
-    plain: Lanes, end: SearchLanes, loss: str, solve: Callable[[Lanes, Float[np.ndarray, "lanes free"]], SearchLanes]
+    plain: Lanes,
+    end: SearchLanes,
+    loss: str,
+    solve: Callable[[Lanes, Float[np.ndarray, "lanes free"]], SearchLanes],
+    depends: Dependence | None = None,
 ) -> Fitted:
     """Least squares again with new weights, until each damper moves no more; each ends by itself.
 
@@ -52,6 +57,7 @@ def by_rounds(
         end: the ends of plain least squares.
         loss: a name in `LOSSES`.
         solve: least squares of some lanes from some coordinates.
+        depends: of dampers that share parameters, which move and end together.
     """
     count, free = end.y.shape
     lanes, factor, share = plain, np.ones(count), np.zeros(count)
@@ -73,8 +79,8 @@ def by_rounds(
                 weight = LOSSES[loss].weight(together / spread)
                 factor[i], share[i] = noise_factor(LOSSES[loss], together / spread), np.mean(weight < HALF)
                 _put(roots, used, np.sqrt(weight))
-        moving = np.flatnonzero(still)
-        if not moving.size:
+        moving = np.flatnonzero(still | (depends is not None))
+        if not np.any(still):
             break
         priors = lanes.priors and lanes.priors._replace(noise=np.where(still, noise, lanes.priors.noise))
         groups = tuple(
@@ -83,8 +89,13 @@ def by_rounds(
         )
         lanes = plain._replace(groups=groups, priors=priors)
         found = solve(lanes._replace(damper=moving), y[moving])
-        length = np.sqrt(np.maximum(np.diagonal(found.aux, axis1=1, axis2=2)[:, :-1], 0.0)) * levels[moving, None]
-        settled = np.all(np.abs(found.y - y[moving]) * length < SETTLED * noise[moving, None], axis=1)
+        length = np.sqrt(np.maximum(np.diagonal(found.aux, axis1=1, axis2=2)[:, :-1], 0.0))
+        if depends is None:
+            steps_made = np.abs(found.y - y[moving]) * length * levels[moving, None]
+            settled = np.all(steps_made < SETTLED * noise[moving, None], axis=1)
+        else:
+            step = np.abs(depends.start(found.y) - depends.start(y)) * length[0]
+            settled = np.full(count, np.all(step < SETTLED * np.mean(noise / levels)))
         y[moving], gram[moving] = found.y, found.aux
         steps[moving] += found.steps
         for i, own in zip(moving, found.status, strict=True):

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
@@ -14,18 +15,19 @@ from jaxdamp._status import Status
 from jaxdamp._tables import Column, Shown, Table, plain, with_unit
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, Scheduled, with_fitted_range
-from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.dependence import OWN, Dependence
 from jaxdamp.identify.estimates import rounded
 from jaxdamp.identify.estimating import WEAK
 from jaxdamp.identify.initial_states import DRIFT
-from jaxdamp.identify.model import Model, law_of, rig_of, with_range
+from jaxdamp.identify.model import Model, covered_range, law_of, rig_of, with_range
 from jaxdamp.parameters import Coordinates, FreeParameters
 from jaxdamp.rig import Rig
 
 
 if TYPE_CHECKING:
     import matplotlib.figure
+
+    from jaxdamp.identify.law_result import FitResult
 
 
 OUTLYING = 6.0  # robust standard deviations from the other dampers from which one is named
@@ -56,6 +58,7 @@ class ManyFits(AbstractResult):
         share_left_out: of the samples of each damper, to which a robust loss gives less than half weight.
         drift: largest relative change of the states of each damper over the cycle before a record that starts in the
             periodic solution.
+        options: of the call, for `fit` of one damper.
     """
 
     names: tuple[str, ...]
@@ -73,6 +76,7 @@ class ManyFits(AbstractResult):
     record_rmse: tuple[Float[np.ndarray, " _"], ...] = ()
     share_left_out: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
     drift: Float[np.ndarray, " _"] = dataclasses.field(default_factory=lambda: np.zeros(0))
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -103,6 +107,20 @@ class ManyFits(AbstractResult):
         """The fitted law of the damper of that name."""
         _checks.one_of("name", name, self.names)
         return self.laws[self.names.index(name)]
+
+    def fit(self, name: str, **options: Any) -> "FitResult":
+        """The fit of one damper with everything that `identify.fit` gives: several minima, profiles, bias, states.
+
+        It starts at the law of this damper, with the options of `fit_many`; parameters that are shared are not held.
+
+        Arguments:
+            name: of the damper.
+            options: others of `identify.fit`, such as `input_noise`.
+        """
+        from jaxdamp.identify.fitting import fit  # which hands many dampers to `fit_many`
+
+        _checks.one_of("name", name, self.names)
+        return fit(self[name], self.records[self.names.index(name)], **{**self.options, **options})
 
     def law_at(self, setting: float, blend: str | None = None) -> AbstractDamper:
         """The law at a setting between those of the dampers.

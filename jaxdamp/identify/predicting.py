@@ -1,13 +1,16 @@
-"""Predicted forces of a model at the samples of records."""
+"""Predicted forces of records, their errors, and the shares of the errors: shape, hysteresis, rest."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp.bench import BenchRun
+from jaxdamp._tables import with_unit
+from jaxdamp._traced import of_known_numbers
+from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import require_finite_force
 from jaxdamp.identify.estimated_states import with_first_states
 from jaxdamp.identify.initial_states import DRIFT, rest_window, start_of
@@ -33,6 +36,7 @@ def _spread(values: np.ndarray, block: int, count: int) -> np.ndarray:
     return values[left] + (places - left) * (values[left + 1] - values[left])
 
 
+@of_known_numbers
 def predict_runs(model: Model, runs: Sequence[BenchRun], initial_state: str = "warm_up") -> list[np.ndarray]:
     """Force [N] of the model at every sample of every record.
 
@@ -95,3 +99,147 @@ def _first_used(model: Model, run: BenchRun, initial_state: str) -> int:
             return rest_window(run)
         start = "warm_up"
     return int(np.ceil(settling_time(run) * run.sampling_rate)) if start == "warm_up" else 0
+
+
+class Score(NamedTuple):
+    """Errors of the force of a law on one record, after settling.
+
+    Attributes:
+        name: of the record.
+        rmse: root of the mean squared error [N].
+        fit_percent: 100 is perfect, 0 no better than a constant [%].
+        largest_error: largest magnitude of the error [N].
+    """
+
+    name: str
+    rmse: float  # N
+    fit_percent: float
+    largest_error: float  # N
+
+    def to_dict(self) -> dict[str, Any]:
+        """The errors with units, ready for JSON."""
+        return {
+            "record": self.name,
+            "fit": with_unit(self.fit_percent, "%"),
+            "rmse": with_unit(self.rmse, "N"),
+            "largest_error": with_unit(self.largest_error, "N"),
+        }
+
+
+def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray]) -> float:
+    """100 (1 − ‖y − ŷ‖/‖y − mean y‖) over all samples: 100 is perfect, 0 no better than a constant.
+
+    −∞ for a constant measured force that is not matched exactly.
+
+    Arguments:
+        measured: measured force of each record [N].
+        predicted: force of the law at the same samples [N].
+    """
+    y, p = np.concatenate(list(measured)), np.concatenate(list(predicted))
+    missed, spread = (float(np.sqrt(np.sum(a * a))) for a in (y - p, y - y.mean()))
+    if missed == 0.0:
+        return 100.0
+    return 100.0 * (1.0 - missed / spread) if spread > 0.0 else -np.inf
+
+
+def score_of(name: str, measured: np.ndarray, predicted: np.ndarray) -> Score:
+    """Errors of a predicted force [N] from a measured one."""
+    error = predicted - measured
+    rmse, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
+    return Score(name, rmse, fit_percent([measured], [predicted]), largest)
+
+
+def score(
+    model: Model | Sequence[Model],
+    runs: Sequence[BenchRun],
+    counted: Sequence[bool] | np.ndarray | None = None,
+    initial_state: str = "warm_up",
+) -> tuple[float, float, tuple[Score, ...]]:
+    """Fit percent and RMSE [N] of a model, or of one for each record, over the records that count, and for each."""
+    models, forces = predict_by_record(model, runs, initial_state)
+    memoryless = {
+        id(own): is_memoryless(own) for own in {id(own): own for own in models}.values()
+    }  # most often one model for all records
+    pairs = zip(models, runs, strict=True)
+    used = [used_samples(own, run, memoryless[id(own)], initial_state) for own, run in pairs]
+    measured = [run.force[k] for run, k in zip(runs, used, strict=True)]
+    predicted = [force[k] for force, k in zip(forces, used, strict=True)]
+    rows = [score_of(run.name, y, p) for run, y, p in zip(runs, measured, predicted, strict=True)]
+    chosen = [i for i in range(len(runs)) if counted is None or counted[i]]
+    y, p = [measured[i] for i in chosen], [predicted[i] for i in chosen]
+    errors = np.concatenate(p) - np.concatenate(y)
+    return fit_percent(y, p), float(np.sqrt(np.mean(errors**2))), tuple(rows)
+
+
+class ErrorShares(NamedTuple):
+    """Shares of the mean squared error; their sum is 1.
+
+    Attributes:
+        shape: share that another curve of force over velocity would remove [-].
+        hysteresis: share by which the force differs between the two passes through the same velocity [-].
+        rest: noise, and changes from cycle to cycle [-].
+    """
+
+    shape: float  # another curve of force over velocity would remove it
+    hysteresis: float  # the force differs between the two passes through the same velocity
+    rest: float  # noise, and changes from cycle to cycle
+
+
+@of_known_numbers
+def error_shares(
+    law: Model | Sequence[Model], runs: BenchRun | Iterable[BenchRun], initial_state: str = "warm_up"
+) -> ErrorShares:
+    """Split the squared force error of a law over records, record by record, by an analysis of variance.
+
+    The samples of a record are sorted by velocity into bins, and each bin is divided by the half of the stroke: a cycle
+    passes every velocity twice, once above and once below mid-stroke. The mean of a bin is the error that another curve
+    over velocity could remove (*shape*), the difference of the two halves from it is *hysteresis* (or a dependence on
+    the stroke), and the scatter about them is the *rest*. The contribution of the scatter to the means is subtracted.
+
+    `FitResult.error_shares` gives the shares of a fit over its own records.
+
+    Arguments:
+        law: a law, fitted or not, or the `model` of a fit; or one for each record.
+        runs: one record or several.
+        initial_state: how they start, as in `fit`.
+
+    >>> from jaxdamp import bench
+    >>> from jaxdamp.dampers import Bilinear, Linear
+    >>> runs = bench.VirtualDyno(Bilinear(2600.0, 1200.0), force_noise=5.0).run(bench.SineTest(0.01, 2.0))
+    >>> error_shares(Linear(1900.0), runs).shape > 0.9
+    True
+    """
+    runs = as_runs(runs, call="error_shares(law, runs)")
+    sums = np.zeros(3)
+    laws, forces = predict_by_record(law, runs, initial_state)
+    for own, run, force in zip(laws, runs, forces, strict=True):
+        part = used_samples(own, run, is_memoryless(own), initial_state)
+        sums += _sums(run.velocity[part], run.stroke[part], force[part] - run.force[part])
+    shape, hysteresis, rest = sums / max(sums.sum(), np.finfo(float).tiny)
+    return ErrorShares(float(shape), float(hysteresis), float(rest))
+
+
+def _sums(
+    velocity: Float[np.ndarray, " samples"], stroke: Float[np.ndarray, " samples"], error: Float[np.ndarray, " samples"]
+) -> Float[np.ndarray, "3"]:
+    """Sums of squares of one record: shape, hysteresis, rest."""
+    count = len(error)
+    bins = int(np.clip(count // 16, 1, 30))
+    number = np.empty(count, dtype=int)
+    number[np.argsort(velocity, kind="stable")] = np.arange(count) * bins // count
+    above = stroke > 0.5 * (stroke.max() + stroke.min())
+    cells = 2 * number + above
+    by_bin = _group_squares(number, error, bins)
+    by_cell = _group_squares(cells, error, 2 * bins)
+    total = float(error @ error)
+    scatter = (total - by_cell) / max(count - 2 * bins, 1)
+    shape = max(by_bin - bins * scatter, 0.0)
+    hysteresis = max(by_cell - by_bin - bins * scatter, 0.0)
+    return np.array([shape, hysteresis, max(total - shape - hysteresis, 0.0)])
+
+
+def _group_squares(number: np.ndarray, error: np.ndarray, groups: int) -> float:
+    """Σ n m² over groups of n samples with mean m."""
+    n = np.bincount(number, minlength=groups)
+    sums = np.bincount(number, weights=error, minlength=groups)
+    return float(np.sum(sums[n > 0] ** 2 / n[n > 0]))

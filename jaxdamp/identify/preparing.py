@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import Reach
 from jaxdamp.identify.criteria import FIRST_NOISE, Priors, priors_on
@@ -35,6 +36,7 @@ from jaxdamp.parameters import free_parameters, match_paths, name_patterns, para
 FIT_OUTSIDE = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`; the residuals of a `Problem` can be traced."
 
 
+@of_known_numbers
 def prepare(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],

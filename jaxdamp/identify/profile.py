@@ -1,19 +1,27 @@
-"""Standard errors checked by moving a parameter, since linear estimates are wrong if the sum of squares is no parabola.
+"""Parameters moved away from a minimum, all others fitted again: standard errors checked, costs as curves.
 
-Example: the slope above a knee that the records do not reach seems certain as long as the knee is fixed; if the knee
-may move, any slope fits. If a fit is doubtful, each parameter that seems certain is therefore moved away in growing
-steps, and all others are fitted again at each step.
+Linear errors are wrong if the sum of squares is no parabola. Example: the slope above a knee that the records do not
+reach seems certain as long as the knee is fixed; if the knee may move, any slope fits. If a fit is doubtful, each
+parameter that seems certain is therefore moved away in growing steps, and all others are fitted again at each step.
 """
 
-from typing import NamedTuple
+import dataclasses
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jaxdamp._results import AbstractResult
+from jaxdamp._tables import Column, Table, plain
 from jaxdamp.dampers import keeps_conditions
 from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.solve import BoundedLevenbergMarquardt
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 STEPS = 15  # of each search; an incomplete search makes an error smaller, never larger
@@ -21,6 +29,15 @@ LOOSE = BoundedLevenbergMarquardt(tolerance=0.1)  # standard errors: 0.01 in chi
 MOST_STEPS = 250  # of all searches together; parameters after that have their linear errors
 CHI_SQUARE = 9.0  # increase up to which a moved parameter still fits: three standard errors
 GROWTH = 4.0  # of the distance, from one step to the next
+CURVE_STEPS = 60  # of each search
+COARSE = BoundedLevenbergMarquardt(tolerance=0.01)  # standard errors
+FIRST = 0.5  # first distance, in standard errors
+CURVE_GROWTH = 1.5  # of the distance, from one point to the next
+MOST_POINTS = 24  # on each side
+FAR = 1e3  # relative to the value or to the standard error, beyond which a side counts as open
+CLOSE = 1e-2  # of the root of the cost at an end of the interval
+MOST_SECANTS = 12  # to find an end
+LEAST_SHARE = 0.05  # of the bracket, by which a secant stays away from its ends
 
 
 class Profile(NamedTuple):
@@ -80,3 +97,135 @@ def moved_to(problem: Problem, end: SearchEnd, index: int, value: float) -> Prob
     moved = problem.started_at(values)
     inside = lower[index] < value < upper[index] and keeps_conditions(moved.free.tree)
     return moved if inside else None
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class ProfileCurve(AbstractResult):
+    """How much worse the records fit with other values of a parameter, the best of all others given.
+
+    Attributes:
+        name: of the parameter.
+        unit: its unit.
+        values: values tried, increasing, shape (points,).
+        cost: increase of the sum of squares, over the variance of the noise: squared standard errors, shape (points,).
+        interval: 95 % interval: where the cost is below `level`. An end is infinite if the cost stays below it.
+        level: square of the quantile of Student's t, about 3.84.
+        linear_interval: the interval from the standard error, which is exact where the cost is a parabola.
+    """
+
+    name: str
+    unit: str
+    values: Float[np.ndarray, " points"]
+    cost: Float[np.ndarray, " points"]
+    interval: tuple[float, float]
+    level: float
+    linear_interval: tuple[float, float]
+
+    @property
+    def summary(self) -> str:
+        """The interval, and the one from the standard error."""
+        (low, high), (lower, upper) = self.interval, self.linear_interval
+        unit = f" {self.unit}".rstrip()
+        return (
+            f"{self.name} lies between {low:.4g} and {high:.4g}{unit} (95 %); its standard error alone says"
+            f" {lower:.4g} to {upper:.4g}."
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """An interval without an end."""
+        open_ended = not np.all(np.isfinite(self.interval))
+        return (f"The records do not bound {self.name} on both sides.",) * open_ended
+
+    def table(self) -> Table:
+        """The values tried with their cost."""
+        columns = Column(self.name, self.unit, ".5g"), Column("cost in squared standard errors", spec=".3g")
+        return Table(f"Profile of {self.name}", columns, tuple(zip(*map(plain, (self.values, self.cost)), strict=True)))
+
+    def content(self) -> dict[str, Any]:
+        """The curve and its intervals as plain data."""
+        return plain({field.name: getattr(self, field.name) for field in dataclasses.fields(self)})
+
+    def plot(self) -> "Figure":
+        """Cost over value, with the interval and the parabola of the standard error."""
+        from jaxdamp.plots import profile
+
+        return profile(self)
+
+
+def profile_curve(evidence: Evidence, name: str, linear: tuple[float, float]) -> ProfileCurve:
+    """`FitResult.profile`."""
+    problem, found = evidence.problem, evidence.minimum
+    i, level = problem.free.names.index(name), evidence.quantile**2
+    error = float(np.sqrt(evidence.covariance[i, i]))
+    side = _Side(evidence, i, error if 0 < error < np.inf else 0.1 * (abs(found.values[i]) or 1.0))
+    below, lower = side.walk(-1.0, level)
+    above, upper = side.walk(1.0, level)
+    points = sorted([*below, (float(found.values[i]), 0.0), *above])
+    values, cost = (np.array(column) for column in zip(*points, strict=True))
+    return ProfileCurve(name, problem.free.owners[i].unit, values, cost, (lower, upper), level, linear)
+
+
+class _Side:
+    """Searches with one parameter held, ever farther from the minimum."""
+
+    def __init__(self, evidence: Evidence, index: int, unit: float) -> None:
+        self.evidence, self.index, self.unit = evidence, index, unit
+        self.centre = float(evidence.minimum.values[index])
+        jacobian = evidence.minimum.jacobian
+        others = np.delete(jacobian, index, axis=1)
+        column = jacobian[:, index]
+        left = column - (others @ np.linalg.lstsq(others, column, rcond=None)[0] if others.size else 0.0)
+        variance = evidence.covariance[index, index]
+        # What a standard error costs, so that noise with a memory is counted here as it is there.
+        self.one = float(left @ left) * variance if 0 < variance < np.inf else evidence.noise.variance
+
+    def at(self, value: float, start: SearchEnd) -> tuple[float, SearchEnd] | None:
+        """Cost at a value, and the end of the search; `None` where the law refuses the value."""
+        moved = moved_to(self.evidence.problem, start, self.index, value)
+        if moved is None:
+            return None
+        end = search(moved, CURVE_STEPS, held=self.index, solver=COARSE)
+        return max(end.squares - self.evidence.minimum.squares, 0.0) / self.one, end
+
+    def walk(self, way: float, level: float) -> tuple[list[tuple[float, float]], float]:
+        """Points on one side, and the end of the interval there."""
+        edge = float(self.evidence.problem.free.limits()[way > 0][self.index])
+        points: list[tuple[float, float]] = []
+        inside, end = (self.centre, 0.0), self.evidence.minimum
+        distance, most = FIRST * self.unit, FAR * max(abs(self.centre), self.unit)
+        for _ in range(MOST_POINTS):
+            value = self.centre + way * distance
+            beyond = (value - edge) * way >= 0
+            value = 0.5 * (inside[0] + edge) if beyond else value
+            tried = self.at(value, end)
+            if tried is None:
+                return points, edge if beyond else inside[0]
+            points.append((value, tried[0]))
+            if tried[0] > level:
+                more, crossing = self._between(inside, (value, tried[0]), level, end)
+                return [*points, *more], crossing
+            if beyond and abs(edge - value) < CLOSE * self.unit:
+                return points, edge
+            inside, end = (value, tried[0]), tried[1]
+            distance = distance if beyond else CURVE_GROWTH * distance
+            if distance > most:
+                break
+        return points, way * np.inf if not np.isfinite(edge) else edge
+
+    def _between(
+        self, low: tuple[float, float], high: tuple[float, float], level: float, end: SearchEnd
+    ) -> tuple[list[tuple[float, float]], float]:
+        """Points between one inside the interval and one outside, and its end, by secants of the root of the cost."""
+        points, value = [], low[0]
+        for _ in range(MOST_SECANTS):
+            roots = np.sqrt([low[1], high[1], level])
+            share = float(np.clip((roots[2] - roots[0]) / (roots[1] - roots[0]), LEAST_SHARE, 1.0 - LEAST_SHARE))
+            value = low[0] + share * (high[0] - low[0])
+            tried = self.at(value, end)
+            point = (value, np.inf if tried is None else tried[0])
+            points += [point] * (tried is not None)
+            if abs(np.sqrt(point[1]) - roots[2]) < CLOSE:
+                break
+            low, high = (point, high) if point[1] < level else (low, point)
+        return points, value

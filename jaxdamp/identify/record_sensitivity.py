@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain
-from jaxdamp.identify.ends import at_ends
+from jaxdamp.identify.estimating import at_ends
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.traces import Batch

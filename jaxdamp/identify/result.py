@@ -12,7 +12,7 @@ from jaxdamp._status import Status
 from jaxdamp._tables import Table, plain
 from jaxdamp.identify.bayes import Posterior, posterior
 from jaxdamp.identify.estimates import Estimate, Minimum, describe, parameter_table, rounded
-from jaxdamp.identify.profile_curve import ProfileCurve, profile_curve
+from jaxdamp.identify.profile import ProfileCurve, profile_curve
 from jaxdamp.identify.propagation import Evidence, Propagated, propagate
 
 

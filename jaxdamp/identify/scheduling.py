@@ -14,6 +14,7 @@ from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import AbstractDamper, Scheduled, takes_command
 from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
@@ -22,8 +23,8 @@ from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, Machine, constant_forces
 from jaxdamp.identify.model import law_of, rig_of
+from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
-from jaxdamp.identify.scoring import score
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
 
@@ -153,6 +154,7 @@ class ScheduledFit(AbstractResult):
         return "\n".join([self.table().to_text(), *self.verdict])
 
 
+@of_known_numbers
 def fit_scheduled(
     law: Start,
     runs: Iterable[BenchRun],

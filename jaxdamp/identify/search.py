@@ -82,11 +82,11 @@ def search(
     start = np.asarray(coordinates.start, np.float64)
     if held is not None:
         lower[held] = upper[held] = start[held]
-    precision = float(jnp.finfo(problem.free.values.dtype).eps)
-    bounded = dataclasses.replace(solver, lower=lower, upper=upper, precision=precision)
+    kind = problem.free.values.dtype
+    bounded = dataclasses.replace(solver, lower=lower, upper=upper, precision=float(jnp.finfo(kind).eps))
 
     def at(y: Float[np.ndarray, "1 free"], _: Any) -> tuple[Linearisation, _Point]:
-        return _linearised(problem, y[0])
+        return _linearised(problem, coordinates, jnp.asarray(y[0], kind))
 
     end = least_squares_on_host(at, bounded, start[None], max_steps)
     point: _Point = end.aux
@@ -94,10 +94,9 @@ def search(
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _linearised(problem: Problem, y: Float[np.ndarray, " free"]) -> tuple[Linearisation, _Point]:
+def _linearised(problem: Problem, coordinates: Coordinates, y: Float[Array, " free"]) -> tuple[Linearisation, _Point]:
     """The problem at coordinates, by the one compiled program."""
-    point = jnp.asarray(y, problem.free.values.dtype)
-    arrays = [np.asarray(a, np.float64) for a in _evaluated(problem.coordinates, point, problem.residuals)]
+    arrays = [np.asarray(a, np.float64) for a in _evaluated(coordinates, y, problem.residuals)]
     values, residual, jacobian, units, of_law, slopes = arrays
     residual, jacobian = problem.anchored(values, residual, jacobian)
     rows = triangle(np.concatenate([jacobian, residual[:, None]], axis=1))
@@ -138,8 +137,9 @@ def _search_unbounded(problem: Problem, max_steps: int, solver: Solver) -> Searc
     residual = _Residual(coordinates, problem.residuals, jnp.asarray(problem.level), problem.anchor)
     start = jnp.asarray(coordinates.start)
     solution = optx.least_squares(residual, solver, start, max_steps=max_steps, throw=False)
-    y = np.asarray(problem.coordinates.from_physical(coordinates.to_physical(solution.value)), np.float64)
-    _, point = _linearised(problem, y)
+    bounded = problem.coordinates
+    y = bounded.from_physical(coordinates.to_physical(solution.value))
+    _, point = _linearised(problem, bounded, y)
     if solution.result == optx.RESULTS.successful:
         status = Status.CONVERGED
     elif solution.result == optx.RESULTS.nonlinear_max_steps_reached:

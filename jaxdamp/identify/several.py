@@ -108,19 +108,22 @@ def scattered_starts(free: FreeParameters, count: int, seed: int) -> list[Float[
     return starts
 
 
-def search_each(problem: Problem, starts: Sequence[Float[np.ndarray, " free"]], max_steps: int) -> Solution:
+def search_each(
+    problem: Problem, starts: Sequence[Float[np.ndarray, " free"]], max_steps: int, solver: Solver | None = None
+) -> Solution:
     """Search from every start to its end; the first of those that count as equally good is the best.
 
     Arguments:
         problem: in residuals of unit noise: channels in their noise, targets in their tolerance.
         starts: values of the free numbers.
         max_steps: largest number of steps of each search.
+        solver: as in `search`.
     """
-    kept = [v for i, v in enumerate(starts) if i == 0 or keeps_conditions(problem.free.started_at(v).tree)]
-    ends = [search(problem.started_at(values), max_steps) for values in kept]
+    allowed = [v for i, v in enumerate(starts) if i == 0 or keeps_conditions(problem.free.started_at(v).tree)]
+    ends = [search(problem.started_at(values), max_steps, solver=solver) for values in allowed]
     squares = np.array([end.squares if end.finite else np.inf for end in ends])
     best = ends[int(np.argmax(squares <= squares.min() + equally_good(squares.min())))]
-    return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(kept))
+    return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(allowed))
 
 
 def equally_good(squares: float) -> float:

@@ -11,7 +11,8 @@ from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
-from jaxdamp._tables import Column, Table, plain
+from jaxdamp._tables import Column, Table, plain, plus_minus
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
@@ -19,7 +20,7 @@ from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
 from jaxdamp.identify.noise import Noise, independent
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.result import Fit
-from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.search import SearchEnd, Solver
 from jaxdamp.identify.several import Solution, equally_good, scattered_starts, search_each
 from jaxdamp.parameters import FreeParameters, Parameter, free_parameters, interval, match_paths, name_patterns, real
 from jaxdamp.simulation import Ride
@@ -132,6 +133,7 @@ class TargetResiduals(AbstractResiduals):
         return jnp.sum(1.0 / jnp.square(self.tolerance))
 
 
+@of_known_numbers
 @one_thread()
 def fit_targets(
     numbers: Callable[[Any], Mapping[str, Any]] | Ride,
@@ -148,6 +150,7 @@ def fit_targets(
     max_steps: int = 100,
     starts: int = 4,
     seed: int = 0,
+    solver: Solver | None = None,
 ) -> TargetFit:
     """Find the parameters with which a model has given numbers, by least squares in units of the tolerances.
 
@@ -168,6 +171,7 @@ def fit_targets(
         starts: number of searches, the first from `start`, the others from parameters up to twice and half of it. The
             first one counts unless another one meets the targets better.
         seed: of the other starts.
+        solver: as in `fit`.
 
     Returns:
         The model, its parameters and the numbers reached. Targets outside their tolerance are named by a warning, and
@@ -192,18 +196,18 @@ def fit_targets(
         if count < 1:
             _checks.refuse(name, "be 1 or more", count)
     free = _free(start, over, freeze, bounds, tie)
-    known = priors_on(free, priors or {}, 1.0)
+    expected = priors_on(free, priors or {}, 1.0)
     padding = max(free.values.size + 1 - len(goals), 0)
     wanted, allowed = (jnp.asarray(np.array(column, float)) for column in zip(*goals.values(), strict=True))
     residuals = TargetResiduals(numbers, wanted, allowed, tuple(goals), padding)
     _check_numbers(residuals, free.tree)
     level = float(jnp.linalg.norm(wanted / allowed)) or 1.0
-    owner = np.zeros(len(goals) + padding + sum(part.size for part in known), int)
-    everywhere, parts = Reach(np.inf, np.inf), (residuals, *known)
+    owner = np.zeros(len(goals) + padding + sum(part.size for part in expected), int)
+    everywhere, parts = Reach(np.inf, np.inf), (residuals, *expected)
     problem = Problem(free, parts, level, (), (1.0,), owner, everywhere, free.tree, (), False)
 
     def by_squares(problem: Problem, count: int | None) -> Solution:
-        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps)
+        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps, solver)
 
     problem, solution = solve_by(problem, by_squares, loss=loss, noise=_tolerances, starts=starts, spread=1.0)
     if not solution.best.finite:
@@ -224,7 +228,7 @@ def _judged(
     estimates = estimate(problem, solution, noise)
     notes = [*on_status(end), *(f"{e.name} = {e.value:.4g} is {e.note}." for e in estimates.estimates if e.note)]
     notes += [
-        f"{t.name} is missed: {t.value:.4g} instead of {t.target:.4g} ± {t.tolerance:.2g}." for t in met if not t.met
+        f"{t.name} is missed: {t.value:.4g} instead of {plus_minus(t.target, t.tolerance)}." for t in met if not t.met
     ]
     notes += _disagreements(free, solution)
     how, main = fields_of_fit(problem, solution, noise, estimates), tuple(notes[:MOST_WARNINGS])

@@ -16,15 +16,15 @@ from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
-from jaxdamp.identify.covered import covered_range
 from jaxdamp.identify.judging import notes_on
 from jaxdamp.identify.law_result import AbstractFitted
 from jaxdamp.identify.machine import Machine
-from jaxdamp.identify.model import Model, law_of, rig_of, with_range
+from jaxdamp.identify.model import Model, covered_range, law_of, rig_of, with_range
+from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals
-from jaxdamp.identify.scoring import score
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.traces import batches
 from jaxdamp.parameters import Coordinates
@@ -104,6 +104,7 @@ class Training(AbstractFitted):
         return self.summary
 
 
+@of_known_numbers
 def train(
     law: Start,
     runs: BenchRun | Iterable[BenchRun],

@@ -7,20 +7,22 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._one_thread import one_thread
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.criteria import LOSSES, Priors, criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
+from jaxdamp.identify.left_out import on_free_scale, on_sensors, on_signs
 from jaxdamp.identify.machine import Machine, started_machine
 from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
-from jaxdamp.identify.search import SearchEnd, search
+from jaxdamp.identify.search import SearchEnd, Solver, search
 from jaxdamp.identify.several import Solution, scattered_starts, search_each
-from jaxdamp.identify.vehicle_left_out import on_free_scale, on_sensors, on_signs
 from jaxdamp.identify.vehicle_preparing import (
     FreeScale,
     VehicleData,
@@ -49,6 +51,7 @@ MOST_ROUNDS = 6
 MOST_CHECKS = 4  # of whether `simulate` accepts the vehicle at the minimum
 
 
+@of_known_numbers
 @one_thread()
 def fit_vehicle(
     vehicle: AbstractVehicle,
@@ -72,6 +75,7 @@ def fit_vehicle(
     starts: int = 1,
     seed: int = 0,
     max_steps: int = 100,
+    solver: Solver | None = None,
 ) -> VehicleFit:
     """Fit masses, rates, friction and damper laws of a vehicle to records of its motion.
 
@@ -107,11 +111,12 @@ def fit_vehicle(
         samples_per_cycle: of bench records, as in `fit`.
         loss: as in `fit`: "huber", "soft_l1" or "student_t" for channels with spikes and dropouts.
         priors: as in `fit`; one on a mass shows the scale.
-        starts: number of searches, the first from `vehicle`, the others from parameters up to twice and half of it,
-            all with the noise found by the first. The first one counts unless another one fits better; `minima`
+        starts: number of searches, the first from `vehicle`, the others from parameters up to twice and half of those
+            that it ends at, with the noise that it finds. The first one counts unless another one fits better; `minima`
             describes the others.
         seed: of the other starts.
         max_steps: largest number of steps of each search.
+        solver: as in `fit`.
 
     Returns:
         The fitted vehicle, its parameters with standard errors, scores of each channel, warnings.
@@ -146,9 +151,10 @@ def fit_vehicle(
     problem = data.problem(free, sigma, expected)
     scale = free_scale(problem, search(problem, 1))
     problem = problem._replace(free=without(free, scale.held))
-    how = {"loss": loss, "starts": starts, "max_steps": max_steps, "seed": seed}
+    how = {"loss": loss, "starts": starts, "max_steps": max_steps, "seed": seed, "solver": solver}
+    begin = np.asarray(problem.free.values)
     problem, solution = _solved(data, problem, known, expected, **how)
-    problem, solution, refused = _accepted(data, problem, solution, known, expected, dt, how | {"starts": 1})
+    problem, solution, refused = _accepted(data, problem, solution, begin, known, expected, dt, how | {"starts": 1})
     paths = [p.path for p in parameters(model)]
     named = matched_in_words([path for path in paths if path.startswith("vehicle.")], over=over or ())
     others = matched_in_words(paths, freeze=freeze, bounds=bounds or {}, per_record=per_record)
@@ -167,20 +173,23 @@ def _solved(
     starts: int,
     max_steps: int,
     seed: int,
+    solver: Solver | None,
 ) -> tuple[Problem, Solution]:
     """The minimum with each channel weighted by its noise, which is estimated until it is consistent."""
     sigma = dict(zip(data.channels, problem.sigma, strict=True))
-    for _ in range(MOST_ROUNDS):
-        end = search(problem, max_steps)
+    rounds = 0
+    while True:
+        end, rounds = search(problem, max_steps, solver=solver), rounds + 1
         before, sigma = sigma, {**data.noise_in(end, problem, sigma, loss), **known}
-        if not end.finite or all(abs(np.log(sigma[name] / before[name])) < ALIKE for name in sigma):
+        consistent = all(abs(np.log(sigma[name] / before[name])) < ALIKE for name in sigma)
+        if not end.finite or consistent or rounds == MOST_ROUNDS:
             break
         problem = data.problem(problem.free.started_at(end.values), sigma, expected)
     if not end.finite or (loss == "squares" and starts == 1 and not expected):
         return problem, Solution(end, (end,), 1)
 
     def by_squares(problem: Problem, count: int | None) -> Solution:
-        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps)
+        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps, solver)
 
     def noise(problem: Problem, end: SearchEnd) -> Noise:
         return channel_noise(problem, end.residual, end.values.size)
@@ -192,13 +201,14 @@ def _accepted(
     data: VehicleData,
     problem: Problem,
     solution: Solution,
+    start: Float[np.ndarray, " free"],
     known: Mapping[str, float],
     expected: Sequence[Priors],
     dt: float | None,
     how: Mapping[str, Any],
 ) -> tuple[Problem, Solution, list[str]]:
-    """The minimum among the vehicles that `simulate` accepts, by as many substeps as their laws need."""
-    start, notes = np.asarray(problem.free.values), list[str]()
+    """The minimum among the vehicles that `simulate` accepts, as it does the start, with the substeps they need."""
+    notes = list[str]()
 
     def drives_at(values: np.ndarray) -> list[Drive] | None:
         """How the records are simulated with these numbers; None where `simulate` would refuse."""

@@ -13,9 +13,9 @@ from jaxdamp._tables import Column, Table, with_unit
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.estimates import parameter_table
 from jaxdamp.identify.model import VehicleTest
+from jaxdamp.identify.predicting import fit_percent
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.result import Fit
-from jaxdamp.identify.scoring import fit_percent
 from jaxdamp.identify.vehicle_preparing import checked_records, drives_of
 from jaxdamp.identify.vehicle_residuals import DamperOnBench, RideBatch, ride_batches
 from jaxdamp.rig import Rig, Sensor

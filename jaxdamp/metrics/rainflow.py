@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import VectorLike
 
 
@@ -41,6 +42,7 @@ class RainflowCycles:
         return float(np.sum(self.count * self.amplitude ** float(exponent)))
 
 
+@of_known_numbers
 def rainflow_cycles(signal: VectorLike) -> RainflowCycles:
     """The cycles of a load by rainflow counting: the force of a damper, a spring or a tyre, simulated or measured.
 

@@ -82,10 +82,12 @@ def welch_plan(
 ) -> tuple[Float[Array, " size"], int]:
     """The window of a segment and the step from one to the next, checked."""
     check_interval(dt)
+    _checks.untraced("segment_length", segment_length, "It is part of a compiled program: give a plain number.")
     size = max(2, signal.size // 8) if segment_length is None else segment_length
     if not 2 <= size <= signal.size:
         remedy = "Shorten the segments."
         _checks.refuse("segment_length", f"lie between 2 and the length of the signal ({signal.size})", size, remedy)
+    overlap = _checks.plain_number("overlap", overlap)
     if not 0.0 <= overlap < 1.0:
         remedy = "It is a part of a segment: write 0.5 for 50 %."
         _checks.refuse("overlap", "be at least 0 and below 1", overlap, remedy)

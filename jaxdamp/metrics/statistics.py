@@ -15,6 +15,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most, largest, root
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp.metrics.running import max_transient_value
 
@@ -271,6 +272,7 @@ class _Percentile:
         return jnp.percentile(record, self.share)
 
 
+@of_known_numbers
 @functools.cache
 def percentile(share: float | int) -> Statistic:
     """The value that a share of the samples of a record stays below.

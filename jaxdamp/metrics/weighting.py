@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Complex, Float
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics._linear_system import StateSpace
 from jaxdamp.metrics._signals import as_numbers
 
@@ -182,6 +183,7 @@ def weighting_state_space(weighting: str) -> StateSpace:
     return StateSpace(*(jnp.asarray(part, float) for part in cascade(weighting)))
 
 
+@of_known_numbers
 @functools.cache
 def discrete_weighting(weighting: str, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Φ, H₀, H₁ and C of w₁ = Φ w₀ + H₀ u₀ + H₁ (u₁ − u₀), y = C w: a weighting, exact for u straight over a step.

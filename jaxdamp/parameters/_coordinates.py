@@ -89,9 +89,10 @@ class Coordinates(eqx.Module):
                 low, high = p.domain.lower, p.domain.upper
                 belongs = not (_has_range(p) or p.domain.ordered) and p.domain.contains(np.asarray(low))
                 margin = 0.0 if belongs else OPEN_END
-            lower.append(np.ravel(low / np.asarray(unit)) + margin)
-            upper.append(np.ravel(high / np.asarray(unit)) - margin)
-        return Bounds(np.concatenate(lower), np.concatenate(upper))
+            size = unit if isinstance(unit, Tracer) else np.asarray(unit)
+            lower.append(low / size + margin)
+            upper.append(high / size - margin)
+        return Bounds(_joined(lower), _joined(upper))
 
     def order(self) -> tuple[Float[np.ndarray, "rows free"], Float[np.ndarray, " rows"]]:
         """Rows A and numbers b with A y ≥ b where vectors that must increase do so."""

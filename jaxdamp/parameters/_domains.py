@@ -10,6 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from jaxdamp._traced import of_known_numbers
+
 
 @dataclasses.dataclass(frozen=True)
 class Domain:
@@ -163,6 +165,7 @@ def _raw_of_ordered_shares(shares: Array) -> Array:
     return jnp.log(gaps[:-1] / gaps[-1])
 
 
+@of_known_numbers
 @functools.cache
 def interval(lower: float, upper: float) -> Domain:
     """Numbers between two finite ones (scaled logistic map).
@@ -174,6 +177,7 @@ def interval(lower: float, upper: float) -> Domain:
     return _bounded("", lower, upper, jax.nn.sigmoid, _logit, interval)
 
 
+@of_known_numbers
 @functools.cache
 def ordered_interval(lower: float, upper: float) -> Domain:
     """Increasing numbers between two finite ones: their gaps are the shares of a softmax.

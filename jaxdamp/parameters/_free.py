@@ -118,6 +118,7 @@ def free_parameters(
     >>> free_parameters(half_car_002(Linear(1000.0)), over=["rate"], tie={"front.*.rate": "rear.*.rate"}).names
     ['rear.damper.rate']
     """
+    _checks.untraced("bounds", dict(bounds or {}), "Give plain numbers, which are known before a program is compiled.")
     all_parameters = parameters(tree)
     known = [p.path for p in all_parameters]
     keep = match_paths(known, name_patterns("over", over)) if over is not None else known

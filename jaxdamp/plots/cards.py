@@ -10,6 +10,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.plots import _style, fitted_range
@@ -54,6 +55,7 @@ def _loops(law: AbstractDamper, amplitude: float, frequencies: Sequence[float]) 
     return _Loops(*(np.stack(column) for column in zip(*rows, strict=True)))
 
 
+@of_known_numbers
 def law_card(
     law: AbstractDamper,
     *,

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import VectorLike
 from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle, peak_velocity_points
 from jaxdamp.dampers import AbstractDamper
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 
+@of_known_numbers
 def force_velocity(
     laws: AbstractDamper | Mapping[str, AbstractDamper],
     velocities: VectorLike | None = None,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jaxdamp import _checks, metrics
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.rig import quasi_static
 from jaxdamp.simulation import Response
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 _BINS, _POINTS, _SHADE_POINTS = 41, 81, 2001
 
 
+@of_known_numbers
 def damper_use(
     responses: Response | Mapping[str, Response], *, damper: str | None = None
 ) -> "matplotlib.figure.Figure":

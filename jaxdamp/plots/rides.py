@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks, metrics
 from jaxdamp._tables import typeset_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.simulation import Response
 from jaxdamp.vehicles import ChannelKind, Layout
@@ -25,6 +26,7 @@ _WORDS = {
 }
 
 
+@of_known_numbers
 def ride(
     responses: Response | Mapping[str, Response],
     *,

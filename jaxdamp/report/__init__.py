@@ -8,6 +8,7 @@
 - Tables of these pages: `records_table`, `ride_records_table`, `ride_tables`, `fitted_range_table`, `range_use_table`.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp._tables import Column as Column, Table
 from jaxdamp.report.attempts import Attempts as Attempts
 from jaxdamp.report.benches import (
@@ -31,10 +32,8 @@ from jaxdamp.report.ranges import fitted_range_table as fitted_range_table, rang
 from jaxdamp.report.records import add_records as add_records, records_table as records_table
 from jaxdamp.report.results import result_report
 from jaxdamp.report.rides import (
-    GOALS as GOALS,
     add_rides as add_rides,
     axles_sentence as axles_sentence,
-    goal_metrics as goal_metrics,
     notes_of as notes_of,
     ride_report,
     ride_tables as ride_tables,
@@ -60,7 +59,6 @@ __all__ = [
 ]
 # What the other packages of the library import, and what is only returned: a user writes none of these.
 __shared__ = [
-    "GOALS",
     "Attempts",
     "Column",
     "add_evaluation",
@@ -74,7 +72,6 @@ __shared__ = [
     "fit_verdict",
     "fitted_range_table",
     "fitted_velocities",
-    "goal_metrics",
     "law_evaluation",
     "notes_of",
     "parameters_of",
@@ -84,3 +81,5 @@ __shared__ = [
     "ride_tables",
     "ride_verdict",
 ]
+
+answer_guesses(__name__, __all__)

@@ -96,19 +96,22 @@ class Report:
 
     def verdict(self, *sentences: str) -> None:
         """The result in words, each sentence on a line, in a box; nothing if there are no words."""
-        lines = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in sentences if sentence)
+        lines = "".join(f"<p>{self._escaped(sentence)}</p>" for sentence in sentences if sentence)
         if lines:
             self._blocks.append(f'<div class="verdict">{lines}</div>')
 
     def text(self, *sentences: str) -> None:
         """A paragraph; nothing if there are no words."""
         if any(sentences):
-            self._blocks.append(f"<p>{html.escape(' '.join(sentences))}</p>")
+            self._blocks.append(f"<p>{self._escaped(' '.join(sentences))}</p>")
 
     def points(self, items: Sequence[str]) -> None:
         """A list of remarks; nothing if it is empty."""
         if items:
-            self._blocks.append(_points(items))
+            self._blocks.append(_points([self.attempts.words(item) for item in items]))
+
+    def _escaped(self, sentence: str) -> str:
+        return html.escape(self.attempts.words(sentence))
 
     def table(self, table: Table) -> None:
         """A table."""

@@ -11,14 +11,8 @@ from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import range_use_table
 from jaxdamp.simulation import Response, comfort_table, metrics_table
-from jaxdamp.vehicles import ChannelKind, Layout
 
 
-GOALS = {  # word: kind of the channel, statistic, whether it is weighted
-    "comfort": (ChannelKind.ACCELERATION, "rms", True),
-    "travel": (ChannelKind.STROKE, "peak_to_peak", False),
-    "grip": (ChannelKind.TYRE_LOAD, "rms", False),
-}
 WORDS = {
     "comfort": "weighted RMS of the body acceleration",
     "travel": "suspension travel, peak to peak,",
@@ -80,29 +74,6 @@ def add_rides(report: Report, responses: Mapping[str, Response], title: str, pre
         report.picture(lambda name=damper: plots.damper_use(responses, damper=name), caption, f"{prefix}{damper}.png")
 
 
-def goal_metrics(layout: Layout, goal: str, *, white: bool = False) -> list[str]:
-    """The ride metrics of a vehicle that a goal means: comfort, travel or grip.
-
-    Comfort is the weighted RMS acceleration of the body [m/s^2]; travel the working space of every suspension, peak to
-    peak, on a white road its RMS [m]; grip the RMS variation of the load of every tyre [N].
-
-    Arguments:
-        layout: of the vehicle, `vehicle.layout`.
-        goal: one of `GOALS`.
-        white: for stationary rides on a white road.
-    """
-    kind, statistic, weighted = GOALS[goal]
-    statistic = "standard_deviation" if white and kind is ChannelKind.STROKE else statistic
-    names = [
-        m.name
-        for m in layout.metrics
-        if layout.by_name[m.channel].kind is kind
-        and m.statistic.name == statistic
-        and (m.weighting is not None) == weighted
-    ]
-    return names[:1] if goal == "comfort" else names
-
-
 def ride_verdict(responses: Mapping[str, Response]) -> list[str]:
     """Comfort, travel and grip in a sentence for each ride, compared with the first one if there are several.
 
@@ -110,8 +81,7 @@ def ride_verdict(responses: Mapping[str, Response]) -> list[str]:
         responses: by name, of one kind of vehicle.
     """
     (first, baseline), *others = responses.items()
-    layout = baseline.system.layout
-    goals = {goal: names for goal in GOALS if (names := goal_metrics(layout, goal))}
+    goals = {goal: names for goal in WORDS if (names := baseline.vehicle.goal_metrics(goal))}
     values = {name: _means(response, goals) for name, response in responses.items()}
     if others:
         return [

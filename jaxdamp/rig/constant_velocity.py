@@ -10,6 +10,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import AbstractDamper, coverage
 from jaxdamp.parameters import as_float
 
@@ -37,6 +38,7 @@ STEADY = 1e-4  # change of a force while the time held doubles, relative to the 
 STILL = {"float64": 1e-9, "float32": 1e-3}  # the same, at which no longer hold can improve the curve
 
 
+@of_known_numbers
 def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.ndarray) -> QuasiStatic:
     """Force [N] of a law at constant velocity, its states settled: the curve without hysteresis.
 

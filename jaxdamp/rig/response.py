@@ -143,6 +143,7 @@ def respond(
     check_module("law", law, (AbstractDamper,), "respond(law, time, stroke, velocity)")
     instants, time, stroke = _checks.concrete(time), as_float(time), as_float(stroke)
     _check_record(instants, time, stroke, velocity)
+    _checks.untraced("substeps", substeps, "The number of steps is part of a compiled program: give a plain number.")
     if substeps < 1:
         _checks.refuse("substeps", "be 1 or more", substeps)
     dt = (time[-1] - time[0]) / (time.size - 1)

@@ -34,6 +34,7 @@ A speed hump, then a rough surface, at 10 m/s:
 (10001, 4)
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp.roads.assessment import RoughnessAssessment as RoughnessAssessment, assess_roughness
 from jaxdamp.roads.axles import delayed, in_phase
 from jaxdamp.roads.base import AbstractRoad, Columns as Columns
@@ -94,3 +95,5 @@ __shared__ = [
     "RoughnessAssessment",
     "WhiteRoad",
 ]
+
+answer_guesses(__name__, __all__)

@@ -10,6 +10,7 @@ from jaxtyping import ArrayLike, Float
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.roads.iso_classes import (
     HIGHEST_SPATIAL_FREQUENCY,
     LOWEST_SPATIAL_FREQUENCY,
@@ -136,6 +137,7 @@ class RoughnessAssessment(AbstractResult):
         return f"{self.table().to_text()}\n{self.verdict}"
 
 
+@of_known_numbers
 def assess_roughness(
     height: Float[ArrayLike, " samples"], spacing: float | int, *, bands_per_octave: int = 1
 ) -> RoughnessAssessment:

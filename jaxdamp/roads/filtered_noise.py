@@ -119,6 +119,7 @@ def _length(speed: ScalarLike | int, duration: float | int | None, length: float
     if duration is None:
         _checks.positive("length", length)
         return float(length or 0.0)
+    duration = _checks.plain_number("duration", duration)
     _checks.positive("duration", duration)
     velocity = _checks.concrete(speed)
     if velocity is None:

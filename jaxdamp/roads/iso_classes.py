@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar, ScalarLike
 
 
@@ -61,6 +62,7 @@ def class_limits(road_class: str) -> tuple[float, float]:
     return 0.0 if road_class == "A" else 0.5 * mean, math.inf if road_class == "H" else 2.0 * mean
 
 
+@of_known_numbers
 def road_class(roughness_psd: float) -> str:
     """The letter of the class with a roughness G_d(n0) [m^3], n0 = 0.1 cycle/m; a limit belongs to the rougher class.
 

@@ -213,6 +213,7 @@ def _repeat_length(
 ) -> float:
     needed = 0.0
     if duration is not None:
+        duration = _checks.plain_number("duration", duration)
         _checks.positive("duration", duration)
         velocity = _checks.concrete(speed)
         if velocity is None:

@@ -54,6 +54,7 @@ def from_profile(
     >>> round(ramp_up.grid, 6), round(ramp_up.duration, 6)
     (0.1, 0.3)
     """
+    _checks.untraced("position", position, "The samples may be traced, not their places.")
     spacing = _uniform_spacing(np.asarray(position, float))
     heights = jnp.asarray(height, float)
     if heights.shape[0] != np.size(position):

@@ -66,7 +66,8 @@ def band_limited(
     >>> round(float(z.max() - z.min()), 6)
     0.01
     """
-    size, first, last = _lines(float(low), float(high), float(duration), float(dt))
+    plain = {"low": low, "high": high, "duration": duration, "dt": dt}
+    size, first, last = _lines(*(_checks.plain_number(name, value) for name, value in plain.items()))
     _checks.nonnegative("ramp", ramp, "Use 0 for no fade-in.")
     if (rms is None) == (peak_to_peak is None):
         both = "neither was given" if rms is None else f"{rms} m, and peak_to_peak {peak_to_peak} m was given as well"

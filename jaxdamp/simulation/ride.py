@@ -59,8 +59,9 @@ class Ride(eqx.Module):
     Arguments:
         vehicle: where parameters that are not given come from.
         road: as in `simulate`, or `roads.white(...)`.
-        metrics: names among `vehicle.ride_metrics`, or a `metrics.Metric` of any channel; all ride metrics if left out.
-            Fewer are faster.
+        metrics: names among `vehicle.ride_metrics`, the short ones "comfort", "travel" and "grip"
+            (`vehicle.goal_metrics`), or a `metrics.Metric` of any channel; all ride metrics if left out. Fewer are
+            faster.
         duration: as in `simulate`.
         dt: as in `simulate`; it is checked here, with the numbers of this vehicle. Points far from it, of a sweep for
             instance, are driven with the same steps unchecked.
@@ -103,7 +104,8 @@ class Ride(eqx.Module):
         if engine is not None:
             check_module("engine", engine, (AbstractEngine,), "Ride(vehicle, road, engine=...)")
         refuse_stacked(vehicle)
-        chosen, self.vehicle = vehicle.chosen_metrics(metrics), vehicle
+        white = isinstance(road, WhiteRoad)
+        chosen, self.vehicle = vehicle.chosen_metrics(metrics, white=white), vehicle
         if isinstance(road, WhiteRoad):
             for name, value in (("duration", duration), ("substeps", substeps), ("engine", engine)):
                 _refuse_run(name, value)

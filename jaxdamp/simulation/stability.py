@@ -94,7 +94,7 @@ def substeps_needed(vehicle: AbstractVehicle, dt: float) -> int:
     Raises:
         ValueError: a vehicle whose numbers are not known, as inside `jax.jit`.
     """
-    cars = known_cars(known_system(vehicle), dt)
+    cars = known_cars(known_system(vehicle), _checks.plain_number("dt", dt))
     if cars is None:
         _checks.refuse("vehicle", "have numbers that are known", "traced", "Call it outside `jax.jit`.")
     return max(step_need(*car, dt).substeps for car in cars)

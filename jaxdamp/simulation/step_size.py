@@ -21,6 +21,7 @@ from jaxdamp.vehicles import System
 
 LEAST_PER_PERIOD = 5.0  # instants a period of the fastest mode that follows the road; fewer are refused
 ENOUGH_PER_PERIOD = 30.0  # from here on the error of a car on a road is below a percent, and is not estimated
+USUAL = 1e-3  # s between instants, which resolve a road for cars and trucks
 FOLLOWS = 0.1  # share of the road's height that a mode takes at rest, from which on the road must resolve it
 STEEP = 0.25  # share of a velocity's error that comes back through the travel, from which on the error is estimated
 SAMPLES_PER_PERIOD = 3.0  # of a record of the road; the tyre of a real wheel smooths what lies between them
@@ -105,7 +106,8 @@ class RunCheck(NamedTuple):
         """The same for engines that choose their own steps: what the instants miss of the road is judged alike."""
         cars = known_cars(self.system, self.dt)
         if cars is None:
-            _warn(_unknown_vehicle(self.dt), TracedStepWarning)
+            if self.dt > USUAL * (1 + 1e-9):
+                _warn(_unknown_vehicle(self.dt), TracedStepWarning)
             return
         per_period = self._per_period(cars)
         worst = int(np.argmin(per_period))

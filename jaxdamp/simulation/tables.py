@@ -4,12 +4,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from jaxdamp._tables import Compared, Table, comparison_table, percent_change
+from jaxdamp._traced import of_known_numbers
 
 
 if TYPE_CHECKING:
     from jaxdamp.simulation.response import Response
 
 
+@of_known_numbers
 def metrics_table(responses: "Mapping[str, Response]") -> Table:
     """The ride metrics of responses by name, of one kind of vehicle, and the change from the first to the last.
 
@@ -29,6 +31,7 @@ def metrics_table(responses: "Mapping[str, Response]") -> Table:
     return comparison_table("Ride metrics", "metric", tuple(responses), rows)
 
 
+@of_known_numbers
 def comfort_table(responses: "Mapping[str, Response]") -> Table:
     """Comfort by ISO 2631-1 of every acceleration, of responses by name, and the change from the first to the last.
 

@@ -157,10 +157,11 @@ def _pull_within_bounds(optimum: Any, _: Any, inputs: Any) -> Any:
     fn, solver, _, args, *_ = inputs
     flat, unravel = ravel_pytree(optimum)
 
-    def half_squares(flat: Any) -> Any:
-        return 0.5 * jnp.sum(ravel_pytree(fn(unravel(flat), args)[0])[0] ** 2)
+    def residual(flat: Any) -> tuple[Any, Any]:
+        return (ravel_pytree(fn(unravel(flat), args)[0])[0],) * 2
 
-    pull = jax.grad(half_squares)(flat)
+    jacobian, missed = jax.jacfwd(residual, has_aux=True)(flat)  # forwards, as in the search: the unknowns are few
+    pull = missed @ jacobian
     if isinstance(solver, BoundedLevenbergMarquardt):
         lower, upper, *_ = rules_of(solver, jnp, optimum)
         pull = jnp.where(flat - lower < AT_EDGE, flat - lower, jnp.where(upper - flat < AT_EDGE, flat - upper, pull))

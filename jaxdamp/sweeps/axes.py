@@ -8,6 +8,7 @@ from typing import Any, final
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 
 
 Columns = dict[str, np.ndarray]
@@ -107,6 +108,7 @@ def points(values: Mapping[str, Any]) -> Points:
     return listed
 
 
+@of_known_numbers
 def random(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str] = False) -> Points:
     """Points drawn independently and uniformly between limits.
 
@@ -123,6 +125,7 @@ def random(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[st
     return _stretch(ranges, np.random.default_rng(seed).random((count, len(ranges))), log)
 
 
+@of_known_numbers
 def sobol(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str] = False) -> Points:
     """Points of a scrambled Sobol sequence, which fill the space between limits more evenly than random ones.
 

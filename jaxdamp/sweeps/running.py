@@ -10,6 +10,7 @@ from jaxtyping import Array
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar
 from jaxdamp.sweeps import processes
 from jaxdamp.sweeps.axes import AbstractPoints, as_points
@@ -30,6 +31,7 @@ BAR = 20  # characters
 COMPILED, PRINTED = "compiled by XLA", "printed as C"
 
 
+@of_known_numbers
 def sweep(
     function: Callable[[dict[str, Scalar]], Mapping[str, Array]],
     over: Mapping[str, Any] | AbstractPoints,

@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import free_parameters
@@ -93,11 +94,22 @@ def check_passive(law: AbstractDamper) -> None:
 
 
 def check_compiled(law: AbstractDamper) -> None:
-    """Compiled and plain calls agree."""
-    x, v = jnp.asarray(0.003), jnp.asarray(-0.21)
-    compiled = points(free_parameters(law), x, v)[0][0]
+    """Compiled and plain calls agree, and so do their derivatives in the parameters, forward and reverse."""
+    free, x, v = free_parameters(law), jnp.asarray(0.003), jnp.asarray(-0.21)
+    values, slopes = (a[0] for a in points(free, x, v)[:2])
+
+    def plain(numbers: Array) -> Array:
+        return outputs(free.build(numbers), x, v)
+
+    largest = [np.max(np.abs(part), initial=0.0) or 1.0 for part in (values[:2], values[2:])]  # of forces and of rates
+    size = np.repeat(largest, [2, values.size - 2])
     message = "Compiled and plain calls must agree: look for Python's `if` and `float` on numbers of the law."
-    require_equal(outputs(law, x, v), compiled, message, rtol=1e-9, atol=1e-9)
+    require_equal(plain(free.values) / size, values / size, message, atol=1e-12)
+    scale = np.abs(np.asarray(free.values)) / size[:, None]
+    for mode, derivative in {"forward": jax.jacfwd, "reverse": jax.jacrev}.items():
+        found = derivative(plain)(free.values) * scale
+        message = f"Plain derivatives in {mode} mode must be those of a compiled batch."
+        require_equal(found, slopes * scale, message, rtol=1e-9, atol=1e-9)
 
 
 def check_batched(law: AbstractDamper) -> None:

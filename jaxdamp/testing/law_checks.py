@@ -46,7 +46,8 @@ def check_law(law: AbstractDamper, *, leave_out: Collection[str] = ()) -> None:
     - `"traits"`: the declared traits agree with the forces.
     - `"finite"`, `"continuous"`: value, slope and derivatives are finite everywhere, and the force has no jump.
     - `"rest"`, `"passive"`: no force at rest; neither sines nor random motions gain energy from the law.
-    - `"compiled"`, `"batched"`, `"single precision"`: the same numbers compiled, in a batch, and in single precision.
+    - `"compiled"`, `"batched"`, `"single precision"`: the same numbers compiled (to 1e-12, derivatives to 1e-9), in a
+      batch, and in single precision.
     - `"derivatives"`: forward mode, reverse mode and differences agree in every parameter.
     - `"step"`, `"prediction"`: the step converges with second order to an independent integration of the rates.
     - `"inside wrappers"`, `"alike ports"`: it works in every wrapper, and twice in a half car with different

@@ -11,6 +11,7 @@
 - `compare_dampers`: differences between dampers with error bars; `valving`: a mono-tube damper for a wanted force.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp._status import Status
 from jaxdamp.tune.comparison import DamperComparison, Difference
 from jaxdamp.tune.decisions import FittedLaw, compare_dampers
@@ -86,3 +87,5 @@ __all__ = [
     "tolerances",
     "valving",
 ]
+
+answer_guesses(__name__, __all__)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
-from jaxdamp._tables import Column, Table, plain, typeset_unit
+from jaxdamp._tables import Column, Table, plain, plus_minus, typeset_unit
 
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Difference(NamedTuple):
         """The difference in words."""
         parts = f"± {self.from_parameters:.2g} % from the fitted parameters, ± {self.from_roads:.2g} % from the roads"
         less = "less" if self.change < 0 else "more"
-        size = f"{abs(self.change):.2g} ± {self.margin:.2g} % {less} {self.metric}"
+        size = f"{plus_minus(abs(self.change), self.margin)} % {less} {self.metric}"
         verdict = "" if self.significant else ", which may be none"
         return f"{self.damper} has {size}{verdict} (95 %; standard errors {parts})."
 

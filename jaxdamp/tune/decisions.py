@@ -13,6 +13,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._jacobian import value_and_jacobian
 from jaxdamp._progress import Progress
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import FreeParameters, free_parameters
@@ -58,6 +59,7 @@ class _DamperMetrics(NamedTuple):
     variance: Float[np.ndarray, " metrics"]
 
 
+@of_known_numbers
 def compare_dampers(
     dampers: Mapping[str, AbstractDamper | FittedLaw],
     vehicle: Callable[[AbstractDamper], AbstractVehicle],

@@ -12,6 +12,7 @@ from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, typeset_unit, with_unit
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.tune.measuring import Measurement
@@ -30,6 +31,7 @@ def non_dominated(values: Float[np.ndarray, "points objectives"]) -> Bool[np.nda
     return ~np.any(no_worse & (better | earlier), axis=0)
 
 
+@of_known_numbers
 def hypervolume(values: Float[np.ndarray, "points objectives"], reference: Float[np.ndarray, " objectives"]) -> float:
     """Volume of objectives that at least one point beats, up to a reference point, by slices along the last objective.
 

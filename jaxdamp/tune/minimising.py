@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.descending import Descent, Ended, missed, reached
@@ -41,6 +42,7 @@ from jaxdamp.tune.wording import (
 TIGHTENED = 2  # times that a search is repeated with limits that did not hold on fresh roads
 
 
+@of_known_numbers
 def minimise(
     metric: str | Metric | Function,
     vehicle: V,
@@ -67,8 +69,9 @@ def minimise(
     beyond.
 
     Arguments:
-        metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`; a `metrics.Metric` of any
-            channel; or a differentiable function of the metrics by name, such as
+        metric: the name of a ride metric of the vehicle, such as `"rms_sprung_acceleration"`, or "comfort", "travel" or
+            "grip" (`vehicle.goal_metrics`; of several metrics their mean); a `metrics.Metric` of any channel; or a
+            differentiable function of the metrics by name, such as
             `lambda m: m["rms_sprung_acceleration"] / 1.5 + m["dynamic_load_coefficient"] / 0.2`, or `Targets(...)`.
         vehicle: the vehicle to start from.
         road: a road for the simulation, the same in every step; `roads.white(...)` for the stationary response with

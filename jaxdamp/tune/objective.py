@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array
 
 from jaxdamp import _checks
+from jaxdamp._tables import plus_minus
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import (
     STATISTICS,
@@ -110,7 +111,7 @@ def objective_of(
         ValueError: an unknown metric, one that is not available on this kind of road, or one without a derivative; a
             function that does not return one number; two objectives of one name.
     """
-    extra = vehicle.chosen_metrics(list(more), "metrics") if more else []
+    extra = vehicle.chosen_metrics(list(more), "metrics", white=white) if more else []
     own = [one for one in wanted if isinstance(one, Metric)]
     extra += vehicle.chosen_metrics(own, argument) if own else []
     beside = tuple(exact for exact in map(exact_counterpart, extra) if exact is not None)
@@ -142,6 +143,42 @@ def objective_of(
     # Further metrics for information: those without weightings, counts and means, which may be negative.
     chosen = [m for m in known.values() if m.name in (*used, *limited) or _for_information(m)]
     return Objective(tuple(names), tuple(functions.items()), tuple(chosen), beside)
+
+
+def goal_objective(
+    one: str | Metric | Function, vehicle: AbstractVehicle, *, white: bool, argument: str = "metric"
+) -> str | Metric | Function:
+    """An objective with "comfort", "travel" and "grip" spelled out: the metric, or the mean of several."""
+    if not isinstance(one, str):
+        return one
+    names = metrics_of(argument, one, vehicle, white=white)
+    if len(names) == 1:
+        return names[0]
+
+    def mean_of_all(m: Mapping[str, Scalar]) -> Scalar:
+        return sum((m[name] for name in names), jnp.zeros(())) / len(names)
+
+    mean_of_all.__name__ = one
+    return mean_of_all
+
+
+def goal_limits(limits: Any, vehicle: AbstractVehicle, *, white: bool, known: Sequence[str] = ()) -> Any:
+    """Limits with "comfort", "travel" and "grip" spelled out: each metric of a goal gets its limit."""
+    if not isinstance(limits, Mapping):
+        return limits
+    spelled = {}
+    for one, span in limits.items():
+        several = isinstance(one, str) and one not in known
+        for name in metrics_of("limits", one, vehicle, white=white) if several else [one]:
+            spelled[name] = span
+    return spelled
+
+
+def metrics_of(argument: str, one: str, vehicle: AbstractVehicle, *, white: bool) -> list[str]:
+    """The metrics of a name, which may be a short one; an unknown name is refused."""
+    current = current_name(one, vehicle.metric_words)
+    _checks.one_of(argument, current, vehicle.metric_words)
+    return vehicle.goal_metrics(current, white=white)
 
 
 def check_objective(argument: str, one: Any, remedy: str) -> None:
@@ -220,7 +257,7 @@ class Targets:
         target, tolerance = self.values[name]
         off = (value - target) / tolerance
         met = "met" if abs(off) <= 1.0 else f"missed by {abs(off):.1f} tolerances"
-        return f"target {target:.4g} ± {tolerance:.2g}, {met}"
+        return f"target {plus_minus(target, tolerance)}, {met}"
 
 
 def _pair(metric: str | Metric, pair: Any) -> tuple[float, float]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, shares_of
 from jaxdamp.tune.front_notes import judged, notes_on_points
@@ -28,6 +29,7 @@ BEYOND = 0.1  # distance of the default reference point beyond the worst values,
 FRESH_ROADS, MAX_STEPS = 3, 40  # by default
 
 
+@of_known_numbers
 def pareto(
     objectives: Sequence[str | Metric | Function],
     vehicle: V,

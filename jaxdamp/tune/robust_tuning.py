@@ -9,6 +9,7 @@ from jaxdamp._field_types import check_module
 from jaxdamp._results import AbstractResult
 from jaxdamp._status import Status
 from jaxdamp._tables import Table, plain
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric
 from jaxdamp.tune.minimising import minimise
 from jaxdamp.tune.objective import Function
@@ -91,6 +92,7 @@ class RobustResult(AbstractResult, Generic[V]):
         return "\n".join([self.summary, repr(self.tuning), *self.sentences])
 
 
+@of_known_numbers
 def robust(
     metric: str | Metric | Function,
     vehicle: V,

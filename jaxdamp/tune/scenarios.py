@@ -9,6 +9,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import AbstractEngine
@@ -172,6 +173,7 @@ class Scenarios:
         )
 
 
+@of_known_numbers
 def tolerances(scatter: Mapping[str, float], count: int, *, seed: int = 0) -> dict[str, Condition]:
     """Conditions of `count` dampers or vehicles from one production, whose parameters scatter independently.
 
@@ -207,6 +209,7 @@ def tolerances(scatter: Mapping[str, float], count: int, *, seed: int = 0) -> di
     }
 
 
+@of_known_numbers
 def samples(values: Mapping[str, Any]) -> dict[str, Condition]:
     """Conditions of given values, one for each sample: those of a fitted law from its posterior, for instance.
 

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers import AbstractMemoryless
 from jaxdamp.metrics import Metric
@@ -60,6 +61,7 @@ class SensitivitySettings(Free, Curves, Run, total=False):
 DEFAULTS: dict[str, Any] = {"over": ("*",), "freeze": (), "dampers": "*damper", "reach": None, "hats": HATS, **RUN}
 
 
+@of_known_numbers
 def sensitivity(
     metric: str | Metric | Function | Sequence[str | Metric],
     vehicle: AbstractVehicle,

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper, laws_inside
 from jaxdamp.parameters import get, matching
@@ -52,6 +53,7 @@ class Shape:
         return dataclasses.replace(self, dampers=dampers)
 
 
+@of_known_numbers
 def slope(lower: float | None = None, upper: float | None = None, *, reach: float = 1.0) -> Shape:
     """Limits of the slope of the curve [N s/m].
 
@@ -68,6 +70,7 @@ def slope(lower: float | None = None, upper: float | None = None, *, reach: floa
     return Shape("slope", "N s/m", span, tuple(map(float, velocities)), _slopes, places)
 
 
+@of_known_numbers
 def monotone(*, reach: float = 1.0) -> Shape:
     """A force that never falls as the velocity grows: a slope of zero or more.
 
@@ -77,6 +80,7 @@ def monotone(*, reach: float = 1.0) -> Shape:
     return slope(0.0, reach=reach)
 
 
+@of_known_numbers
 def ratio(lower: float | None = None, upper: float | None = None, *, velocity: float) -> Shape:
     """Limits of the rebound force over the compression force at a velocity, both measured from standstill.
 
@@ -90,6 +94,7 @@ def ratio(lower: float | None = None, upper: float | None = None, *, velocity: f
     return Shape(name, "", _span(lower, upper), (-velocity, 0.0, velocity), _ratio)
 
 
+@of_known_numbers
 def knee(lower: float | None = None, upper: float | None = None, *, side: str = "rebound", reach: float = 1.0) -> Shape:
     """Limits of the velocity of the knee [m/s], positive on both sides.
 

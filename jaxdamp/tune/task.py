@@ -15,7 +15,7 @@ from jaxdamp.simulation import stationary_notes
 from jaxdamp.solve import Evaluation, Region
 from jaxdamp.tune.limits import Limit, LimitRange, limit_ends, limit_ranges, scaled
 from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
-from jaxdamp.tune.objective import Function, Targets, objective_of
+from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import V
 from jaxdamp.tune.run_notes import range_notes, rides_on, step_notes
@@ -69,12 +69,18 @@ class DesignTask(Generic[V]):
     ) -> None:
         self.vehicle, self.road, self._argument = vehicle, road, argument
         self.run = {name: settings[name] for name in RUN}
-        limits, metrics = settings["limits"], settings["metrics"]
-        known = [m.name for m in (*vehicle.ride_metrics, *(m for m in metrics if isinstance(m, Metric)))]
+        metrics, white = settings["metrics"], is_white(road)
+        further = [m.name for m in metrics if isinstance(m, Metric)]
+        known = [*(m.name for m in vehicle.ride_metrics), *further]
+        objectives = [
+            one if one in further else goal_objective(one, vehicle, white=white, argument=argument)
+            for one in objectives
+        ]
+        limits = goal_limits(settings["limits"], vehicle, white=white, known=further)
         self.allowed = limit_ranges(limits, known)
         limited = [metric for metric in limits or {} if isinstance(metric, Metric)]
         of_targets = _metrics_of_targets(objectives, known, limited)
-        more, white = [*metrics, *limited, *of_targets], is_white(road)
+        more = [*metrics, *limited, *of_targets]
         self.objective = objective_of(objectives, vehicle, more, list(self.allowed), white=white, argument=argument)
         _refuse_negative(self.allowed, self.objective.metrics)
         self.space = search_range(vehicle, *(settings[name] for name in ("over", "freeze", "bounds", "tie")))

@@ -7,6 +7,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import Column, Table
+from jaxdamp._traced import of_known_numbers
 from jaxdamp.parameters import match_paths
 from jaxdamp.tune.sensitivities import sensitivity
 from jaxdamp.tune.settings import RUN, Run, completed
@@ -35,6 +36,7 @@ class ToleranceEffect(NamedTuple):
         return f"A {100 * self.scatter:g} % scatter of {self.parameter} {cost} {100 * self.deviation:.2g} %."
 
 
+@of_known_numbers
 def tolerance_effects(
     metric: Any,
     vehicle: AbstractVehicle,

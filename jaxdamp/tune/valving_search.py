@@ -14,6 +14,7 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
+from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper, MonoTube
@@ -70,6 +71,7 @@ class _End(NamedTuple):
     status: Status
 
 
+@of_known_numbers
 def valving(
     target: AbstractDamper | BenchRun | Sequence[BenchRun] | tuple[Any, Any],
     start: MonoTube,

@@ -9,6 +9,7 @@
 z is up, pitch positive nose up, roll positive left side up.
 """
 
+from jaxdamp._guesses import answer_guesses
 from jaxdamp.vehicles import presets
 from jaxdamp.vehicles.axle import Axle
 from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle
@@ -109,3 +110,5 @@ __shared__ = [
     "rest_position",
     "with_weightings",
 ]
+
+answer_guesses(__name__, __all__)

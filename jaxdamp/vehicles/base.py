@@ -10,14 +10,15 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from jaxdamp import _checks
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.metrics import Metric
+from jaxdamp.metrics import Metric, current_name
 from jaxdamp.parameters import Module, check_parameters, readable
 from jaxdamp.vehicles.channels import channels_of
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
-from jaxdamp.vehicles.ride_metrics import chosen_metrics
+from jaxdamp.vehicles.ride_metrics import GOALS, chosen_metrics, metrics_of_goal
 from jaxdamp.vehicles.system import Layout, System, assemble, layout_of
 
 
@@ -77,13 +78,45 @@ class AbstractVehicle(Module):
         """The predefined ride metrics."""
         return self.layout.metrics
 
-    def chosen_metrics(self, wanted: Sequence[str | Metric] | None, argument: str = "metrics") -> list[Metric]:
+    def chosen_metrics(
+        self, wanted: Sequence[str | Metric] | None, argument: str = "metrics", *, white: bool = False
+    ) -> list[Metric]:
         """These metrics, by the names of ride metrics or as a `Metric` of any channel; all ride metrics if None.
+
+        The short names "comfort", "travel" and "grip" mean what `goal_metrics` says, on a `white` road its RMS.
 
         Raises:
             ValueError: an unknown name or channel, with the nearest known one; the message names `argument`.
         """
-        return chosen_metrics(self.layout.metrics, self.layout.by_name, wanted, argument)
+        return chosen_metrics(self.layout.metrics, self.layout.by_name, wanted, argument, white=white)
+
+    def goal_metrics(self, goal: str, *, white: bool = False) -> list[str]:
+        """The names of the ride metrics that a short name means: "comfort", "travel" or "grip"; or of one metric.
+
+        Comfort is the weighted RMS acceleration of the body [m/s^2]; travel the working space of every suspension, peak
+        to peak, on a white road its RMS [m]; grip the RMS variation of the load of every tyre [N]. The same names are
+        taken by `Ride`, `simulate(...).metrics`, `tune` and the command line.
+
+        Arguments:
+            goal: such a name, or that of a ride metric.
+            white: for stationary rides on a white road.
+
+        Raises:
+            ValueError: an unknown name.
+
+        >>> from jaxdamp import vehicles
+        >>> vehicles.presets.half_car_002().goal_metrics("grip")
+        ['rms_front_dynamic_tyre_load', 'rms_rear_dynamic_tyre_load']
+        """
+        if goal not in GOALS:
+            _checks.one_of("goal", current_name(goal, [m.name for m in self.layout.metrics]), self.metric_words)
+            return [goal]
+        return metrics_of_goal(self.layout.metrics, self.layout.by_name, goal, white=white)
+
+    @property
+    def metric_words(self) -> list[str]:
+        """All names that a ride metric may have: the short ones first."""
+        return [*GOALS, *(metric.name for metric in self.layout.metrics)]
 
     def static_wheel_loads(self) -> Float[Array, " wheels"]:
         """Load of each wheel at rest on level ground [N] (see `Frame.static_wheel_loads`)."""

@@ -1,17 +1,21 @@
 """Where a vehicle comes to rest on the road, with every nonlinear spring."""
 
-from typing import Any, NoReturn
+from collections.abc import Callable
+from typing import Any, NoReturn, TypeAlias, final
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+import optimistix as optx
+from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._matrices import solve
+from jaxdamp._root import ImplicitDerivatives
 from jaxdamp._sharded import varying_as
+from jaxdamp._types import Scalar
 from jaxdamp.dampers import coverage
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.port_form import PortForm
@@ -39,12 +43,14 @@ def rest_position(system: System, road: Float[Array, " wheels"]) -> Float[Array,
         still = jnp.zeros(len(system.laws))
         forces = ports.force(still, still, ports.initial())
         return solve(form.stiffness, form.road_stiffness @ road - form.ports.T @ forces)
-    arrays, rest = eqx.partition((form, ports, road), eqx.is_array)
-    position = _newton(*eqx.combine(jax.lax.stop_gradient(arrays), rest))
-    for _ in range(2):  # differentiable Newton steps: one gives exact first derivatives, two exact second ones
-        residual, slope = _residual_force(form, ports, road, position)
-        position = position - solve(slope, residual)
-    return position
+    scale = jnp.max(jnp.diag(form.stiffness))  # N/m, converts residual forces to lengths
+    solver = _SharedNewton(atol=1e-8 if scale.dtype == jnp.float32 else 1e-14)
+    setting = form, ports, road, jax.lax.stop_gradient(scale)
+    start = varying_as(jnp.zeros_like(form.mass[0]), *eqx.filter(setting, eqx.is_array))
+    found = optx.root_find(
+        _unbalanced, solver, start, setting, max_steps=STEPS, adjoint=ImplicitDerivatives(), throw=False
+    )
+    return jnp.where(found.state < 1e3 * solver.atol, found.value, jnp.nan)
 
 
 def _residual_force(form: PortForm, ports: Ports, road: Array, q: Float[Array, " q"]) -> tuple[Array, Array]:
@@ -56,22 +62,47 @@ def _residual_force(form: PortForm, ports: Ports, road: Array, q: Float[Array, "
     return residual, form.stiffness + (form.ports.T * slopes[None, :]) @ form.ports
 
 
-def _newton(form: PortForm, ports: Ports, road: Float[Array, " wheels"]) -> Float[Array, " q"]:
-    scale = jnp.max(jnp.diag(form.stiffness))  # N/m, converts residual forces to lengths
-    tolerance = 1e-8 if scale.dtype == jnp.float32 else 1e-14
+_Setting: TypeAlias = tuple[PortForm, Ports, Array, Scalar]  # and the stiffness that converts forces to lengths
 
-    def step(now: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-        q, _, count = now
-        residual, slope = _residual_force(form, ports, road, q)
-        tries = q[None] - SHARES[:, None] * solve(slope, residual)[None]
+
+def _unbalanced(q: Float[Array, " q"], setting: _Setting) -> Array:
+    """The unbalanced forces at a position, as lengths [m]."""
+    form, ports, road, scale = setting
+    return _residual_force(form, ports, road, q)[0] / scale
+
+
+@final
+class _SharedNewton(optx.AbstractRootFinder):
+    """Newton's method, of whose step that share is taken which leaves the least; its state is what is left [m]."""
+
+    atol: float
+    rtol: float = 0.0
+    norm: Callable[[Any], Array] = eqx.field(static=True, default=optx.max_norm)
+
+    def init(self, fn: Any, y: Any, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any) -> Array:
+        """Nothing is known of the first position."""
+        return jnp.full_like(args[3], jnp.inf)
+
+    def step(self, fn: Any, y: Any, args: Any, options: Any, state: Array, tags: Any) -> tuple[Array, Array, None]:
+        """The best of some shares."""
+        form, ports, road, scale = args
+        residual, slope = _residual_force(form, ports, road, y)
+        tries = y[None] - SHARES[:, None] * solve(slope, residual)[None]
         sizes = jnp.linalg.norm(jax.vmap(lambda q: _residual_force(form, ports, road, q)[0])(tries), axis=1)
         best = jnp.nanargmin(sizes)
-        return tries[best], sizes[best] / scale, count + 1
+        return tries[best], sizes[best] / scale, None
 
-    start = jnp.zeros_like(form.mass[0]), jnp.full_like(scale, jnp.inf), jnp.zeros((), int)
-    start = varying_as(start, *eqx.filter((form, ports, road), eqx.is_array))
-    position, size, _ = jax.lax.while_loop(lambda now: (now[1] > tolerance) & (now[2] < STEPS), step, start)
-    return jnp.where(size < 1e3 * tolerance, position, jnp.nan)
+    def terminate(
+        self, fn: Any, y: Any, args: Any, options: Any, state: Array, tags: Any
+    ) -> tuple[Bool[Array, ""], optx.RESULTS]:
+        """Where rounding errors are left."""
+        return state <= self.atol, optx.RESULTS.successful
+
+    def postprocess(
+        self, fn: Any, y: Any, aux: Any, args: Any, options: Any, state: Any, tags: Any, result: Any
+    ) -> tuple[Any, Any, dict[str, Any]]:
+        """As it is."""
+        return y, aux, {}
 
 
 @eqx.filter_jit

@@ -9,6 +9,14 @@ from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Link, Wheel, prefixed
 
 
+# The short names of what a rider and a designer want: kind of the channel, statistic, whether it is weighted.
+GOALS = {
+    "comfort": (ChannelKind.ACCELERATION, "rms", True),
+    "travel": (ChannelKind.STROKE, "peak_to_peak", False),
+    "grip": (ChannelKind.TYRE_LOAD, "rms", False),
+}
+
+
 def ride_metrics_of(frame: Frame, channels: Sequence[Channel]) -> tuple[Metric, ...]:
     """The ride metrics, in groups: bodies and places, suspensions, tyres."""
     return (*_of_bodies(frame, channels), *_of_elements(frame), *_of_tyres(frame))
@@ -85,16 +93,37 @@ def is_stationary(metric: Metric, channels: Mapping[str, Channel]) -> bool:
     return metric.statistic.of_rms is not None and not (unbounded or metric.by or metric.window)
 
 
+def metrics_of_goal(
+    metrics: Sequence[Metric], channels: Mapping[str, Channel], goal: str, *, white: bool = False
+) -> list[str]:
+    """The names of the ride metrics that a short name means, as `goal_metrics` says."""
+    kind, statistic, weighted = GOALS[goal]
+    statistic = "standard_deviation" if white and kind is ChannelKind.STROKE else statistic
+    names = [
+        m.name
+        for m in metrics
+        if channels[m.channel].kind is kind and m.statistic.name == statistic and (m.weighting is not None) == weighted
+    ]
+    return names[:1] if goal == "comfort" else names
+
+
 def chosen_metrics(
-    metrics: Sequence[Metric], channels: Mapping[str, Channel], wanted: Sequence[str | Metric] | None, argument: str
+    metrics: Sequence[Metric],
+    channels: Mapping[str, Channel],
+    wanted: Sequence[str | Metric] | None,
+    argument: str,
+    *,
+    white: bool = False,
 ) -> list[Metric]:
     """The requested metrics, checked and with their weightings.
 
     Arguments:
         metrics: the predefined ride metrics of the vehicle.
         channels: channels of the vehicle, by name.
-        wanted: names of ride metrics, or metrics of any channel; None for all ride metrics.
+        wanted: names of ride metrics, or metrics of any channel; "comfort", "travel" and "grip" mean those of
+            `goal_metrics`; None for all ride metrics.
         argument: name of this argument in error messages.
+        white: for stationary rides on a white road.
 
     Raises:
         ValueError: an empty list; an unknown name or channel, with the nearest known one; a weighting of a channel that
@@ -108,6 +137,9 @@ def chosen_metrics(
     if not len(wanted):
         some = ", ".join(map(repr, list(known)[:3]))
         _checks.refuse(argument, "name one or more", "empty", f"Write [{some}], or leave it out for all.")
+    if not isinstance(wanted, str):
+        spelled = {goal: metrics_of_goal(metrics, channels, goal, white=white) for goal in GOALS}
+        wanted = [m for one in wanted for m in (spelled.get(one) or [one] if isinstance(one, str) else [one])]
     names = [m for m in wanted if not isinstance(m, Metric)] if not isinstance(wanted, str) else wanted
     current = iter(current_names(argument, names, known))
     chosen = [of_channel(m, channels, argument) if isinstance(m, Metric) else known[next(current)] for m in wanted]

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from jaxdamp import bench, identify
 from jaxdamp.bench import BenchSet
 from jaxdamp.cli import app
-from jaxdamp.cli.options import law_names, split
+from jaxdamp.cli.records import law_names, split
 from jaxdamp.cli.vehicle_words import presets
 from jaxdamp.dampers import Bilinear, Linear
 from jaxdamp.export import from_json, to_json
@@ -72,6 +72,7 @@ def test_fit_writes_laws_that_load_again(records: Path, tmp_path: Path) -> None:
     assert isinstance(law, Bilinear)
     assert (float(law.rebound_rate), float(law.compression_rate)) == pytest.approx((2600.0, 1200.0), rel=2e-3)
     assert from_json(out / "laws" / "bilinear.json") == law
+    assert text.index("  - linear: RMSE ") < text.index("  - bilinear: RMSE ") < text.index("Recommended: bilinear")
     assert text.index("Recommended: bilinear") < text.index("Laws (shape") < text.index("Written to")
     for said in ("Records", "stroke from 'stroke [m]'", "RMSE [N]", "linear", "Recommended: bilinear", "Written to"):
         assert said in text

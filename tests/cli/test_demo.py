@@ -7,7 +7,8 @@ from jaxdamp import bench
 from jaxdamp.bench import SineTest
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.demo import Scenario, run_demo
-from jaxdamp.cli.demo_rides import TRUE
+from jaxdamp.cli.demo_words import TRUE
+from jaxdamp.cli.jobs import Output
 from jaxdamp.dampers import Besinger
 from jaxdamp.export import from_json
 
@@ -24,7 +25,7 @@ def test_the_demo_goes_through_the_whole_chain(tmp_path: Path, capsys: pytest.Ca
         fresh_roads=2,
     )
     out = tmp_path / "demo"
-    run_demo(Screen(), scenario, out=out)
+    run_demo(Screen(), scenario, Output(out))
     text = " ".join(capsys.readouterr().out.split())  # however long the lines are
     assert bench.read(out / "records").names == ("30mm_1Hz", "30mm_3Hz", "30mm_5Hz")
     assert isinstance(from_json(out / "best_law.json"), Besinger)

@@ -59,5 +59,5 @@ def test_refusals(law: Path) -> None:
     to_json(sine(amplitude=0.01, frequency=1.0), folder / "road.json")
     assert "LAW must be a law as JSON" in refused(folder, "export", folder / "road.json", "--to", "csv")
     jaxdamp("export", law, "--to", "csv")
-    assert "Option --out must be a new file" in refused(folder, "export", law, "--to", "csv")
+    assert "Option --file must be a new file" in refused(folder, "export", law, "--to", "csv")
     jaxdamp("export", law, "--to", "csv", "--replace")

@@ -10,7 +10,7 @@ import pytest
 
 from jaxdamp import bench, identify, roads, vehicles
 from jaxdamp.bench import RideRecord
-from jaxdamp.cli.options import assignments
+from jaxdamp.cli import offers
 from jaxdamp.dampers import Bilinear, CoulombFriction
 from jaxdamp.export import from_json, to_json
 from jaxdamp.rig import Sensor
@@ -166,7 +166,7 @@ def test_wrong_words_are_refused(files: dict[str, Path], tmp_path: Path, words: 
 
 
 def test_names_with_commas_are_headers_of_any_channel() -> None:
-    assert assignments("columns", ["stroke=LVDT, FL,front.stroke = 3"], None) == {
+    assert offers.WRITTEN["columns"].read("columns", ["stroke=LVDT, FL,front.stroke = 3"]) == {
         "stroke": "LVDT, FL",
-        "front.stroke": "3",
+        "front.stroke": 3,
     }

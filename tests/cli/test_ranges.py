@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from jaxdamp import roads, simulate, vehicles
-from jaxdamp.cli.run_warnings import without_range_warnings
+from jaxdamp.cli.jobs import without_range_warnings
 from jaxdamp.dampers import Bilinear, FittedRange, Linear, with_fitted_range
 from jaxdamp.export import from_json, to_json
 from jaxdamp.report import fitted_range_table, notes_of, range_use_table

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from jaxdamp import roads, simulate, vehicles
+from jaxdamp.cli.jobs import with_step_warnings
 from jaxdamp.cli.riding import parse_road
-from jaxdamp.cli.run_warnings import with_step_warnings
 from jaxdamp.cli.vehicle_words import presets
 from jaxdamp.dampers import AbstractDamper, Bilinear, Linear
 from jaxdamp.export import to_json

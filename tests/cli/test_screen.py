@@ -9,9 +9,9 @@ from rich.console import Console
 
 from jaxdamp import bench
 from jaxdamp.bench import SineTest
-from jaxdamp.cli import console
+from jaxdamp.cli import console, offers
 from jaxdamp.cli.console import Screen
-from jaxdamp.cli.options import assignments, column_numbers, decisions
+from jaxdamp.cli.records import decisions
 from jaxdamp.dampers import Linear
 from jaxdamp.report import Column, Table
 
@@ -26,9 +26,12 @@ def test_notes_of_one_kind_are_said_once() -> None:
 
 
 def test_assignments_may_hold_commas() -> None:
-    found = assignments("columns", ["time=t_s,stroke=Displacement, in", "force=2,velocity=none"])
-    assert found == {"time": "t_s", "stroke": "Displacement, in", "force": "2", "velocity": "none"}
-    assert column_numbers(found) == {"time": "t_s", "stroke": "Displacement, in", "force": 2, "velocity": None}
+    assert offers.WRITTEN["columns"].read("columns", ["time=t_s,stroke=Displacement, in", "force=2,velocity=none"]) == {
+        "time": "t_s",
+        "stroke": "Displacement, in",
+        "force": 2,
+        "velocity": None,
+    }
 
 
 @pytest.mark.parametrize("terminal", [True, False])

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 from jaxdamp import vehicles
-from jaxdamp.cli.metric_words import metric_names
 from jaxdamp.cli.vehicle_words import parse_vehicle
 from jaxdamp.dampers import Bilinear, Linear
 from jaxdamp.export import from_json, to_json
@@ -95,9 +94,8 @@ def test_vehicles_from_files_take_a_law(tmp_path: Path) -> None:
 
 def test_words_for_metrics() -> None:
     car = vehicles.presets.full_car_jazar()
-    assert metric_names("limit", "comfort", car, white=False) == ["weighted_rms_sprung_acceleration"]
-    assert len(metric_names("limit", "travel", car, white=False)) == 4
-    assert len(metric_names("limit", "grip", car, white=False)) == 4
+    assert car.goal_metrics("comfort") == ["weighted_rms_sprung_acceleration"]
+    assert len(car.goal_metrics("travel")) == 4 and len(car.goal_metrics("grip")) == 4
 
 
 WRONG = [

@@ -98,8 +98,8 @@ def test_another_vehicle_has_the_road_under_its_own_axles():
 
 ON_TWO_DEVICES = """
 import jax, jax.numpy as jnp, numpy as np
-from jax.sharding import Mesh, PartitionSpec
-from jaxdamp import Ride, dampers, respond, roads, simulate
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
+from jaxdamp import Ride, dampers, respond, roads, simulate, vehicles
 from jaxdamp.vehicles.presets import quarter_car_000
 
 bump = roads.cosine_bump(0.05, start=0.02, duration=0.1)
@@ -111,13 +111,28 @@ def numbers(rate):
     law = dampers.Lag(dampers.Linear(rate), 0.004)
     run = simulate(quarter_car_000(law), bump, duration=0.1, substeps=1)
     force = respond(law, time, 0.01 * np.sin(20 * time))
-    return jnp.stack([ride({"rate": rate})["rms_sprung_acceleration"], run["stroke"][-1], force[-1]])
+    gas = vehicles.QuarterCar(300.0, 40.0, 20e3, 180e3, dampers.Linear(1500.0),
+        extra_spring=dampers.GasSpring(1e3 * rate, 6e-5, 1e-4))
+    lift = vehicles.static_equilibrium(gas)["z_sprung"]
+    return jnp.stack([ride({"rate": rate})["rms_sprung_acceleration"], run["stroke"][-1], force[-1], 100.0 * lift])
 
 rates, spec = jnp.asarray([900.0, 1500.0]), PartitionSpec("device")
 mesh = Mesh(np.array(jax.devices()), ("device",))
 spread = jax.jit(jax.shard_map(jax.vmap(numbers), mesh=mesh, in_specs=spec, out_specs=spec))(rates)
 assert len(spread.sharding.device_set) == 2
-np.testing.assert_allclose(spread, jax.vmap(numbers)(rates), rtol=1e-4)
+alone = jax.vmap(numbers)(rates)
+np.testing.assert_allclose(spread, alone, rtol=1e-4)
+
+placed = jax.device_put(rates, NamedSharding(mesh, spec))
+together = jax.jit(jax.vmap(numbers))(placed)
+assert len(together.sharding.device_set) == 2
+np.testing.assert_allclose(together, alone, rtol=1e-4)
+
+def lift(charge):
+    return numbers(charge)[3]
+
+slopes = jax.jit(jax.shard_map(jax.vmap(jax.grad(lift)), mesh=mesh, in_specs=spec, out_specs=spec))(rates)
+np.testing.assert_allclose(slopes, jax.vmap(jax.grad(lift))(rates), rtol=1e-3)
 """
 
 

@@ -11,7 +11,7 @@ from jaxdamp import Ride, dampers, roads, simulate
 from jaxdamp._types import Number
 from jaxdamp.dampers import AbstractStateful
 from jaxdamp.parameters import parameter, positive
-from jaxdamp.simulation import TracedStepWarning, substeps_needed
+from jaxdamp.simulation import Adaptive, TracedStepWarning, substeps_needed
 from jaxdamp.vehicles.presets import quarter_car_000
 
 
@@ -117,6 +117,26 @@ def test_what_is_no_argument_of_a_compiled_function_is_known_inside():
 
     jax.jit(drive)(1.0)
     assert found == [23]
+
+
+def test_plain_numbers_are_known_inside_a_compiled_function():
+    found = []
+
+    def drive(scale):
+        found.append(ride(LAWS["steep friction"][0](500.0)).substeps)
+        return scale
+
+    jax.jit(drive)(1.0)  # a `TracedStepWarning` would be an error here
+    assert found == [23]
+
+
+def test_an_adaptive_engine_says_what_it_cannot_check_of_a_traced_vehicle():
+    def last(rate):
+        car = quarter_car_000(dampers.Linear(rate))
+        return simulate(car, ROAD, duration=0.1, dt=2e-3, engine=Adaptive(rtol=1e-4))["stroke"][-1]
+
+    with pytest.warns(TracedStepWarning, match=r"whether instants every 0\.002 s resolve the road .* is not checked"):
+        jax.eval_shape(last, jnp.asarray(1500.0))
 
 
 def test_what_an_eager_run_refuses_a_derivative_and_a_batch_refuse():

@@ -16,7 +16,9 @@ CAR = QuarterCar(300.0, 40.0, 20e3, 180e3, Linear(1500.0), friction=CoulombFrict
 def test_the_number_that_is_refused_is_named_with_its_last_accepted_value():
     free = free_parameters(CAR.friction)
     start, end = np.array([100.0, 1e-2]), np.array([300.0, 1e-5])
-    index, value, limited = first_refused(free, start, end, lambda values: values[1] > 1e-3)
+    limit = first_refused(free, start, end, lambda values: bool(values[1] > 1e-3))
+    assert limit is not None
+    index, value, limited = limit
     assert index == 1 and value == pytest.approx(1e-3, rel=0.01) and value > 1e-3
     assert limited.limits()[0][1] == value and value < float(limited.values[1]) < 2e-3
     assert first_refused(free, start, end, lambda values: bool(np.all(values == start))) is None

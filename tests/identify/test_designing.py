@@ -10,7 +10,7 @@ from jaxdamp import identify
 from jaxdamp.bench import MultiSineTest, SineTest, TriangleTest, VirtualDyno, programmes
 from jaxdamp.dampers import AbstractDamper, Besinger, Bilinear, Linear
 from jaxdamp.identify import MachineLimits, design_experiment
-from jaxdamp.identify.information import information
+from jaxdamp.identify.design_goal import information
 from jaxdamp.rig import Rig
 
 

@@ -136,8 +136,6 @@ def test_what_is_refused(clicks):
         ({"shared": ["rebound"]}, "No parameter is named 'rebound'"),
         ({"settings": CLICKS[:3]}, "one number for each of 6 dampers"),
         ({"starts": 0}, "`starts` must be 1 or more"),
-        ({"initial_state": "estimated"}, "`initial_state` must need no numbers of each record"),
-        ({"starts": 2, "shared": ["rebound_rate"]}, "`starts` must be 1 with shared parameters"),
     )
     for options, message in refusals:
         with pytest.raises(ValueError, match=message):
@@ -185,7 +183,38 @@ def test_a_bad_record_of_a_damper_is_named(clicks):
     assert many.unusual == ("6",) and f"mostly of {bad[1].name!r}" in many.remarks[3]
 
 
-@pytest.mark.parametrize("options", [{"loss": "huber"}, {"priors": {"rebound_rate": (2000.0, 10.0)}}])
-def test_losses_and_priors_are_refused_with_shared_parameters(clicks, options):
-    with pytest.raises(ValueError, match=f"`{next(iter(options))}` must be left out with shared parameters"):
-        fit_many(Bilinear, clicks, shared=["rebound_rate"], **options)
+@pytest.mark.parametrize(
+    "options",
+    [{"loss": "student_t"}, {"priors": {"rebound_rate": (2400.0, 2.0)}}, {"starts": 2}],
+    ids=["loss", "priors", "starts"],
+)
+def test_everything_shared_is_the_fit_of_all_records_together(options):
+    dampers = {name: records(Bilinear(2400.0, 1200.0), seed) for seed, name in enumerate("ABC")}
+    if "loss" in options:
+        dampers = {name: spiked(runs, 1) for name, runs in dampers.items()}
+    every = [run for runs in dampers.values() for run in runs]
+    single = fit(Bilinear, every, **options)
+    many = fit_many(Bilinear, dampers, shared=["*_rate"], **options)
+    assert many.converged
+    for j, e in enumerate(single.parameters):
+        np.testing.assert_allclose(many.values[:, j], e.value, atol=0.2 * e.standard_error)
+        assert many.standard_errors[0, j] == pytest.approx(e.standard_error, rel=0.1)
+
+
+def test_states_at_the_beginning_are_estimated_damper_by_damper():
+    law = Lag(Bilinear(2000.0, 1200.0), 5e-3)
+    dampers = {name: records(law, seed)[:1] for seed, name in enumerate("AB")}
+    begun = Lag(Bilinear(1500.0, 1500.0), 2e-3)
+    many = fit_many(begun, dampers, initial_state="estimated")
+    single = fit(begun, dampers["B"], initial_state="estimated", starts=1)
+    np.testing.assert_allclose(many.values[1], [single[name].value for name in many.parameters], rtol=1e-9)
+    with pytest.raises(ValueError, match="be the same for dampers that share parameters"):
+        fit_many(begun, dampers, initial_state="estimated", shared=["lag_time"])
+
+
+def test_one_damper_of_many_has_everything_that_a_single_fit_has(clicks):
+    many = fit_many(Bilinear, clicks, rig="gas")
+    single = many.fit("10", input_noise=(1e-5, 1e-3))
+    np.testing.assert_allclose(many.values[5], [e.value for e in single.parameters], rtol=1e-3)
+    assert single["rebound_rate"].bias is not None
+    assert single.profile("law.rebound_rate").interval[0] < single["rebound_rate"].value

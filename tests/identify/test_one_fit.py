@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import optimistix as optx
 import pytest
 
 from jaxdamp import bench, identify, roads
@@ -105,6 +106,14 @@ def test_a_robust_loss_takes_sound_data_as_they_are(fitted, plain):
         value(plain, "rebound_rate"), abs=2.0 * plain.estimate("rebound_rate").standard_error
     )
     assert "loss huber" in result.criterion
+
+
+@pytest.mark.slow
+def test_a_solver_of_optimistix_ends_in_the_same_minimum(fitted, plain):
+    result = fitted(starts=1, solver=optx.Dogleg(rtol=1e-8, atol=1e-8))
+    for name in RATES:
+        error = plain.estimate(name).standard_error
+        assert value(result, name) == pytest.approx(value(plain, name), abs=0.01 * error)
 
 
 def test_bounds_ties_and_frozen_numbers(fitted):

@@ -8,8 +8,7 @@ import pytest
 from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.dampers import Bilinear, Linear, ModifiedBoucWen, Scaled, Scheduled, with_command
-from jaxdamp.identify.recommending import not_worse
-from jaxdamp.identify.verdict import cannot_choose
+from jaxdamp.identify.rungs import cannot_choose, not_worse
 from jaxdamp.parameters import get
 
 

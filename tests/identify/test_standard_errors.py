@@ -6,8 +6,8 @@ import pytest
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import Besinger, Bilinear, Linear
 from jaxdamp.identify import fit
+from jaxdamp.identify.estimating import uncertainty, weak_directions
 from jaxdamp.identify.noise import Noise, _corrected, autocorrelation, correlation_time
-from jaxdamp.identify.uncertainty import uncertainty, weak_directions
 
 
 def coloured(rng, count, memory):

@@ -56,7 +56,8 @@ def test_roughness_of_a_road() -> None:
 
 def test_targets() -> None:
     met = [Met("frequency", 1.2, 0.01, 1.215), Met("ratio", 0.3, 0.1, 0.28)]
-    result = TargetFit(None, (), tuple(met), (), identify.Status.CONVERGED, 3)
+    ended = {"warnings": (), "status": identify.Status.CONVERGED, "steps": 3}
+    result = TargetFit(model=None, parameters=(), covariance=np.zeros((0, 0)), targets=tuple(met), **ended)
     (axes,) = result.plot().axes
     np.testing.assert_allclose(np.asarray(axes.get_lines()[0].get_xdata(), float), [1.5, -0.2])
 

@@ -80,3 +80,12 @@ def test_a_stop_between_parts_is_not_taken_for_a_failure() -> None:
     with pytest.raises(Stopped), attempts.part("The picture"):
         pass
     assert attempts.troubles == []
+
+
+def test_the_words_of_a_page_are_those_of_its_reader() -> None:
+    attempts = Attempts(words=lambda text: text.replace("`rig`", "--rig"))
+    page = Report("Page", attempts=attempts)
+    page.verdict("first `rig`")
+    page.text("second", "`rig`")
+    page.points(["third `rig`"])
+    assert page.to_html().count("--rig") == 3 and "`" not in page.to_html().partition("<h1>")[2]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp._tables import Cell, Shown
+from jaxdamp._tables import Cell, Shown, plus_minus
 from jaxdamp.bench.analysis import NEAR_PEAK, FoldedCycles
 
 
@@ -42,8 +42,7 @@ class Measurement:
         if not np.isfinite(self.value):
             return None
         width = self.scatter if self.uncertainty is None else self.uncertainty
-        spread = "" if width is None else f" ± {width:.2g}"
-        return Shown(self.value, f"{self.value:.4g}{spread}")
+        return Shown(self.value, f"{self.value:.4g}" if width is None else plus_minus(self.value, width))
 
 
 def at_velocity(measurement: Measurement, velocity: float | None) -> bool:

@@ -1,4 +1,4 @@
-"""The rides of `jaxdamp demo`: what the choice of a law costs in the prediction of a ride."""
+"""What `jaxdamp demo` says: what the choice of a law costs in the prediction of a ride, what the tuning gains."""
 
 from collections.abc import Mapping
 
@@ -7,6 +7,7 @@ from jaxdamp._tables import Column, Table, percent_change, typeset_unit
 from jaxdamp.cli.console import Screen
 from jaxdamp.report import Report, notes_of
 from jaxdamp.simulation import Response
+from jaxdamp.tune import TuneResult
 
 
 TRUE = "true damper"
@@ -18,6 +19,12 @@ METRICS = {
     "rms_dynamic_tyre_load": "tyre load, RMS",
 }
 JUDGED = "rms_sprung_acceleration"
+COMFORT = "weighted_rms_sprung_acceleration"
+GRIP = "rms_dynamic_tyre_load"
+WORDS = {
+    COMFORT: "body acceleration as people feel it (ISO 2631-1, Wk)",
+    GRIP: "tyre load variation",
+}
 
 
 def ride_table(title: str, responses: Mapping[str, Response]) -> Table:
@@ -70,3 +77,26 @@ def add_rides(report: Report, rides: Mapping[str, Mapping[str, Response]]) -> No
         shown = {name: responses[name] for name in dict.fromkeys((TRUE, names[-1], names[0]))}
         words = f"Quarter car on {title}: the true damper, the law furthest from it and the nearest"
         report.picture(lambda rides=shown: plots.ride(rides, reference=TRUE), words, f"ride_{index + 1}.png")
+
+
+def purpose(tyre_load: float) -> str:
+    """What is tuned, and why, in words."""
+    return (
+        f"For this light car the damper is stiff: it holds the tyre to the road and shakes the body. Its three damping "
+        f"coefficients, each within a third and three times its value, are tuned for the least {WORDS[COMFORT]}, while "
+        f"the RMS variation of the tyre load may grow by {100 * (tyre_load - 1):.0f} % at most."
+    )
+
+
+def outcome(tuned: TuneResult) -> str:
+    """What the tuning gained, what stopped it, and what it cost."""
+    gain = 100 * (1 - tuned.after[COMFORT] / tuned.before[COMFORT])
+    bounds = [f"{c.name} is {c.note}" for c in tuned.parameters if c.note]
+    stops = [f"the {WORDS.get(n, n)} is at its limit" for n in tuned.active_limits]
+    stops += bounds or ["all coefficients lie inside their bounds"]
+    others = [n for n in tuned.before if n not in (COMFORT, *tuned.limits) and tuned.before[n]]
+    shares = {n: 100 * (tuned.after[n] / tuned.before[n] - 1) for n in others}
+    worse = ", ".join(f"{n.replace('_', ' ')} {s:+.0f} %" for n, s in shares.items() if s >= 1)
+    cost = f"The price: {worse}." if worse else "Nothing else gets worse."
+    stop = "; ".join(stops)
+    return f"The body shakes {gain:.0f} % less. What ends the search: {stop}. {cost}"

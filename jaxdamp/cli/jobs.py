@@ -1,0 +1,120 @@
+"""What the commands share between their start and their end: where they write, pictures, warnings of rides."""
+
+import contextlib
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from jaxdamp._tables import Table
+from jaxdamp.cli import interrupt
+from jaxdamp.cli.application import command_line
+from jaxdamp.cli.console import Screen
+from jaxdamp.cli.results import Results, another_page, results_folder
+from jaxdamp.cli.wording import in_command_line, message
+from jaxdamp.dampers import OutsideFittedRangeWarning
+from jaxdamp.report import Attempts, Report
+from jaxdamp.simulation import CoarseStepWarning, Response
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where a command writes its results.
+
+    Arguments:
+        out: folder to write; jaxdamp- and the name of the command if left out.
+        replace: write into --out although it is not empty; earlier results go to .previous in it.
+    """
+
+    out: Path | None = None
+    replace: bool = False
+
+
+class Job(NamedTuple):
+    """A command at work.
+
+    Attributes:
+        screen: the terminal.
+        results: the folder that is written.
+        attempts: parts of the work that may fail by themselves.
+    """
+
+    screen: Screen
+    results: Results
+    attempts: Attempts
+
+    @contextlib.contextmanager
+    def saving(self, title: str, missing: str = "the pictures and the report") -> Iterator[Path]:
+        """Write what is finished into the folder that this gives; it is put into place, and no `check` stops it.
+
+        Arguments:
+            title: of the stage.
+            missing: what is still to come.
+        """
+        interrupt.keep()
+        with interrupt.saving(), self.screen.stage(title):
+            yield self.results.draft
+            self.results.publish(missing)
+
+    def page(self, report: Callable[..., Report], *contents: Any, part: str = "", **more: Any) -> None:
+        """Draw the pictures and write the page.
+
+        Arguments:
+            report: makes the page.
+            contents: its arguments.
+            part: folder inside the results.
+            more: its further arguments.
+        """
+        with self.screen.stage("Pictures and report"):
+            folder = self.results.draft / part
+            folder.mkdir(exist_ok=True)
+            page = report(*contents, **more, folder=folder, attempts=self.attempts)
+            page.write(folder / "report.html", command_line())
+
+
+@contextlib.contextmanager
+def job(screen: Screen, command: str, output: Output, page: Path | None = None) -> Iterator[Job]:
+    """The results of a command; at the end the terminal says what was written and what could not be made.
+
+    Arguments:
+        screen: the terminal.
+        command: its name.
+        output: the folder to write.
+        page: another place for the page.
+    """
+    target = output.out or Path(f"jaxdamp-{command}")
+    attempts, replace = Attempts(interrupt.check, message, in_command_line), output.replace
+    with another_page(page, target, replace=replace), results_folder(target, command, replace=replace) as results:
+        yield Job(screen, results, attempts)
+    screen.files(target, results.published)
+    screen.points(attempts.troubles, style="yellow")
+
+
+def write_tables(folder: Path, tables: Mapping[str, Table]) -> None:
+    """Tables as CSV by the names of their files."""
+    folder.mkdir(exist_ok=True)
+    for name, table in tables.items():
+        (folder / f"{name}.csv").write_text(table.to_csv(), encoding="utf-8")
+
+
+@contextlib.contextmanager
+def without_range_warnings() -> Iterator[None]:
+    """No Python warnings of laws outside their range: the tables and remarks of the command say it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OutsideFittedRangeWarning)
+        yield
+
+
+def with_step_warnings(drive: Callable[[], Response]) -> tuple[Response, list[str]]:
+    """A run, and what it warns of its step in the words of the command line; other warnings pass."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", CoarseStepWarning)
+        response = drive()
+    texts = []
+    for warning in caught:
+        if issubclass(warning.category, CoarseStepWarning):
+            texts.append(in_command_line(str(warning.message)))
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+    return response, texts

@@ -1,0 +1,185 @@
+"""Bench records at the command line: how they are read, checked, processed, divided, and what was decided."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from jaxdamp import _checks, bench, identify
+from jaxdamp._checks import Setting
+from jaxdamp.bench import BenchRun, BenchSet, Preflight
+from jaxdamp.cli.console import Screen
+from jaxdamp.cli.options import Call
+from jaxdamp.cli.wording import in_command_line, in_options
+from jaxdamp.cli.words import words
+
+
+COMMAND = "command"  # stands for what was set on the damper, unless a setting has this name
+_COMPRESSION = Setting("sign", "compression-positive")  # what the reader proposes in its notes
+_COLOURS = {"error": "red", "warning": "yellow", "note": ""}
+_LINES = 5  # of findings at the terminal
+_CUT_OFF = ("rest before", "rest after")  # findings on what `process(moving=True)` cuts off
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the files are read, and what is done to the records.
+
+    Arguments:
+        read: as in `bench.read`.
+        steps: as in `bench.Steps`.
+        cycles: full cycles to keep: 3 or last:3, or skip:2.
+        keep_rest: keep the rest before and after the motion, which is cut off otherwise.
+        verbose: print all findings on the records.
+    """
+
+    read: Annotated[Call, "bench.read"]
+    steps: Annotated[Call, "bench.Steps"]
+    cycles: str | None = None
+    keep_rest: bool = False
+    verbose: bool = False
+
+    def raw(self, files: Sequence[Path]) -> BenchSet:
+        """The records as they are in the files."""
+        return bench.read(list(files), **self.read.arguments())
+
+    def processing(self) -> dict[str, Any]:
+        """The steps of `BenchRun.process`.
+
+        >>> steps = Call("bench.Steps", {"low_pass": 50.0})
+        >>> Reading(Call("bench.read"), steps, cycles="skip:2").processing()
+        {'low_pass': 50.0, 'moving': True, 'skip_cycles': 2}
+        """
+        steps = self.steps.arguments()
+        if not self.keep_rest:
+            steps["moving"] = True
+        if self.cycles is not None:
+            kind, _, count = self.cycles.rpartition(":")
+            if kind not in ("", "last", "skip") or not count.isdigit():
+                _checks.refuse("cycles", "read like 3, last:3 or skip:2", repr(self.cycles))
+            steps["skip_cycles" if kind == "skip" else "last_cycles"] = int(count)
+        return steps
+
+    def processed(self, runs: BenchSet) -> BenchSet:
+        """The records with these steps done."""
+        steps = self.processing()
+        return runs.process(**steps) if steps else runs
+
+    def checked(self, screen: Screen, runs: BenchSet, *, refuse: bool = False) -> tuple[BenchSet, Preflight]:
+        """The records without an error, and the findings on all of them but those on rest that is cut off.
+
+        Arguments:
+            screen: where the worst findings are printed; with `--verbose` all.
+            runs: the records as they were read.
+            refuse: refuse a record with an error unless bad ones are to be left out.
+
+        Raises:
+            ValueError: every record has an error, or one has and errors are refused.
+        """
+        with screen.stage("Checking the records"):
+            found = bench.preflight(runs).without(() if self.keep_rest else _CUT_OFF)
+        screen.heading(found.summary)
+        sentences = found.sentences()
+        shown = sentences if self.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
+        for sentence in shown:
+            screen.points([in_command_line(sentence)], style=_COLOURS[sentence.split(",")[0]])
+        if len(sentences) > len(shown):
+            kinds = dict.fromkeys(finding.name for finding in found.findings)
+            more = [kind for kind in kinds if not any(kind in text.split(":")[0] for text in shown)]
+            screen.points([f"also {', '.join(more)}: --verbose prints all, the page has them"])
+        wrong = {name for finding in found.of("error") for name in finding.records}
+        sound = BenchSet((run for run in runs if run.name not in wrong), runs.left_out)
+        if not len(sound):
+            raise ValueError(" ".join(in_command_line(f"{finding}") for finding in found.of("error")))
+        names = ", ".join(sorted(wrong))
+        if wrong and refuse and not self.read.given.get("skip_bad"):
+            first = in_command_line(f"{found.of('error')[0]}")
+            raise ValueError(f"{first} With --skip-bad, records with an error are left out: {names}.")
+        if wrong:
+            screen.points([f"left out, with an error: {names}"], style="red")
+        return sound, found
+
+
+def law_names(asked: Sequence[str]) -> list[str]:
+    """The laws to fit: all that are not optional, or those named, each once.
+
+    >>> law_names(["linear, besinger", "linear"])
+    ['linear', 'besinger']
+    """
+    asked = words("law", asked)
+    if not asked:
+        _checks.refuse("law", "name a law", "empty", 'See "jaxdamp laws".')
+    for name in asked:
+        _checks.one_of("law", name, ("all", *identify.NAMED_LAWS))
+    return list(identify.LAWS) if "all" in asked else list(dict.fromkeys(asked))
+
+
+def split(runs: BenchSet, patterns: Sequence[str]) -> tuple[BenchSet, BenchSet]:
+    """The records to fit and those to hold out, which are named by name, file or pattern."""
+    if not patterns:
+        return runs, BenchSet()
+    names = [name for pattern in patterns for name in _names_of(runs, pattern)]
+    try:
+        held, fitted = runs.select(names), runs.without(names)
+    except KeyError as error:
+        raise ValueError(f"Option --held-out: {error.args[0]}") from error
+    if not len(fitted):
+        raise ValueError("Option --held-out leaves no record to fit: hold out fewer.")
+    return fitted, held
+
+
+def _names_of(runs: BenchSet, pattern: str) -> list[str]:
+    """The records of a file, or the pattern without the ending of a file."""
+    path = Path(pattern).expanduser()
+    if path.is_file():
+        here = [run.name for run in runs if Path(run.source).resolve() == path.resolve()]
+        if here:
+            return here
+    suffix = path.suffix
+    return [pattern.removesuffix(suffix) if suffix.lower() in bench.READERS else pattern]
+
+
+def decisions(runs: BenchSet | Sequence[BenchRun]) -> list[str]:
+    """What the reader decided, and what it left out; notes that differ in their numbers are said once."""
+    kinds: dict[str, list[str]] = {}
+    for run in runs:
+        for text in run.notes:
+            note = in_options(text, (_COMPRESSION,))
+            kinds.setdefault(re.sub(r"[+-]?\d[\d.]*(?:e[+-]?\d+)?", "#", note), []).append(note)
+    sentences = []
+    for notes in kinds.values():
+        who = "all records" if len(notes) == len(runs) else f"{len(notes)} records"
+        alike = "" if len(set(notes)) == 1 else ", numbers of the first"
+        sentences.append(notes[0] if len(runs) == 1 else f"{notes[0]} ({who}{alike})")
+    left_out = runs.left_out if isinstance(runs, BenchSet) else ()
+    return sentences + [f"left out: {sentence}" for sentence in left_out]
+
+
+def value_of(runs: Sequence[BenchRun], name: str) -> Callable[[BenchRun], str]:
+    """The setting of a record in words, by the name of the setting, which all records must state."""
+    values = {run.name: run.settings.get(name, run.command if name == COMMAND else None) for run in runs}
+    lacking = [record for record, value in values.items() if value is None]
+    if lacking:
+        stated = sorted({setting for run in runs for setting in run.settings})
+        there = f"There are {', '.join(stated)}." if stated else "A manifest states settings, see docs/reading.md."
+        must = "name a setting that every record states"
+        _checks.refuse("group_by", must, f"{name!r}, which {', '.join(lacking[:3])} do not state", there)
+    return lambda run: value if isinstance(value := values[run.name], str) else f"{value:g}"
+
+
+def grouped(runs: BenchSet, name: str | None) -> dict[str, BenchSet]:
+    """The records by the name of a folder for each value of a setting; all of them by an empty name without one.
+
+    Raises:
+        ValueError: a record does not state the setting, or two values would have the same folder.
+    """
+    if name is None:
+        return {"": runs}
+    value, groups = value_of(tuple(runs), name), {}
+    for run in runs:
+        groups.setdefault(value(run), []).append(run)
+    folders = {f"{name}_{value}": re.sub(r"[^\w.+-]+", "_", f"{name}_{value}") for value in groups}
+    if len(set(folders.values())) < len(folders):
+        _checks.refuse("group_by", "give a folder to each value", ", ".join(folders), "Name the values otherwise.")
+    return {folder: BenchSet(part) for folder, part in zip(folders.values(), groups.values(), strict=True)}

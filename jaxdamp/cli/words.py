@@ -1,0 +1,206 @@
+"""How values are written on the command line: numbers, ranges, names with values. Needs no JAX."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from jaxdamp import _checks
+
+
+Reader = Callable[[str, Any], Any]  # gives the value of an option, from its name and its text or texts
+
+
+def words(option: str, texts: Sequence[str]) -> list[str]:
+    """Words between commas, also from several texts.
+
+    >>> words("over", ["stroke, road", "pitch"])
+    ['stroke', 'road', 'pitch']
+    """
+    return [word.strip() for text in texts for word in text.split(",") if word.strip()]
+
+
+def pairs(option: str, texts: Sequence[str], like: str = "NAME=VALUE") -> list[tuple[str, str]]:
+    """What "a=1,b=2" assigns, also from several texts; a comma inside a value stays.
+
+    Arguments:
+        option: its name, for messages.
+        texts: as they were typed.
+        like: how it is written, for messages.
+
+    >>> pairs("limit", ["travel=0.1,grip=900", "comfort=1"])
+    [('travel', '0.1'), ('grip', '900'), ('comfort', '1')]
+    >>> pairs("columns", ["time=t,stroke=LVDT, FL"])
+    [('time', 't'), ('stroke', 'LVDT, FL')]
+    """
+    found: list[tuple[str, str]] = []
+    for part in (part.strip() for text in texts for part in re.split(r",(?=\s*[^\s,=:]+\s*=)", text)):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not equals or not name or not value:
+            _checks.refuse(option, f"read like {like}", repr(part))
+        if name in (known for known, _ in found):
+            _checks.refuse(option, "name each thing once", f"twice {name!r}")
+        found.append((name, value))
+    return found
+
+
+def column(text: str) -> str | int | None:
+    """The header or the number of a column; "none" for no column.
+
+    >>> column("Displacement, in"), column("2"), column("none")
+    ('Displacement, in', 2, None)
+    """
+    return int(text) if text.isdigit() else None if text.lower() == "none" else text
+
+
+def columns(option: str, given: Sequence[str]) -> list[str | int | None]:
+    """Headers or numbers of columns, one from each text: a header may hold commas."""
+    return [column(text) for text in given]
+
+
+def named(value: Callable[[str], Any], must: str = "be numbers", like: str = "NAME=VALUE") -> Reader:
+    """The reader of "a=1,b=2".
+
+    Arguments:
+        value: of a text.
+        must: what a text must be that has none.
+        like: how it is written, for messages.
+
+    >>> named(float)("noise", ["stroke=0.0002"])
+    {'stroke': 0.0002}
+    """
+
+    def read(option: str, given: Sequence[str]) -> dict[str, Any]:
+        found = {}
+        for name, text in pairs(option, given, like):
+            try:
+                found[name] = value(text)
+            except ValueError:
+                _checks.refuse(option, must, repr(text))
+        return found
+
+    return read
+
+
+def commands(option: str, given: Sequence[str]) -> dict[str, float]:
+    """What was set on the damper, by name or pattern of the records.
+
+    >>> commands("command", ["*_0.5A=0.5,*_1A=1"])
+    {'*_0.5A': 0.5, '*_1A': 1.0}
+    """
+    like = "'*_0.5A=0.5'"
+    return named(float, f"read like {like}", like)(option, given)
+
+
+def numbers_in_order(option: str, given: Sequence[str]) -> list[float]:
+    """Numbers between commas.
+
+    >>> numbers_in_order("velocities", ["0.052,0.131"])
+    [0.052, 0.131]
+    """
+    try:
+        return [float(word) for word in words(option, given)]
+    except ValueError:
+        _checks.refuse(option, "read like 0.052,0.131", repr(",".join(given)))
+
+
+def names_or_numbers(option: str, given: Sequence[str]) -> str | list[float]:
+    """One word, or numbers."""
+    try:
+        return numbers_in_order(option, given)
+    except ValueError:
+        return ",".join(given)
+
+
+def two(option: str, given: str) -> tuple[float, float]:
+    """Two numbers, as in 2:10."""
+    try:
+        first, second = map(float, given.split(":"))
+    except ValueError:
+        _checks.refuse(option, "read like 2:10", repr(given))
+    return first, second
+
+
+def span(text: str) -> tuple[float | None, float | None]:
+    """The ends of "0.1" (an upper one alone), "0.05:0.1" or "0.05:".
+
+    >>> span("0.05:"), span("3")
+    ((0.05, None), (None, 3.0))
+    """
+    ends = [float(end) if end.strip() else None for end in text.split(":")]
+    if len(ends) > 2 or ends in ([None], [None, None]):
+        raise ValueError(text)
+    return (None, ends[0]) if len(ends) == 1 else (ends[0], ends[1])
+
+
+def limit(text: str) -> Any:
+    """A largest value, a range, or either relative to the start; None is no limit.
+
+    >>> limit("0.1"), limit("-0.1:0.2"), limit("+10%"), limit("0.05:+20%"), limit("none")
+    (0.1, (-0.1, 0.2), '+10%', (0.05, '+20%'), None)
+    """
+    parts = [part.strip() for part in text.split(":")]
+    if text == "none":
+        return None
+    if any(part.endswith("%") for part in parts) and len(parts) < 3:
+        ends = [part if part.endswith("%") else float(part) if part else None for part in parts]
+        lower, upper = (None, ends[0]) if len(ends) == 1 else ends
+    else:
+        lower, upper = span(text)
+    return upper if lower is None else (lower, upper)
+
+
+def axis(text: str) -> np.ndarray:
+    """The values of an axis: "1000:8000:15" are 15 of them, "1000;1200" two.
+
+    >>> axis("1000:2000:3").tolist(), axis("1;2").tolist()
+    ([1000.0, 1500.0, 2000.0], [1.0, 2.0])
+    """
+    first, *more = text.split(":")
+    if more:
+        last, count = more
+        return np.linspace(float(first), float(last), int(count))
+    return np.array([float(number) for number in text.split(";")])
+
+
+def axes(option: str, given: Sequence[str]) -> dict[str, np.ndarray]:
+    """The axes of a sweep by parameter, each of one value or more."""
+    found = named(axis, "read like NAME=FIRST:LAST:COUNT or NAME=A;B;C")(option, given)
+    for name, values in found.items():
+        if not values.size:
+            _checks.refuse(option, "have one value or more on each axis", name)
+    return found
+
+
+def named_numbers(known: Mapping[str, float | None], example: str) -> Reader:
+    """The reader of texts such as "stroke:offset,delay=0.001".
+
+    It gives the owner and its numbers of each text; those without a value take that of `known`.
+
+    >>> named_numbers({"offset": 0.0, "delay": 0.0}, "")("sensor", ["stroke:offset,delay=0.001"])
+    [('stroke', {'offset': 0.0, 'delay': 0.001})]
+    """
+
+    def read(option: str, given: Sequence[str]) -> list[Any]:
+        return [one(option, text) for text in given]
+
+    def one(option: str, text: str) -> tuple[str, dict[str, float]]:
+        owner, _, rest = (part.strip() for part in text.partition(":"))
+        if not owner or not rest:
+            must = "read like NAME:NUMBER=START,NUMBER=START"
+            _checks.refuse(option, must, repr(text), f"Such as {example}.")
+        found: dict[str, float] = {}
+        for part in rest.split(","):
+            name, equals, value = (piece.strip() for piece in part.partition("="))
+            _checks.one_of(option, name, known)
+            try:
+                number = float(value) if equals else known[name]
+            except ValueError:
+                number = None
+            if number is None:
+                _checks.refuse(option, f"give a number for {name}", repr(text), f"Such as {example}.")
+            found[name] = number
+        return owner, found
+
+    return read
