@@ -4,6 +4,7 @@ import importlib
 import inspect
 import json
 import pkgutil
+from types import ModuleType
 from typing import Any, cast
 
 import matplotlib.figure
@@ -166,11 +167,15 @@ def test_a_result_writes_its_page(kind, samples, tmp_path) -> None:
     assert "<h1>A page</h1>" in page and "data:image/png" in page and result.table().title in page
 
 
+def _names(package: ModuleType) -> list[str]:
+    return [*package.__all__, *getattr(package, "__shared__", ())]
+
+
 def test_whatever_has_a_table_is_a_result() -> None:
     others = {
         name
         for package in ("bench", "identify", "roads", "simulation", "tune", "vehicles")
-        for name in getattr(jaxdamp, package).__all__
+        for name in _names(getattr(jaxdamp, package))
         if inspect.isclass(each := getattr(getattr(jaxdamp, package), name))
         and hasattr(each, "table")
         and not issubclass(each, AbstractResult)
