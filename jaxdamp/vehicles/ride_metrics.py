@@ -137,12 +137,18 @@ def chosen_metrics(
     if not len(wanted):
         some = ", ".join(map(repr, list(known)[:3]))
         _checks.refuse(argument, "name one or more", "empty", f"Write [{some}], or leave it out for all.")
-    if not isinstance(wanted, str):
-        spelled = {goal: metrics_of_goal(metrics, channels, goal, white=white) for goal in GOALS}
-        wanted = [m for one in wanted for m in (spelled.get(one) or [one] if isinstance(one, str) else [one])]
-    names = [m for m in wanted if not isinstance(m, Metric)] if not isinstance(wanted, str) else wanted
-    current = iter(current_names(argument, names, known))
-    chosen = [of_channel(m, channels, argument) if isinstance(m, Metric) else known[next(current)] for m in wanted]
+    if isinstance(wanted, str):
+        current_names(argument, wanted, known)  # refuses a text
+    spelled = {goal: metrics_of_goal(metrics, channels, goal, white=white) for goal in GOALS}
+    every = [m for one in wanted for m in (spelled.get(one) or [one] if isinstance(one, str) else [one])]
+    current = iter(current_names(argument, [m for m in every if not isinstance(m, Metric)], known))
+    return _of_different_names(
+        [of_channel(m, channels, argument) if isinstance(m, Metric) else known[next(current)] for m in every], argument
+    )
+
+
+def _of_different_names(chosen: Sequence[Metric], argument: str) -> list[Metric]:
+    """The metrics, each once; two of one name are refused."""
     by_name: dict[str, Metric] = {}
     for metric in chosen:
         if by_name.setdefault(metric.name, metric) != metric:
