@@ -51,9 +51,9 @@ def ride(damping: jax.Array, delay: float, end: float) -> Ride:
     jumps, they are higher at an instant.
     """
     count, part = round((end - START) / STEP), GAMMA * STEP
-    time = START + STEP * (np.arange(count)[:, None] + np.array([GAMMA, 1.0]))  # of the stages
+    time = jnp.asarray(START + STEP * (np.arange(count)[:, None] + np.array([GAMMA, 1.0])))  # of the stages
     at_rest = jnp.zeros_like(time)
-    tyres = TYRE * jnp.stack([at_rest, at_rest, bump(jnp.asarray(time)), bump(time - delay)], axis=-1)
+    tyres = TYRE * jnp.stack([at_rest, at_rest, bump(time), bump(time - delay)], axis=-1)
     interval = np.minimum(np.arange(count) // round(INTERVAL / STEP), damping.shape[0] - 1)
     inverse = np.linalg.inv(np.diag(MASSES) / part + part * STIFFNESS)
     compliance = STROKES @ inverse @ STROKES.T
@@ -76,7 +76,7 @@ def ride(damping: jax.Array, delay: float, end: float) -> Ride:
         return (last, after), (body, stroke, rate * stroke)
 
     _, outputs = jax.lax.scan(step, (jnp.zeros(4), jnp.zeros(4)), (damping[interval], tyres))
-    return Ride(jnp.asarray(time[:, 1]), *outputs)
+    return Ride(time[:, 1], *outputs)
 
 
 def damping_of(search: jax.Array) -> jax.Array:

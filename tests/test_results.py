@@ -5,6 +5,7 @@ import inspect
 import json
 import pkgutil
 from types import ModuleType
+from typing import Any, cast
 
 import matplotlib.figure
 import numpy as np
@@ -55,7 +56,7 @@ def _bench_results() -> list[AbstractResult]:
 def _fits() -> list[AbstractResult]:
     runs = _runs()
     fit = identify.fit(dampers.Bilinear(2000.0, 1000.0), runs)
-    evidence, law = fit.evidence, fit.law
+    evidence, law, by_setting = fit.evidence, fit.law, cast(Any, identify.fit)
     assert evidence is not None
     spread = identify.Spread("rebound_rate", "N s/m", 1.0, 0.1, (0.8, 1.2), 1.2, 50.0)
     design = identify.ExperimentDesign(law, (bench.SineTest(0.02, 1.0),), free_parameters(law), np.eye(2), "D")
@@ -75,7 +76,7 @@ def _fits() -> list[AbstractResult]:
         identify.compare({"linear": dampers.Linear}, runs),
         identify.cross_validate({"linear": dampers.Linear}, runs),
         identify.fit_many(dampers.Linear, {"a": runs[:1], "b": runs[1:]}),
-        identify.fit(law=dampers.Linear, runs=runs, scheduled=True),
+        by_setting(law=dampers.Linear, runs=runs, scheduled=True),
         identify.fit_targets(lambda n: {"y": n["x"] ** 2}, {"x": 1.0}, {"y": 4.0}),
     ]
 

@@ -50,7 +50,8 @@ class Driving:
         length = self.duration or USUAL
         seeds = range(self.seed, self.seed + count)
         realisations = [parse_road(word, speed=self.speed, duration=length, seed=seed) for seed in seeds]
-        return realisations, {"duration": self.duration or realisations[0].duration or USUAL, "dt": self.dt}
+        own = length if self.duration or kind == "iso" else realisations[0].duration or length
+        return realisations, {"duration": own, "dt": self.dt}
 
 
 def parse_road(word: str, *, speed: float, duration: float, seed: int) -> AbstractRoad:
@@ -113,6 +114,7 @@ def ride(
     (surface,), run = driving.over(road)
     if not isinstance(surface, AbstractRoad):
         refuse_road(road)
+    run["duration"] = driving.duration or surface.duration or USUAL  # an iso road in full
     screen.points(unusual(road, driving.speed), style="yellow")
     with job(screen, "ride", output) as work:
         responses: dict[str, Response] = {}

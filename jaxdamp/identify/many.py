@@ -267,7 +267,7 @@ def _solved(
     bounds, precision = lanes.coordinates.bounds(), float(jnp.finfo(lanes.coordinates.free.values.dtype).eps)
     if depends is None:
         dampers = np.unique(lanes.damper)
-        solver = BoundedLevenbergMarquardt(*bounds, precision=precision)
+        solver = BoundedLevenbergMarquardt(lower=bounds.lower, upper=bounds.upper, precision=precision)
         end = least_squares_on_host(lanes.linearise, solver, begin, max_steps)
         squares = [s if np.isfinite(s) else np.inf for s in end.aux[:, -1, -1]]
         best = [min(np.flatnonzero(lanes.damper == i), key=lambda lane: squares[lane]) for i in dampers]
@@ -279,7 +279,8 @@ def _solved(
         inside = np.all((y >= bounds.lower) & (y <= bounds.upper))
         return depends.gathered(*lanes.linearise(y, everyone), bool(inside))
 
-    solver = BoundedLevenbergMarquardt(*depends.bounds(bounds), precision=precision)
+    inner = depends.bounds(bounds)
+    solver = BoundedLevenbergMarquardt(lower=inner.lower, upper=inner.upper, precision=precision)
     end = least_squares_on_host(linearise, solver, depends.start(begin)[None], max_steps)
     y, count = depends.at_dampers(end.y[0]), len(begin)
     products = np.broadcast_to(end.aux, (count, *end.aux.shape[1:]))

@@ -151,7 +151,9 @@ class Problem(NamedTuple):
         """
         lower, upper = (jnp.asarray(side) for side in self.coordinates.bounds())
         conditions = self.margins if self.has_conditions else None
-        return BoundedLevenbergMarquardt(lower, upper, conditions, tolerance=tolerance, level=self.level)
+        return BoundedLevenbergMarquardt(
+            lower=lower, upper=upper, conditions=conditions, tolerance=tolerance, level=self.level
+        )
 
     def minimum(
         self, force: Float[Array, " numbers"] | None = None, *, tolerance: float = 1e-4, max_steps: int = 200

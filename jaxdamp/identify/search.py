@@ -90,7 +90,7 @@ def search(
 
     end = least_squares_on_host(at, bounded, start[None], max_steps)
     point: _Point = end.aux
-    return SearchEnd(*(leaf[0] for leaf in point), end.status[0], int(end.steps[0]))
+    return SearchEnd(point.values[0], point.residual[0], point.jacobian[0], end.status[0], int(end.steps[0]))
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -146,7 +146,8 @@ def _search_unbounded(problem: Problem, max_steps: int, solver: Solver) -> Searc
         status = Status.STEP_LIMIT
     else:
         status = Status.NO_STEP
-    return SearchEnd(*(leaf[0] for leaf in point), status, int(solution.stats["num_steps"]))
+    steps = int(solution.stats["num_steps"])
+    return SearchEnd(point.values[0], point.residual[0], point.jacobian[0], status, steps)
 
 
 class _Residual(eqx.Module):

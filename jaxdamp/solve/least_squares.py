@@ -158,7 +158,8 @@ def _pull_within_bounds(optimum: Any, _: Any, inputs: Any) -> Any:
     flat, unravel = ravel_pytree(optimum)
 
     def residual(flat: Any) -> tuple[Any, Any]:
-        return (ravel_pytree(fn(unravel(flat), args)[0])[0],) * 2
+        missed = ravel_pytree(fn(unravel(flat), args)[0])[0]
+        return missed, missed
 
     jacobian, missed = jax.jacfwd(residual, has_aux=True)(flat)  # forwards, as in the search: the unknowns are few
     pull = missed @ jacobian

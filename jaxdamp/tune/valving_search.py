@@ -263,7 +263,9 @@ def _search(space: SearchRange, force_of: Any, wanted: np.ndarray, begin: np.nda
     """Least squares within the bounds from one start, and again from lower points beside its end."""
     size = float(np.linalg.norm(wanted))
     precision = float(jnp.finfo(space.free.values.dtype).eps)
-    solver = BoundedLevenbergMarquardt(space.lower / space.unit, space.upper / space.unit, precision=precision)
+    solver = BoundedLevenbergMarquardt(
+        lower=space.lower / space.unit, upper=space.upper / space.unit, precision=precision
+    )
 
     def at(y: np.ndarray, lanes: np.ndarray) -> tuple[Linearisation, np.ndarray]:
         force, slopes = force_of(np.clip(y[0] * space.unit, space.lower, space.upper))

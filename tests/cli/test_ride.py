@@ -8,7 +8,7 @@ import pytest
 
 from jaxdamp import roads, simulate, vehicles
 from jaxdamp.cli.jobs import with_step_warnings
-from jaxdamp.cli.riding import parse_road
+from jaxdamp.cli.riding import Driving, parse_road
 from jaxdamp.cli.vehicle_words import presets
 from jaxdamp.dampers import AbstractDamper, Bilinear, Linear
 from jaxdamp.export import to_json
@@ -87,3 +87,10 @@ def test_every_preset_with_a_damper_takes_the_law() -> None:
     for make in presets().values():
         laws = make(damper=Linear(1234.0)).elements()
         assert any("1234.0" in repr(law) for law in laws)
+
+
+def test_how_long_a_road_is_driven() -> None:
+    for word, given, expected in (("iso:C", None, 10.0), ("iso:C", 3.0, 3.0), ("bump:0.05:4", None, 10.0)):
+        roads_driven, run = Driving(duration=given).over(word, 1)
+        assert run == {"duration": expected, "dt": 1e-3} and len(roads_driven) == 1
+    assert Driving().over("white:C")[1] == {}
