@@ -3,9 +3,10 @@
     python -m benchmarks.from_jax [--cars 32768] [--records 64]
 
 Half cars drive 1 s at 1 kHz, all ride metrics: a plain `jax.vmap` of a ride, which chooses the form for many cars by
-itself, against the ride compiled for many. The step of optax follows the gradient of one metric of a quarter car by the
-parameters of its damper over 60 s; memory is what the compiled step needs beside its arguments. Records of one motion
-with other noise are fitted by `jax.vmap` of the least squares of a `Problem`, and by `fit_many`.
+itself, against the ride compiled for many; both are compiled, and driven once. The step of optax follows the gradient
+of one metric of a quarter car by the parameters of its damper over 60 s; memory is what the compiled step needs beside
+its arguments. Records of one motion with other noise are fitted by `jax.vmap` of the least squares of a `Problem`, and
+by `fit_many`.
 """
 
 import argparse
@@ -22,7 +23,7 @@ from jaxdamp import configure
 
 configure(cpu_devices=1, cache=False)
 
-from benchmarks._timing import first_and_warm, report  # noqa: E402
+from benchmarks._timing import cost_of, first_and_warm, report  # noqa: E402
 from jaxdamp import Ride, bench, dampers, identify, roads  # noqa: E402
 from jaxdamp.vehicles.presets import half_car_002, quarter_car_000  # noqa: E402
 
@@ -37,7 +38,12 @@ def batches(cars: int) -> list[list[Any]]:
     ride = Ride(half_car_002(LAW), ROAD, duration=1.0)
     point = {"sprung_mass": jnp.linspace(500.0, 900.0, cars)}
     ways = {"jit(vmap(ride))": jax.jit(jax.vmap(ride)), "side by side": jax.jit(jax.vmap(ride.side_by_side()))}
-    return [[name, cars, *first_and_warm(lambda way=way: way(point), 2), None] for name, way in ways.items()]
+    rows = []
+    for name, way in ways.items():
+        compiling, drive = cost_of(lambda way=way: way.lower(point).compile())
+        once, _ = cost_of(lambda drive=drive: jax.block_until_ready(drive(point)))
+        rows.append([name, cars, compiling.wall, once.wall, None])
+    return rows
 
 
 def step_of_optax(seconds: float) -> list[Any]:

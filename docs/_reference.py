@@ -11,6 +11,9 @@ from typing import Any
 import jaxdamp
 
 
+FURTHER = "What the functions above return, and what other packages of the library use; rarely written by a user."
+
+
 def packages() -> list[str]:
     """Names of the public packages, in alphabetical order."""
     return [f"jaxdamp.{module.name}" for module in iter_modules(jaxdamp.__path__) if is_public(module)]
@@ -36,8 +39,15 @@ def write_pages(folder: Path) -> None:
 def _page(name: str, described: dict[int, str]) -> str:
     package = import_module(name)
     heading = [name, "=" * len(name), "", f".. automodule:: {name}", "", f".. currentmodule:: {name}", ""]
-    members = {member: getattr(package, member) for member in sorted(package.__all__)}
-    return "\n".join([*heading, *(_member(f"{name}.{member}", value, described) for member, value in members.items())])
+    lines = [*heading, *_members(name, package.__all__, described)]
+    if shared := getattr(package, "__shared__", ()):
+        lines += ["Results and further parts", "-" * 25, "", FURTHER, "", *_members(name, shared, described)]
+    return "\n".join(lines)
+
+
+def _members(name: str, members: list[str], described: dict[int, str]) -> list[str]:
+    package = import_module(name)
+    return [_member(f"{name}.{member}", getattr(package, member), described) for member in sorted(members)]
 
 
 def _member(name: str, value: Any, described: dict[int, str]) -> str:

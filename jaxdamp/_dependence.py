@@ -1,13 +1,13 @@
 """What a function depends on, from its trace."""
 
 from collections.abc import Callable
-from typing import Any
 
 import jax
 from jax.extend.core import Var
+from jaxtyping import PyTree
 
 
-def depends(function: Callable[[Any], Any], values: Any) -> bool:
+def depends(function: Callable[[PyTree], PyTree], values: PyTree) -> bool:
     """Whether the result of a function depends on its argument; a call inside counts as depending on all of its inputs.
 
     Arguments:

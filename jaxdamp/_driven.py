@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode
@@ -33,8 +33,8 @@ def verdict(result: Any) -> str:
 
 
 def solve(
-    field: Callable[[Scalar, Any], Any],
-    start: Any,
+    field: Callable[[Scalar, PyTree], PyTree],
+    start: PyTree,
     time: Signal,
     solver: diffrax.AbstractSolver,
     rtol: float,
@@ -43,7 +43,7 @@ def solve(
     mode: Mode = "forward",
     every: int = 1,
     steps_per_instant: int = STEPS_PER_INSTANT,
-) -> tuple[Any, Any]:
+) -> tuple[PyTree, PyTree]:
     """States of ẏ = field(t, y) at every so many-th instant, and the solver's verdict.
 
     Arguments:
@@ -85,7 +85,7 @@ batching.defvectorized(_forward_only)
 mlir.register_lowering(_forward_only, lambda context, x: [x])
 
 
-def _refuse_reverse(cotangent: Any, x: Any) -> Any:
+def _refuse_reverse(cotangent: PyTree, x: PyTree) -> PyTree:
     raise ValueError(
         f"Adaptive engines {_FORWARD_ONLY}, or take `simulation.Exponential()`, which passes forward and reverse ones."
     )

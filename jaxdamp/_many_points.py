@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxdamp.parameters import Domain, get, match_paths, parameters
 
@@ -15,7 +16,7 @@ from jaxdamp.parameters import Domain, get, match_paths, parameters
 Columns = Mapping[str, np.ndarray]
 
 
-def outside_domains(tree: Any, columns: Columns) -> np.ndarray:
+def outside_domains(tree: PyTree, columns: Columns) -> np.ndarray:
     """The reason why a law or a vehicle refuses each of many points; an empty text for allowed points.
 
     Arguments:
@@ -60,20 +61,20 @@ def _above(path: str) -> list[str]:
     return [".".join(parts[:count]) for count in range(len(parts))]
 
 
-def _varying_domain(tree: Any, path: str) -> bool:
+def _varying_domain(tree: PyTree, path: str) -> bool:
     """Whether a domain follows from the other values of its module."""
     owner, _, name = path.rpartition(".")
     return name in _domains_by_value(get(tree, owner))
 
 
-def _domains_by_value(module: Any) -> dict[str, Any]:
+def _domains_by_value(module: PyTree) -> dict[str, Any]:
     """The domains that are functions of the module, by field."""
     fields = dataclasses.fields(module) if dataclasses.is_dataclass(module) else ()
     declared = {field.name: field.metadata.get("parameter", {}).get("domain") for field in fields}
     return {name: domain for name, domain in declared.items() if callable(domain) and not isinstance(domain, Domain)}
 
 
-def _judge_together(module: Any, start: str, below: Columns, reasons: np.ndarray) -> None:
+def _judge_together(module: PyTree, start: str, below: Columns, reasons: np.ndarray) -> None:
     """Enter what is wrong between several values of one module: each different combination is looked at once.
 
     Conditions of a module stand in a `__check_init__` of its class and never pass what is not a number. One that takes
@@ -100,7 +101,7 @@ def _judge_together(module: Any, start: str, below: Columns, reasons: np.ndarray
     reasons[left] = found[places.ravel()]
 
 
-def _refusal(check: Any, module: Any) -> str:
+def _refusal(check: Any, module: PyTree) -> str:
     """What a check says, without the value; nothing if it passes."""
     try:
         check(module)
@@ -112,13 +113,13 @@ def _refusal(check: Any, module: Any) -> str:
 class _Placed:
     """A module with places to set values at, quickly and without checks."""
 
-    def __init__(self, module: Any, paths: list[str]) -> None:
+    def __init__(self, module: PyTree, paths: list[str]) -> None:
         marks = [object() for _ in paths]
         leaves, self._tree = jax.tree.flatten(eqx.tree_at(lambda m: [get(m, path) for path in paths], module, marks))
         self._leaves = leaves
         self._places = [next(i for i, leaf in enumerate(leaves) if leaf is mark) for mark in marks]
 
-    def at(self, values: np.ndarray) -> Any:
+    def at(self, values: np.ndarray) -> PyTree:
         """The module with these values."""
         leaves = list(self._leaves)
         for place, value in zip(self._places, values, strict=True):

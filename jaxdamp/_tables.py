@@ -207,7 +207,7 @@ def with_tied(note: str, tied: Sequence[str]) -> str:
     return "; ".join([note] * bool(note) + [f"= {', '.join(tied)}"] * bool(tied))
 
 
-def _plain_cell(cell: Any) -> Any:
+def _plain_cell(cell: object) -> object:
     """A cell of a CSV file; texts that a spreadsheet would compute as a formula begin with an apostrophe."""
     if cell is None:
         return ""

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jax.extend.core import unsafe_am_i_under_a_jit_DO_NOT_USE  # pyright: ignore[reportPrivateImportUsage]
+from jaxtyping import PyTree
 
 
 Tree = TypeVar("Tree")
@@ -29,7 +30,7 @@ class Behind(NamedTuple):
     batch_axes: int
 
 
-def look_behind(value: Any) -> Behind | None:
+def look_behind(value: object) -> Behind | None:
     """The value behind derivatives and batches; None where no value is known yet."""
     if not isinstance(value, Tracer):
         return Behind(np.asarray(value), 0)
@@ -44,13 +45,13 @@ def look_behind(value: Any) -> Behind | None:
     return Behind(np.moveaxis(whole.value, whole.batch_axes + axis, whole.batch_axes), whole.batch_axes + 1)
 
 
-def behind(value: Any) -> np.ndarray | None:
+def behind(value: object) -> np.ndarray | None:
     """The value, or all values of a batch with the batch in front; None where no value is known yet."""
     found = look_behind(value)
     return None if found is None else found.value
 
 
-def is_traced(tree: Any) -> bool:
+def is_traced(tree: PyTree) -> bool:
     """Whether JAX traces any leaf."""
     return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
 
@@ -60,12 +61,12 @@ def at_compile_time() -> AbstractContextManager[None]:
     return jax.ensure_compile_time_eval() if unsafe_am_i_under_a_jit_DO_NOT_USE() else nullcontext()
 
 
-def is_batched(tree: Any) -> bool:
+def is_batched(tree: PyTree) -> bool:
     """Whether any leaf stands for a batch of `jax.vmap`, also below derivatives or a compiled function around it."""
     return any(map(_is_batched, jax.tree.leaves(tree)))
 
 
-def _is_batched(value: Any) -> bool:
+def _is_batched(value: object) -> bool:
     while isinstance(value, Tracer):
         if isinstance(getattr(value, "batch_dim", None), int):
             return True
@@ -86,7 +87,7 @@ def known(tree: Tree) -> Tree | None:
     return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), values), rest)
 
 
-def rows(tree: Any) -> list[np.ndarray] | None:
+def rows(tree: PyTree) -> list[np.ndarray] | None:
     """The values of all arrays of a tree for each car of a batch, shape (cars, ...); None where one is not known.
 
     One car if nothing is a batch. Batches within batches are laid out one after the other.

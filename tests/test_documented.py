@@ -1,5 +1,6 @@
 """Every public name has a docstring that mentions every argument, so that the API reference has no gaps."""
 
+import ast
 import enum
 import inspect
 import re
@@ -22,10 +23,10 @@ UNITS = {  # of arguments that mean the same wherever they stand
 
 
 def public(package: str) -> Iterator[tuple[str, Any]]:
-    """The functions and classes that a package offers."""
+    """The functions and classes that a package offers, to users or to other packages."""
     module = import_module(f"jaxdamp.{package}")
     assert module.__doc__
-    for name in module.__all__:
+    for name in [*module.__all__, *getattr(module, "__shared__", ())]:
         value = getattr(module, name)
         if callable(value) and value.__module__.startswith("jaxdamp"):
             yield name, value
@@ -53,6 +54,18 @@ def described(name: str, text: str) -> str:
     """What a section says of an argument, `name: words` with its further lines; or that it stands in a sentence."""
     found = re.search(rf"^ *(?:\w+, )*\**{name}(?:, \w+)*: (.*(?:\n {{8,}}.*)*)", text, re.M)
     return found[1] if found else "in a sentence" * bool(re.search(rf"\b{name}\b", text))
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_name_of_a_package_is_in_one_of_its_lists(package: str) -> None:
+    """`__all__` holds what a user writes, `__shared__` what is only returned or used by other packages."""
+    module = import_module(f"jaxdamp.{package}")
+    listed = [*module.__all__, *getattr(module, "__shared__", ())]
+    assert len(listed) == len(set(listed)) and all(hasattr(module, name) for name in listed)
+    tree = ast.parse(inspect.getsource(module))
+    imported = {alias.asname or alias.name for n in tree.body if isinstance(n, ast.ImportFrom) for alias in n.names}
+    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    assert imported <= {*listed, *used}
 
 
 @pytest.mark.parametrize("package", PACKAGES)

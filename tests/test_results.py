@@ -4,6 +4,8 @@ import importlib
 import inspect
 import json
 import pkgutil
+from types import ModuleType
+from typing import Any, cast
 
 import matplotlib.figure
 import numpy as np
@@ -57,7 +59,7 @@ def _bench_results() -> list[AbstractResult]:
 def _fits() -> list[AbstractResult]:
     runs = _runs()
     fit = identify.fit(dampers.Bilinear(2000.0, 1000.0), runs)
-    evidence, law = fit.evidence, fit.law
+    evidence, law, by_setting = fit.evidence, fit.law, cast(Any, identify.fit)
     assert evidence is not None
     spread = identify.Spread("rebound_rate", "N s/m", 1.0, 0.1, (0.8, 1.2), 1.2, 50.0)
     design = identify.ExperimentDesign(law, (bench.SineTest(0.02, 1.0),), free_parameters(law), np.eye(2), "D")
@@ -77,7 +79,7 @@ def _fits() -> list[AbstractResult]:
         identify.compare({"linear": dampers.Linear}, runs),
         identify.cross_validate({"linear": dampers.Linear}, runs),
         identify.fit_many(dampers.Linear, {"a": runs[:1], "b": runs[1:]}),
-        identify.fit(law=dampers.Linear, runs=runs, scheduled=True),
+        by_setting(law=dampers.Linear, runs=runs, scheduled=True),
         identify.fit_targets(lambda n: {"y": n["x"] ** 2}, {"x": 1.0}, {"y": 4.0}),
     ]
 
@@ -167,11 +169,15 @@ def test_a_result_writes_its_page(kind, samples, tmp_path) -> None:
     assert "<h1>A page</h1>" in page and "data:image/png" in page and result.table().title in page
 
 
+def _names(package: ModuleType) -> list[str]:
+    return [*package.__all__, *getattr(package, "__shared__", ())]
+
+
 def test_whatever_has_a_table_is_a_result() -> None:
     others = {
         name
         for package in ("bench", "identify", "roads", "simulation", "tune", "vehicles")
-        for name in getattr(jaxdamp, package).__all__
+        for name in _names(getattr(jaxdamp, package))
         if inspect.isclass(each := getattr(getattr(jaxdamp, package), name))
         and hasattr(each, "table")
         and not issubclass(each, AbstractResult)

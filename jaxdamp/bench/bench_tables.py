@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench import clock, stamps
-from jaxdamp.bench import sign as signs
+from jaxdamp.bench import clock, sign as signs, stamps
 from jaxdamp.bench.clock import Part, regular_parts
 from jaxdamp.bench.columns import REQUIRED, Choice, Column, find_columns
 from jaxdamp.bench.motion import Samples, cycle_instants
@@ -84,8 +83,8 @@ def _values(table: RawTable, raw: RawColumn, column: Column) -> tuple[Samples, s
 def _columns_note(table: RawTable, columns: Mapping[str, Column]) -> str:
     used = ", ".join(f"{c.role} from {c.header!r} in {c.unit}" for c in columns.values())
     taken = {column.index for column in columns.values()}
-    rest = [name for i, name in enumerate(table.names) if i not in taken] if table.is_named else []
-    return f"{used}; brought to SI" + (f"; not used: {', '.join(rest)}" if rest else "")
+    unused = [name for i, name in enumerate(table.names) if i not in taken] if table.is_named else []
+    return f"{used}; brought to SI" + (f"; not used: {', '.join(unused)}" if unused else "")
 
 
 def _parts(table: RawTable, time: Samples | None, motion: Samples, rate: float | int | None) -> list[Part]:
@@ -128,11 +127,11 @@ def _from_rate(count: int, rate: float | int | None, where: str) -> Part:
 def _check_rate(parts: list[Part], rate: float | int | None, where: str) -> None:
     """Refuse a sampling rate that contradicts the time column."""
     time = max(parts, key=lambda part: len(part.time)).time
-    own = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else 0.0
-    if rate is not None and abs(rate - own) > 0.01 * rate:
+    measured = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else 0.0
+    if rate is not None and abs(rate - measured) > 0.01 * rate:
         given, without = Setting("sampling_rate", rate), Setting("columns", {"time": None})
         raise ArgumentError(
-            f"{where}: {given} contradicts the time column, which has {own:.6g} Hz. Leave one of "
+            f"{where}: {given} contradicts the time column, which has {measured:.6g} Hz. Leave one of "
             f"them out: {without} leaves out the column.",
             given,
             without,
@@ -157,16 +156,16 @@ def _record(
     else:
         stroke = part.of(channels["stroke"])
         clock.check_stroke(stroke, f"{where}, column {columns['stroke'].header!r}")
-    own = bool(table.preamble) and table.preamble[0].strip() == FILE_MARK
-    if own:
+    states_all = bool(table.preamble) and table.preamble[0].strip() == FILE_MARK
+    if states_all:
         _refuse_signs(how, where)
         decision = signs.Decision(1.0, 1.0, ("positive stroke is rebound, as the file states",))
     else:
         decision = signs.decide(time, stroke, force, how.sign, how.force_sign, where)
-    if velocity is None or not (own or integrated):
+    if velocity is None or not (states_all or integrated):
         velocity, source = _velocity(time, stroke, velocity, where)
     temperature = channels.get("temperature")
-    stated = _stated(table) if own else {}
+    stated = _stated(table) if states_all else {}
     return BenchRun(
         name,
         time,

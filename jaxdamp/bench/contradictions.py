@@ -66,7 +66,7 @@ def contradictions(runs: Sequence[BenchRun]) -> list[Contradiction]:
     """
     pairs = [pair for pair in itertools.combinations(runs, 2) if same_motion(*pair)]
     cycles = {id(run): _mean_cycle(run) for run in {id(run): run for pair in pairs for run in pair}.values()}
-    found = []
+    pairs_apart = []
     for a, b in pairs:
         one, other = cycles[id(a)], cycles[id(b)]
         if one is None or other is None or _rms(one.stroke - other.stroke) > SAME_SHAPE * a.amplitude:
@@ -74,8 +74,8 @@ def contradictions(runs: Sequence[BenchRun]) -> list[Contradiction]:
         difference, level = _rms(one.force - other.force), np.hypot(_rms(one.force), _rms(other.force)) / np.sqrt(2.0)
         scatter = max(one.scatter, other.scatter)
         if difference > OTHER_FORCE * level and difference > BEYOND_SCATTER * scatter:
-            found.append(Contradiction(a.name, b.name, difference, float(difference / level), scatter))
-    return sorted(found, key=lambda pair: -pair.share)
+            pairs_apart.append(Contradiction(a.name, b.name, difference, float(difference / level), scatter))
+    return sorted(pairs_apart, key=lambda pair: -pair.share)
 
 
 def contradictions_in_words(found: Sequence[Contradiction]) -> list[str]:
@@ -135,6 +135,8 @@ def _mean_cycle(run: BenchRun) -> _Cycle | None:
 
 def _mean_over_cycles(values: Float[np.ndarray, "cycles bins"]) -> Float[np.ndarray, " bins"]:
     """The mean over the cycles that have samples in a bin; NaN where none has."""
-    known = np.isfinite(values)
-    count = known.sum(axis=0)
-    return np.divide(np.where(known, values, 0.0).sum(axis=0), count, out=np.full(count.shape, np.nan), where=count > 0)
+    sampled = np.isfinite(values)
+    count = sampled.sum(axis=0)
+    return np.divide(
+        np.where(sampled, values, 0.0).sum(axis=0), count, out=np.full(count.shape, np.nan), where=count > 0
+    )

@@ -185,8 +185,8 @@ def _of_one_length(file: Path, name: str, columns: list[RawColumn]) -> RawTable 
     lengths = [np.size(column.values) for column in columns]
     length = max(lengths, key=lambda n: (lengths.count(n), n), default=0)
     same = [column for column, n in zip(columns, lengths, strict=True) if n == length]
-    rest = [f"{column.name} ({n})" for column, n in zip(columns, lengths, strict=True) if n != length]
-    notes = (f"left out, because they do not have {length} samples: {', '.join(rest)}",) if rest else ()
+    others = [f"{column.name} ({n})" for column, n in zip(columns, lengths, strict=True) if n != length]
+    notes = (f"left out, because they do not have {length} samples: {', '.join(others)}",) if others else ()
     return RawTable(file, tuple(same), name, notes=notes) if len(same) > 1 else None
 
 

@@ -132,9 +132,9 @@ def ratio(written: str, other: str) -> float | None:
 
 def named_conversion(role: str, written: str, where: str) -> Conversion:
     """As `conversion`, but a clear error that begins with `where` and suggests a unit."""
-    found = conversion(role, written)
-    if found is not None:
-        return found
+    known_unit = conversion(role, written)
+    if known_unit is not None:
+        return known_unit
     near = get_close_matches(written, [*USUAL[role], *_WRITTEN[role]], 1, cutoff=0.4)
     hint = f"Did you mean {near[0]!r}? " if near else ""
     if ratio(written, "V") is not None or written.strip().lower() in SIGNALS:

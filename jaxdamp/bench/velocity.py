@@ -69,8 +69,8 @@ def estimate_velocity(time: ArrayLike, stroke: ArrayLike, *, method: str | None 
         fit = _fit_harmonics(time, stroke, frequency)
         if fit is not None:
             plural = "s" if fit.harmonics > 1 else ""
-            found = f"{fit.frequency:.5g} Hz, {fit.harmonics} harmonic{plural}"
-            return fit.velocity, f"velocity from the stroke by harmonic regression, {found}"
+            wave = f"{fit.frequency:.5g} Hz, {fit.harmonics} harmonic{plural}"
+            return fit.velocity, f"velocity from the stroke by harmonic regression, {wave}"
         if method == "harmonic":
             _checks.refuse(
                 "method",

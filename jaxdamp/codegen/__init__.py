@@ -12,26 +12,29 @@ functions are those of the language's own library. A primitive that cannot be pr
 `printed_scan` prints a loop over time for many points side by side, compiles it and calls it from JAX.
 """
 
-from jaxdamp.codegen._languages import AbstractLanguage, C, JavaScript, PrintedFunction
-from jaxdamp.codegen._lowering import Program, Symbols, lower, symbols
+from jaxdamp.codegen._languages import AbstractLanguage as AbstractLanguage, C, JavaScript, PrintedFunction
+from jaxdamp.codegen._lowering import Program as Program, Symbols as Symbols, lower, symbols
 from jaxdamp.codegen._native import compiler
-from jaxdamp.codegen._printing import is_printing, printing
-from jaxdamp.codegen._program import Constant
-from jaxdamp.codegen._scan import printed_scan
+from jaxdamp.codegen._printing import is_printing as is_printing, printing as printing
+from jaxdamp.codegen._program import Constant as Constant
+from jaxdamp.codegen._scan import printed_scan as printed_scan
 
 
 __all__ = [
-    "AbstractLanguage",
     "C",
-    "Constant",
     "JavaScript",
     "PrintedFunction",
+    "compiler",
+    "lower",
+    "symbols",
+]
+# What the other packages of the library import, and what is only returned: a user writes none of these.
+__shared__ = [
+    "AbstractLanguage",
+    "Constant",
     "Program",
     "Symbols",
-    "compiler",
     "is_printing",
-    "lower",
     "printed_scan",
     "printing",
-    "symbols",
 ]

@@ -96,8 +96,8 @@ REDUCTIONS = {
 def _reduce(writer: Writer, equation: Equation, operands: list[Atoms]) -> list[Atoms]:
     operation, empty = REDUCTIONS[equation.name]
     axes, count = equation.parameters["axes"], operands[0].ndim
-    kept = [axis for axis in range(count) if axis not in axes]
-    rows = operands[0].transpose(*kept, *axes).reshape((*equation.shape, -1))
+    remaining = [axis for axis in range(count) if axis not in axes]
+    rows = operands[0].transpose(*remaining, *axes).reshape((*equation.shape, -1))
     result = np.empty(equation.shape, object)
     for index in np.ndindex(*equation.shape):
         result[index] = _combined(writer, operation, list(rows[index]), equation.dtype, empty)

@@ -23,8 +23,8 @@ def _nvrtc() -> ctypes.CDLL:
     """
     spec = util.find_spec("nvidia")
     folders = [Path(place) for place in (spec.submodule_search_locations or ())] if spec else []
-    found = [str(path) for folder in folders for path in sorted(folder.glob("*/lib/libnvrtc.so.*"))]
-    name = next(iter(found), None) or ctypes.util.find_library("nvrtc")
+    libraries = [str(path) for folder in folders for path in sorted(folder.glob("*/lib/libnvrtc.so.*"))]
+    name = next(iter(libraries), None) or ctypes.util.find_library("nvrtc")
     if name is None:
         raise NotImplementedError("NVRTC, the compiler of CUDA, is not installed. Install `nvidia-cuda-nvrtc-cu12`.")
     return ctypes.CDLL(name)

@@ -174,7 +174,7 @@ def _parts(
 ) -> dict[str, str | list[str]]:
     printer = _InLanes()
     carried = _carried(before, after)
-    kept, carried, statements = _with_kept(statements, levels, carried)
+    repeated, carried, statements = _with_kept(statements, levels, carried)
     inside = {name for name, level in levels.items() if level == OF_BOTH}
     statements = sums_of_products(statements, inside, carried.values())
     statements, limits = _limited(statements, levels)
@@ -185,15 +185,15 @@ def _parts(
     load = [f"const {printer.types[v.dtype]} {v.name} = hoisted[{i}][lane];" for i, v in enumerate(hoisted)]
     store = [f"hoisted[{i}][lane] = {v.name};" for i, v in enumerate(hoisted)]
     store += _missing(limits)
-    store += printer.lines(dict.fromkeys(s for value in kept for s in value.first), 0)
-    store += [f"{_kept_name(i)} = {value.target.name};" for i, value in enumerate(kept)]
+    store += printer.lines(dict.fromkeys(s for value in repeated for s in value.first), 0)
+    store += [f"{_kept_name(i)} = {value.target.name};" for i, value in enumerate(repeated)]
     ends = [(name, printer.atom(new)) for name, new in carried.items() if Variable(name, "float64") != new]
     counts = inputs.counts
     return {
         **{name: str(counts[name]) for name in ("shared", "own", "now", "state")},
         "rows": str(counts["row"]),
         "hoisted": str(len(hoisted)),
-        "kept": str(len(kept)),
+        "kept": str(len(repeated)),
         "once": [*printer.lines(parts[0], 0)],
         "of_point": [*printer.lines(parts[OF_POINT], 0), *store],
         "of_step": [*printer.lines(parts[OF_STEP], 0)],
@@ -225,21 +225,21 @@ def _with_kept(
 ) -> tuple[list[Kept], dict[str, Atom], list[Define | Table]]:
     """The values that the step before has computed, what is then carried, and the statements that read them."""
     still = {name: Variable(name, "float64") for name, level in levels.items() if not level & OF_STEP}
-    kept = [
+    repeated = [
         value
         for value in kept_values(statements, still | carried, carried.values())
         if levels[value.target.name] == levels[value.again.name] == OF_BOTH
     ]
-    given: dict[Atom, Atom] = {value.target: Variable(_kept_name(i), "float64") for i, value in enumerate(kept)}
-    levels |= {_kept_name(i): OF_BOTH for i in range(len(kept))}
-    carried = carried | {_kept_name(i): value.again for i, value in enumerate(kept)}
+    given: dict[Atom, Atom] = {value.target: Variable(_kept_name(i), "float64") for i, value in enumerate(repeated)}
+    levels |= {_kept_name(i): OF_BOTH for i in range(len(repeated))}
+    carried = carried | {_kept_name(i): value.again for i, value in enumerate(repeated)}
     carried = {name: given.get(new, new) for name, new in carried.items()}
 
     def reading(s: Define | Table) -> Define | Table:
         atoms = tuple(given.get(a, a) for a in (s.operands if isinstance(s, Define) else s.entries))
         return Define(s.target, s.operation, atoms) if isinstance(s, Define) else Table(s.target, atoms)
 
-    return kept, carried, _straight(pruned([reading(s) for s in statements], names(carried.values())))
+    return repeated, carried, _straight(pruned([reading(s) for s in statements], names(carried.values())))
 
 
 def _limited(

@@ -142,9 +142,9 @@ class AbstractLanguage(ABC):
             return f"{texts[0]} {self.equal[operation == 'ne']} {texts[1]}"
         if operation == "not":
             return f"!{texts[0]}" if dtype == "bool" else f"~{texts[0]}"
-        own = self.own(operation, texts, dtypes, dtype)
-        if own is not None:
-            return own
+        text = self.own(operation, texts, dtypes, dtype)
+        if text is not None:
+            return text
         if operation in _INFIX:
             return f"{texts[0]} {_INFIX[operation]} {texts[1]}"
         templates = _TEMPLATES | (_OF_FLOATS if dtype.startswith("float") else {})

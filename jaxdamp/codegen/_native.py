@@ -24,8 +24,8 @@ _WIDE = ("-mprefer-vector-width=512", "-mrecip")  # of gcc for x86
 
 def compiler() -> str | None:
     """The C compiler: the environment variable `CC`, or gcc, clang, cc on the path; None without one."""
-    own = os.environ.get("CC", "").split()
-    return next(filter(None, map(shutil.which, [*own[:1], "gcc", "clang", "cc"])), None)
+    chosen = os.environ.get("CC", "").split()
+    return next(filter(None, map(shutil.which, [*chosen[:1], "gcc", "clang", "cc"])), None)
 
 
 def compiled_by() -> str:

@@ -139,9 +139,9 @@ class Writer:
             if place is not None:
                 return operands[place]
         key = operation, operands, dtype
-        for known in reversed(self._known):
-            if key in known:
-                return known[key]
+        for defined in reversed(self._known):
+            if key in defined:
+                return defined[key]
         target = self._known[-1][key] = self.new(dtype)
         self.put(Define(target, operation, operands))
         return target
@@ -201,12 +201,12 @@ def _number(atom: Constant) -> Any:
 
 def pruned(statements: list[Statement], needed: set[str]) -> list[Statement]:
     """Without what nothing uses; `needed` are the names used afterwards, and the names used here are added to it."""
-    kept: list[Statement] = []
+    used_statements: list[Statement] = []
     for statement in reversed(statements):
         used = _pruned_statement(statement, needed)
         if used is not None:
-            kept.append(used)
-    return kept[::-1]
+            used_statements.append(used)
+    return used_statements[::-1]
 
 
 def _pruned_statement(statement: Statement, needed: set[str]) -> Statement | None:

@@ -5,16 +5,16 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 """
 
 from jaxdamp._guesses import answer_guesses
-from jaxdamp.dampers._commands import command_paths
-from jaxdamp.dampers._points import drives_motion
-from jaxdamp.dampers._starts import Reach, from_samples
+from jaxdamp.dampers._commands import command_paths as command_paths
+from jaxdamp.dampers._points import drives_motion as drives_motion
+from jaxdamp.dampers._starts import Reach as Reach, from_samples as from_samples
 from jaxdamp.dampers.acceleration_surface import AccelerationSurface
 from jaxdamp.dampers.base import (
     AbstractDamper,
     AbstractMemoryless,
     AbstractStateful,
     AbstractStateless,
-    laws_inside,
+    laws_inside as laws_inside,
     own_states,
 )
 from jaxdamp.dampers.besinger import Besinger
@@ -22,20 +22,20 @@ from jaxdamp.dampers.bilinear import Bilinear
 from jaxdamp.dampers.bouc_wen import BoucWen
 from jaxdamp.dampers.bump_stop import BumpStop
 from jaxdamp.dampers.bushing import Bushing
-from jaxdamp.dampers.command import takes_command, with_command
-from jaxdamp.dampers.conditions import keeps_conditions, margins
+from jaxdamp.dampers.command import takes_command as takes_command, with_command
+from jaxdamp.dampers.conditions import keeps_conditions as keeps_conditions, margins as margins
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
-from jaxdamp.dampers.coverage import coverage, require_finite_force
+from jaxdamp.dampers.coverage import coverage as coverage, require_finite_force as require_finite_force
 from jaxdamp.dampers.creeping_visco_plastic import CreepingViscoPlastic
 from jaxdamp.dampers.dahl import Dahl
 from jaxdamp.dampers.degressive import Degressive
 from jaxdamp.dampers.digressive_progressive import DigressiveProgressive
 from jaxdamp.dampers.fitted_range import (
-    UNITS,
+    UNITS as UNITS,
     FittedRange,
     OutsideFittedRangeWarning,
-    has_fitted_range,
-    without_fitted_ranges,
+    has_fitted_range as has_fitted_range,
+    without_fitted_ranges as without_fitted_ranges,
 )
 from jaxdamp.dampers.force_surface import ForceSurface
 from jaxdamp.dampers.frequency_selective import FrequencySelective
@@ -49,7 +49,7 @@ from jaxdamp.dampers.linear import Linear
 from jaxdamp.dampers.lugre import LuGre
 from jaxdamp.dampers.modified_bouc_wen import ModifiedBoucWen
 from jaxdamp.dampers.mono_tube import MonoTube
-from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.motion import Motion as Motion
 from jaxdamp.dampers.motion_ratio import MotionRatio
 from jaxdamp.dampers.neural_hysteresis import NeuralHysteresis
 from jaxdamp.dampers.piecewise_linear import PiecewiseLinear
@@ -57,9 +57,15 @@ from jaxdamp.dampers.piston_flow import PistonFlow
 from jaxdamp.dampers.play import Play
 from jaxdamp.dampers.polynomial import Polynomial
 from jaxdamp.dampers.power_law import PowerLaw
-from jaxdamp.dampers.range_use import RangeUse, extrapolated, range_use, sentence, warn_outside
+from jaxdamp.dampers.range_use import (
+    RangeUse as RangeUse,
+    extrapolated as extrapolated,
+    range_use as range_use,
+    sentence as sentence,
+    warn_outside as warn_outside,
+)
 from jaxdamp.dampers.saturating import Saturating
-from jaxdamp.dampers.scaled import Scaled
+from jaxdamp.dampers.scaled import Scaled as Scaled
 from jaxdamp.dampers.scheduled import Scheduled
 from jaxdamp.dampers.segmented_polynomial import SegmentedPolynomial
 from jaxdamp.dampers.series_spring import SeriesSpring
@@ -67,7 +73,7 @@ from jaxdamp.dampers.spline_table import SplineTable
 from jaxdamp.dampers.spring import Spring
 from jaxdamp.dampers.stribeck_friction import StribeckFriction
 from jaxdamp.dampers.stroke_dependent import StrokeDependent
-from jaxdamp.dampers.sum import Sum
+from jaxdamp.dampers.sum import Sum as Sum
 from jaxdamp.dampers.table import Table
 from jaxdamp.dampers.temperature_scaled import TemperatureScaled
 from jaxdamp.dampers.traits import Traits
@@ -77,7 +83,6 @@ from jaxdamp.dampers.wrapper import AbstractWrapper
 
 
 __all__ = [
-    "UNITS",
     "AbstractDamper",
     "AbstractMemoryless",
     "AbstractStateful",
@@ -107,7 +112,6 @@ __all__ = [
     "LuGre",
     "ModifiedBoucWen",
     "MonoTube",
-    "Motion",
     "MotionRatio",
     "NeuralHysteresis",
     "OutsideFittedRangeWarning",
@@ -116,10 +120,7 @@ __all__ = [
     "Play",
     "Polynomial",
     "PowerLaw",
-    "RangeUse",
-    "Reach",
     "Saturating",
-    "Scaled",
     "Scheduled",
     "SegmentedPolynomial",
     "SeriesSpring",
@@ -127,11 +128,22 @@ __all__ = [
     "Spring",
     "StribeckFriction",
     "StrokeDependent",
-    "Sum",
     "Table",
     "TemperatureScaled",
     "Traits",
     "ViscoPlastic",
+    "own_states",
+    "with_command",
+    "with_fitted_range",
+]
+# What the other packages of the library import, and what is only returned: a user writes none of these.
+__shared__ = [
+    "UNITS",
+    "Motion",
+    "RangeUse",
+    "Reach",
+    "Scaled",
+    "Sum",
     "command_paths",
     "coverage",
     "drives_motion",
@@ -141,14 +153,11 @@ __all__ = [
     "keeps_conditions",
     "laws_inside",
     "margins",
-    "own_states",
     "range_use",
     "require_finite_force",
     "sentence",
     "takes_command",
     "warn_outside",
-    "with_command",
-    "with_fitted_range",
     "without_fitted_ranges",
 ]
 

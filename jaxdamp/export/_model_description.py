@@ -37,27 +37,27 @@ def variables(program: LawProgram | VehicleProgram, longest_step: float) -> list
     """All variables, in the order of unit.c: values and rates of the inputs, outputs, numbers, states, their rates."""
     signals = _of_law(program) if isinstance(program, LawProgram) else _of_vehicle(program)
     said = {"description": "longest step of the model; longer communication steps are divided"}
-    found = [*signals, Variable("longest_step", "s", _FIXED | said, longest_step, (1e-9, np.inf))]
-    found += [variable for number in program.numbers for variable in _of_number(number)]
+    listed = [*signals, Variable("longest_step", "s", _FIXED | said, longest_step, (1e-9, np.inf))]
+    listed += [variable for number in program.numbers for variable in _of_number(number)]
     if not program.numbers:
-        found.append(Variable("none", "", _FIXED, 0.0))
+        listed.append(Variable("none", "", _FIXED, 0.0))
     states = (
         [(f"state[{k}]", "") for k in range(program.states)]
         if isinstance(program, LawProgram)
         else [(f"state.{name}", unit) for name, unit in program.states]
     )
-    first = len(found)
-    found += [Variable(name, unit, _LOCAL) for name, unit in states]
+    first = len(listed)
+    listed += [Variable(name, unit, _LOCAL) for name, unit in states]
     rates = {"m": "m/s", "m/s": "m/s^2", "rad": "rad/s", "rad/s": "rad/s^2"}
-    found += [
+    listed += [
         Variable(f"der({name})", rates.get(unit, ""), _LOCAL, derivative_of=first + k)
         for k, (name, unit) in enumerate(states)
     ]
-    names = [variable.name for variable in found]
+    names = [variable.name for variable in listed]
     double = next((name for name in names if names.count(name) > 1), None)
     if double is not None:
         _checks.refuse("law", "have a different name for each parameter, channel and input", f"two of {double!r}")
-    return found
+    return listed
 
 
 def _of_law(program: LawProgram) -> Iterator[Variable]:

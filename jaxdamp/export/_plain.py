@@ -24,24 +24,24 @@ BORROWED = ("equinox", "lineax", "optimistix", "diffrax")  # whose modules are n
 
 def known_classes() -> dict[str, type[eqx.Module]]:
     """All modules by the name of their class: those of this package first, of others the one defined last."""
-    found: list[type[eqx.Module]] = []
+    classes: list[type[eqx.Module]] = []
     waiting: list[type[eqx.Module]] = [eqx.Module]
     while waiting:
         subclasses = waiting.pop().__subclasses__()
         waiting += subclasses
-        found += [c for c in subclasses if not inspect.isabstract(c) and c.__module__.split(".")[0] not in BORROWED]
-    ours = [c for c in found if c.__module__.startswith("jaxdamp.")]
-    return {c.__name__: c for c in [*found, *ours] if not c.__name__.startswith("Abstract")}
+        classes += [c for c in subclasses if not inspect.isabstract(c) and c.__module__.split(".")[0] not in BORROWED]
+    ours = [c for c in classes if c.__module__.startswith("jaxdamp.")]
+    return {c.__name__: c for c in [*classes, *ours] if not c.__name__.startswith("Abstract")}
 
 
 def known_functions() -> dict[str, Any]:
     """The functions of the roads of this package, of which a road can hold one, by name."""
     modules = [module for name, module in list(sys.modules.items()) if name.startswith("jaxdamp.roads.")]
-    found = [f for module in modules for f in vars(module).values() if inspect.isfunction(f)]
-    return {f.__name__: f for f in found if f.__module__.startswith("jaxdamp.roads.")}
+    functions = [f for module in modules for f in vars(module).values() if inspect.isfunction(f)]
+    return {f.__name__: f for f in functions if f.__module__.startswith("jaxdamp.roads.")}
 
 
-def declared(field: Any) -> dict[str, Any] | None:
+def declared(field: dataclasses.Field) -> dict[str, Any] | None:
     """The declaration of a field, if it is a parameter or a setting."""
     return field.metadata.get("parameter") or field.metadata.get("setting")
 
@@ -51,7 +51,7 @@ def own_fields(module: eqx.Module | type[eqx.Module]) -> list[dataclasses.Field]
     return [field for field in dataclasses.fields(module) if field.name != "range_note"]
 
 
-def plain_module(module: Any) -> dict[str, Any]:
+def plain_module(module: eqx.Module) -> dict[str, Any]:
     """A module with all modules inside."""
     name = type(module).__name__
     if type(module).__module__.split(".")[0] in BORROWED:
@@ -75,7 +75,7 @@ def plain_module(module: Any) -> dict[str, Any]:
     return result
 
 
-def _plain(value: Any, where: str) -> Any:
+def _plain(value: object, where: str) -> Any:
     if isinstance(value, eqx.Module) and not isinstance(value, Partial):
         return plain_module(value)
     if type(value) is tuple:
@@ -112,7 +112,7 @@ def _quantity(value: Any, unit: str | None, where: str) -> dict[str, Any]:
     return {"value": numbers.tolist()} | ({} if unit is None else {"unit": unit})
 
 
-def _known_number(value: Any, where: str) -> np.ndarray:
+def _known_number(value: object, where: str) -> np.ndarray:
     numbers = _checks.concrete(value)
     if numbers is None:
         remedy = "Call `to_json` outside `jax.jit`, `jax.vmap`, `jax.grad`."

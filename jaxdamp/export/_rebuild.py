@@ -15,7 +15,7 @@ from jaxdamp.export._plain import FITTED_TO, declared, known_classes, known_func
 from jaxdamp.parameters import as_float
 
 
-def rebuilt(plain: Any, where: str) -> Any:
+def rebuilt(plain: object, where: str) -> Any:
     """The module that `plain_module` wrote, unchecked.
 
     Raises:
@@ -67,7 +67,7 @@ def _of_field(field: dataclasses.Field, plain: Any, where: str) -> Any:
     return _value(plain, where) if number is None else _number(plain, number["unit"], where)
 
 
-def _fitted_to(plain: Any, owner: str) -> FittedRange | None:
+def _fitted_to(plain: object, owner: str) -> FittedRange | None:
     """The range of a law, as `plain_module` writes it."""
     if plain is None:
         return None
@@ -85,7 +85,7 @@ def _fitted_to(plain: Any, owner: str) -> FittedRange | None:
     return FittedRange(**limits)
 
 
-def _value(plain: Any, where: str) -> Any:
+def _value(plain: object, where: str) -> Any:
     if isinstance(plain, list):
         return tuple(_value(item, f"{where}[{i}]") for i, item in enumerate(plain))
     if not isinstance(plain, dict):
@@ -102,7 +102,7 @@ def _value(plain: Any, where: str) -> Any:
     return rebuilt(plain, where)
 
 
-def _number(plain: Any, unit: str | None, where: str) -> jax.Array:
+def _number(plain: object, unit: str | None, where: str) -> jax.Array:
     shown = {"value": "..."} | ({} if unit is None else {"unit": unit})
     if not isinstance(plain, dict) or plain.keys() != shown.keys():
         _checks.refuse(where, f"be written as {json.dumps(shown)}", json.dumps(plain)[:80])

@@ -66,16 +66,19 @@ def to_fmu(law: AbstractDamper | AbstractVehicle, path: str | os.PathLike[str], 
         must = "be a file NAME.fmu whose name is an identifier of C"
         _checks.refuse("path", must, str(file), f"Try {identifier(name) + '.fmu'!r}.")
     if isinstance(law, AbstractDamper):
-        program, longest, own = LawProgram(law), _LONGEST_STEP, "law.c"
+        program, longest, code = LawProgram(law), _LONGEST_STEP, "law.c"
         model, printed = program.law, law_source(program, "model", ("force", "state_rate"))
     else:
-        program, longest, own = VehicleProgram(law), _LONGEST_STEP / substeps_needed(law, _LONGEST_STEP), "vehicle.c"
+        program, longest, code = VehicleProgram(law), _LONGEST_STEP / substeps_needed(law, _LONGEST_STEP), "vehicle.c"
         model, printed = program.vehicle, vehicle_source(program, "model", derivatives=True)
-    known = variables(program, longest)
-    texts = [printed.static(), *((_TEXTS / file).read_text(encoding="utf-8") for file in (own, "unit.c", "services.c"))]
-    guid = hashlib.sha256(repr((texts, known)).encode()).hexdigest()[:32]
+    listed = variables(program, longest)
+    texts = [
+        printed.static(),
+        *((_TEXTS / file).read_text(encoding="utf-8") for file in (code, "unit.c", "services.c")),
+    ]
+    guid = hashlib.sha256(repr((texts, listed)).encode()).hexdigest()[:32]
     source = "\n".join([f'#define GUID "{{{guid}}}"', f"#define DEFAULT_STEP {longest!r}\n", *texts])
-    contents = {"modelDescription.xml": description(model, known, name, guid).encode()}
+    contents = {"modelDescription.xml": description(model, listed, name, guid).encode()}
     contents |= {f"sources/{h.name}": h.read_bytes() for h in sorted(_TEXTS.glob("*.h"))}
     contents[f"sources/{name}.c"] = source.encode()
     if compiler is not None:

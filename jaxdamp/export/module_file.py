@@ -116,7 +116,7 @@ def from_json(path_or_text: str | os.PathLike[str]) -> Any:
     return module
 
 
-def _layout(value: Any, indent: str = "") -> str:
+def _layout(value: object, indent: str = "") -> str:
     """JSON with one field a line; a quantity and a list of numbers stay on one line."""
     deeper = indent + "  "
     if isinstance(value, dict) and value and "value" not in value:

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Protocol, cast, overload, runtime_checkable
+from typing import Any, ParamSpec, Protocol, cast, overload, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -36,10 +36,6 @@ from jaxdamp.parameters import FreeParameters, matched_in_words, parameters
 from jaxdamp.vehicles import AbstractVehicle
 
 
-if TYPE_CHECKING:
-    from jaxdamp.identify.scheduling import ScheduledFit
-
-
 P = ParamSpec("P")
 UNSEEN = 1e-12  # of the largest derivative, up to which one is a rounding error
 # Errors due to a law that does not suit the records, as opposed to a wrong call (`TypeError` and so on).
@@ -60,10 +56,6 @@ class FitCall(Protocol[P]):
     def __call__(self, law: Start, runs: Mapping[str, BenchRun | Iterable[BenchRun]], **options: Any) -> ManyFits: ...
     @overload
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> FitResult: ...
-    @overload
-    def __call__(
-        self, law: Start, runs: Iterable[BenchRun], *, scheduled: Literal[True], **options: Any
-    ) -> "ScheduledFit": ...
 
 
 def of_any_records(fit: Callable[P, FitResult]) -> FitCall[P]:

@@ -7,21 +7,21 @@ Fits, tables, plot labels and reports all read that one declaration. A *path* su
 parameter inside a composition. Freezing, ties and extra bounds are arguments of a fit or of a tuning, never of the law.
 """
 
-from jaxdamp.parameters._checking import check_parameters, checked
-from jaxdamp.parameters._coordinates import Bounds, Coordinates
+from jaxdamp.parameters._checking import check_parameters as check_parameters, checked as checked
+from jaxdamp.parameters._coordinates import Bounds as Bounds, Coordinates
 from jaxdamp.parameters._declaration import (
-    Module,
-    Parameter,
-    as_float,
-    domain_of,
-    modules_inside,
+    Module as Module,
+    Parameter as Parameter,
+    as_float as as_float,
+    domain_of as domain_of,
+    modules_inside as modules_inside,
     parameter,
     parameters,
-    readable,
+    readable as readable,
     setting,
 )
 from jaxdamp.parameters._domains import (
-    Domain,
+    Domain as Domain,
     around_zero,
     ends,
     increasing,
@@ -33,42 +33,53 @@ from jaxdamp.parameters._domains import (
     real,
     weight,
 )
-from jaxdamp.parameters._free import FreeParameters, free_parameters
-from jaxdamp.parameters._paths import get, match_paths, matched_in_words, matching, name_patterns, replace, with_values
+from jaxdamp.parameters._free import FreeParameters as FreeParameters, free_parameters
+from jaxdamp.parameters._paths import (
+    get,
+    match_paths as match_paths,
+    matched_in_words as matched_in_words,
+    matching as matching,
+    name_patterns as name_patterns,
+    replace,
+    with_values,
+)
 
 
 __all__ = [
-    "Bounds",
     "Coordinates",
-    "Domain",
-    "FreeParameters",
-    "Module",
-    "Parameter",
     "around_zero",
-    "as_float",
-    "check_parameters",
-    "checked",
-    "domain_of",
     "ends",
     "free_parameters",
     "get",
     "increasing",
     "increasing_negative",
     "interval",
-    "match_paths",
-    "matched_in_words",
-    "matching",
-    "modules_inside",
-    "name_patterns",
     "nonnegative",
     "ordered_interval",
     "parameter",
     "parameters",
     "positive",
-    "readable",
     "real",
     "replace",
     "setting",
     "weight",
     "with_values",
+]
+# What the other packages of the library import, and what is only returned: a user writes none of these.
+__shared__ = [
+    "Bounds",
+    "Domain",
+    "FreeParameters",
+    "Module",
+    "Parameter",
+    "as_float",
+    "check_parameters",
+    "checked",
+    "domain_of",
+    "match_paths",
+    "matched_in_words",
+    "matching",
+    "modules_inside",
+    "name_patterns",
+    "readable",
 ]

@@ -8,56 +8,67 @@ from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
 from jaxdamp.plots.curves import force_velocity
 from jaxdamp.plots.damper_use import damper_use
-from jaxdamp.plots.decisions import damper_comparison
+from jaxdamp.plots.decisions import damper_comparison as damper_comparison
 from jaxdamp.plots.errors import ladder
-from jaxdamp.plots.evaluation import evaluation, gas_and_friction, limit_check
-from jaxdamp.plots.experiments import experiment
+from jaxdamp.plots.evaluation import evaluation, gas_and_friction as gas_and_friction, limit_check as limit_check
+from jaxdamp.plots.experiments import experiment as experiment
 from jaxdamp.plots.fronts import pareto
-from jaxdamp.plots.history import training_history
-from jaxdamp.plots.loops import fit_loops
-from jaxdamp.plots.many_values import many_fits, posterior, rescore, targets
+from jaxdamp.plots.history import training_history as training_history
+from jaxdamp.plots.loops import fit_loops as fit_loops
+from jaxdamp.plots.many_values import (
+    many_fits as many_fits,
+    posterior as posterior,
+    rescore as rescore,
+    targets as targets,
+)
 from jaxdamp.plots.modes import modes
 from jaxdamp.plots.preflight import preflight
-from jaxdamp.plots.profiles import profile
+from jaxdamp.plots.profiles import profile as profile
 from jaxdamp.plots.records import records
 from jaxdamp.plots.rides import ride
-from jaxdamp.plots.roughness import roughness_by_segment, roughness_spectrum
-from jaxdamp.plots.sensitivities import record_sensitivity, sensitivity
+from jaxdamp.plots.roughness import (
+    roughness_by_segment as roughness_by_segment,
+    roughness_spectrum as roughness_spectrum,
+)
+from jaxdamp.plots.sensitivities import record_sensitivity as record_sensitivity, sensitivity
 from jaxdamp.plots.sweeps import sweep
-from jaxdamp.plots.validation import cross_validation
+from jaxdamp.plots.validation import cross_validation as cross_validation
 from jaxdamp.plots.valve_choice import valving
-from jaxdamp.plots.vehicle_fit import vehicle_fit
+from jaxdamp.plots.vehicle_fit import vehicle_fit as vehicle_fit
 
 
 __all__ = [
-    "cross_validation",
-    "damper_comparison",
     "damper_use",
     "evaluation",
-    "experiment",
-    "fit_loops",
     "force_velocity",
-    "gas_and_friction",
     "ladder",
     "law_card",
-    "limit_check",
-    "many_fits",
     "modes",
     "pareto",
-    "posterior",
     "preflight",
-    "profile",
-    "record_sensitivity",
     "records",
-    "rescore",
     "ride",
-    "roughness_by_segment",
-    "roughness_spectrum",
     "sensitivity",
     "sweep",
-    "targets",
-    "training_history",
     "tuning",
     "valving",
+]
+# What the other packages of the library import, and what is only returned: a user writes none of these.
+__shared__ = [
+    "cross_validation",
+    "damper_comparison",
+    "experiment",
+    "fit_loops",
+    "gas_and_friction",
+    "limit_check",
+    "many_fits",
+    "posterior",
+    "profile",
+    "record_sensitivity",
+    "rescore",
+    "roughness_by_segment",
+    "roughness_spectrum",
+    "targets",
+    "training_history",
     "vehicle_fit",
 ]

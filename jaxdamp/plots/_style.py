@@ -56,11 +56,11 @@ def law_styles(laws: Mapping[str, AbstractDamper]) -> dict[str, dict[str, Any]]:
     Of several laws of one family in a figure, all but the first are dashed, in colours that no family there has as long
     as there are any.
     """
-    own = {name: _family(law) for name, law in laws.items()}
-    spare = [colour for colour in range(len(COLOURS)) if colour not in own.values()]
-    more = [(colour, dash) for dash in range(1, len(DASHES)) for colour in (*spare, *sorted(set(own.values())))]
+    families = {name: _family(law) for name, law in laws.items()}
+    spare = [colour for colour in range(len(COLOURS)) if colour not in families.values()]
+    more = [(colour, dash) for dash in range(1, len(DASHES)) for colour in (*spare, *sorted(set(families.values())))]
     chosen: dict[str, tuple[int, int]] = {}
-    for name, family in own.items():
+    for name, family in families.items():
         unused = [place for place in ((family, 0), *more) if place not in chosen.values()]
         chosen[name] = unused[0] if unused else (family, 0)
     return {name: {"color": COLOURS[colour], "linestyle": DASHES[dash]} for name, (colour, dash) in chosen.items()}
@@ -161,5 +161,5 @@ def law_name(law: AbstractDamper) -> str:
     """The classes of a law in words: "SeriesSpring of Besinger", "Linear + CoulombFriction"."""
     if isinstance(law, Sum):
         return " + ".join(law_name(term) for term in law.terms)
-    own, inside = type(law).__name__, law.inner_laws()
-    return f"{own} of {law_name(inside[0])}" if len(inside) == 1 else own
+    name, inside = type(law).__name__, law.inner_laws()
+    return f"{name} of {law_name(inside[0])}" if len(inside) == 1 else name

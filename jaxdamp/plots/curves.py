@@ -114,9 +114,9 @@ def draw_laws(
         force = np.asarray(curve.force)
         handles += fitted_range.curve(axes, law, velocities, force, linewidth=1.8, label=label, **style)
         if name in bands:
-            own, label = bands[name], f"{name}, 95 %"
+            band, label = bands[name], f"{name}, 95 %"
             shade = {"color": style["color"], "alpha": 0.25, "linewidth": 0.0, "zorder": 2.0, "label": label}
-            handles.append(axes.fill_between(own.velocity, own.lower, own.upper, **shade))
+            handles.append(axes.fill_between(band.velocity, band.lower, band.upper, **shade))
     return handles, gaps
 
 

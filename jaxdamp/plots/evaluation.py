@@ -144,9 +144,9 @@ def _draw_forces(axes: "matplotlib.axes.Axes", evaluation: Evaluation, styles: M
     Lines join the peaks of a setting whose velocities differ clearly; repeats of one velocity stand beside each other.
     """
     for setting, runs in evaluation.settings.items():
-        own = {(m.quantity, m.record): m.value for m in evaluation.measurements}
+        values = {(m.quantity, m.record): m.value for m in evaluation.measurements}
         for side in ("rebound", "compression"):
-            pairs = sorted((own[f"{side} velocity", run.name], own[f"{side} force", run.name]) for run in runs)
+            pairs = sorted((values[f"{side} velocity", run.name], values[f"{side} force", run.name]) for run in runs)
             velocity, force = np.array(pairs).T
             joined = bool(np.all(np.diff(velocity) > _DISTINCT * np.abs(velocity).max()))
             look = styles[setting] if joined else {**styles[setting], "linestyle": ""}
@@ -169,14 +169,16 @@ def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list[Any]:
     for limit, measured in limits.results:
         if limit.velocity is None or measured is None or measured.unit != "N":
             continue
-        kept = limit.kept_by(measured.value)
+        passed = limit.kept_by(measured.value)
         low = measured.value if limit.minimum is None else limit.minimum
         high = measured.value if limit.maximum is None else limit.maximum
         at = limit.velocity if limit.quantity.startswith("rebound") else -limit.velocity
-        axes.plot([at, at], [low, high], color=colours[kept], linewidth=7.0, alpha=0.45, solid_capstyle="butt")
-        seen.add(kept)
+        axes.plot([at, at], [low, high], color=colours[passed], linewidth=7.0, alpha=0.45, solid_capstyle="butt")
+        seen.add(passed)
     words = {True: "limits, kept", False: "limits, not kept"}
-    return [Line2D([], [], color=colours[kept], linewidth=7.0, alpha=0.45, label=words[kept]) for kept in sorted(seen)]
+    return [
+        Line2D([], [], color=colours[passed], linewidth=7.0, alpha=0.45, label=words[passed]) for passed in sorted(seen)
+    ]
 
 
 def _dress(panels: Mapping[str, "matplotlib.axes.Axes"]) -> None:

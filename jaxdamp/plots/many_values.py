@@ -53,12 +53,12 @@ def posterior(result: Posterior) -> "matplotlib.figure.Figure":
         result: of `FitResult.posterior`.
     """
     figure, panels = _panels(len(result.parameters))
-    for axes, own, samples in zip(panels, result.parameters, result.samples.T, strict=True):
+    for axes, parameter, samples in zip(panels, result.parameters, result.samples.T, strict=True):
         axes.hist(samples, _BINS, color=_style.COLOURS[0], alpha=0.6)
-        axes.axvline(own.mean, color=_style.BLACK, linewidth=1.2)
-        for end in own.interval:
+        axes.axvline(parameter.mean, color=_style.BLACK, linewidth=1.2)
+        for end in parameter.interval:
             axes.axvline(end, color=_style.BLACK, linewidth=0.9, linestyle="--")
-        _style.dress(axes, f"{own.name} [{own.unit or '–'}]", "samples", f"r hat {own.r_hat:.3f}")
+        _style.dress(axes, f"{parameter.name} [{parameter.unit or '–'}]", "samples", f"r hat {parameter.r_hat:.3f}")
     figure.suptitle(f"Posterior from {len(result.samples)} samples: mean and 95 % interval")
     return figure
 

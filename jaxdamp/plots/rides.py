@@ -123,9 +123,9 @@ def _ride_styles(responses: Mapping[str, Response], reference: str | None) -> di
     """How to draw each response: in the colour of its first damper's law, the reference broad beneath all."""
     others = [name for name in responses if name != reference]
     laws = {name: r.vehicle.frame().element(r.dampers[0]).law for name, r in responses.items() if r.dampers}
-    known = all(name in laws for name in others)
-    styles = _style.law_styles({name: laws[name] for name in others}) if known else {}
-    styles = {n: (styles[n] if known else _style.line_style(i)) | {"linewidth": 1.2} for i, n in enumerate(others)}
+    are_laws = all(name in laws for name in others)
+    styles = _style.law_styles({name: laws[name] for name in others}) if are_laws else {}
+    styles = {n: (styles[n] if are_laws else _style.line_style(i)) | {"linewidth": 1.2} for i, n in enumerate(others)}
     return styles if reference is None else {reference: {"color": "0.7", "linewidth": 3.5}} | styles
 
 
@@ -138,8 +138,8 @@ def default_channels(layout: Layout) -> tuple[str, ...]:
     """Body acceleration, first stroke, first dynamic tyre load of a vehicle."""
     acceleration = next(m.channel for m in layout.metrics if layout.by_name[m.channel].kind.weighting is not None)
     kinds = ChannelKind.STROKE, ChannelKind.TYRE_LOAD
-    rest = [next((c.name for c in layout.channels if c.kind is kind), None) for kind in kinds]
-    return (acceleration, *[name for name in rest if name is not None])
+    others = [next((c.name for c in layout.channels if c.kind is kind), None) for kind in kinds]
+    return (acceleration, *[name for name in others if name is not None])
 
 
 def _window(response: Response, channel: str) -> tuple[float, float]:

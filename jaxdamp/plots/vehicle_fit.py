@@ -31,12 +31,12 @@ def vehicle_fit(result: VehicleFit, record: str | None = None) -> "matplotlib.fi
     units = {score.channel: score.unit for score in result.scores if score.record == name}
     figure = _style.new_figure(12.0, 1.0 + 2.2 * len(units))
     rows = figure.subplots(len(units), 2, sharex=True, squeeze=False, width_ratios=(2.0, 1.0))
-    for (over, beside), (channel, unit) in zip(rows, units.items(), strict=True):
+    for (over, spectrum), (channel, unit) in zip(rows, units.items(), strict=True):
         over.plot(shown.time, shown[channel], color=_style.GREY, linewidth=2.5, alpha=0.5, label="measured")
         over.plot(shown.time, fitted[channel], color=_style.COLOURS[0], linewidth=0.9, label="fitted")
-        beside.plot(shown.time, fitted[channel] - shown[channel], color=_style.COLOURS[1], linewidth=0.6)
+        spectrum.plot(shown.time, fitted[channel] - shown[channel], color=_style.COLOURS[1], linewidth=0.6)
         _style.dress(over, "", f"[{unit}]", channel)
-        _style.dress(beside, "", f"[{unit}]", "fitted − measured")
+        _style.dress(spectrum, "", f"[{unit}]", "fitted − measured")
     for axes in rows[-1]:
         axes.set_xlabel("time [s]")
     _style.legend_above(figure, rows[0, 0].get_lines())

@@ -9,53 +9,66 @@
 """
 
 from jaxdamp._guesses import answer_guesses
-from jaxdamp._tables import Column, Table
-from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.benches import add_evaluation, baseline_table, bench_report, law_evaluation
+from jaxdamp._tables import Column as Column, Table
+from jaxdamp.report.attempts import Attempts as Attempts
+from jaxdamp.report.benches import (
+    add_evaluation as add_evaluation,
+    baseline_table as baseline_table,
+    bench_report,
+    law_evaluation as law_evaluation,
+)
 from jaxdamp.report.chains import chain_report
 from jaxdamp.report.fits import (
     add_fits,
-    add_other_fits,
-    failure_sentences,
+    add_other_fits as add_other_fits,
+    failure_sentences as failure_sentences,
     fit_report,
-    fit_verdict,
-    fitted_velocities,
-    parameters_of,
+    fit_verdict as fit_verdict,
+    fitted_velocities as fitted_velocities,
+    parameters_of as parameters_of,
 )
 from jaxdamp.report.page import Report
-from jaxdamp.report.ranges import fitted_range_table, range_use_table
-from jaxdamp.report.records import add_records, records_table
+from jaxdamp.report.ranges import fitted_range_table as fitted_range_table, range_use_table as range_use_table
+from jaxdamp.report.records import add_records as add_records, records_table as records_table
 from jaxdamp.report.results import result_report
 from jaxdamp.report.rides import (
-    add_rides,
-    axles_sentence,
-    notes_of,
+    add_rides as add_rides,
+    axles_sentence as axles_sentence,
+    notes_of as notes_of,
     ride_report,
-    ride_tables,
-    ride_verdict,
+    ride_tables as ride_tables,
+    ride_verdict as ride_verdict,
 )
 from jaxdamp.report.sweeps import sweep_report
-from jaxdamp.report.tunings import add_tuning, tuning_report
-from jaxdamp.report.vehicle_fits import ride_records_table, vehicle_fit_report
+from jaxdamp.report.tunings import add_tuning as add_tuning, tuning_report
+from jaxdamp.report.vehicle_fits import ride_records_table as ride_records_table, vehicle_fit_report
 
 
 __all__ = [
-    "Attempts",
-    "Column",
     "Report",
     "Table",
-    "add_evaluation",
     "add_fits",
+    "bench_report",
+    "chain_report",
+    "fit_report",
+    "result_report",
+    "ride_report",
+    "sweep_report",
+    "tuning_report",
+    "vehicle_fit_report",
+]
+# What the other packages of the library import, and what is only returned: a user writes none of these.
+__shared__ = [
+    "Attempts",
+    "Column",
+    "add_evaluation",
     "add_other_fits",
     "add_records",
     "add_rides",
     "add_tuning",
     "axles_sentence",
     "baseline_table",
-    "bench_report",
-    "chain_report",
     "failure_sentences",
-    "fit_report",
     "fit_verdict",
     "fitted_range_table",
     "fitted_velocities",
@@ -64,14 +77,9 @@ __all__ = [
     "parameters_of",
     "range_use_table",
     "records_table",
-    "result_report",
     "ride_records_table",
-    "ride_report",
     "ride_tables",
     "ride_verdict",
-    "sweep_report",
-    "tuning_report",
-    "vehicle_fit_report",
 ]
 
 answer_guesses(__name__, __all__)

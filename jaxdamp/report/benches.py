@@ -76,8 +76,10 @@ def add_evaluation(
             report.table(table)
         if name == "velocities" and baseline is not None:
             report.table(baseline_table(evaluation, baseline))
-    for number, found in enumerate(evaluation.gas_and_friction.values()):
-        report.picture(found.plot, f"Gas force and friction of {found.record}", f"gas_and_friction_{number + 1}.png")
+    for number, separated in enumerate(evaluation.gas_and_friction.values()):
+        report.picture(
+            separated.plot, f"Gas force and friction of {separated.record}", f"gas_and_friction_{number + 1}.png"
+        )
 
 
 def bench_verdict(
@@ -92,8 +94,8 @@ def bench_verdict(
     """
     sentences = []
     if limits is not None:
-        kept = [measured is not None and limit.kept_by(measured.value) for limit, measured in limits.results]
-        sentences.append(f"Limits: {sum(kept)} of {len(kept)} are kept{'' if all(kept) else ': NOT PASSED'}.")
+        passed = [measured is not None and limit.kept_by(measured.value) for limit, measured in limits.results]
+        sentences.append(f"Limits: {sum(passed)} of {len(passed)} are kept{'' if all(passed) else ': NOT PASSED'}.")
     if evaluation.velocities:
         velocity = max(evaluation.velocities)
         for setting in evaluation.settings:

@@ -9,8 +9,8 @@ def machine_sentences(result: FitResult) -> tuple[str, ...]:
     """What the test machine adds to the force, and what it was taken not to add."""
     if result.rig is None:
         return ("No test machine was fitted: all of the measured force counts as the damper's.",)
-    own = {e.name.removeprefix("rig."): e for e in result.parameters if e.name.startswith("rig.")}
-    texts = [(name, *rounded(e.value, e.standard_error), e.unit) for name, e in own.items()]
+    machine = {e.name.removeprefix("rig."): e for e in result.parameters if e.name.startswith("rig.")}
+    texts = [(name, *rounded(e.value, e.standard_error), e.unit) for name, e in machine.items()]
     fitted = [f"{name.replace('_', ' ')} {value} ± {error} {unit}".rstrip() for name, value, error, unit in texts]
     absent = [p.path.replace("_", " ") for p in parameters(result.rig) if not p.value.any()]
     return (

@@ -76,14 +76,14 @@ def fit_verdict(report: Report, comparison: Comparison, baseline: AbstractDamper
         comparison: the fits.
         baseline: another law.
     """
-    best, beside = comparison.best, ()
+    best, others = comparison.best, ()
     if baseline is not None:
         with report.part("The errors of the baseline"):
             records = comparison.held_out or best.result.runs
             percent, rmse, _ = dataclasses.replace(best.result, law=baseline, record_laws=()).score(records)
             factor = f", {rmse / best.error:.1f} times that of {best.name}" if best.error else ""
-            beside = (f"Baseline on the same records: RMSE {rmse:.1f} N (fit {percent:.1f} %){factor}.",)
-    return *comparison.verdict, *beside
+            others = (f"Baseline on the same records: RMSE {rmse:.1f} N (fit {percent:.1f} %){factor}.",)
+    return *comparison.verdict, *others
 
 
 def add_fits(
@@ -191,21 +191,20 @@ def _add_curves(report: Report, comparison: Comparison, baseline: AbstractDamper
     drawn = dict(list(laws.items())[:MOST_CURVES])
     note = ""
     if len(laws) > len(drawn):
-        rest = ", ".join(list(laws)[MOST_CURVES:])
-        note = (
-            f"Drawn are {best.name} and the laws with the smallest errors. The other {len(laws) - len(drawn)}: {rest}."
-        )
+        others = ", ".join(list(laws)[MOST_CURVES:])
+        count = len(laws) - len(drawn)
+        note = f"Drawn are {best.name} and the laws with the smallest errors. The other {count}: {others}."
     dashed = best.name if len(drawn) > 1 and best.name in drawn else None
     if baseline is not None:
         drawn |= _with_curves(report, {BASELINE: baseline}, points)
         dashed = BASELINE if BASELINE in drawn else dashed
     machine, runs = best.result.rig, best.result.runs
     static = 0.0 if machine is None else float(machine.force_offset) + float(machine.gas_force)
-    rest = None if machine is None else dataclasses.replace(machine, force_offset=0.0, gas_force=0.0)
+    without_force = None if machine is None else dataclasses.replace(machine, force_offset=0.0, gas_force=0.0)
     report.picture(
         lambda: plots.force_velocity(
             drawn,
-            runs=without_machine(rest, runs),
+            runs=without_machine(without_force, runs),
             baseline=dashed,
             note=note,
             bands=bands,

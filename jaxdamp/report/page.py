@@ -169,9 +169,9 @@ def _points(items: Sequence[str]) -> str:
 
 def _footer(command: str) -> str:
     """Date, versions, and the command that makes the page again."""
-    own, *libraries = (f"{name} {_version(name)}" for name in ("jaxdamp", "jax", "equinox", "numpy", "scipy"))
+    library, *libraries = (f"{name} {_version(name)}" for name in ("jaxdamp", "jax", "equinox", "numpy", "scipy"))
     system = f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"
-    made = f"Written on {datetime.date.today()} by {own} ({', '.join(libraries)}, {system})."
+    made = f"Written on {datetime.date.today()} by {library} ({', '.join(libraries)}, {system})."
     again = f" To repeat it:<pre>{html.escape(command)}</pre>" if command else ""
     return f"<footer>{html.escape(made)}{again}</footer>"
 

@@ -36,9 +36,9 @@ def result_report(result: AbstractResult, title: str = "") -> Report:
     >>> "damping ratio" in page.to_html()
     True
     """
-    own = next((page for kind, page in _PAGES.items() if isinstance(result, kind)), None)
-    if own is not None:
-        return own(result, title=title) if title else own(result)
+    page_of = next((page for kind, page in _PAGES.items() if isinstance(result, kind)), None)
+    if page_of is not None:
+        return page_of(result, title=title) if title else page_of(result)
     page = Report(title or result.table().title)
     page.verdict(result.summary)
     if result.warnings:

@@ -98,9 +98,9 @@ def _summary(result: VehicleFit) -> str:
     """What was fitted, in two sentences."""
     count, free = len(result.records), len(result.parameters)
     benches = sum(map(len, result.bench.values()))
-    beside = f" and {benches} bench records" if benches else ""
+    also = f" and {benches} bench records" if benches else ""
     held = f" {', '.join(result.held)} is held at its start." if result.held else ""
     return (
         f"{type(result.vehicle).__name__}: {free} free numbers from {count} record{'s' * (count > 1)} of its motion"
-        f"{beside}; {result.worst}.{held}"
+        f"{also}; {result.worst}.{held}"
     )

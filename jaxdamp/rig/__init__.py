@@ -1,21 +1,24 @@
 """The test machine: the force of a law under a prescribed stroke, and what the machine adds to it."""
 
-from jaxdamp.rig.constant_velocity import QuasiStatic, quasi_static
-from jaxdamp.rig.machine import Readings, Rig
-from jaxdamp.rig.marching import march, solve_law
-from jaxdamp.rig.response import AbstractLawEngine, StartsInMotionWarning, respond
+from jaxdamp.rig.constant_velocity import QuasiStatic as QuasiStatic, quasi_static
+from jaxdamp.rig.machine import Readings as Readings, Rig
+from jaxdamp.rig.marching import march as march, solve_law as solve_law
+from jaxdamp.rig.response import AbstractLawEngine as AbstractLawEngine, StartsInMotionWarning, respond
 from jaxdamp.rig.sensor import Sensor
 
 
 __all__ = [
-    "AbstractLawEngine",
-    "QuasiStatic",
-    "Readings",
     "Rig",
     "Sensor",
     "StartsInMotionWarning",
-    "march",
     "quasi_static",
     "respond",
+]
+# What the other packages of the library import, and what is only returned: a user writes none of these.
+__shared__ = [
+    "AbstractLawEngine",
+    "QuasiStatic",
+    "Readings",
+    "march",
     "solve_law",
 ]

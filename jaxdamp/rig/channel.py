@@ -28,12 +28,12 @@ def lagged(values: Signal, samples: Scalar) -> Signal:
     """
     there = samples > 1e-3  # below, exp(−1/samples) is no number beside 1
     safe = jnp.where(there, samples, 1.0)
-    kept = jnp.where(there, jnp.exp(-1.0 / safe), 0.0)
-    mean = samples * (1.0 - kept)
-    weights = (mean - kept, 1.0 - mean)
+    decay = jnp.where(there, jnp.exp(-1.0 / safe), 0.0)
+    mean = samples * (1.0 - decay)
+    weights = (mean - decay, 1.0 - mean)
 
     def step(y: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:
-        return kept * y + weights[0] * ends[0] + weights[1] * ends[1], y  # the one before, as in `march`
+        return decay * y + weights[0] * ends[0] + weights[1] * ends[1], y  # the one before, as in `march`
 
     last, before = jax.lax.scan(step, values[0], (values[:-1], values[1:]))
     return jnp.append(before, last)

@@ -144,10 +144,10 @@ class Rig(Module):
                 _checks.refuse("temperature", "be as long as `time`", value)
             _checks.finite("temperature", temperature)
         motion = self.delayed_motion(self.effects(), dt, stroke, rate)
-        own = temperature if law.traits().temperature_dependent else None
-        rest = (law if own is None else law.at_temperature(own[0])).initial_state()
+        temperatures = temperature if law.traits().temperature_dependent else None
+        start = (law if temperatures is None else law.at_temperature(temperatures[0])).initial_state()
         inside = motion[0] - self.stroke_offset
-        law_force = respond(law, time, inside, motion[1], state=rest, temperature=own, substeps=substeps)
+        law_force = respond(law, time, inside, motion[1], state=start, temperature=temperatures, substeps=substeps)
         return _readings(self, self.effects(), law_force, dt, *motion, temperature)
 
     def march(
@@ -182,8 +182,8 @@ class Rig(Module):
             "lag": (self.force_lag,),
             "delay": (self.force_delay,),
         }
-        known = {effect: [_checks.concrete(value) for value in values] for effect, values in numbers.items()}
-        return tuple(effect for effect, values in known.items() if any(v is None or v.any() for v in values))
+        values_of = {effect: [_checks.concrete(value) for value in values] for effect, values in numbers.items()}
+        return tuple(effect for effect, values in values_of.items() if any(v is None or v.any() for v in values))
 
 
 @eqx.filter_jit

@@ -202,21 +202,21 @@ def _refuse_beside_engine(temperature: Any, substeps: int, state: Any, return_st
 
 def _checked_state(law: AbstractDamper, state: Any, temperature: Signal | None) -> State:
     """The states, as many as the law has."""
-    own = law if temperature is None else law.at_temperature(temperature[0])
-    begin, known = as_float(state), own.initial_state().shape
-    if begin.shape != known:
-        _checks.refuse("state", f"have the shape {known} for {type(law).__name__}", f"of shape {begin.shape}")
+    warm_law = law if temperature is None else law.at_temperature(temperature[0])
+    begin, shape = as_float(state), warm_law.initial_state().shape
+    if begin.shape != shape:
+        _checks.refuse("state", f"have the shape {shape} for {type(law).__name__}", f"of shape {begin.shape}")
     _checks.finite("state", begin)
     return begin
 
 
 def _warn_of_motion(law: AbstractDamper, velocity: Signal) -> None:
     """Say that a law with states starts at rest in a record that begins in motion."""
-    known = _checks.concrete(velocity)
-    if known is None or not law.initial_state().size or abs(known[0]) <= IN_MOTION * np.abs(known).max():
+    values = _checks.concrete(velocity)
+    if values is None or not law.initial_state().size or abs(values[0]) <= IN_MOTION * np.abs(values).max():
         return
     text = (
-        f"The record begins at {known[0]:.3g} m/s, but the states of {type(law).__name__} start at rest: the first "
+        f"The record begins at {values[0]:.3g} m/s, but the states of {type(law).__name__} start at rest: the first "
         "forces are wrong, for about a cycle or a few lag times. Begin at rest, or pass a state: "
         "`rig.quasi_static(law, velocity[:1]).states[0]`, that after a cycle (`return_state=True`), or "
         "`law.initial_state()` if it is meant."
@@ -247,14 +247,14 @@ def _warn_of_range(law: AbstractDamper, *channels: Signal) -> None:
 
 def _refuse_strokes(law: AbstractDamper, stroke: Signal) -> None:
     """Refuse strokes outside the limits of a law."""
-    found = _checks.concrete(stroke)
+    values = _checks.concrete(stroke)
     for term in law.side_by_side():
         low, high = (_checks.concrete(limit) for limit in term.stroke_limits)
-        if found is None or low is None or high is None:
+        if values is None or low is None or high is None:
             continue
-        if found.min() < low or found.max() > high:
+        if values.min() < low or values.max() > high:
             must = f"stay from {low:.4g} to {high:.4g} m for {type(term).__name__}"
-            value = f"from {found.min():.4g} to {found.max():.4g} m"
+            value = f"from {values.min():.4g} to {values.max():.4g} m"
             _checks.refuse("stroke", must, value, "The law's volumes are those at stroke zero: shift the stroke.")
 
 

@@ -35,9 +35,9 @@ A speed hump, then a rough surface, at 10 m/s:
 """
 
 from jaxdamp._guesses import answer_guesses
-from jaxdamp.roads.assessment import RoughnessAssessment, assess_roughness
+from jaxdamp.roads.assessment import RoughnessAssessment as RoughnessAssessment, assess_roughness
 from jaxdamp.roads.axles import delayed, in_phase
-from jaxdamp.roads.base import AbstractRoad, Columns
+from jaxdamp.roads.base import AbstractRoad, Columns as Columns
 from jaxdamp.roads.bump import cosine_bump
 from jaxdamp.roads.coherency import coherency
 from jaxdamp.roads.contact import contact_patch, rolling_disc
@@ -56,14 +56,11 @@ from jaxdamp.roads.sequence import joined
 from jaxdamp.roads.superposition import superposed
 from jaxdamp.roads.sweep import sweep_sine
 from jaxdamp.roads.tracks import two_track
-from jaxdamp.roads.white import WhiteRoad, white
+from jaxdamp.roads.white import WhiteRoad as WhiteRoad, white
 
 
 __all__ = [
     "AbstractRoad",
-    "Columns",
-    "RoughnessAssessment",
-    "WhiteRoad",
     "assess_roughness",
     "band_limited",
     "class_limits",
@@ -91,6 +88,12 @@ __all__ = [
     "two_track",
     "wave_course",
     "white",
+]
+# What the other packages of the library import, and what is only returned: a user writes none of these.
+__shared__ = [
+    "Columns",
+    "RoughnessAssessment",
+    "WhiteRoad",
 ]
 
 answer_guesses(__name__, __all__)

@@ -5,7 +5,7 @@ from typing import Any, final
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode
@@ -100,7 +100,7 @@ class Adaptive(AbstractEngine):
             ground = RoadInput(height, slope)
             return equations.at(motion, states, ground), ground
 
-        def add(gathered: Any, instant: tuple) -> tuple[Any, Any]:
+        def add(gathered: PyTree, instant: tuple) -> tuple[PyTree, PyTree]:
             now, ground = see(instant)
             gathered = observer.add(gathered, now, ground)
             return gathered, observer.saved(now, gathered)
@@ -113,7 +113,7 @@ class Adaptive(AbstractEngine):
         last, _ = see(jax.tree.map(lambda y: y[-1], instants))
         return Outcome(gathered, records, equations.ports.by_port(last.states), status, last)
 
-    def remedy(self, status: Any, dt: float) -> str:
+    def remedy(self, status: PyTree, dt: float) -> str:
         """What the solver says of a run that diverged, and what to do about it."""
         from jaxdamp._driven import verdict
 

@@ -3,10 +3,10 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import equinox as eqx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode
@@ -25,15 +25,15 @@ class AbstractObserver(ABC):
     saves_motion: bool = False  # it saves whole instants, so that the memory of a run grows with its length anyway
 
     @abstractmethod
-    def begin(self, now: StepState, road: RoadInput) -> Any:
+    def begin(self, now: StepState, road: RoadInput) -> PyTree:
         """What is gathered at the first instant."""
 
     @abstractmethod
-    def add(self, gathered: Any, now: StepState, road: RoadInput) -> Any:
+    def add(self, gathered: PyTree, now: StepState, road: RoadInput) -> PyTree:
         """What is gathered with one instant more."""
 
     @abstractmethod
-    def saved(self, now: StepState, gathered: Any) -> Any:
+    def saved(self, now: StepState, gathered: PyTree) -> PyTree:
         """What is saved of an instant."""
 
 
@@ -67,10 +67,10 @@ class Outcome(NamedTuple):
         last: the vehicle at the last instant, from which a run goes on; None of an engine that cannot.
     """
 
-    gathered: Any
-    records: Any
+    gathered: PyTree
+    records: PyTree
     states: list[Float[Array, " _state"]]
-    status: Any = None
+    status: PyTree = None
     last: StepState | None = None
 
 
@@ -146,7 +146,7 @@ class AbstractEngine(AbstractLawEngine):
         check.road()
         return self
 
-    def remedy(self, status: Any, dt: float) -> str:
+    def remedy(self, status: PyTree, dt: float) -> str:
         """What to do about a run that diverged."""
         del status
         return f"Take shorter steps than {dt:g} s."
@@ -181,10 +181,10 @@ def chosen_engine(
     elif substeps is not None:
         remedy = "Write `engine=simulation.Exponential(substeps=...)`."
         _checks.refuse("substeps", "be left out beside an engine, which has its own", substeps, remedy)
-    own = engine.spacing
+    spacing = engine.spacing
     if dt is None:
-        return engine, 1e-3 if own is None else own
+        return engine, 1e-3 if spacing is None else spacing
     dt = _checks.plain_number("dt", dt)
-    if own is not None and own != dt:
-        _checks.refuse("dt", f"be left out, or be that of the engine, {own:g} s", dt)
+    if spacing is not None and spacing != dt:
+        _checks.refuse("dt", f"be left out, or be that of the engine, {spacing:g} s", dt)
     return engine, dt

@@ -1,11 +1,11 @@
 """The equations of motion of a vehicle, which every engine integrates, and its state at an instant."""
 
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import equinox as eqx
 import jax.numpy as jnp
 from jax.ad_checkpoint import checkpoint_name
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp._types import ScalarLike
 from jaxdamp._vectors import Matrix, MemoryLayout, Vector, laid_out, minus, times
@@ -54,7 +54,7 @@ class StepState(NamedTuple):
     motion: Vector
     states: States
     force: Vector
-    memory: Any = None
+    memory: PyTree = None
 
 
 @final
@@ -87,7 +87,7 @@ class Equations(eqx.Module):
             rate = minus(rate, times(self.road_deflection, road.rate))
         return checkpoint_name((deflection, rate), FOR_REVERSE)
 
-    def at(self, motion: Vector, states: States, road: RoadInput, memory: Any = None) -> StepState:
+    def at(self, motion: Vector, states: States, road: RoadInput, memory: PyTree = None) -> StepState:
         """The vehicle in this motion, with the forces of its elements."""
         return StepState(motion, states, self.ports.force(*self.at_ports(motion, road), states), memory)
 

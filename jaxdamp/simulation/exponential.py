@@ -14,7 +14,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode
@@ -199,7 +199,7 @@ class Exponential(AbstractFixedStep):
         """The same with as many substeps as the laws need, if none were asked for."""
         return dataclasses.replace(self, substeps=check.substeps(self.substeps))
 
-    def remedy(self, status: Any, dt: float) -> str:
+    def remedy(self, status: PyTree, dt: float) -> str:
         """What to do about a run that diverged."""
         solver = "an implicit solver, `engine=simulation.Adaptive(diffrax.Kvaerno5())`"
         return f"Take a shorter step than {dt:g} s, or {solver}."

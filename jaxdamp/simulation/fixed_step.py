@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp._jacobian import Mode
 from jaxdamp._sharded import varying_as
@@ -22,7 +22,7 @@ from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome,
 from jaxdamp.simulation.equations import FOR_REVERSE, STRAIGHT, Equations, RoadEdges, RoadInput, StepState
 
 
-Carry: TypeAlias = tuple[StepState, Any, RoadInput, tuple[Array, ...]]
+Carry: TypeAlias = tuple[StepState, PyTree, RoadInput, tuple[Array, ...]]
 BLOCK = 16_384  # instants, of which reverse derivatives keep what they need; longer runs are driven twice
 
 
@@ -110,14 +110,14 @@ class AbstractFixedStep(AbstractEngine):
         policy = jax.checkpoint_policies.save_only_these_names(FOR_REVERSE)
         lean = step if observer.saves_motion else jax.checkpoint(step, policy=policy, prevent_cse=False)
 
-        def stride(carry: Carry, ahead: Array) -> tuple[Carry, Any]:
+        def stride(carry: Carry, ahead: Array) -> tuple[Carry, PyTree]:
             if observer.every == 1:
                 carry = lean(carry, ahead)
             else:
                 carry, _ = jax.lax.scan(lambda carry, ahead: (lean(carry, ahead), None), carry, ahead)
             return carry, observer.saved(carry[0], carry[1])
 
-        def drive(carry: Carry, road: Array) -> tuple[Carry, Any]:
+        def drive(carry: Carry, road: Array) -> tuple[Carry, PyTree]:
             return jax.lax.scan(stride, carry, road)
 
         first = RoadInput(laid_out(heights[0], layout), None)
@@ -142,14 +142,14 @@ class AbstractFixedStep(AbstractEngine):
             blocks = road[:whole].reshape(-1, BLOCK, *road.shape[1:])
             carry, saved = jax.lax.scan(jax.checkpoint(drive), carry, blocks)
             parts.append(jax.tree.map(lambda y: y.reshape(-1, *y.shape[2:]), saved))
-        rest = road[whole:]
+        remaining = road[whole:]
         if observer.every > 1:
-            rest = rest.reshape(-1, observer.every, *rest.shape[1:])
-        carry, saved = drive(carry, rest)
+            remaining = remaining.reshape(-1, observer.every, *remaining.shape[1:])
+        carry, saved = drive(carry, remaining)
         records = jax.tree.map(lambda *ys: jnp.concatenate(ys), *parts, saved)
         return self._outcome(carry, records, equations)
 
-    def _outcome(self, carry: Carry, records: Any, equations: Equations) -> Outcome:
+    def _outcome(self, carry: Carry, records: PyTree, equations: Equations) -> Outcome:
         return Outcome(carry[1], records, equations.ports.by_port(carry[0].states), last=carry[0])
 
     def _printed(self, step: Any, carry: Carry, road: Array, observer: AbstractObserver) -> Carry:

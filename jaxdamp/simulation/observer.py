@@ -78,12 +78,12 @@ class MetricObserver(AbstractObserver):
         """At the first instant, the vehicle in its static equilibrium and weightings at rest."""
         values = self._values(now, road)
         still = tuple((jnp.zeros_like(values[0]),) * f.output.size for f in self.weighted.values())
-        rest = tuple(values[self.names.index(name)] for name in self.from_rest)
-        samples = self._samples(values, still, rest)
+        at_rest = tuple(values[self.names.index(name)] for name in self.from_rest)
+        samples = self._samples(values, still, at_rest)
         gathered = tuple(m.statistic.begin(y) for m, y in zip(self.metrics, samples, strict=True))
         before = values if self.weighted else ()
         instant = jnp.zeros((), int) if any(m.window for m in self.metrics) else None
-        return Accumulators(before, still, gathered, rest, self._saved(samples), instant)
+        return Accumulators(before, still, gathered, at_rest, self._saved(samples), instant)
 
     def add(self, gathered: Accumulators, now: StepState, road: RoadInput) -> Accumulators:
         """One instant more."""
@@ -111,13 +111,13 @@ class MetricObserver(AbstractObserver):
             gathered: at the last instant.
             records: what was saved of all instants.
         """
-        found, saved = {}, iter(records)
+        values, saved = {}, iter(records)
         for m, (first, last), terms in zip(self.metrics, self.windows, gathered.statistics, strict=True):
             if m.statistic.needs_record:
-                found[m.name] = m.statistic.of(next(saved)[first : last + 1], self.dt)
+                values[m.name] = m.statistic.of(next(saved)[first : last + 1], self.dt)
             else:
-                found[m.name] = m.statistic.end(terms, last - first + 1, self.dt)
-        return found
+                values[m.name] = m.statistic.end(terms, last - first + 1, self.dt)
+        return values
 
     def _values(self, now: StepState, road: RoadInput) -> tuple[Scalar, ...]:
         """The channels."""

@@ -1,12 +1,11 @@
 """By how much a run takes the laws of a vehicle outside the ranges that they were fitted to."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.dampers import AbstractDamper, Motion, RangeUse, has_fitted_range, range_use, sentence
@@ -34,18 +33,18 @@ def range_uses(
     Returns:
         The dampers whose law has a range; empty if none has one, or while JAX traces the run.
     """
-    tree: Any = (vehicle, motion)
+    tree: PyTree = (vehicle, motion)
     if not has_fitted_range(vehicle) or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(tree)):
         return {}
     position, rate = jnp.split(motion, 2, axis=1)
     strokes, velocities = (np.asarray(form.at_ports(*at), dtype=float) for at in ((position, road), (rate, road_rate)))
     forces = np.asarray(port_force, dtype=float)
-    found = {}
+    uses_of = {}
     for i, (name, law) in enumerate(named_laws(vehicle).items()):
         uses = range_use(law, Motion(strokes[:, i], velocities[:, i], forces[:, i]))
         if uses:
-            found[name] = uses
-    return found
+            uses_of[name] = uses
+    return uses_of
 
 
 def named_laws(vehicle: AbstractVehicle) -> dict[str, AbstractDamper]:
@@ -63,5 +62,5 @@ def range_sentences(uses: dict[str, Sequence[RangeUse]] | dict[str, list[RangeUs
     Arguments:
         uses: by the name of the damper.
     """
-    texts = (sentence(name.replace("_", " "), found) for name, found in uses.items())
+    texts = (sentence(name.replace("_", " "), of_damper) for name, of_damper in uses.items())
     return tuple(text for text in texts if text)

@@ -1,10 +1,10 @@
 """Runs of which the instants are saved."""
 
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import equinox as eqx
 import jax
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp._types import Scalar
 from jaxdamp._vectors import Vector
@@ -55,7 +55,7 @@ def recorded(
     start: Float[Array, " n"] | RunState | None = None,
     every: int = 1,
     edges: RoadEdges | None = None,
-) -> tuple[Saved, Any]:
+) -> tuple[Saved, PyTree]:
     """Motion (q, q̇) and element forces at every instant of the road, or every so many-th; what the engine says of it.
 
     From `start`, or settled and at rest on the road's first height. Elements that stand on the road take its rate as

@@ -230,9 +230,9 @@ class Ride(eqx.Module):
         for name, value in point.items():
             if np.shape(value) != ():
                 self._check_shape(name, np.shape(value))
-        known = {name: value for name, value in point.items() if look_behind(value) is not None}
-        if known:  # checked here; the compiled function is for all values
-            replace(self.vehicle, known)
+        numbers = {name: value for name, value in point.items() if look_behind(value) is not None}
+        if numbers:  # checked here; the compiled function is for all values
+            replace(self.vehicle, numbers)
         point = {name: as_float(value, name) for name, value in point.items()}
         ride = self.side_by_side() if is_batched((self, point)) else self
         with self.engine.naming_derivatives():
@@ -243,17 +243,17 @@ class Ride(eqx.Module):
 
     def _check_shape(self, name: str, shape: tuple[int, ...]) -> None:
         """Refuse several numbers for one, which would be several cars."""
-        known = {p.path: p.value.shape for p in parameters(self.vehicle)}
-        for path in match_paths(list(known), [name]):
-            if known[path] != shape:
-                must = "be one number for one car" if known[path] == () else f"be of shape {known[path]}"
+        shapes = {p.path: p.value.shape for p in parameters(self.vehicle)}
+        for path in match_paths(list(shapes), [name]):
+            if shapes[path] != shape:
+                must = "be one number for one car" if shapes[path] == () else f"be of shape {shapes[path]}"
                 remedy = "For several cars use `jaxdamp.sweep(ride, {...})`, or `jax.vmap(ride)`."
                 _checks.refuse(f"point[{name!r}]", must, f"of shape {shape}", remedy)
 
 
 def _infinite(value: Scalar) -> bool:
-    known = _checks.concrete(value)
-    return known is not None and not np.all(np.isfinite(known))
+    number = _checks.concrete(value)
+    return number is not None and not np.all(np.isfinite(number))
 
 
 @eqx.filter_jit
@@ -282,10 +282,10 @@ def _refuse_run(argument: str, value: Any) -> None:
 
 def _stationary(vehicle: AbstractVehicle, chosen: Sequence[Metric], *, all_of_them: bool) -> tuple[Metric, ...]:
     """The metrics among these that a white road gives; where they are wanted by name, all of them must be."""
-    known = tuple(m for m in chosen if is_stationary(m, vehicle.layout.by_name))
-    missing = [m.name for m in chosen if m not in known]
+    closed = tuple(m for m in chosen if is_stationary(m, vehicle.layout.by_name))
+    missing = [m.name for m in chosen if m not in closed]
     if missing and not all_of_them:
         names = [m.name for m in vehicle.ride_metrics if is_stationary(m, vehicle.layout.by_name)]
         remedy = f"It has no peaks, counts, means or powers, but {', '.join(names)}. Drive over `roads.iso8608(...)`."
         _checks.refuse("metrics", "follow from an RMS on a white road", ", ".join(missing), remedy)
-    return known
+    return closed

@@ -40,8 +40,8 @@ def stationary_metrics(vehicle: AbstractVehicle, road: WhiteRoad, metrics: Seque
     lost = jnp.all(jnp.isinf(linear.feed_through))
     for weighting, channels in wanted.items():
         weighted = with_weightings(linear, [(name, weighting) for name in dict.fromkeys(channels)])
-        found = stationary_rms(weighted, road.velocity_psd, speed=road.speed)
-        rms[weighting] = {name: jnp.where(lost, jnp.inf, value) for name, value in found.items()}
+        levels = stationary_rms(weighted, road.velocity_psd, speed=road.speed)
+        rms[weighting] = {name: jnp.where(lost, jnp.inf, value) for name, value in levels.items()}
     values = {}
     for m in metrics:
         assert m.statistic.of_rms is not None
@@ -73,8 +73,8 @@ def stationary_notes(vehicle: AbstractVehicle, road: WhiteRoad) -> list[str]:
     """
     if not any(nonlinear_variables(law) for law in vehicle.elements()):
         return []
-    found = stationary_dampers(vehicle, road)
-    words = [f"{name.replace('_', ' ')} {one.words()}" for name, one in found.items() if not one.linear]
+    dampers = stationary_dampers(vehicle, road)
+    words = [f"{name.replace('_', ' ')} {one.words()}" for name, one in dampers.items() if not one.linear]
     return [f"On a white road: {'; '.join(words)}. {TRUSTED}"] if words else []
 
 

@@ -109,15 +109,15 @@ def _driven(
         return RoadInput(*(between(a[whole], a[whole + 1], share) for a in (heights, slopes)))
 
     def step(i: Array, carry: tuple[StepState, Array]) -> tuple[StepState, Array]:
-        now, found = carry
+        now, gathered = carry
         now = stepper(now, ground(i), ground(i + 1))
         number = (i + substeps) // substeps  # the last of an interval is the instant's
-        return now, found.at[number].set(values(now, ground(i + 1)))
+        return now, gathered.at[number].set(values(now, ground(i + 1)))
 
     def values(now: StepState, at: RoadInput) -> Float[Array, " channels"]:
         return outputs(now.motion, now.force, at.height, at.rate)
 
     first = ground(jnp.zeros_like(count))
     now = stepper.start(start, first)
-    found = jnp.zeros((heights.shape[0], len(names)), heights.dtype).at[0].set(values(now, first))
-    return jax.lax.fori_loop(0, count * substeps, step, (now, found))[1]
+    gathered = jnp.zeros((heights.shape[0], len(names)), heights.dtype).at[0].set(values(now, first))
+    return jax.lax.fori_loop(0, count * substeps, step, (now, gathered))[1]

@@ -132,9 +132,9 @@ class RunCheck(NamedTuple):
         """Estimate the error of these cars of a batch, and judge the largest."""
         if not suspects:
             return
-        known = self.system, self.heights, self.start
-        with nullcontext() if is_batched(known) else at_compile_time():
-            if rows(known) is None:
+        ride = self.system, self.heights, self.start
+        with nullcontext() if is_batched(ride) else at_compile_time():
+            if rows(ride) is None:
                 _warn(_unknown_road(self.dt), TracedStepWarning)
                 return
             run = self.system, self.heights, self.half(), self.start
@@ -144,7 +144,7 @@ class RunCheck(NamedTuple):
                 roughness = [np.sum(np.diff(row(run, runs, i)[1], axis=0) ** 2) for i in range(len(runs[0]))]
                 suspects = {int(np.argmax(roughness))}
             arrays = [eqx.partition(row(run, runs, i), lambda leaf: isinstance(leaf, np.ndarray)) for i in suspects]
-            chosen = [eqx.combine(jax.tree.map(jnp.asarray, values), rest) for values, rest in arrays]
+            chosen = [eqx.combine(jax.tree.map(jnp.asarray, values), static) for values, static in arrays]
             estimates = [
                 step_error(system, np.asarray(heights), lambda fine=fine: fine, self.dt, count, start)
                 for system, heights, fine, start in chosen

@@ -1,11 +1,11 @@
 """How a road reaches the wheels of a vehicle: one axle after the other, unless asked otherwise."""
 
 from collections.abc import Callable
-from typing import Any, Literal, final
+from typing import Literal, final
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._dependence import depends
@@ -101,7 +101,7 @@ def heights_under_wheels(vehicle: AbstractVehicle, road: AbstractRoad, time: Sig
     return heights if np.array_equal(chosen, np.arange(heights.shape[1])) else heights[:, chosen]
 
 
-def moves_axles(build: Callable[[Any], AbstractVehicle], values: Any) -> bool:
+def moves_axles(build: Callable[[PyTree], AbstractVehicle], values: PyTree) -> bool:
     """Whether the axle positions of the vehicle built from values depend on them; conservative within inner calls.
 
     Arguments:

@@ -1,9 +1,19 @@
 """One function over many points: `jaxdamp.sweep`, and samples to sweep over: `points`, `random`, `sobol`."""
 
 from jaxdamp.sweeps.axes import points, random, sobol
-from jaxdamp.sweeps.effects import without_effect
-from jaxdamp.sweeps.function import SweepFunction
+from jaxdamp.sweeps.effects import without_effect as without_effect
+from jaxdamp.sweeps.function import SweepFunction as SweepFunction
 from jaxdamp.sweeps.running import sweep
 
 
-__all__ = ["SweepFunction", "points", "random", "sobol", "sweep", "without_effect"]
+__all__ = [
+    "points",
+    "random",
+    "sobol",
+    "sweep",
+]
+# What the other packages of the library import, and what is only returned: a user writes none of these.
+__shared__ = [
+    "SweepFunction",
+    "without_effect",
+]

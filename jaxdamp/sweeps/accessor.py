@@ -66,6 +66,6 @@ def _is_in(axis: xarray.DataArray, dims: tuple[Any, ...]) -> bool:
     return bool(axis.dims) and set(axis.dims) <= set(dims)
 
 
-def _cell(value: Any) -> Any:
+def _cell(value: object) -> object:
     """Nothing in place of a result that there is not."""
     return None if isinstance(value, float) and np.isnan(value) else value

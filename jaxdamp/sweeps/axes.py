@@ -101,11 +101,11 @@ def points(values: Mapping[str, Any]) -> Points:
     >>> points({"rate": [1000.0, 2000.0], "mass": [300.0, 250.0]}).count
     2
     """
-    found = Points(_columns("values", values))
-    lengths = {name: len(column) for name, column in found.values.items()}
+    listed = Points(_columns("values", values))
+    lengths = {name: len(column) for name, column in listed.values.items()}
     if len(set(lengths.values())) > 1:
         _checks.refuse("values", "have equally many numbers for each axis", lengths, "A mapping by itself is a grid.")
-    return found
+    return listed
 
 
 @of_known_numbers
@@ -149,7 +149,7 @@ def sobol(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str
     return _stretch(ranges, unit, log)
 
 
-def as_points(over: Any) -> AbstractPoints:
+def as_points(over: object) -> AbstractPoints:
     """What `sweep` takes as `over`: points as they are, a mapping as a grid."""
     if isinstance(over, AbstractPoints):
         return over
@@ -163,7 +163,7 @@ def _columns(argument: str, values: Mapping[str, Any]) -> Columns:
     """The numbers of each axis as float64, checked."""
     if not values:
         _checks.refuse(argument, "have at least one axis", values)
-    found = {}
+    columns = {}
     for name, numbers in values.items():
         _check_name(argument, name)
         try:
@@ -175,11 +175,11 @@ def _columns(argument: str, values: Mapping[str, Any]) -> Columns:
             remedy = "Write [1.0, 2.0] or `numpy.linspace(1.0, 2.0, 11)`; one value alone is [1.0]."
             _checks.refuse(f"{argument}[{name!r}]", "be a sequence of one or more numbers", repr(numbers), remedy)
         _checks.finite(f"{argument}[{name!r}]", column)
-        found[name] = column
-    return found
+        columns[name] = column
+    return columns
 
 
-def _check_name(argument: str, name: Any) -> None:
+def _check_name(argument: str, name: object) -> None:
     if not isinstance(name, str) or not name or "/" in name or name in (POINT, PARAMETER):
         must = f"have names without '/' as keys, other than {POINT!r} and {PARAMETER!r}"
         _checks.refuse(argument, must, f"one with {name!r}")

@@ -30,15 +30,15 @@ def choose_devices(devices: Any) -> list[Any]:
         _checks.refuse("devices", f"be from 1 to {here}, the devices that JAX shows", devices, remedy)
     everywhere = jax.devices() if processes.several() else jax.local_devices()
     by_process = {d.process_index: [e for e in everywhere if e.process_index == d.process_index] for d in everywhere}
-    return [device for own in by_process.values() for device in own[:devices]]
+    return [device for of_process in by_process.values() for device in of_process[:devices]]
 
 
 def free_memory(mesh: Mesh) -> float:
     """Bytes that each device of this process could still take."""
-    own = [device for device in mesh.devices.flat if device.process_index == jax.process_index()]
-    if not own:
+    devices = [device for device in mesh.devices.flat if device.process_index == jax.process_index()]
+    if not devices:
         return np.inf
-    stats = own[0].memory_stats() if own[0].platform != "cpu" else None
+    stats = devices[0].memory_stats() if devices[0].platform != "cpu" else None
     if stats and "bytes_limit" in stats:
         return float(stats["bytes_limit"] - stats["bytes_in_use"])
     free = []
@@ -51,4 +51,4 @@ def free_memory(mesh: Mesh) -> float:
         free.append(float((group / "memory.max").read_text()) - used)
     if not free:
         free.append(0.5 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 2e9)
-    return max(min(free), 1e6) / len(own)
+    return max(min(free), 1e6) / len(devices)

@@ -25,7 +25,7 @@ def without_effect(data: "xarray.Dataset") -> dict[str, list[str]]:
     >>> without_effect(data)
     {'area': ['b']}
     """
-    found = {}
+    idle = {}
     dims = [str(name) for name in data["failed"].dims if data.sizes[name] > 1 and name in data.coords]
     for name, result in data.data_vars.items():
         if result.dims != data["failed"].dims:
@@ -38,5 +38,5 @@ def without_effect(data: "xarray.Dataset") -> dict[str, list[str]]:
             if compared.any() and bool(((result.max(over) - result.min(over)).where(compared, 0.0) <= size).all())
         ]
         if flat:
-            found[str(name)] = flat
-    return found
+            idle[str(name)] = flat
+    return idle

@@ -70,14 +70,14 @@ class Runner:
             pending, left = [left[: pace.capacity]], left[pace.capacity :]
             while pending:
                 indices = pending.pop()
-                found, full = self._call(pace, indices)
-                if found is None and full and pace.program.layout.chunk > 1:  # out of memory
+                values, full = self._call(pace, indices)
+                if values is None and full and pace.program.layout.chunk > 1:  # out of memory
                     pieces = max(-(-len(indices) // pace.program.capacity(1)), 1)
                     pending += np.array_split(indices, pieces)[::-1]
-                elif found is None and len(indices) > 1:
+                elif values is None and len(indices) > 1:
                     pending += np.array_split(indices, 2)[::-1]
                 else:
-                    yield indices, found
+                    yield indices, values
 
     def _next(self, left: int) -> _Pace:
         """The program whose turn it is."""
@@ -91,16 +91,16 @@ class Runner:
 
     def _call(self, pace: _Pace, indices: np.ndarray) -> tuple[dict[str, np.ndarray] | None, bool]:
         """Results, or None and whether for want of memory, in which case the next calls take half the chunk."""
-        start, found, error = time.perf_counter(), {}, ""
+        start, results, error = time.perf_counter(), {}, ""
         try:
-            found = pace.program.start(self._points.columns(indices))
+            results = pace.program.start(self._points.columns(indices))
         except (RuntimeError, FloatingPointError) as raised:
             error = str(raised) or repr(raised)
         full = "RESOURCE_EXHAUSTED" in error
         seconds, some_failed, some_full = processes.largest(time.perf_counter() - start, bool(error), full)
         if not some_failed:
             self._adapt(pace, len(indices), float(seconds))
-            return pace.program.collect(found, len(indices)), False
+            return pace.program.collect(results, len(indices)), False
         if some_full and pace.program.layout.chunk > 1:
             old = pace.program
             pace.program, pace.rounds = with_chunk(old.traced, old.layout.mesh, old.layout.chunk // 2), 1

@@ -93,9 +93,9 @@ def sweep(
     function = function.side_by_side() if isinstance(function, HasSideBySide) else function
     traced = trace(function, points.names, gradients)
     table = Table.empty(points, traced, function.units if isinstance(function, HasUnits) else {})
-    kept = None if file is None else SweepFile(file, table)
-    if kept is not None:
-        kept.resume()
+    stored = None if file is None else SweepFile(file, table)
+    if stored is not None:
+        stored.resume()
     _leave_out(function, table)
     left = np.flatnonzero(~table.done)
     loop = COMPILED
@@ -106,12 +106,12 @@ def sweep(
             try:
                 for indices, results in runner.results(left):
                     table.fill(indices, results, runner.error)
-                    if kept is not None:
-                        kept.save()
+                    if stored is not None:
+                        stored.save()
                     _tell(progress, shown, int(table.done.sum()), points.count, runner.rate)
             finally:
-                if kept is not None:
-                    kept.save(now=True)
+                if stored is not None:
+                    stored.save(now=True)
             runner.close()
         loop = COMPILED if runner.program.traced is traced else PRINTED
     table.warn()
@@ -127,8 +127,8 @@ def _printed(function: Any, traced: Traced, count: int, chunk: int | None, devic
         return None
     try:
         with warnings.catch_warnings(action="ignore"):  # of axes, which were given before
-            own = trace(printed, list(traced.axes), False)._replace(fingerprint=traced.fingerprint)
-        return prepare(own, count, chunk, devices, _lanes(printed))
+            printed_trace = trace(printed, list(traced.axes), False)._replace(fingerprint=traced.fingerprint)
+        return prepare(printed_trace, count, chunk, devices, _lanes(printed))
     except NotImplementedError:
         return None
 
@@ -155,6 +155,12 @@ def _tell(progress: Callable[[int, int], None] | None, shown: Progress, done: in
         progress(done, total)
     elif processes.is_first():
         full = BAR * done // total
-        rest = (total - done) / rate
-        time_left = f"{rest:.0f} s" if rest < 120 else f"{rest / 60:.0f} min" if rest < 7200 else f"{rest / 3600:.1f} h"
+        remaining = (total - done) / rate
+        time_left = (
+            f"{remaining:.0f} s"
+            if remaining < 120
+            else f"{remaining / 60:.0f} min"
+            if remaining < 7200
+            else f"{remaining / 3600:.1f} h"
+        )
         shown(f"{'█' * full}{'·' * (BAR - full)} {100 * done // total} %, {done} of {total} points, {time_left} left")

@@ -48,10 +48,10 @@ class Table:
 
     def fill(self, indices: np.ndarray, results: Mapping[str, np.ndarray] | None, error: str = "") -> None:
         """Enter the results of some points: finite numbers stay; None says that there are none, because of an error."""
-        for name, found in (results or {}).items():
-            finite = np.isfinite(found)
-            self.values[name][indices] = np.where(finite, found, np.nan)
-            bad = indices[~np.all(finite, axis=tuple(range(1, found.ndim)))]
+        for name, column in (results or {}).items():
+            finite = np.isfinite(column)
+            self.values[name][indices] = np.where(finite, column, np.nan)
+            bad = indices[~np.all(finite, axis=tuple(range(1, column.ndim)))]
             self.give_reasons(bad[~self.failed[bad]], f"{name} is not finite")
         if results is None:
             self.give_reasons(indices, f"the function raised: {error}" if error else "the function raised")
@@ -80,10 +80,10 @@ class Table:
         dims, lengths = list(self.points.shape), list(self.points.shape.values())
         variables = {}
         for name, values in self.values.items():
-            own = [f"{name}_{i}" for i in range(values.ndim - 1)]
+            numbered = [f"{name}_{i}" for i in range(values.ndim - 1)]
             if name in self.traced.slopes.values():
-                own = [PARAMETER]
-            variables[name] = ([*dims, *own], values.reshape(*lengths, *values.shape[1:]), self._about(name))
+                numbered = [PARAMETER]
+            variables[name] = ([*dims, *numbered], values.reshape(*lengths, *values.shape[1:]), self._about(name))
         coordinates: dict[str, Any] = {
             name: (along, values, self._about(name)) for name, (along, values) in self.points.coordinates.items()
         }

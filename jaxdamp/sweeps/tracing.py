@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal
-from jaxtyping import Array
+from jaxtyping import Array, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode, value_and_jacobian
@@ -27,7 +27,7 @@ RESERVED = (POINT, PARAMETER, "failed", "reason", "done")
 class StaticPart:
     """A function without its arrays: `static.build(arrays)` gives it back. Equal parts compile to the same code."""
 
-    def __init__(self, function: Any) -> None:
+    def __init__(self, function: PyTree) -> None:
         leaves, self._tree = jax.tree.flatten(function)
         self._others = tuple(None if _is_array(leaf) else leaf for leaf in leaves)
         self._places = tuple(i for i, leaf in enumerate(leaves) if _is_array(leaf))
@@ -43,7 +43,7 @@ class StaticPart:
     def __hash__(self) -> int:
         return hash(self._key)
 
-    def build(self, arrays: list[Array]) -> Callable[[dict[str, Array]], Any]:
+    def build(self, arrays: list[Array]) -> Callable[[dict[str, Array]], PyTree]:
         """The function."""
         leaves = list(self._others)
         for place, array in zip(self._places, arrays, strict=True):
@@ -51,7 +51,7 @@ class StaticPart:
         return jax.tree.unflatten(self._tree, leaves)
 
 
-def _is_array(leaf: Any) -> bool:
+def _is_array(leaf: object) -> bool:
     return isinstance(leaf, jax.Array) or (isinstance(leaf, np.ndarray) and leaf.dtype.kind in "biufc")
 
 
@@ -59,7 +59,7 @@ class Traced(NamedTuple):
     """A function of named axes, traced for one point."""
 
     static: StaticPart
-    arrays: list[Any]
+    arrays: list[Array]
     axes: tuple[str, ...]
     results: dict[str, jax.ShapeDtypeStruct]  # of one point, derivatives among them
     slopes: dict[str, str]  # name of the derivative of each result that is differentiated
@@ -72,7 +72,7 @@ def number_type() -> np.dtype:
     return jnp.zeros(()).dtype
 
 
-def trace(function: Callable[[dict[str, Array]], Any], axes: list[str], gradients: bool | Mode) -> Traced:
+def trace(function: Callable[[dict[str, Array]], PyTree], axes: list[str], gradients: bool | Mode) -> Traced:
     """Trace a function for one point and check what it returns.
 
     Raises:
@@ -145,7 +145,7 @@ def _stored(dtype: Any) -> np.dtype:
     return np.dtype(dtype) if dtype in (np.float32, np.float64) else number_type()
 
 
-def _named(returned: Any, axes: list[str]) -> dict[str, Array]:
+def _named(returned: object, axes: list[str]) -> dict[str, Array]:
     """The results as arrays by name, checked."""
     if not isinstance(returned, Mapping) or not returned:
         remedy = "Write `return {'rms': ...}`; of a `Response`, return `response.metrics()`."
@@ -192,7 +192,7 @@ def _loops_without_end(jaxpr: ClosedJaxpr | Jaxpr) -> bool:
     return any(eqn.primitive.name == "while" or any(map(_loops_without_end, _inside(eqn))) for eqn in eqns)
 
 
-def _fingerprint(jaxpr: ClosedJaxpr, arrays: list[Any]) -> str:
+def _fingerprint(jaxpr: ClosedJaxpr, arrays: list[Array]) -> str:
     """A hash of what the function computes, which is the same in every process."""
     digest = hashlib.sha256(re.sub(r"0x[0-9a-f]+", "", str(jaxpr)).encode())
     for array in [*arrays, *_constants(jaxpr)]:
@@ -203,7 +203,7 @@ def _fingerprint(jaxpr: ClosedJaxpr, arrays: list[Any]) -> str:
     return digest.hexdigest()
 
 
-def _constants(jaxpr: ClosedJaxpr | Jaxpr) -> Iterator[Any]:
+def _constants(jaxpr: ClosedJaxpr | Jaxpr) -> Iterator[Array]:
     """All constants of a program: its text shows only the small ones."""
     if isinstance(jaxpr, ClosedJaxpr):
         yield from jaxpr.consts

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from jaxdamp._types import ScalarLike
 
 
-def _is_one(coefficient: Any) -> bool:
+def _is_one(coefficient: object) -> bool:
     return isinstance(coefficient, float) and coefficient == 1.0
 
 

@@ -1,5 +1,6 @@
 """The predefined ride metrics of a vehicle, and the choice among them."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 
 from jaxdamp import _checks
@@ -139,12 +140,18 @@ def chosen_metrics(
         _checks.refuse(argument, "name one or more", "empty", f"Write [{some}], or leave it out for all.")
     if not isinstance(wanted, str):
         spelled = {goal: metrics_of_goal(metrics, channels, goal, white=white) for goal in GOALS}
-        wanted = [m for one in wanted for m in (spelled.get(one) or [one] if isinstance(one, str) else [one])]
+        lists = [(isinstance(one, str) and spelled.get(one)) or [one] for one in wanted]
+        wanted = list(itertools.chain.from_iterable(lists))
     names = [m for m in wanted if not isinstance(m, Metric)] if not isinstance(wanted, str) else wanted
     current = iter(current_names(argument, names, known))
     chosen = [of_channel(m, channels, argument) if isinstance(m, Metric) else known[next(current)] for m in wanted]
+    return _of_different_names(chosen, argument)
+
+
+def _of_different_names(metrics: Sequence[Metric], argument: str) -> list[Metric]:
+    """The metrics, each once; two of one name are refused."""
     by_name: dict[str, Metric] = {}
-    for metric in chosen:
+    for metric in metrics:
         if by_name.setdefault(metric.name, metric) != metric:
             remedy = "Give one of them another: `Metric(..., name=...)`."
             _checks.refuse(argument, "have one metric of each name", f"two of {metric.name!r}", remedy)

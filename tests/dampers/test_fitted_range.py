@@ -227,4 +227,5 @@ def test_laws_that_are_mixed_from_others_do_not_notice_their_ranges():
 
 
 def test_the_names_are_public():
-    assert {"FittedRange", "OutsideFittedRangeWarning", "with_fitted_range", "range_use"} <= set(dampers.__all__)
+    assert {"FittedRange", "OutsideFittedRangeWarning", "with_fitted_range"} <= set(dampers.__all__)
+    assert "range_use" in dampers.__shared__

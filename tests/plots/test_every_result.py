@@ -94,7 +94,7 @@ def test_a_tuning_on_other_roads() -> None:
 def test_every_result_with_a_table_has_a_picture() -> None:
     words = {"LimitCheck", "Table", "Report", "MetricValues"}  # drawn by the evaluation, or numbers of other results
     for package in (bench, identify, roads, tune, vehicles):
-        for name in package.__all__:
+        for name in [*package.__all__, *getattr(package, "__shared__", ())]:
             kind = getattr(package, name)
             if isinstance(kind, type) and hasattr(kind, "table") and name not in words:
                 assert hasattr(kind, "plot"), f"{name} has a table and no picture"

@@ -6,8 +6,7 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from jaxdamp import dampers, roads, vehicles
-from jaxdamp import tune as typed_tune
+from jaxdamp import dampers, roads, tune as typed_tune, vehicles
 
 
 COMFORT, TYRE = "rms_sprung_acceleration", "rms_dynamic_tyre_load"

@@ -41,8 +41,10 @@ def interpolated(points: Sequence[PeakForce], velocity: float) -> tuple[float, f
         return float("nan"), None, 0
     one, two = points[after - 1], points[after]
     share = (velocity - one.velocity) / (two.velocity - one.velocity)
-    known = one.scatter is not None and two.scatter is not None
-    scatter = float(np.hypot((1 - share) * (one.scatter or 0.0), share * (two.scatter or 0.0))) if known else None
+    have_scatter = one.scatter is not None and two.scatter is not None
+    scatter = (
+        float(np.hypot((1 - share) * (one.scatter or 0.0), share * (two.scatter or 0.0))) if have_scatter else None
+    )
     return (1 - share) * one.force + share * two.force, scatter, 2
 
 
@@ -88,7 +90,7 @@ def rates_and_knees(cycles: FoldedCycles, setting: str, record: str) -> list[Mea
     0.015 m/s on, where friction is fully there. A knee exists where both rates differ by more than a tenth and it
     takes away more than half of what a straight line leaves; otherwise there is one rate, and no knee.
     """
-    found = []
+    measurements = []
     for name, sign in DIRECTIONS.items():
         rows = np.array(
             [_bend(*cycle, sign) for cycle in zip(cycles.stroke, cycles.velocity, cycles.force, strict=True)]
@@ -97,8 +99,8 @@ def rates_and_knees(cycles: FoldedCycles, setting: str, record: str) -> list[Mea
         for quantity, column in zip(quantities, rows.T, strict=True):
             if np.isfinite(column).mean() >= 0.5:
                 unit = "m/s" if quantity.endswith("velocity") else "N s/m"
-                found.append(Measurement(quantity, unit, *measured(column), setting=setting, record=record))
-    return found
+                measurements.append(Measurement(quantity, unit, *measured(column), setting=setting, record=record))
+    return measurements
 
 
 def _bend(stroke: Cycle, velocity: Cycle, force: Cycle, sign: float) -> tuple[float, float, float, float]:
@@ -113,11 +115,11 @@ def _bend(stroke: Cycle, velocity: Cycle, force: Cycle, sign: float) -> tuple[fl
     knees = np.linspace(low, high, _KNEES)
     near = int(np.argmin(_with_knees(v, x, f, knees)[1]))
     knees = np.linspace(knees[max(near - 1, 0)], knees[min(near + 1, _KNEES - 1)], _KNEES)
-    bent, rest = _with_knees(v, x, f, knees)
-    best = int(np.argmin(rest))
+    bent, squares = _with_knees(v, x, f, knees)
+    best = int(np.argmin(squares))
     low_rate, high_rate = bent[best, 2:].tolist()
     bends = abs(low_rate - high_rate) > _BEND * max(abs(low_rate), abs(high_rate))
-    if bends and rest[best] < (1 - _EXPLAINS) * left[0]:
+    if bends and squares[best] < (1 - _EXPLAINS) * left[0]:
         return nothing, low_rate, high_rate, float(knees[best])
     return float(straight[0, 2]), nothing, nothing, nothing
 

@@ -155,13 +155,13 @@ def separate_gas_and_friction(run: BenchRun, *, up_to: float = LOW_SPEED) -> Gas
     fits, uncertain, note = _fit(cycles, low, high, run)
     quantities = (("gas force", "N"), ("gas rate", "N/m"), ("friction", "N"))
     quantities += (("rebound bleed rate", "N s/m"), ("compression bleed rate", "N s/m"))
-    found = tuple(
+    measurements = tuple(
         Measurement(name, unit, *measured(column), record=run.name, uncertainty=uncertain.get(name))
         for (name, unit), column in zip(quantities, fits.T, strict=True)
     )
     stroke, rebound, compression = _branches(cycles)
     middle = 0.5 * float(cycles.stroke.max() + cycles.stroke.min())
-    return GasAndFriction(found, middle, stroke, rebound, compression, run.name, (low, high), note)
+    return GasAndFriction(measurements, middle, stroke, rebound, compression, run.name, (low, high), note)
 
 
 class _Fits(NamedTuple):

@@ -21,15 +21,15 @@ def mixed_settings(runs: Sequence[BenchRun]) -> list[Finding]:
     groups: dict[float | None, list[BenchRun]] = {}
     for run in runs:
         groups.setdefault(run.command, []).append(run)
-    found = []
+    findings = []
     for pair in (pair for group in groups.values() for pair in contradictions(group)):
         message = (
             f"the same motion, but forces differ by {pair.difference:.3g} N, {100 * pair.share:.0f} % of their RMS"
         )
         remedy = "Were settings mixed (clicks, current, temperature)? State them as `command`, or fit apart."
         names = (pair.first, pair.second)
-        found.append(Finding("warning", "contradiction", names, message, pair.difference, "N", None, remedy))
-    return found
+        findings.append(Finding("warning", "contradiction", names, message, pair.difference, "N", None, remedy))
+    return findings
 
 
 def turned_by_the_reader(runs: Sequence[BenchRun]) -> list[Finding]:
@@ -49,7 +49,7 @@ def turned_motion(runs: Sequence[BenchRun]) -> list[Finding]:
     if len(whole) < 3:
         return []
     points = peak_velocity_points(whole)
-    found = []
+    findings = []
     for i, run in enumerate(whole):
         votes = []
         for j, other in enumerate(whole):
@@ -63,8 +63,8 @@ def turned_motion(runs: Sequence[BenchRun]) -> list[Finding]:
         if len(votes) > 1 and np.mean(votes) > 0.5:
             message = "its rebound is like the compression of the other records, and the other way round"
             remedy = 'Was it recorded with the other sign? Read it with sign="compression-positive".'
-            found.append(Finding("error", "sign unlike its bench", (run.name,), message, None, "", None, remedy))
-    return found
+            findings.append(Finding("error", "sign unlike its bench", (run.name,), message, None, "", None, remedy))
+    return findings
 
 
 def hysteresis_or_delay(findings: Sequence[Finding]) -> list[Finding]:

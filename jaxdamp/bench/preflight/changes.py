@@ -77,8 +77,8 @@ def _of_parts(e: Examined, parts: np.ndarray) -> tuple[Samples, Samples, Samples
     products = np.stack([np.add.reduceat(columns * row, first, axis=1) for row in columns], axis=0)
     gram, right = products[:3, :3].transpose(2, 0, 1), products[:3, 3].T
     scale = np.sqrt(np.einsum("nii->ni", gram))
-    found = np.linalg.solve(gram / (scale[:, :, None] * scale[:, None, :]), (right / scale)[..., None])[..., 0] / scale
-    return found[:, 0], found[:, 1], found[:, 2]
+    terms = np.linalg.solve(gram / (scale[:, :, None] * scale[:, None, :]), (right / scale)[..., None])[..., 0] / scale
+    return terms[:, 0], terms[:, 1], terms[:, 2]
 
 
 def _step(series: Float[np.ndarray, " parts"]) -> _Step | None:

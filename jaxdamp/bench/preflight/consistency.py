@@ -53,10 +53,10 @@ def velocity(e: Examined) -> list[Finding]:
     covered = np.concatenate([[0.0], np.cumsum(0.5 * (e.run.velocity[1:] + e.run.velocity[:-1]))]) / e.run.sampling_rate
     measured, derived = (values[width:] - values[:-width] for values in (covered, e.run.stroke))
     # Sums rather than np.dot: threads of BLAS would take longer to start than this takes.
-    both, own, squares = (
+    both, power, squares = (
         float(np.sum(a * b)) for a, b in ((measured, derived), (measured, measured), (derived, derived))
     )
-    likeness, scale = both / np.sqrt(own * squares) if own * squares > 0 else 0.0, both / squares
+    likeness, scale = both / np.sqrt(power * squares) if power * squares > 0 else 0.0, both / squares
     if likeness > 0.99 and 0.93 < scale < 1.07:
         return []
     severity = "error" if likeness < 0.8 or not 0.8 < scale < 1.25 else "warning"
@@ -165,20 +165,20 @@ def drift(e: Examined) -> list[Finding]:
     figures = {name: values for (name, _), values in cycle_figures(e.cycles).items()}
     time = e.cycles.starts - e.cycles.starts[0]
     place = (e.moving.start, min(e.moving.stop, len(e.run)) - 1)
-    found = []
+    findings = []
     change, clear = _trend(time, figures["equivalent damping"])
     relative = change / float(figures["equivalent damping"].mean())
     if clear and abs(relative) > SMALL:
         message = f"the damping changes by {100 * relative:+.2g} % over the record, as by heat"
         remedy = "Warm the damper up, record shorter, or fit its temperature: `dampers.TemperatureScaled`."
-        found += e.finding("warning", "drift of damping", message, relative, "", place, remedy)
+        findings += e.finding("warning", "drift of damping", message, relative, "", place, remedy)
     change, clear = _trend(time, figures["static force"])
     if clear and abs(change) > SMALL * np.ptp(e.cycles.force):
         message = f"the static force changes by {change:+.3g} N over the record, as gas that grows warm, or a load cell"
-        found += e.finding(
+        findings += e.finding(
             "warning", "drift of static force", message, change, "N", place, "Let the damper settle first."
         )
-    return found
+    return findings
 
 
 def _trend(time: Float[np.ndarray, " cycles"], values: Float[np.ndarray, " cycles"]) -> tuple[float, bool]:
@@ -187,6 +187,6 @@ def _trend(time: Float[np.ndarray, " cycles"], values: Float[np.ndarray, " cycle
 
     t = time - time.mean()
     slope = float(np.dot(t, values) / np.dot(t, t))
-    rest = values - values.mean() - slope * t
-    error = float(np.sqrt(np.sum(rest**2) / (len(t) - 2) / np.dot(t, t)))
+    residual = values - values.mean() - slope * t
+    error = float(np.sqrt(np.sum(residual**2) / (len(t) - 2) / np.dot(t, t)))
     return slope * float(time[-1] - time[0]), bool(abs(slope) > float(stdtrit(len(t) - 2, 1 - 5e-5)) * error)

@@ -21,7 +21,7 @@ _USUAL = (
 
 def rest(e: Examined) -> list[Finding]:
     """Rest before and after the motion, during which the force rests too."""
-    found = []
+    findings = []
     ends = (("rest before", 0, e.moving.start), ("rest after", e.moving.stop - 1, len(e.run) - 1))
     for name, first, last in ends:
         if last > first and np.std(e.run.force[first : last + 1]) < _ALIVE * np.std(e.run.force[e.moving]):
@@ -29,8 +29,8 @@ def rest(e: Examined) -> list[Finding]:
             share = 100 * (last - first) / len(e.run)
             message = f"{seconds:.3g} s of rest {name.split()[1]} the motion, {share:.2g} % of the record"
             remedy = "Laws with memory and means suffer: `process(moving=True)` cuts it off."
-            found += e.finding("warning", name, message, seconds, "s", (first, last), remedy)
-    return found
+            findings += e.finding("warning", name, message, seconds, "s", (first, last), remedy)
+    return findings
 
 
 def run_up(e: Examined) -> list[Finding]:
@@ -38,7 +38,7 @@ def run_up(e: Examined) -> list[Finding]:
     steady, count = steady_cycles(e.run), e.run.cycles
     if not steady or len(steady) < 0.5 * count or not e.repeats:
         return []
-    found, period, end = [], 1 / e.run.frequency, len(e.run) - 1
+    findings, period, end = [], 1 / e.run.frequency, len(e.run) - 1
     first, last = e.moving.start, min(e.moving.stop - 1, end)
     ends = (
         ("run-up", first, steady[0].start, first > 0),
@@ -50,8 +50,8 @@ def run_up(e: Examined) -> list[Finding]:
         if seconds > (0.4 if beside_rest else 1.05) * period:
             message = f"{seconds:.3g} s of {name}, in which the amplitude is not steady"
             remedy = "Means over cycles leave it out; for fits choose cycles: `process(skip_cycles=...)`."
-            found += e.finding("note", name, message, seconds, "s", (start, stop), remedy)
-    return found
+            findings += e.finding("note", name, message, seconds, "s", (start, stop), remedy)
+    return findings
 
 
 def integrated(e: Examined) -> list[Finding]:
@@ -93,12 +93,12 @@ def magnitudes(e: Examined) -> list[Finding]:
         float(np.max(np.abs(run.force))),
         ratio,
     )
-    found = []
+    findings = []
     for value, (what, unit, low, high, question) in zip(values, _USUAL, strict=True):
         if not low <= value <= high:
             message = f"unusual: the {what} is {value:.3g} {unit}"
-            found += e.finding("warning", f"unusual {what}", message, value, unit, None, question)
-    return found
+            findings += e.finding("warning", f"unusual {what}", message, value, unit, None, question)
+    return findings
 
 
 def jitter(e: Examined) -> list[Finding]:

@@ -23,12 +23,12 @@ _SQUARES = 0.05  # of the sum of squares of a channel, from which its spikes dec
 
 def repeated(e: Examined) -> list[Finding]:
     """A channel that repeats one value where it should move: stuck, held or dropped to zero."""
-    found = []
+    findings = []
     for name in UNITS:
         stretches = _stuck(e, name)
         if stretches:
             first, last = max(stretches, key=lambda pair: pair[1] - pair[0])
-            found += _stuck_finding(e, name, first, last)
+            findings += _stuck_finding(e, name, first, last)
             continue
         values = getattr(e.run, name)
         gaps = e.gaps[name]
@@ -37,8 +37,8 @@ def repeated(e: Examined) -> list[Finding]:
             ("held", gaps[values[gaps[:, 0]] != 0.0]),
         ):
             if len(part):
-                found += _gap_finding(e, name, kind, part)
-    return found
+                findings += _gap_finding(e, name, kind, part)
+    return findings
 
 
 def _stuck(e: Examined, name: str) -> list[tuple[int, int]]:
@@ -73,7 +73,7 @@ def edges(e: Examined) -> list[Finding]:
 
     What changes suddenly in every cycle, as friction does where the motion turns, is the damper's.
     """
-    found = []
+    findings = []
     for name, values in e.channels.items():
         third = _third_differences(values)
         size = np.abs(third)
@@ -88,12 +88,12 @@ def edges(e: Examined) -> list[Finding]:
         step = np.diff(values)
         first, last, height = _spikes(values, step, at, least, min(_WIDEST, e.samples_per_cycle / 6))
         if len(first):
-            found += _spike_finding(e, name, values, first, last, height)
+            findings += _spike_finding(e, name, values, first, last, height)
         taken = np.zeros(len(values), bool)
         for a, b in [*zip(first, last, strict=True), *(e.gaps[name] - e.moving.start)]:
             taken[max(a - 3, 0) : b + 4] = True
-        found += _jump_finding(e, name, at[~taken[at]], third, least)
-    return found
+        findings += _jump_finding(e, name, at[~taken[at]], third, least)
+    return findings
 
 
 def _third_differences(values: Samples) -> Samples:
@@ -140,8 +140,8 @@ def _spike_finding(
     width = f" of up to {counts.max()} samples" if counts.max() > 1 else ""
     message = f"{number}{width} in the {name}, about {size:.3g} {UNITS[name]}, {size / noise:.2g} times its noise"
     squares = float(np.sum(counts * height**2))
-    rest = float(np.median(np.abs(values - np.median(values)))) / 0.6745
-    decides = squares > _SQUARES * len(values) * rest**2
+    deviation = float(np.median(np.abs(values - np.median(values)))) / 0.6745
+    decides = squares > _SQUARES * len(values) * deviation**2
     remedy = "Look for a loose plug or a dropped sample; fits weigh spikes by their square" + (
         ", and these outweigh the record: cut it there, or measure again." if decides else "."
     )
@@ -164,9 +164,9 @@ def _jump_finding(e: Examined, name: str, at: np.ndarray, third: Samples, least:
     top = size[
         (size >= np.abs(third[np.maximum(at - 1, 0)])) & (size >= np.abs(third[np.minimum(at + 1, len(third) - 1)]))
     ]
-    own = max(2, int(SHARE * cycles))  # so many jumps at most are none of the damper's
-    if len(top) > own:
-        least = max(least, _ABOVE_OTHERS * float(np.sort(top)[-own - 1]))
+    most = max(2, int(SHARE * cycles))  # so many jumps at most are none of the damper's
+    if len(top) > most:
+        least = max(least, _ABOVE_OTHERS * float(np.sort(top)[-most - 1]))
     at = at[size > least]
     i = int(at[np.argmax(np.abs(third[at]))]) if len(at) else 0
     jump = float(third[i])
@@ -191,7 +191,7 @@ COARSE = 1000  # levels over the range, below which rounding is seen in loops
 
 def clipping(e: Examined) -> list[Finding]:
     """Flat tops: the largest or smallest value again and again, reached with a slope that would have gone on."""
-    found = []
+    findings = []
     for name, values in e.channels.items():
         for side, extreme in (("largest", values.max()), ("smallest", values.min())):
             flat = [(a, b) for a, b in runs_of(values == extreme) if b > a + 1]
@@ -206,8 +206,8 @@ def clipping(e: Examined) -> list[Finding]:
                 message = f"the {name} is clipped at {extreme:.4g} {UNITS[name]} ({share:.2g} % of the samples)"
                 place = (e.moving.start + flat[0][0], e.moving.start + flat[-1][1])
                 remedy = f"Its {side} values are lost: take a larger range of the channel and measure again."
-                found += e.finding("error", f"{name} clipped", message, extreme, UNITS[name], place, remedy)
-    return found
+                findings += e.finding("error", f"{name} clipped", message, extreme, UNITS[name], place, remedy)
+    return findings
 
 
 def _goes_on(values: Samples, first: int, last: int, noise: float) -> bool:
@@ -224,20 +224,20 @@ def _goes_on(values: Samples, first: int, last: int, noise: float) -> bool:
 
 def quantisation(e: Examined) -> list[Finding]:
     """A channel with so few levels that its steps are seen."""
-    found = []
+    findings = []
     for name, values in e.channels.items():
         size = step(values)
         levels = np.ptp(values) / size if size > 0 else np.inf
         if levels < COARSE:
             message = f"the {name} comes in steps of {size:.3g} {UNITS[name]}, {levels:.0f} of them over its range"
             remedy = "Take a smaller range or more bits, and write more digits."
-            found += e.finding("note", f"{name} quantised", message, size, UNITS[name], None, remedy)
-    return found
+            findings += e.finding("note", f"{name} quantised", message, size, UNITS[name], None, remedy)
+    return findings
 
 
 def ripple(e: Examined) -> list[Finding]:
     """Lines at the mains frequency and its harmonics that stand out from the motion beside them, and from the noise."""
-    found = []
+    findings = []
     for name in e.channels:
         for mains in MAINS:
             lines = e.mains[name].get(mains, [])
@@ -247,5 +247,5 @@ def ripple(e: Examined) -> list[Finding]:
                 said = f"line{'s' * (len(lines) > 1)} at {where}"
                 message = f"{mains:.0f} Hz ripple of {size:.3g} {UNITS[name]} in the {name} ({said})"
                 remedy = f"Mend the earthing, or filter: `process(low_pass={mains / 2:g})` if the motion allows it."
-                found += e.finding("warning", f"{name} ripple", message, size, UNITS[name], None, remedy)
-    return found
+                findings += e.finding("warning", f"{name} ripple", message, size, UNITS[name], None, remedy)
+    return findings
