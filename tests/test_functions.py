@@ -31,7 +31,7 @@ def branches(node: ast.AST) -> int:
 def lines(function: Function) -> int:
     """Lines of the body."""
     body = function.body[1:] if ast.get_docstring(function) is not None else function.body
-    return function.end_lineno - body[0].lineno + 1 if body else 0
+    return (function.end_lineno or 0) - body[0].lineno + 1 if body else 0
 
 
 def faults(source: str) -> Iterator[str]:
