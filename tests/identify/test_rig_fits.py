@@ -156,6 +156,7 @@ def test_every_law_is_without_the_static_force_that_the_machine_has():
     starts = {"table": Table, "bouc_wen": BoucWen, "sum": Bilinear(2000.0, 1000.0) + Spring(1000.0)}
     for name, start in starts.items():
         found = identify.fit(start, runs, rig="offset", starts=1)
+        assert found.rig is not None
         static = float(found.rig.force_offset)
         assert static == pytest.approx(-90.0, abs=15.0), name
         assert abs(float(found.law.force(0.0, 0.0, found.law.initial_state()))) < 2.0, name

@@ -1,5 +1,7 @@
 """Fits by any solver of optimistix, and a problem as a function in a JAX program."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import jaxtyping
@@ -15,7 +17,7 @@ from jaxdamp.solve import BoundedLevenbergMarquardt
 
 BESINGER = Besinger(1600.0, 4200.0, 900.0, 0.13, 0.05)
 AWAY = Besinger(1500.0, 4000.0, 1000.0, 0.15, 0.04)
-HOW = {"rtol": 1e-9, "atol": 1e-9}
+HOW: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-9}
 
 
 def apart(one, other):

@@ -40,23 +40,25 @@ def on_host(data, solver, conditions=None, max_steps=100, start=(1.0, 1.0), reco
 
 @pytest.mark.parametrize("upper", [10.0, (10.0, 1.2)], ids=["inside", "at a bound"])
 def test_host_and_jax_take_the_same_steps(upper):
-    solver = BoundedLevenbergMarquardt(np.zeros(2), np.broadcast_to(upper, 2))
+    solver = BoundedLevenbergMarquardt(lower=np.zeros(2), upper=np.broadcast_to(upper, 2))
     end = on_host(DATA[None], solver)
-    inside = optx.least_squares(misses, BoundedLevenbergMarquardt(0.0, jnp.asarray(upper)), jnp.ones(2), DATA)
+    inside = optx.least_squares(
+        misses, BoundedLevenbergMarquardt(lower=0.0, upper=jnp.asarray(upper)), jnp.ones(2), DATA
+    )
     np.testing.assert_allclose(inside.value, end.y[0], rtol=1e-9)
     assert int(inside.stats["num_steps"]) == end.steps[0] and end.status == [Status.CONVERGED]
 
 
 def test_lanes_end_by_themselves_and_are_computed_no_more():
     data, seen = jnp.stack([DATA, 3.0 * jnp.exp(-1.0 * TIME), 0.01 * DATA]), []
-    end = on_host(data, BoundedLevenbergMarquardt(np.zeros(2), np.full(2, np.inf)), record=seen)
-    alone = [on_host(row[None], BoundedLevenbergMarquardt(np.zeros(2), np.full(2, np.inf))) for row in data]
+    end = on_host(data, BoundedLevenbergMarquardt(lower=np.zeros(2), upper=np.full(2, np.inf)), record=seen)
+    alone = [on_host(row[None], BoundedLevenbergMarquardt(lower=np.zeros(2), upper=np.full(2, np.inf))) for row in data]
     for lane, single in enumerate(alone):
         np.testing.assert_allclose(end.y[lane], single.y[0], rtol=1e-10)
         assert end.steps[lane] == single.steps[0] == sum(lane in lanes for lanes, _ in seen)
     assert len(set(end.steps)) > 1
     together = jax.jit(
-        jax.vmap(lambda d: optx.least_squares(misses, BoundedLevenbergMarquardt(0.0), jnp.ones(2), d).value)
+        jax.vmap(lambda d: optx.least_squares(misses, BoundedLevenbergMarquardt(lower=0.0), jnp.ones(2), d).value)
     )
     np.testing.assert_allclose(together(data), end.y, rtol=1e-7)
 
@@ -67,19 +69,21 @@ def test_a_condition_that_bends_within_a_step_is_kept():
     def allowed(y):
         return (4.0 - y[0] ** 2 - (y[1] - 1.0) ** 2)[None]  # the minimum, near (3, 1.5), is outside
 
-    solver = BoundedLevenbergMarquardt(np.zeros(2), np.full(2, 10.0))
+    solver = BoundedLevenbergMarquardt(lower=np.zeros(2), upper=np.full(2, 10.0))
     tried = []
     ends = [on_host(DATA[None], solver, allowed, max_steps=steps, record=tried) for steps in (2, 3, 4, 5, 6, 100)]
     assert min(float(margins[0, 0]) for _, margins in tried) < 0.0  # a step did break it
     assert all(float(allowed(end.y[0])[0]) > 0.0 for end in ends)  # but was not accepted
     assert ends[-1].status == [Status.CONVERGED] and float(allowed(ends[-1].y[0])[0]) < 1e-3
-    inside = optx.least_squares(misses, BoundedLevenbergMarquardt(0.0, 10.0, allowed), jnp.ones(2), DATA)
+    inside = optx.least_squares(
+        misses, BoundedLevenbergMarquardt(lower=0.0, upper=10.0, conditions=allowed), jnp.ones(2), DATA
+    )
     np.testing.assert_allclose(inside.value, ends[-1].y[0], rtol=1e-6)
 
 
 def test_the_gradient_of_a_solution_is_that_of_differences():
     def rate(data, upper):
-        solver = BoundedLevenbergMarquardt(0.0, jnp.asarray([10.0, upper]), tolerance=1e-9)
+        solver = BoundedLevenbergMarquardt(lower=0.0, upper=jnp.asarray([10.0, upper]), tolerance=1e-9)
         return optx.least_squares(misses, solver, jnp.ones(2), data, adjoint=ImplicitWithinBounds()).value
 
     along = jnp.cos(7.0 * TIME)
@@ -94,14 +98,14 @@ def test_unknowns_and_residuals_may_be_trees():
     def fn(y, _):
         return {"a": y["level"] * jnp.exp(-y["rate"] * TIME) - DATA, "b": 1e-6 * y["rate"]}
 
-    solver = BoundedLevenbergMarquardt({"level": 0.0, "rate": 0.0}, {"level": 10.0, "rate": 1.2})
+    solver = BoundedLevenbergMarquardt(lower={"level": 0.0, "rate": 0.0}, upper={"level": 10.0, "rate": 1.2})
     found = optx.least_squares(fn, solver, {"level": jnp.asarray(1.0), "rate": jnp.asarray(1.0)})
     assert float(found.value["rate"]) == pytest.approx(1.2) and found.value["level"].shape == ()
 
 
 def test_a_column_without_effect_leaves_a_finite_step():
     """However long the search: the least damping keeps the system solvable."""
-    solver = BoundedLevenbergMarquardt(np.full(2, -np.inf), np.full(2, np.inf))
+    solver = BoundedLevenbergMarquardt(lower=np.full(2, -np.inf), upper=np.full(2, np.inf))
     rows = np.array([[[1.0, 0.0, 1.0], [0.0, 0.0, 0.5]]])
     nothing = np.zeros((1, 0)), np.zeros((1, 0, 2)), np.ones(1)
     state = solver.init(None, np.zeros((1, 2)), None, {"linearise": None}, None, None, frozenset())
@@ -113,8 +117,8 @@ def test_a_column_without_effect_leaves_a_finite_step():
 
 
 def test_a_start_without_finite_residual_has_no_step():
-    end = on_host(DATA[None] * np.nan, BoundedLevenbergMarquardt(np.zeros(2), np.full(2, np.inf)))
+    end = on_host(DATA[None] * np.nan, BoundedLevenbergMarquardt(lower=np.zeros(2), upper=np.full(2, np.inf)))
     assert end.status == [Status.NO_STEP] and end.steps[0] == 1
-    solver = BoundedLevenbergMarquardt(0.0)
+    solver = BoundedLevenbergMarquardt(lower=0.0)
     lost = optx.least_squares(misses, solver, jnp.ones(2), DATA * jnp.nan, throw=False)
     assert lost.result == optx.RESULTS.nonfinite
