@@ -41,8 +41,13 @@ ANSWERS = {  # call: words that its refusal holds
     "tune.Scenarios([3.0])": ("`roads['road 1']`", "3.0"),
     "tune.Scenarios([road], [{'rate': 1.0}])": ("`conditions['condition 1']` must be a `tune.Condition",),
     "tune.Scenarios([road], tune.Condition())": ("`conditions` must be conditions by name", "around one condition"),
-    "tune.minimise('rms_stroke', car, road, limits=['rms_stroke'])": ("`limits` must be a mapping of metrics",),
-    "tune.minimise('rms_stroke', car, road, limits={'rms_stroke': 'low'})": ("`limits['rms_stroke']`", "Write 0.1"),
+    "tune.minimise('rms_sprung_acceleration', car, road, limits=['rms_stroke'])": (
+        "`limits` must be a mapping of metrics",
+    ),
+    "tune.minimise('comfort', car, road, limits={'working_space_rms': 'low'})": (
+        "`limits['working_space_rms']`",
+        "Write 0.1",
+    ),
     "tune.minimise('working_space_rms', car, road, shape=['monotone'])": ("`shape` must be made by `tune.slope`",),
     "tune.Targets({'rms_stroke': 1.0})": ("`targets['rms_stroke']` must be a value and a positive tolerance",),
     "tune.sensitivity(3.0, car, road)": ("`metric` must be metrics by name",),

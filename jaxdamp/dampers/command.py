@@ -2,6 +2,7 @@
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._traced import is_traced
 from jaxdamp._types import ScalarLike
 from jaxdamp.dampers._commands import command_paths
 from jaxdamp.dampers.base import AbstractDamper
@@ -44,6 +45,7 @@ def with_command(law: AbstractDamper, command: ScalarLike) -> AbstractDamper:
         _checks.refuse("law", "take a command", f"{law}, which takes none", remedy)
     value = as_float(command)
     changed = checked(with_values(law, dict.fromkeys(paths, value)))
-    uses = [use for use in range_use(changed, Motion()) if use.quantity == "command"]
-    warn_outside([sentence(type(law).__name__, uses)])
+    if not is_traced(changed):
+        uses = [use for use in range_use(changed, Motion()) if use.quantity == "command"]
+        warn_outside([sentence(type(law).__name__, uses)])
     return changed

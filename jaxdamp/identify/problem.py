@@ -1,7 +1,8 @@
 """A fit as a least-squares problem: residuals as functions of a model with free parameters."""
 
+import dataclasses
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -229,16 +230,34 @@ NUMBERS = ("free", "residuals", "level", "law", "anchor")  # fields of a problem
 
 
 class _Fixed:
-    """The other fields, the same only if they are the same objects."""
+    """The other fields, which are the same if their values are."""
 
     def __init__(self, problem: Problem) -> None:
         self.fields = {name: value for name, value in problem._asdict().items() if name not in NUMBERS}
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Fixed) and all(self.fields[name] is other.fields[name] for name in self.fields)
+        return isinstance(other, _Fixed) and _same(tuple(self.fields.values()), tuple(other.fields.values()))
 
     def __hash__(self) -> int:
-        return hash(tuple(map(id, self.fields.values())))
+        plain = (value for value in self.fields.values() if isinstance(value, str | int | float))
+        return hash((len(self.fields["runs"]), *plain))
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether records and other fixed values are equal, which a record by itself is only to itself."""
+    if one is other:
+        return True
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray | jax.Array):
+        return one.dtype == other.dtype and np.array_equal(one, other)
+    if dataclasses.is_dataclass(one):
+        one, other = vars(one), vars(other)
+    if isinstance(one, Mapping):
+        return one.keys() == other.keys() and all(_same(value, other[key]) for key, value in one.items())
+    if isinstance(one, tuple | list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    return bool(one == other)
 
 
 jax.tree_util.register_pytree_node(

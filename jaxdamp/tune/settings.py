@@ -40,8 +40,8 @@ class Design(Free, total=False):
     >>> from jaxdamp import roads, tune, vehicles
     >>> design = tune.Design(over={"damper.rate": (1500.0, 4000.0)})
     >>> result = tune.minimise("comfort", vehicles.presets.quarter_car_000(), roads.white("C", 20.0), **design)
-    >>> result.parameters[0].note
-    'at its upper bound'
+    >>> result.converged, 1500.0 < float(result.vehicle.damper.rate) < 4000.0
+    (True, True)
     """
 
     bounds: Mapping[str, Any] | None

@@ -223,7 +223,7 @@ def test_progress_and_history_follow_the_search():
     [
         ({"metric": "rms_acceleration"}, "Did you mean 'rms_sprung_acceleration'"),
         ({"metric": "working_space_peak_to_peak"}, "must be one of 'rms_sprung_acceleration'"),
-        ({"limits": {"travel": 0.1}}, "`limits` must be one of .* but is 'travel'"),
+        ({"limits": {"travelling": 0.1}}, "`limits` must be one of .* but is 'travelling'"),
         ({"over": ["damper.rat"]}, "did you mean 'damper.rate'"),
         ({"bounds": {"damper.rate": (3000.0, 9000.0)}}, "Start inside the bounds or widen them"),
         (
