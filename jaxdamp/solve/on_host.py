@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from jaxdamp._status import Status
 from jaxdamp.solve.damped_steps import Linearisation, at_edges
@@ -89,5 +89,5 @@ def _put(lanes: Int[np.ndarray, " some"], some: Any, whole: Any) -> Any:
     return jtu.tree_map(replaced, some, whole)
 
 
-def _status(converged: Bool[np.ndarray, ""], stuck: Bool[np.ndarray, ""]) -> Status:
+def _status(converged: bool | np.bool_, stuck: bool | np.bool_) -> Status:
     return Status.CONVERGED if converged else Status.NO_STEP if stuck else Status.STEP_LIMIT
