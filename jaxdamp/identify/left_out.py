@@ -36,6 +36,7 @@ TO_THE_MACHINE = 'add "{}" to the machine (`rig`)'
 SURE = 6.0  # standard errors from which an effect is named
 NOTICEABLE = 0.01  # sampling intervals of a delay, and tenths of a channel, below which an effect does not matter
 REVERSED = -0.3  # correlation of a channel with its prediction below which its sign is doubted
+POORLY = 30.0  # fit [%] of a channel below which the vehicle of the start is asked too
 OF_ITS_OWN = 1e-3  # share of an effect that no fitted number has, below which it cannot be shown
 
 
@@ -187,15 +188,24 @@ def _travel_since_reversal(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return np.where(last >= 0, from_last, np.inf)
 
 
-def on_signs(scores: Sequence[ChannelScore]) -> list[str]:
-    """A sentence on each channel that the vehicle predicts with the other sign."""
-    return [
-        f"{score.channel} of {score.record} runs against the fitted vehicle (correlation {score.correlation:.2f}): its"
-        " sign, or that of the other channels, is reversed. Accelerations and heights count positive up, travels in"
-        " extension; `read_rides(..., reversed_channels=[...])` and --reversed turn a channel round."
-        for score in scores
-        if score.correlation < REVERSED
-    ]
+def on_signs(scores: Sequence[ChannelScore], at_start: Sequence[ChannelScore]) -> list[str]:
+    """A sentence on each channel that the vehicle predicts with the other sign.
+
+    A fit may bend the vehicle until a reversed channel runs with it a little, and explain it badly all the same: then
+    the vehicle that the fit started from tells.
+    """
+    notes = []
+    for score, first in zip(scores, at_start, strict=True):
+        which, against = "fitted vehicle", score.correlation
+        if score.fit_percent < POORLY:
+            which, against = min((which, against), ("vehicle of the start", first.correlation), key=lambda one: one[1])
+        if against < REVERSED:
+            notes.append(
+                f"{score.channel} of {score.record} runs against the {which} (correlation {against:.2f}): its sign, or"
+                " that of the other channels, is reversed. Accelerations and heights count positive up, travels in"
+                " extension; `read_rides(..., reversed_channels=[...])` and --reversed turn a channel round."
+            )
+    return notes
 
 
 def on_free_scale(scale: FreeScale, model: VehicleTest) -> list[str]:

@@ -40,7 +40,7 @@ from jaxdamp.identify.vehicle_preparing import (
     without,
 )
 from jaxdamp.identify.vehicle_residuals import Drive
-from jaxdamp.identify.vehicle_result import VehicleFit, channel_scores
+from jaxdamp.identify.vehicle_result import ChannelScore, VehicleFit, channel_scores
 from jaxdamp.parameters import free_parameters, get, matched_in_words, parameters, with_values
 from jaxdamp.rig import Sensor
 from jaxdamp.vehicles import AbstractVehicle
@@ -149,7 +149,8 @@ def fit_vehicle(
     expected = priors_on(free, priors or {}, 1.0)
     free, sigma = in_units(free, vehicle.units), {**data.first_noise(), **known}
     problem = data.problem(free, sigma, expected)
-    scale = free_scale(problem, search(problem, 1))
+    first = search(problem, 1)
+    scale, at_start = free_scale(problem, first), channel_scores(problem, first.residual, rides)
     problem = problem._replace(free=without(free, scale.held))
     how = {"loss": loss, "starts": starts, "max_steps": max_steps, "seed": seed, "solver": solver}
     begin = np.asarray(problem.free.values)
@@ -158,7 +159,7 @@ def fit_vehicle(
     paths = [p.path for p in parameters(model)]
     named = matched_in_words([path for path in paths if path.startswith("vehicle.")], over=over or ())
     others = matched_in_words(paths, freeze=freeze, bounds=bounds or {}, per_record=per_record)
-    result = _judged(data, problem, solution, scale, refused)
+    result = _judged(data, problem, solution, scale, at_start, refused)
     criterion = criterion_in_words(problem, loss, priors or {})
     return dataclasses.replace(result, patterns="; ".join(filter(None, (named, others))), criterion=criterion)
 
@@ -245,7 +246,12 @@ def _accepted(
 
 
 def _judged(
-    data: VehicleData, problem: Problem, solution: Solution, scale: FreeScale, refused: Sequence[str]
+    data: VehicleData,
+    problem: Problem,
+    solution: Solution,
+    scale: FreeScale,
+    at_start: Sequence[ChannelScore],
+    refused: Sequence[str],
 ) -> VehicleFit:
     """The result at the minimum."""
     end = solution.best
@@ -258,8 +264,10 @@ def _judged(
     estimates = estimate(problem, solution, noise)
     model = mean_over_records(model, data.per_record)
     scores = channel_scores(problem, end.residual, data.rides)
-    notes = [*on_status(end), *refused, *on_free_scale(scale, model), *on_signs(scores), *estimates.notes]
-    notes += on_sensors(problem, end, data.rides, data.channels, model.sensors)
+    signs = on_signs(scores, at_start)
+    notes = [*on_status(end), *refused, *on_free_scale(scale, model), *signs, *estimates.notes]
+    if not signs:  # what a reversed channel looks like is no lag of a sensor
+        notes += on_sensors(problem, end, data.rides, data.channels, model.sensors)
     if noise.inflation > 1.0:
         notes.append(
             "Neighbouring residuals are alike: the vehicle or its sensors miss something systematic. The standard"
