@@ -37,7 +37,8 @@ def pytest_configure(config: pytest.Config) -> None:
     if "JAX_COMPILATION_CACHE_DIR" in os.environ or not hasattr(config, "cache"):
         return
     kept = config.cache.mkdir("programs")
-    if sum(file.stat().st_size for file in kept.iterdir()) > MOST_KEPT:
+    main = not hasattr(config, "workerinput")  # it begins before its workers do
+    if main and sum(file.stat().st_size for file in kept.iterdir()) > MOST_KEPT:
         shutil.rmtree(kept)
         kept.mkdir()
     # JAX does not write these files in one step: each process has a folder of links and hands in what it adds.
