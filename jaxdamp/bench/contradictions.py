@@ -140,3 +140,15 @@ def _mean_over_cycles(values: Float[np.ndarray, "cycles bins"]) -> Float[np.ndar
     return np.divide(
         np.where(sampled, values, 0.0).sum(axis=0), count, out=np.full(count.shape, np.nan), where=count > 0
     )
+
+
+def repeats(runs: Sequence[BenchRun]) -> list[list[BenchRun]]:
+    """Records of the same motion side by side."""
+    groups: list[list[BenchRun]] = []
+    for run in runs:
+        group = next((group for group in groups if same_motion(group[0], run)), None)
+        if group is None:
+            groups.append([run])
+        else:
+            group.append(run)
+    return groups

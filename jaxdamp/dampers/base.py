@@ -5,10 +5,8 @@ extension: a passive law dissipates energy, ∮ F v dt ≥ 0. One instance is on
 """
 
 import dataclasses
-import inspect
 from abc import abstractmethod
 from collections.abc import Sequence
-from importlib import import_module
 from typing import Any
 
 import equinox as eqx
@@ -18,6 +16,7 @@ import jax.numpy as jnp
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, State
 from jaxdamp.dampers._conditions import Condition, check_conditions
+from jaxdamp.dampers._functions import by_name, with_functions
 from jaxdamp.dampers._starts import Reach, from_samples, starts_of_bends
 from jaxdamp.dampers.fitted_range import FittedRange, RangeNote
 from jaxdamp.dampers.motion import Motion
@@ -26,37 +25,6 @@ from jaxdamp.parameters import Module, check_parameters, readable
 
 
 START = "Start from `law.initial_state()`."
-
-
-@dataclasses.dataclass(frozen=True)
-class _NamedFunction:
-    """A public function of JAX, or the default of an argument of a class of equinox, in a file."""
-
-    module: str
-    name: str
-    argument: str = ""
-
-    def function(self) -> Any:
-        """The function itself."""
-        there = getattr(import_module(self.module), self.name)
-        return inspect.signature(there).parameters[self.argument].default if self.argument else there
-
-
-_PLACES = [_NamedFunction("equinox.nn", "MLP", argument) for argument in ("activation", "final_activation")]
-
-
-def _by_name(leaf: Any) -> Any:
-    """A public function of JAX or a default of equinox as its name; anything else as it is."""
-    if not callable(leaf):
-        return leaf
-    of_jax = [_NamedFunction(place, getattr(leaf, "__name__", "")) for place in ("jax.nn", "jax.numpy", "jax.lax")]
-    known = [place for place in of_jax if hasattr(import_module(place.module), place.name)]
-    return next((place for place in (*known, *_PLACES) if place.function() is leaf), leaf)
-
-
-def _with_functions(law: "AbstractDamper") -> "AbstractDamper":
-    """The law with functions in place of their names."""
-    return jax.tree.map(lambda leaf: leaf.function() if isinstance(leaf, _NamedFunction) else leaf, law)
 
 
 class AbstractDamper(Module):
@@ -82,9 +50,9 @@ class AbstractDamper(Module):
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         """Functions of JAX, such as the activation of a network, travel by their names: JAX pickles few of them."""
-        named = jax.tree.map(_by_name, self)
+        named = jax.tree.map(by_name, self)
         if any(new is not old for new, old in zip(*map(jax.tree.leaves, (named, self)), strict=True)):
-            return _with_functions, (named,)
+            return with_functions, (named,)
         return super().__reduce_ex__(protocol)
 
     def __repr__(self) -> str:

@@ -1,190 +1,28 @@
-"""The evaluation of records: every measurement, as tables, plain data and pictures."""
+"""`evaluate`: every measurement of records, by setting."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError
-from jaxdamp._results import AbstractResult
-from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, percent_change, plain
 from jaxdamp.bench.analysis import FoldedCycles, as_records, fold_cycles
-from jaxdamp.bench.contradictions import same_motion
+from jaxdamp.bench.contradictions import repeats
 from jaxdamp.bench.evaluation import curve
-from jaxdamp.bench.evaluation.limits import Limit, LimitCheck
-from jaxdamp.bench.evaluation.measurements import Measurement, at_velocity, measured, record_measurements
+from jaxdamp.bench.evaluation.measurements import Measurement, measured, record_measurements
+from jaxdamp.bench.evaluation.result import Evaluation
 from jaxdamp.bench.evaluation.separation import GasAndFriction, separate_gas_and_friction
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.settings import by_number, settings_apart
 
 
 if TYPE_CHECKING:
-    import matplotlib.figure
+    pass
 
 
 WINDOW = 0.05  # share of a stated velocity within which samples, or records, count as taken at it
-_PEAKS = ("rebound velocity", "rebound force", "compression velocity", "compression force", "rebound/compression ratio")
-_MIDDLE = ("mid-stroke rebound force", "mid-stroke compression force")
-_LOOPS = ("mean force", "static force", "energy per cycle", "equivalent damping", "hysteresis area", "hysteresis width")
-TABLES = {"peak_forces": (*_PEAKS, *_MIDDLE), "loops": _LOOPS}
-
-
-@final
-@dataclass(frozen=True, eq=False, repr=False)
-class Evaluation(AbstractResult):
-    """What records say of a damper at one setting or several.
-
-    Attributes:
-        measurements: all of them; `get` finds one.
-        settings: the records of each setting, in the order of the table.
-        cycles: the steady cycles of each record, by its name.
-        gas_and_friction: of the slowest record of each setting.
-        velocities: at which forces are stated [m/s].
-        method: how these were found.
-        notes: what could not be evaluated, and why.
-    """
-
-    measurements: tuple[Measurement, ...]
-    settings: Mapping[str, tuple[BenchRun, ...]]
-    cycles: Mapping[str, FoldedCycles]
-    gas_and_friction: Mapping[str, GasAndFriction]
-    velocities: tuple[float, ...]
-    method: str
-    notes: tuple[str, ...] = ()
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """`notes`: what could not be evaluated, and why."""
-        return self.notes
-
-    @property
-    def summary(self) -> str:
-        """Numbers of records and of settings."""
-        return f"{len(self.runs)} records at {len(self.settings)} settings, forces by {self.method}."
-
-    @property
-    def runs(self) -> tuple[BenchRun, ...]:
-        """The records evaluated."""
-        return tuple(run for runs in self.settings.values() for run in runs)
-
-    def get(
-        self, quantity: str, *, setting: str | None = None, record: str | None = None, velocity: float | None = None
-    ) -> Measurement:
-        """One measurement by its quantity and, where there are several, its setting, record or velocity [m/s].
-
-        Without `record` and `velocity` it is that of the setting, or of the only record.
-
-        Raises:
-            ValueError: none fits, or several do.
-        """
-        fitting = [
-            m
-            for m in self.measurements
-            if m.quantity == quantity
-            and setting in (None, m.setting)
-            and record in (None, m.record)
-            and at_velocity(m, velocity)
-        ]
-        if not fitting:
-            _checks.one_of("quantity", quantity, dict.fromkeys(m.quantity for m in self.measurements))
-        if len(fitting) != 1:
-            asked = f"{quantity!r}, setting {setting!r}, record {record!r}, velocity {velocity!r}"
-            _checks.refuse("quantity", "name one measurement", f"{asked}, of which there are {len(fitting)}")
-        return fitting[0]
-
-    def table(self) -> Table:
-        """Forces at the stated velocities, and their ratio, a column for each setting."""
-        rows = [(q, v) for q in ("rebound force", "compression force", "rebound/compression ratio")
-                for v in self.velocities]  # fmt: skip
-        chosen = [(f"{quantity} at {v:.4g} m/s", quantity, v) for quantity, v in rows]
-        return self._by_setting(f"Forces at stated velocities ({self.method})", chosen)
-
-    def settings_table(self) -> Table:
-        """Gas force, friction, rates and knees, a column for each setting."""
-        of_records = {quantity for quantities in TABLES.values() for quantity in quantities}
-        others = dict.fromkeys(m.quantity for m in self.measurements if m.quantity not in of_records)
-        return self._by_setting("Gas force, friction and rates", [(name, name, None) for name in others])
-
-    def _by_setting(self, title: str, rows: Sequence[tuple[str, str, float | None]]) -> Table:
-        """Quantities (name, quantity, velocity) with a column for each setting and the change over them."""
-        chosen = [m for m in self.measurements if m.velocity is not None or m.record]
-        cells = {(m.quantity, m.velocity, m.setting): m.cell for m in chosen}
-        units = {m.quantity: m.unit for m in self.measurements}
-        compared = []
-        for name, quantity, velocity in rows:
-            values = [cells.get((quantity, velocity, setting)) for setting in self.settings]
-            numbers = [value for value in values if isinstance(value, float)]
-            change = percent_change(numbers[0], numbers[-1]) if len(numbers) == len(values) else None
-            if numbers:
-                compared.append(Compared(name, units[quantity], values, change))
-        return comparison_table(title, "quantity", [name or "value" for name in self.settings], compared)
-
-    def tables(self) -> dict[str, Table]:
-        """All tables by name: velocities, settings, peak forces and loops of records, repeats, and all in one list."""
-        tables = {"velocities": self.table(), "settings": self.settings_table()}
-        titles = {"peak_forces": "Forces of each record", "loops": "Loops of each record"}
-        tables |= {name: self._records_table(titles[name], quantities) for name, quantities in TABLES.items()}
-        repeats = self._repeats_table()
-        return tables | ({"repeats": repeats} if repeats.rows else {}) | {"measurements": self._list()}
-
-    def _records_table(self, title: str, quantities: Sequence[str]) -> Table:
-        """A row for each record, a column for each quantity, with the scatter over cycles."""
-        several = len(self.settings) > 1
-        measurements = {(m.record, m.quantity): m for m in self.measurements if m.record and m.velocity is None}
-        units = {m.quantity: m.unit for m in self.measurements}
-        columns = [Column("record"), *([Column("setting")] if several else []), Column("cycles", spec="d")]
-        columns += [Column(quantity, units[quantity]) for quantity in quantities]
-        rows = []
-        for setting, runs in self.settings.items():
-            for run in runs:
-                start: tuple[Cell, ...] = (run.name, setting) if several else (run.name,)
-                cells = tuple(measurements[run.name, quantity].cell for quantity in quantities)
-                rows.append((*start, len(self.cycles[run.name].periods), *cells))
-        return Table(f"{title}, mean ± scatter over cycles", tuple(columns), tuple(rows))
-
-    def _repeats_table(self) -> Table:
-        """Quantities of records that repeat a motion at one setting, with the scatter over these records."""
-        columns = (Column("records"), Column("quantity"), Column("unit"), Column("mean"), Column("scatter"))
-        rows = []
-        for runs in self.settings.values():
-            for group in _repeats(runs):
-                if len(group) > 1:
-                    names = ", ".join(run.name for run in group)
-                    for quantity in (*_PEAKS, *_LOOPS):
-                        each = [self.get(quantity, record=run.name) for run in group]
-                        value, scatter, _ = measured(np.array([m.value for m in each]))
-                        rows.append((names, quantity, each[0].unit, value, scatter))
-        return Table("Repeated records, scatter over the records", columns, tuple(rows))
-
-    def _list(self) -> Table:
-        """One row for each measurement, for files."""
-        columns = (Column("setting"), Column("record"), Column("quantity"), Column("velocity", "m/s"))
-        columns += (Column("unit"), Column("value"), Column("scatter", spec=".2g"), Column("count", spec="d"))
-        columns += (Column("uncertainty", spec=".2g"),)
-        rows = ((m.setting, m.record, m.quantity, m.velocity, m.unit, m.value, m.scatter, m.count, m.uncertainty)
-                for m in self.measurements)  # fmt: skip
-        return Table("All measurements", columns, tuple(rows))
-
-    def check(self, limits: Iterable[Limit]) -> LimitCheck:
-        """Which measurements lie within limits; see `bench.read_limits`."""
-        return LimitCheck.of(self.measurements, limits)
-
-    def content(self) -> dict[str, Any]:
-        """All measurements as plain data."""
-        return {"method": self.method, "notes": list(self.notes), "measurements": plain(self._list().records())}
-
-    def plot(
-        self, baseline: "Evaluation | None" = None, limits: LimitCheck | None = None
-    ) -> "matplotlib.figure.Figure":
-        """Mean loops over velocity, stroke, acceleration and time, and forces over velocity, over a baseline."""
-        from jaxdamp import plots
-
-        return plots.evaluation(self, baseline, limits)
-
-    def __repr__(self) -> str:
-        return "\n\n".join([*(str(t) for name, t in self.tables().items() if name != "measurements"), *self.notes])
 
 
 def evaluate(
@@ -254,7 +92,7 @@ def _check_options(velocities: Sequence[float] | None, method: str | None, windo
 
 def _usual_method(settings: Mapping[str, Sequence[BenchRun]]) -> str:
     """Interpolation where every setting has motions of different peak velocity, the loop elsewhere."""
-    return "interpolation" if all(len(_repeats(runs)) > 1 for runs in settings.values()) else "loop"
+    return "interpolation" if all(len(repeats(runs)) > 1 for runs in settings.values()) else "loop"
 
 
 def _of_setting(
@@ -313,23 +151,11 @@ def _command(run: BenchRun) -> float:
     return -np.inf if run.command is None else run.command
 
 
-def _repeats(runs: Sequence[BenchRun]) -> list[list[BenchRun]]:
-    """Records of the same motion side by side."""
-    groups: list[list[BenchRun]] = []
-    for run in runs:
-        group = next((group for group in groups if same_motion(group[0], run)), None)
-        if group is None:
-            groups.append([run])
-        else:
-            group.append(run)
-    return groups
-
-
 def _peak_forces(runs: Sequence[BenchRun], of_records: Sequence[Measurement], direction: str) -> list[curve.PeakForce]:
     """Force at the peak velocity of a direction, one for each motion: repeated records are averaged."""
     by = {(m.record, m.quantity): m for m in of_records}
     peaks = []
-    for group in _repeats(runs):
+    for group in repeats(runs):
         velocity = np.array([abs(by[run.name, f"{direction} velocity"].value) for run in group])
         forces = [by[run.name, f"{direction} force"] for run in group]
         value, between, count = measured(np.array([m.value for m in forces]))
