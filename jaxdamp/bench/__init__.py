@@ -42,6 +42,7 @@ from jaxdamp.bench.ride_record import RideRecord
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sensors import Sensors
 from jaxdamp.bench.sets import BenchSet, as_runs as as_runs
+from jaxdamp.bench.settings import by_number as by_number, settings_apart as settings_apart
 from jaxdamp.bench.velocity import estimate_velocity
 from jaxdamp.bench.virtual_dyno import VirtualDyno
 from jaxdamp.bench.waveforms import MultiSineTest, TriangleTest
@@ -91,10 +92,12 @@ __shared__ = [
     "Preflight",
     "VelocityLoops",
     "as_runs",
+    "by_number",
     "contradictions_in_words",
     "fold_cycles",
     "last_steady_cycle",
     "moving_part",
+    "settings_apart",
     "steady_cycles",
 ]
 

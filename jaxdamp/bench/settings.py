@@ -91,7 +91,7 @@ def settings_apart(runs: Sequence[BenchRun]) -> tuple[dict[str, str], str]:
     if not apart or len(apart) < _RECUR * alike:
         return {}, ""
     begin = f"{len(apart)} of {alike} pairs of records of the same motion differ in force: "
-    remedy = "State what was set as `command`."
+    remedy = "To say it, state what was set on the damper (`command`)."
     kinds = [
         (what, settings)
         for what, settings in _candidates(runs)
@@ -116,6 +116,10 @@ def _candidates(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
 
 
 def by_number(text: str) -> tuple[float, str]:
-    """What names of settings are sorted by: their first number."""
+    """What names of settings are sorted by: their first number.
+
+    Arguments:
+        text: name of a setting, such as "0.5A".
+    """
     number = _NUMBER.search(text)
     return (float(number.group().replace(",", ".")) if number else float("inf"), text)

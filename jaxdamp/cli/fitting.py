@@ -60,8 +60,9 @@ def fit(
 ) -> None:
     """Fit damper laws to bench records, and say how good they are.
 
-    Writes a report, pictures, tables, and each law as JSON; with --group-by all of this in a folder for each value of
-    the setting. Laws and tables are in the folder before the first picture is drawn.
+    Writes a report, pictures, tables, and each law as JSON; with --group-by, and where records of the same motion
+    contradict one another and their names tell them apart, all of this in a folder for each value of the setting. Laws
+    and tables are in the folder before the first picture is drawn.
 
     Arguments:
         law: names of laws, see "jaxdamp laws": "linear,besinger"; or "all".
@@ -82,11 +83,14 @@ def fit(
         sound, found = reading.checked(screen, raw, refuse=True)
         runs = reading.processed(sound)
         _, held = split(runs, held_out)
-        groups = grouped(runs, group_by)
+        groups, divided = grouped(runs, group_by)
+        if report is not None and len(groups) > 1:
+            remedy = f"{divided} Each group has a page in its folder of --out."
+            _checks.refuse("report", "be left out where records are fitted apart", str(report), remedy)
         for name, part in groups.items():
             if all(run in held.runs for run in part):
                 raise ValueError(f"Option --held-out leaves no record of {name} to fit: hold out fewer.")
-        remarks = decisions(runs)
+        remarks = [*decisions(runs), *filter(None, [divided])]
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
         options["scheduled"] = group_by is None and len({run.command for run in runs}) > 1

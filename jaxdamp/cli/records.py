@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from jaxdamp import _checks, bench, identify
 from jaxdamp._checks import Setting
-from jaxdamp.bench import BenchRun, BenchSet, Preflight
+from jaxdamp.bench import BenchRun, BenchSet, Preflight, by_number, settings_apart
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.wording import in_command_line, in_options
@@ -168,18 +168,34 @@ def value_of(runs: Sequence[BenchRun], name: str) -> Callable[[BenchRun], str]:
     return lambda run: value if isinstance(value := values[run.name], str) else f"{value:g}"
 
 
-def grouped(runs: BenchSet, name: str | None) -> dict[str, BenchSet]:
+def grouped(runs: BenchSet, name: str | None) -> tuple[dict[str, BenchSet], str]:
     """The records by the name of a folder for each value of a setting; all of them by an empty name without one.
+
+    Without a name, records of the same motion that contradict one another are divided as `bench.evaluate` divides them,
+    where what they state or a word of their names tells them apart.
+
+    Returns:
+        The groups; and a sentence where the records divided them.
 
     Raises:
         ValueError: a record does not state the setting, or two values would have the same folder.
     """
+    sentence = ""
     if name is None:
-        return {"": runs}
-    value, groups = value_of(tuple(runs), name), {}
+        settings: dict[str, str] = {}
+        if all(run.command is None for run in runs):
+            settings, sentence = settings_apart(tuple(runs))
+        if all(setting == record for record, setting in settings.items()):  # nothing tells them apart
+            return {"": runs}, ""
+        name, value = "setting", lambda run: settings[run.name]
+        runs = BenchSet(sorted(runs, key=lambda run: by_number(settings[run.name])))
+    else:
+        value = value_of(tuple(runs), name)
+    groups: dict[str, list[BenchRun]] = {}
     for run in runs:
         groups.setdefault(value(run), []).append(run)
     folders = {f"{name}_{value}": re.sub(r"[^\w.+-]+", "_", f"{name}_{value}") for value in groups}
     if len(set(folders.values())) < len(folders):
         _checks.refuse("group_by", "give a folder to each value", ", ".join(folders), "Name the values otherwise.")
-    return {folder: BenchSet(part) for folder, part in zip(folders.values(), groups.values(), strict=True)}
+    parts = zip(folders.values(), groups.values(), strict=True)
+    return {folder: BenchSet(part) for folder, part in parts}, in_command_line(sentence)

@@ -92,6 +92,12 @@ def test_settings_in_names_are_not_pooled(tmp_path: Path) -> None:
     assert "they are taken as settings 0A, 0.5A, by a word of their names" in " ".join(text.split())
     (header, *_) = (tmp_path / "out" / "tables" / "velocities.csv").read_text().splitlines()
     assert header == "quantity,unit,0A,0.5A,change [%]"
+    fits = jaxdamp("fit", tmp_path / "records", "--law", "bilinear", "--out", tmp_path / "fits").output
+    assert "they are taken as settings 0A, 0.5A, by a word of their names" in " ".join(fits.split())
+    laws = [from_json(tmp_path / "fits" / f"setting_{name}" / "best_law.json") for name in ("0A", "0.5A")]
+    assert [float(law.rebound_rate) for law in laws] == [pytest.approx(r, rel=0.02) for r in (1000.0, 3000.0)]
+    page = ("--report", tmp_path / "page.html")
+    assert "fitted apart" in refused(tmp_path, "fit", tmp_path / "records", "--law", "bilinear", *page)
     for number, run in enumerate(runs):
         run.to_csv(tmp_path / f"{'abcd'[number]}.csv")
     other = [tmp_path / f"{letter}.csv" for letter in "abcd"]
