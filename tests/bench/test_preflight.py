@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from jaxdamp import identify
 from jaxdamp.bench import BenchRun, SineTest, VirtualDyno, preflight, read
 from jaxdamp.dampers import Besinger, Bilinear, CoulombFriction, Linear, StribeckFriction
 
@@ -146,6 +147,10 @@ def test_magnitudes_that_no_damper_test_has():
     swapped = BenchRun.from_arrays("swapped", run.time, 1e-2 * run.force, 1e3 * run.stroke)
     (finding, *_) = preflight(swapped).named("unusual peak velocity")
     assert "unusual: the peak velocity is" in finding.message and "exchanged" in finding.remedy
+    far = BenchRun.from_arrays("stroke in km", run.time, 1e6 * run.stroke, run.force)
+    assert preflight(far).findings[0].severity == "error"
+    with pytest.raises(ValueError, match=r"the peak velocity is .* or the stroke in m or mm"):
+        identify.fit(Linear, far)
     slow = BenchRun.from_arrays("time in ms", 1e3 * run.time, run.stroke, run.force)
     assert "Hz" in preflight(replace(slow, time=1e3 * slow.time)).named("unusual frequency")[0].unit
 

@@ -34,7 +34,14 @@ FAMILIES = (
     ),
 )
 # The checks that find errors, which are quick.
-ERRORS = (sample_checks.repeated, sample_checks.edges, sample_checks.clipping, consistency.velocity, consistency.sign)
+ERRORS = (
+    motion_checks.magnitudes,
+    sample_checks.repeated,
+    sample_checks.edges,
+    sample_checks.clipping,
+    consistency.velocity,
+    consistency.sign,
+)
 # What is in the names of warnings, by what it does to results; all others come behind.
 CONSEQUENCE = ("unusual", "changes", "jump", "dropout", "held", "spikes", "velocity", "contradiction", "sign", "delay")
 BAD_RECORDS = ("refuse", "leave_out", "keep")

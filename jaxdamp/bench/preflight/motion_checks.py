@@ -17,6 +17,8 @@ _USUAL = (
     ("largest force", "N", 1.0, 2e5, "Is the force in kN, or stroke and force exchanged?"),
     ("ratio of force and velocity", "N s/m", 20.0, 1e6, "Is one of the units of time, stroke and force another one?"),
 )
+_IMPOSSIBLE = 10.0  # times the usual upper end of these two, from which a unit is wrong
+_BOUNDED = ("peak velocity", "amplitude")  # a spike may be the largest force
 
 
 def rest(e: Examined) -> list[Finding]:
@@ -82,7 +84,7 @@ def few_samples(e: Examined) -> list[Finding]:
 
 
 def magnitudes(e: Examined) -> list[Finding]:
-    """Numbers that no damper test has."""
+    """Numbers that no damper test has; an error where one is so large that a unit must be wrong."""
     run = e.run
     ratio = float(np.std(run.force) / np.std(run.velocity))
     values = (
@@ -97,7 +99,8 @@ def magnitudes(e: Examined) -> list[Finding]:
     for value, (what, unit, low, high, question) in zip(values, _USUAL, strict=True):
         if not low <= value <= high:
             message = f"unusual: the {what} is {value:.3g} {unit}"
-            findings += e.finding("warning", f"unusual {what}", message, value, unit, None, question)
+            severity = "error" if what in _BOUNDED and value > _IMPOSSIBLE * high else "warning"
+            findings += e.finding(severity, f"unusual {what}", message, value, unit, None, question)
     return findings
 
 
