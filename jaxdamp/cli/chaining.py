@@ -11,7 +11,7 @@ from jaxdamp.cli.console import Screen
 from jaxdamp.cli.fitting import fit_laws, show, write_fits
 from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.records import Reading, decisions, law_names
+from jaxdamp.cli.records import Reading, decisions, grouped, law_names
 from jaxdamp.cli.riding import Driving, unusual
 from jaxdamp.cli.tuning import exit_code_of, tuned, tuning_arguments, write_tuning
 from jaxdamp.cli.vehicle_words import parse_vehicle
@@ -56,6 +56,9 @@ def report(
             raw = reading.raw(files)
         sound, preflight = reading.checked(screen, raw, refuse=True)
         runs = reading.processed(sound)
+        groups, divided = grouped(runs, None)
+        if len(groups) > 1:
+            raise ValueError(f"A report is on one setting of a damper: name the records of one. {divided}")
         remarks = decisions(runs)
         screen.table(records_table(tuple(runs)))
         screen.points(remarks)

@@ -98,6 +98,7 @@ def test_settings_in_names_are_not_pooled(tmp_path: Path) -> None:
     assert [float(law.rebound_rate) for law in laws] == [pytest.approx(r, rel=0.02) for r in (1000.0, 3000.0)]
     page = ("--report", tmp_path / "page.html")
     assert "fitted apart" in refused(tmp_path, "fit", tmp_path / "records", "--law", "bilinear", *page)
+    assert "name the records of one" in refused(tmp_path, "report", tmp_path / "records", "--law", "bilinear")
     for number, run in enumerate(runs):
         run.to_csv(tmp_path / f"{'abcd'[number]}.csv")
     other = [tmp_path / f"{letter}.csv" for letter in "abcd"]
