@@ -56,6 +56,26 @@ def named_laws(vehicle: AbstractVehicle) -> dict[str, AbstractDamper]:
     return dict(zip(vehicle.layout.ports, vehicle.elements(), strict=True))
 
 
+def over_runs(runs: Sequence[dict[str, list[RangeUse]]]) -> dict[str, list[RangeUse]]:
+    """The uses of each damper in several runs of one length as one: the extremes, and the mean share of the time.
+
+    Arguments:
+        runs: uses by the name of the damper, of one vehicle on several roads.
+    """
+    together: dict[str, dict[tuple[str, str], list[RangeUse]]] = {}
+    for uses in runs:
+        for name, of_damper in uses.items():
+            for use in of_damper:
+                together.setdefault(name, {}).setdefault((use.law, use.quantity), []).append(use)
+    return {name: [_over_runs(same) for same in groups.values()] for name, groups in together.items()}
+
+
+def _over_runs(uses: Sequence[RangeUse]) -> RangeUse:
+    used = min(use.used[0] for use in uses), max(use.used[1] for use in uses)
+    shares = [use.share for use in uses if use.share is not None]
+    return uses[0]._replace(used=used, share=sum(shares) / len(uses) if shares else None)
+
+
 def range_sentences(uses: dict[str, Sequence[RangeUse]] | dict[str, list[RangeUse]]) -> tuple[str, ...]:
     """A sentence for each damper that leaves its range.
 
