@@ -11,6 +11,7 @@ from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
 from jaxdamp.simulation.observer import MetricObserver as MetricObserver
 from jaxdamp.simulation.range_notes import (
+    far_outside as far_outside,
     named_laws as named_laws,
     over_runs as over_runs,
     range_sentences as range_sentences,
@@ -58,6 +59,7 @@ __shared__ = [
     "AxleTiming",
     "MetricObserver",
     "RunCheck",
+    "far_outside",
     "moves_axles",
     "named_laws",
     "over_runs",

@@ -4,15 +4,12 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from jaxdamp.dampers import RangeUse, has_fitted_range
+from jaxdamp.dampers import has_fitted_range
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import WhiteRoad
-from jaxdamp.simulation import DEVIATIONS, CoarseStepWarning, Ride, over_runs, range_sentences
+from jaxdamp.simulation import DEVIATIONS, CoarseStepWarning, Ride, far_outside, over_runs, range_sentences
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.vehicles import AbstractVehicle
-
-
-FAR = 0.01  # share of the time outside the fitted range from which a verdict cannot be trusted
 
 
 def rides_on(
@@ -75,17 +72,4 @@ def range_notes(
         reach = f" (velocities of {DEVIATIONS:g} standard deviations)" if white else ""
         uses = over_runs([ride.range_use() for ride in ridden])
         notes += [f"{when}{reach}, {sentence}" for sentence in range_sentences(uses)]
-    briefly = (_excess(name, [use for use in used if (use.share or 0.0) >= FAR]) for name, used in uses.items())
-    return notes, [text for text in briefly if text]
-
-
-def _excess(name: str, uses: Sequence[RangeUse]) -> str:
-    """As in "damper at 5.6 times the velocity and 1.8 times the stroke of its records, 46 % of the time"."""
-    ratios = {use.quantity: use.times for use in uses if use.outside and use.times is not None}
-    if "velocity" in ratios:
-        ratios.pop("force", None)  # it follows from the velocity
-    if not ratios:
-        return ""
-    times = " and ".join(f"{ratio:.2g} times the {quantity}" for quantity, ratio in ratios.items())
-    share = max(use.share or 0.0 for use in uses if use.quantity in ratios)
-    return f"{name.replace('_', ' ')} at {times} of its records, {100 * share:.0f} % of the time"
+    return notes, far_outside(uses)
