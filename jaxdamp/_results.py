@@ -35,6 +35,23 @@ class Derived:
         return self.function(instance)
 
 
+def drawn_by(name: str, text: str) -> "Callable[..., matplotlib.figure.Figure]":
+    """The method `plot` of a result.
+
+    Arguments:
+        name: of the function in `jaxdamp.plots`, which gets the result and all further arguments.
+        text: what it shows.
+    """
+
+    def plot(self: Any, *values: Any, **options: Any) -> "matplotlib.figure.Figure":
+        from jaxdamp import plots
+
+        return getattr(plots, name)(self, *values, **options)
+
+    plot.__doc__ = f"{text} (`plots.{name}`)"
+    return plot
+
+
 class AbstractResult(ABC):
     """A result of a fit, a tuning or a study: what code branches on, what a person reads, what a file holds.
 

@@ -6,22 +6,18 @@ parameter that seems certain is therefore moved away in growing steps, and all o
 """
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp.dampers import keeps_conditions
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.solve import BoundedLevenbergMarquardt
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 STEPS = 15  # of each search; an incomplete search makes an error smaller, never larger
@@ -146,11 +142,7 @@ class ProfileCurve(AbstractResult):
         """The curve and its intervals as plain data."""
         return plain({field.name: getattr(self, field.name) for field in dataclasses.fields(self)})
 
-    def plot(self) -> "Figure":
-        """Cost over value, with the interval and the parabola of the standard error."""
-        from jaxdamp.plots import profile
-
-        return profile(self)
+    plot = drawn_by("profile", "Cost over value, with the interval and the parabola of the standard error.")
 
 
 def profile_curve(evidence: Evidence, name: str, linear: tuple[float, float]) -> ProfileCurve:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, final
+from typing import Any, NamedTuple, TypeAlias, final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
+from jaxdamp._results import drawn_by
 from jaxdamp._tables import Column, Table, plain, plus_minus
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
@@ -24,10 +25,6 @@ from jaxdamp.identify.search import SearchEnd, Solver
 from jaxdamp.identify.several import Solution, equally_good, scattered_starts, search_each
 from jaxdamp.parameters import FreeParameters, Parameter, free_parameters, interval, match_paths, name_patterns, real
 from jaxdamp.simulation import Ride
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 APART = 0.01  # relative difference of a parameter between them that is named
@@ -81,11 +78,7 @@ class TargetFit(Fit):
         ]
         return Table("Targets", tuple(columns), tuple(rows))
 
-    def plot(self) -> "matplotlib.figure.Figure":
-        """The distance of each value from its target (`plots.targets`)."""
-        from jaxdamp import plots
-
-        return plots.targets(self)
+    plot = drawn_by("targets", "The distance of each value from its target.")
 
     @property
     def summary(self) -> str:

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -14,6 +14,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._results import drawn_by
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp._traced import of_known_numbers
@@ -28,10 +29,6 @@ from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.traces import batches
 from jaxdamp.parameters import Coordinates
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 CHUNK = 25  # steps in one compiled call, after which the held-out records are evaluated
@@ -85,11 +82,7 @@ class Training(AbstractFitted):
             "stopped": self.stopped,
         }
 
-    def plot(self, **options: Any) -> "Figure":
-        """The errors over the steps of the training."""
-        from jaxdamp.plots import training_history
-
-        return training_history(self, **options)
+    plot = drawn_by("training_history", "The errors over the steps of the training.")
 
     @property
     def summary(self) -> str:

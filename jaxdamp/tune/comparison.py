@@ -1,18 +1,14 @@
 """The result of `compare_dampers`: differences between dampers in ride metrics, with their uncertainty."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table, plain, plus_minus, typeset_unit
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class Difference(NamedTuple):
@@ -106,8 +102,4 @@ class DamperComparison(AbstractResult):
             "differences": [plain(d._asdict()) | {"significant": bool(d.significant)} for d in self.differences],
         }
 
-    def plot(self, **options: Any) -> "Figure":
-        """The change of each metric with its interval, and the share of each source."""
-        from jaxdamp.plots import damper_comparison
-
-        return damper_comparison(self, **options)
+    plot = drawn_by("damper_comparison", "The change of each metric with its interval, and the share of each source.")

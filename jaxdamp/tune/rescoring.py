@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
 from jaxdamp._types import Scalar
 from jaxdamp.metrics import Metric
@@ -26,8 +26,6 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 if TYPE_CHECKING:
-    import matplotlib.figure
-
     from jaxdamp.tune.result import TuneResult
 
 FEWEST = 4  # fresh roads before their interval is looked at; then twice as many, and so on
@@ -96,11 +94,7 @@ class Rescore(AbstractResult):
         more = (Column("smallest", "%", "+.1f"), Column("largest", "%", "+.1f"))
         return comparison_table(title, "metric", ("before", "after"), rows, more)
 
-    def plot(self) -> "matplotlib.figure.Figure":
-        """The change of each ride metric on each road (`plots.rescore`)."""
-        from jaxdamp import plots
-
-        return plots.rescore(self)
+    plot = drawn_by("rescore", "The change of each ride metric on each road.")
 
     def content(self) -> dict[str, Any]:
         """All metrics on each road with units, ready for JSON; numbers that are not finite are None."""

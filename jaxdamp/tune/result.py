@@ -4,13 +4,13 @@ import dataclasses
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_tied, with_unit
 from jaxdamp.tune.limits import LimitRange, written
@@ -20,10 +20,6 @@ from jaxdamp.tune.scenarios import Road
 from jaxdamp.tune.spectra import Spectrum, spectra
 from jaxdamp.tune.verdict import Verdict, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 V = TypeVar("V", bound=AbstractVehicle)
@@ -180,11 +176,7 @@ class TuneResult(AbstractResult, Generic[V]):
         """Better or not, by how much and at what price: on fresh roads if there are any."""
         return verdict_of(self)
 
-    def plot(self, **options: Any) -> "Figure":
-        """The laws and the metrics before and after."""
-        from jaxdamp.plots import tuning
-
-        return tuning(self, **options)
+    plot = drawn_by("tuning", "The laws and the metrics before and after.")
 
     @property
     def summary(self) -> str:

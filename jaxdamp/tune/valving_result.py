@@ -1,19 +1,15 @@
 """The result of a choice of valving."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp.dampers import MonoTube
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class ValveParameter(NamedTuple):
@@ -144,11 +140,7 @@ class ValvingResult(AbstractResult):
             "force": with_unit(self.force, "N"),
         }
 
-    def plot(self) -> "Figure":
-        """Wanted and reached force over velocity, with the parts out of reach, and the error below."""
-        from jaxdamp.plots import valving
-
-        return valving(self)
+    plot = drawn_by("valving", "Wanted and reached force over velocity with the parts out of reach; the error.")
 
     def __repr__(self) -> str:
         return f"{self.summary}\n{self.table().to_text()}"
