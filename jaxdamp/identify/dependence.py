@@ -17,21 +17,13 @@ OWN = -1  # in place of a degree: every damper has its own value
 
 
 class Dependence(NamedTuple):
-    """How the coordinates of each damper follow from one vector: its own values, then coefficients of polynomials.
+    """How the coordinates of each damper follow from one vector: its own values, then coefficients of polynomials."""
 
-    Attributes:
-        degree: of the polynomial of each coordinate in the setting, `OWN` for one that differs from damper to damper.
-        basis: Legendre polynomials of each damper's setting, scaled to −1 … 1.
-        column: of the vector, for each damper and coordinate (the first of a polynomial).
-        size: of the vector.
-        ends: lowest and highest setting.
-    """
-
-    degree: Int[np.ndarray, " free"]
-    basis: Float[np.ndarray, "dampers degrees"]
-    column: Int[np.ndarray, "dampers free"]
-    size: int
-    ends: tuple[float, float]
+    degree: Int[np.ndarray, " free"]  # of the polynomial of each coordinate in the setting, or `OWN`
+    basis: Float[np.ndarray, "dampers degrees"]  # Legendre polynomials of each damper's setting, scaled to −1 … 1
+    column: Int[np.ndarray, "dampers free"]  # of the vector, for each damper and coordinate (the first of a polynomial)
+    size: int  # of the vector
+    ends: tuple[float, float]  # lowest and highest setting
 
     def at_dampers(self, vector: Float[np.ndarray, " size"]) -> Float[np.ndarray, "dampers free"]:
         """The coordinates of every damper."""
@@ -76,13 +68,7 @@ class Dependence(NamedTuple):
         return Bounds(*sides)
 
     def gathered(self, here: Linearisation, products: Products, inside: bool) -> tuple[Linearisation, Products]:
-        """The problem of all dampers together, by the vector.
-
-        Arguments:
-            here: of each damper.
-            products: of each damper.
-            inside: whether all coordinates are within their bounds.
-        """
+        """The problem of all dampers together, by the vector."""
         together = np.zeros((self.size + 1, self.size + 1))
         slopes = np.zeros((*here.margins.shape, self.size))
         for damper, (own, by_y) in enumerate(zip(products, here.margin_slopes, strict=True)):
@@ -109,11 +95,7 @@ def dependence(
     settings: Sequence[float | int] | None,
     dampers: int,
 ) -> Dependence | None:
-    """The dependence that the arguments of `fit_many` state; `None` if every damper has its own values.
-
-    Raises:
-        ValueError: an unknown parameter; a degree below zero or too high for the settings; no settings.
-    """
+    """The dependence that the arguments of `fit_many` state; `None` if every damper has its own values."""
     degrees = dict(shared) if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
     if not degrees:
         return None

@@ -65,19 +65,12 @@ class Missed(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """Many dampers as one problem; a lane is a set of numbers for one of them.
+    """Many dampers as one problem; a lane is a set of numbers for one of them."""
 
-    Attributes:
-        coordinates: of the free numbers, common to all dampers.
-        groups: the records.
-        damper: the damper of each lane.
-        priors: what is known of the numbers beforehand.
-    """
-
-    coordinates: Coordinates
-    groups: tuple[Group, ...]
-    damper: Int[np.ndarray, " lanes"]
-    priors: LanePriors | None = None
+    coordinates: Coordinates  # of the free numbers, common to all dampers
+    groups: tuple[Group, ...]  # the records
+    damper: Int[np.ndarray, " lanes"]  # the damper of each lane
+    priors: LanePriors | None = None  # what is known of the numbers beforehand
 
     def linearise(
         self, y: Float[np.ndarray, "some free"], lanes: Int[np.ndarray, " some"]

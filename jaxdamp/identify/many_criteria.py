@@ -15,28 +15,16 @@ from jaxdamp.solve import SearchLanes
 
 
 class Fitted(NamedTuple):
-    """The ends of all dampers, one lane each, and the lanes with the weights of the last round.
+    """The ends of all dampers, one lane each, and the lanes with the weights of the last round."""
 
-    Attributes:
-        lanes: with the final weights.
-        end: of each damper.
-        factor: on the noise that weighted residuals show, because of a robust loss.
-        share_left_out: of the samples of each damper that a robust loss gives less than half weight.
-    """
-
-    lanes: Lanes
-    end: SearchLanes
-    factor: Float[np.ndarray, " dampers"]
-    share_left_out: Float[np.ndarray, " dampers"]
+    lanes: Lanes  # with the final weights
+    end: SearchLanes  # of each damper
+    factor: Float[np.ndarray, " dampers"]  # on the noise that weighted residuals show, because of a robust loss
+    share_left_out: Float[np.ndarray, " dampers"]  # of its samples, with less than half weight by a robust loss
 
 
 def noise_level(weighted: list[np.ndarray], free: float | int) -> float:
-    """Standard deviation of the weighted residual of a damper, larger where it is correlated.
-
-    Arguments:
-        weighted: residuals of each record.
-        free: count of free numbers.
-    """
+    """Standard deviation of the weighted residual of a damper, larger where it is correlated."""
     size = sum(residual.size for residual in weighted)
     squares = sum(float(residual @ residual) for residual in weighted) / max(size - free, 1)
     alike = correlation_time(weighted)
@@ -50,15 +38,7 @@ def by_rounds(
     solve: Callable[[Lanes, Float[np.ndarray, "lanes free"]], SearchLanes],
     depends: Dependence | None = None,
 ) -> Fitted:
-    """Least squares again with new weights, until each damper moves no more; each ends by itself.
-
-    Arguments:
-        plain: the dampers with one lane each and the weights as stated.
-        end: the ends of plain least squares.
-        loss: a name in `LOSSES`.
-        solve: least squares of some lanes from some coordinates.
-        depends: of dampers that share parameters, which move and end together.
-    """
+    """Least squares again with new weights, until each damper moves no more; each ends by itself."""
     count, free = end.y.shape
     lanes, factor, share = plain, np.ones(count), np.zeros(count)
     roots, levels = [np.ones(np.shape(group.batch.weight)) for group in plain.groups], plain.levels()

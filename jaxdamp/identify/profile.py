@@ -56,14 +56,6 @@ def profile(
     A parameter at a distance d from its value should increase chi-square by (d/error)². If the other parameters can
     compensate so that the increase is less than `CHI_SQUARE`, the error is at least d over the root of the increase, or
     d if there is hardly any increase.
-
-    Arguments:
-        problem: the problem that was minimised.
-        found: the minimum.
-        errors: standard errors from the Jacobian.
-        far: largest distance to try for each parameter, or three standard errors if these are more.
-        chosen: the parameters to move.
-        variance: variance of the noise of a weighted sample.
     """
     wide, open_ended, left = errors.copy(), np.zeros(errors.shape, bool), MOST_STEPS
     sides = [(int(i), side) for i in np.flatnonzero(chosen & (errors > 0)) for side in (-1.0, 1.0)]

@@ -67,12 +67,6 @@ def search_from(problem: Problem, *, starts: int | None, max_steps: int, solver:
 
     If another start leads to a better end, new proposals are made from there, so that more than one parameter can be
     wrong at the start.
-
-    Arguments:
-        problem: the problem with its start.
-        starts: largest number of starts; all proposed ones if `None`.
-        max_steps: largest number of steps of each search.
-        solver: as in `search`.
     """
     best = search(problem, max_steps, solver=solver)
     ends, tried = [best], [np.asarray(problem.free.values)]
@@ -111,14 +105,7 @@ def scattered_starts(free: FreeParameters, count: int, seed: int) -> list[Float[
 def search_each(
     problem: Problem, starts: Sequence[Float[np.ndarray, " free"]], max_steps: int, solver: Solver | None = None
 ) -> Solution:
-    """Search from every start to its end; the first of those that count as equally good is the best.
-
-    Arguments:
-        problem: in residuals of unit noise: channels in their noise, targets in their tolerance.
-        starts: values of the free numbers.
-        max_steps: largest number of steps of each search.
-        solver: as in `search`.
-    """
+    """Search from every start to its end; the first of those that count as equally good is the best."""
     allowed = [v for i, v in enumerate(starts) if i == 0 or keeps_conditions(problem.free.started_at(v).tree)]
     ends = [search(problem.started_at(values), max_steps, solver=solver) for values in allowed]
     squares = np.array([end.squares if end.finite else np.inf for end in ends])
@@ -152,11 +139,6 @@ def minima_of(solution: Solution, names: Sequence[str], variance: float) -> tupl
 
     Two ends are the same minimum if their sums of squares differ by less than the noise, and if by the Jacobian of the
     better one their parameters give almost the same force.
-
-    Arguments:
-        solution: the ends of the searches.
-        names: names of the free numbers.
-        variance: variance of the noise of a weighted sample.
     """
     best = solution.best
     groups: list[tuple[SearchEnd, int]] = []

@@ -206,12 +206,6 @@ def first_refused(
 ) -> tuple[int, float, FreeParameters] | None:
     """The number by which the end of a search is refused; None if no single number makes the difference.
 
-    Arguments:
-        free: the free parameters.
-        start: values that are accepted.
-        end: values that are not.
-        accepted: whether `simulate` takes a vehicle with these values.
-
     Returns:
         Its index, its last accepted value, and the free parameters with this value as limit.
     """
@@ -253,17 +247,11 @@ def in_units(free: FreeParameters, units: Mapping[str, str]) -> FreeParameters:
 
 
 class FreeScale(NamedTuple):
-    """Numbers that may all grow by one factor without any change of the channels, and the one that is held.
+    """Numbers that may all grow by one factor without any change of the channels, and the one that is held."""
 
-    Attributes:
-        names: of the numbers; empty if the records show the scale.
-        held: index of the number held, the first mass if there is one; None if none can be.
-        held_name: its name.
-    """
-
-    names: tuple[str, ...] = ()
-    held: int | None = None
-    held_name: str = ""
+    names: tuple[str, ...] = ()  # of the numbers; empty if the records show the scale
+    held: int | None = None  # index of the number held, the first mass if there is one; None if none can be
+    held_name: str = ""  # its name
 
 
 def force_powers(free: FreeParameters) -> Float[np.ndarray, " free"]:

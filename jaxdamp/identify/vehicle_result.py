@@ -204,13 +204,7 @@ def _predict(batch: RideBatch, model: VehicleTest) -> Array:
 def channel_scores(
     problem: Problem, residual: Float[np.ndarray, " samples"], records: Sequence[RideRecord]
 ) -> tuple[ChannelScore, ...]:
-    """Errors of each channel of each record over the samples that are compared.
-
-    Arguments:
-        problem: the least squares.
-        residual: at the minimum, weighted.
-        records: the records.
-    """
+    """Errors of each channel of each record over the samples that are compared."""
     scores, end, units = {}, 0, problem.law.units
     forces: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for part in problem.residuals:

@@ -87,20 +87,7 @@ def objective_of(
     white: bool,
     argument: str = "metric",
 ) -> Objective:
-    """The objectives of a search on a road.
-
-    Arguments:
-        wanted: one or more, each the name of a ride metric, a metric, or a function of metrics by name.
-        vehicle: the vehicle to tune.
-        more: further metrics, which the functions or limits can use.
-        limited: names of the metrics with limits.
-        white: whether roads are white, so that only metrics that follow from an RMS are available.
-        argument: name of `wanted` in messages.
-
-    Raises:
-        ValueError: an unknown metric, one that is not available on this kind of road, or one without a derivative; a
-            function that does not return one number; two objectives of one name.
-    """
+    """The objectives of a search on a road."""
     extra = vehicle.chosen_metrics(list(more), "metrics", white=white) if more else []
     own = [one for one in wanted if isinstance(one, Metric)]
     extra += vehicle.chosen_metrics(own, argument) if own else []

@@ -231,11 +231,6 @@ def _notes_on_points(front: ParetoFront, task: DesignTask[Any], start_on_fresh: 
     """Limits that the points do not keep by their true values or on fresh roads; doubts about step and fitted ranges.
 
     The step and the ranges are looked at at the ends and the knee of the front.
-
-    Arguments:
-        front: the front.
-        task: its task.
-        start_on_fresh: the metrics of the start on the fresh roads, for relative limits.
     """
     notes = []
     exact = {m.name: other for m in task.objective.metrics if (other := exact_counterpart(m))}
@@ -269,15 +264,7 @@ def _with_designs_between(
     limits: Sequence[Limit],
     count: int,
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """The designs of a front with others between them, as far as no other one beats them and they keep all limits.
-
-    Arguments:
-        evaluator: simulates the designs.
-        designs: of the front, more than objectives.
-        numbers: of these designs, by name.
-        limits: of numbers.
-        count: number of designs to interpolate.
-    """
+    """The designs of a front with others between them, as far as no other one beats them and they keep all limits."""
     from scipy.interpolate import RBFInterpolator
 
     space, names = evaluator.task.space, evaluator.task.objective.names

@@ -62,25 +62,15 @@ class Choice:
 @final
 @dataclasses.dataclass(frozen=True)
 class SearchRange:
-    """Free numbers with the closed range of each, in physical units and double precision.
+    """Free numbers with the closed range of each, in physical units and double precision."""
 
-    Attributes:
-        coordinates: those of the search, whose free parameters are the vehicle's.
-        start: the value of each number to start from.
-        unit: the value of each number where its coordinate is one.
-        lower: the smallest allowed value of each number.
-        upper: the largest allowed value of each number.
-        origin: where the two bounds of each number come from: `"default"`, `"given"` or `"domain"`.
-        choices: the values that each number may take at the end; None for all between its bounds.
-    """
-
-    coordinates: Coordinates
-    start: np.ndarray
-    unit: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    origin: tuple[tuple[str, str], ...]
-    choices: tuple[Choice | None, ...]
+    coordinates: Coordinates  # those of the search, whose free parameters are the vehicle's
+    start: np.ndarray  # the value of each number to start from
+    unit: np.ndarray  # the value of each number where its coordinate is one
+    lower: np.ndarray  # the smallest allowed value of each number
+    upper: np.ndarray  # the largest allowed value of each number
+    origin: tuple[tuple[str, str], ...]  # of the two bounds of each number: "default", "given" or "domain"
+    choices: tuple[Choice | None, ...]  # the values allowed at the end; None for all between the bounds
 
     @property
     def is_choice(self) -> Bool[np.ndarray, " free"]:
@@ -106,12 +96,7 @@ def search_range(
     bounds: Mapping[str, Any] | None,
     tie: Mapping[str, str] | None = None,
 ) -> SearchRange:
-    """The free parameters and their ranges: of all dampers what a workshop can change, if `over` is None.
-
-    Raises:
-        ValueError: names that fit no parameter, or no free one; bounds of a wrong shape, given twice, or without the
-            start between them; dampers of which nothing can be changed.
-    """
+    """The free parameters and their ranges: of all dampers what a workshop can change, if `over` is None."""
     over = _adjustable(vehicle) if over is None else over
     in_over, names = (over, list(over)) if isinstance(over, Mapping) else ({}, over)
     free = free_parameters(vehicle, over=name_patterns("over", names), freeze=freeze, tie=tie)

@@ -186,15 +186,6 @@ def on_fresh_roads(
 ) -> Rescore | None:
     """The vehicle before and after on other realisations of a road, on so many that gain and limits are decided.
 
-    Arguments:
-        cars: before and after.
-        road: of the tuning.
-        numbers: of the realisations, as many as there may be.
-        allowed: the limits.
-        objective: of the tuning.
-        units: of its metrics.
-        run: as in `simulate`.
-
     Returns:
         None where there is no other realisation.
     """

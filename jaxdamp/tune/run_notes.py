@@ -29,13 +29,7 @@ def rides_on(
 
 
 def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]) -> list[str]:
-    """A sentence if the step is too long or too coarse for the tuned vehicle, or if its laws need more substeps.
-
-    Arguments:
-        start: the vehicle before, for which the substeps were chosen.
-        tuned: the vehicle after.
-        ride_of: the ride of a vehicle, on a road that is driven over.
-    """
+    """A sentence if the step is too long or too coarse for the tuned vehicle, or if its laws need more substeps."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("ignore")
         taken = ride_of(start).substeps
@@ -56,13 +50,7 @@ def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable
 def range_notes(
     start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]
 ) -> tuple[list[str], list[str]]:
-    """A sentence for each damper used outside its fitted range, before and after the tuning; and those far outside.
-
-    Arguments:
-        start: the vehicle before.
-        tuned: the vehicle after.
-        ride_of: the ride of a vehicle; on a white road, velocities up to three standard deviations are compared.
-    """
+    """A sentence for each damper used outside its fitted range, before and after the tuning; and those far outside."""
     if not has_fitted_range((start, tuned)):
         return [], []
     notes, uses = [], {}

@@ -39,13 +39,6 @@ DOUBLE, SINGLE = Tolerance(1e-4, 1e-6, 1e-13), Tolerance(1e-2, 1e-4, 1e-6)
 class DesignTask(Generic[V]):
     """The numbers that a search computes of a vehicle, and the ranges in which they must stay.
 
-    Arguments:
-        objectives: one or more, as the `metric` of `minimise`.
-        vehicle: to start from.
-        road: as in `minimise`.
-        argument: name of the objectives in messages.
-        settings: all of them, as in `minimise`.
-
     Attributes:
         objective: all objectives, with their metrics.
         space: the free parameters and their ranges.
@@ -95,11 +88,7 @@ class DesignTask(Generic[V]):
         return dict(zip(self.names, map(float, values), strict=True))
 
     def limits(self, before: Mapping[str, float]) -> list[Limit]:
-        """All limits, in every scenario, their distances scaled by the numbers of the start.
-
-        Raises:
-            ValueError: a start without finite metrics; only a true peak or settling time beside a smooth one may be so.
-        """
+        """All limits, in every scenario, their distances scaled by the numbers of the start."""
         exact = {m.name for m in self.objective.beside}
         wrong = {name: x for name, x in before.items() if name not in exact and not np.isfinite(x)}
         if wrong:
@@ -143,10 +132,6 @@ class DesignTask(Generic[V]):
 @final
 class Evaluator:
     """The rows that a search follows, at points given by their coordinates: objectives, then ends of limits.
-
-    Arguments:
-        task: with the metrics and the free parameters.
-        lanes: points simulated side by side.
 
     Attributes:
         program: that computes the numbers.
@@ -220,14 +205,7 @@ def is_white(road: Any) -> bool:
 
 
 def check_call(call: str, vehicle: Any, road: Any, counts: Mapping[str, Any]) -> None:
-    """Refuse what is no vehicle or no road, and counts below their least value.
-
-    Arguments:
-        call: as it should be written, for messages.
-        vehicle: the argument of this name.
-        road: the argument of this name.
-        counts: value by argument; the others are not looked at.
-    """
+    """Refuse what is no vehicle or no road, and counts below their least value."""
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
     _checks.untraced("vehicle", vehicle, "Call it outside `jax.jit` and `jax.grad`; a `Ride` can be traced.")
     if not isinstance(road, Scenarios):

@@ -153,13 +153,7 @@ def workshop_notes(space: SearchRange) -> list[str]:
 
 
 def without_effect(space: SearchRange, sides: tuple[Evaluation, Evaluation], ended: np.ndarray) -> tuple[str, ...]:
-    """The parameters by which the derivative of the metric is zero at the start and at the end, but for rounding.
-
-    Arguments:
-        space: the free parameters.
-        sides: metric and derivatives at the start and at the end.
-        ended: the values at the end.
-    """
+    """The parameters by which the derivative of the metric is zero at the start and at the end, but for rounding."""
     idle = np.ones(len(ended), bool)
     for at, (_, rows, slopes) in zip((space.start, ended), sides, strict=True):
         rounded = np.abs(slopes[0] * at / space.unit) <= _ROUNDING * abs(rows[0])
