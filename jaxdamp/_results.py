@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jaxdamp._status import Status
-from jaxdamp._tables import Table
+from jaxdamp._tables import Table, plain, with_unit
 
 
 if TYPE_CHECKING:
@@ -90,6 +90,11 @@ class AbstractResult(ABC):
     def content(self) -> dict[str, Any]:
         """What `to_dict` holds beside status, summary and warnings: all tables, unless a class says more."""
         return {name: table.to_dict() for name, table in self.tables().items()}
+
+    def _data(self, *names: str, **units: str) -> dict[str, Any]:
+        """Attributes as plain data, those with a unit as a value with its unit."""
+        values = {name: plain(getattr(self, name)) for name in names}
+        return values | {name: with_unit(getattr(self, name), unit) for name, unit in units.items()}
 
     def to_dict(self) -> dict[str, Any]:
         """The result as numbers with units and words, ready for JSON; numbers that are not finite are None."""

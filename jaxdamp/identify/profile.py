@@ -132,7 +132,7 @@ class ProfileCurve(AbstractResult):
 
     def content(self) -> dict[str, Any]:
         """The curve and its intervals as plain data."""
-        return plain({field.name: getattr(self, field.name) for field in dataclasses.fields(self)})
+        return self._data(*(field.name for field in dataclasses.fields(self)))
 
     plot = drawn_by("profile", "Cost over value, with the interval and the parabola of the standard error.")
 

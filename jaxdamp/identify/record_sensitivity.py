@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, drawn_by
-from jaxdamp._tables import Column, Table, plain
+from jaxdamp._tables import Column, Table
 from jaxdamp.identify.estimating import at_ends
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.propagation import Evidence
@@ -68,8 +68,7 @@ class RecordSensitivity(AbstractResult):
 
     def content(self) -> dict[str, Any]:
         """All derivatives as plain data, ready for JSON; numbers that are not finite are None."""
-        fields = (field.name for field in dataclasses.fields(self) if field.name != "warnings")
-        return plain({name: getattr(self, name) for name in fields})
+        return self._data(*(field.name for field in dataclasses.fields(self) if field.name != "warnings"))
 
     @property
     def summary(self) -> str:

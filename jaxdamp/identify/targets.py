@@ -91,7 +91,7 @@ class TargetFit(Fit):
 
     def content(self) -> dict[str, Any]:
         """Parameters and targets as plain data."""
-        return super().content() | {"targets": [plain({**t._asdict(), "met": t.met}) for t in self.targets]}
+        return super().content() | {"targets": [plain(t) | {"met": t.met} for t in self.targets]}
 
     def __repr__(self) -> str:
         return "\n".join(map(str, (*reversed(self.tables().values()), *(f"warning: {w}" for w in self.warnings))))

@@ -16,7 +16,7 @@ from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._results import drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._tables import Column, Table, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.judging import notes_on
@@ -74,12 +74,7 @@ class Training(AbstractFitted):
         return super().content() | {
             "held_out": [run.name for run in self.held_out],
             "held_out_fit": with_unit(self.held_out_fit_percent, "%"),
-            "held_out_rmse": with_unit(self.held_out_rmse, "N"),
-            "steps": plain(self.steps),
-            "history": with_unit(self.history, "N"),
-            "held_out_history": with_unit(self.held_out_history, "N"),
-            "best_step": self.best_step,
-            "stopped": self.stopped,
+            **self._data("steps", "best_step", "stopped", held_out_rmse="N", history="N", held_out_history="N"),
         }
 
     plot = drawn_by("training_history", "The errors over the steps of the training.")

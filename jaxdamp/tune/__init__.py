@@ -15,12 +15,11 @@
 
 from jaxdamp._deprecated import answer_old_names
 from jaxdamp._status import Status
-from jaxdamp.tune.comparison import DamperComparison
-from jaxdamp.tune.decisions import compare_dampers
+from jaxdamp.tune.decisions import DamperComparison, compare_dampers
 from jaxdamp.tune.front import ParetoFront, hypervolume
 from jaxdamp.tune.limits import limit_spans
 from jaxdamp.tune.minimising import minimise
-from jaxdamp.tune.objective import Targets
+from jaxdamp.tune.objective import Targets, smooth_peak, smooth_settling
 from jaxdamp.tune.pareto_search import pareto
 from jaxdamp.tune.ranges import Choice
 from jaxdamp.tune.rescoring import Rescore, rescore
@@ -32,7 +31,6 @@ from jaxdamp.tune.sensitivities import sensitivity
 from jaxdamp.tune.sensitivity_result import Sensitivity
 from jaxdamp.tune.settings import Design, Run, Search
 from jaxdamp.tune.shape import damper_paths, knee, monotone, ratio, slope
-from jaxdamp.tune.smooth import smooth_peak, smooth_settling
 from jaxdamp.tune.valving_result import ValvingResult
 from jaxdamp.tune.valving_search import valving
 from jaxdamp.tune.verdict import Outcome
@@ -81,16 +79,16 @@ answer_old_names(
     __all__,
     {
         "Attempt": "result",
-        "Change": "result",
+        "Change": "ranges",
         "CurveSensitivity": "sensitivity_result",
-        "Difference": "comparison",
+        "Difference": "decisions",
         "FittedLaw": "decisions",
         "OutOfReach": "valving_result",
         "Scenario": "scenarios",
         "ScenarioRide": "scenario_ride",
         "ScenarioValues": "result",
         "Shape": "shape",
-        "Spectrum": "spectra",
+        "Spectrum": "rescoring",
         "ToleranceEffect": "result",
         "ValveParameter": "valving_result",
     },

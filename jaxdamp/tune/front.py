@@ -179,22 +179,15 @@ class ParetoFront(AbstractResult, Generic[V]):
 
     def content(self) -> dict[str, Any]:
         """The front as numbers with units and words, ready for JSON; numbers that are not finite are None."""
-        return {
+        return self._data("knee", "hypervolume", "fresh", "evaluations", "interpolated", "dropped") | {
             "objectives": list(self.names),
             "metrics": {
                 name: {"points": plain(values), "start": plain(self.before[name]), "unit": self.units[name]}
                 for name, values in self.values.items()
             },
             "parameters": [
-                plain(p._asdict()) | {"points": plain(column)}
-                for p, column in zip(self.parameters, self.designs.T, strict=True)
+                plain(p) | {"points": plain(column)} for p, column in zip(self.parameters, self.designs.T, strict=True)
             ],
-            "knee": self.knee,
-            "hypervolume": plain(self.hypervolume),
             "reference": {name: with_unit(value, self.units[name]) for name, value in self.reference.items()},
-            "fresh": {name: plain(values) for name, values in self.fresh.items()},
             "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
-            "evaluations": self.evaluations,
-            "interpolated": self.interpolated,
-            "dropped": self.dropped,
         }

@@ -3,12 +3,13 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._tables import with_tied
 from jaxdamp.parameters import (
     Coordinates,
     FreeParameters,
@@ -59,6 +60,35 @@ class Choice:
         return list(dict.fromkeys([self.values[max(place - 1, 0)], self.values[min(place, len(self.values) - 1)]]))
 
 
+class Change(NamedTuple):
+    """One parameter before and after.
+
+    Attributes:
+        name: path of the parameter.
+        before: value of the start, in the unit.
+        after: tuned value, in the unit.
+        unit: in SI.
+        note: empty, "at its lower bound" or "at its upper bound".
+        lower: lower bound of the search.
+        upper: upper bound of the search.
+        tied: the numbers that have the same value.
+    """
+
+    name: str
+    before: float
+    after: float
+    unit: str
+    note: str  # "", "at its lower bound" or "at its upper bound"
+    lower: float
+    upper: float
+    tied: tuple[str, ...] = ()  # the numbers that have the same value
+
+    @property
+    def remark(self) -> str:
+        """The note, and the names of the numbers tied to this one."""
+        return with_tied(self.note, self.tied)
+
+
 @final
 @dataclasses.dataclass(frozen=True)
 class SearchRange:
@@ -87,6 +117,16 @@ class SearchRange:
         slack = np.where(self.is_choice, -np.inf, 2 * INSIDE * self.unit)
         low, high = values <= self.lower + slack, values >= self.upper - slack
         return ["lower" if at_low else "upper" if at_high else "" for at_low, at_high in zip(low, high, strict=True)]
+
+    def changes(self, values: np.ndarray) -> tuple[Change, ...]:
+        """Every free number before and after, with its bounds."""
+        free = self.free
+        notes = [f"at its {side} bound" if side else "" for side in self.side(values)]
+        columns = (free.names, self.start, values, free.owners, notes, self.lower, self.upper, free.followers)
+        return tuple(
+            Change(name, float(before), float(after), p.unit, note, float(lower), float(upper), followers)
+            for name, before, after, p, note, lower, upper, followers in zip(*columns, strict=True)
+        )
 
 
 def search_range(

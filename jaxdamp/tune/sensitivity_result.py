@@ -156,9 +156,8 @@ class Sensitivity(AbstractResult):
 
     def content(self) -> dict[str, Any]:
         """All derivatives as plain data, ready for JSON; numbers that are not finite are None."""
-        data = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        curves = {path: curve._asdict() for path, curve in self.curves.items()}
-        return plain(data | {"curves": curves, "elasticities": {name: self.elasticities(name) for name in self.values}})
+        elasticities = {name: plain(self.elasticities(name)) for name in self.values}
+        return self._data(*(field.name for field in dataclasses.fields(self))) | {"elasticities": elasticities}
 
     def __repr__(self) -> str:
         flat = [] if self.hessian is None else [s for name in self.values for s in self.flatness(name)]

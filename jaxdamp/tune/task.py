@@ -1,6 +1,7 @@
-"""The task of a search over designs of a vehicle: objectives, free parameters, limits and shapes."""
+"""The task of a search over designs of a vehicle: objectives, free parameters, limits and shapes; its doubts."""
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, NamedTuple, final
 
 import numpy as np
@@ -8,20 +9,73 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp.dampers import has_fitted_range
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import stationary_notes
+from jaxdamp.simulation import DEVIATIONS, CoarseStepWarning, Ride, range_sentences, stationary_notes
 from jaxdamp.solve import Evaluation, Region
 from jaxdamp.tune.limits import Limit, LimitRange, limit_ends, limit_ranges, scaled
 from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
 from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import V
-from jaxdamp.tune.run_notes import range_notes, rides_on, step_notes
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import LEAST, RUN
 from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
+
+
+FAR = 0.01  # share of the time outside the fitted range from which a verdict cannot be trusted
+
+
+def rides_on(
+    road: Road | Scenarios, metrics: Sequence[Metric], run: Mapping[str, Any]
+) -> list[Callable[[AbstractVehicle], Ride]]:
+    """For each road a function that makes the checked ride of a vehicle on it, in no special condition."""
+    roads = [s.road for s in road.scenarios] if isinstance(road, Scenarios) else [road]
+    distinct = list({id(one): one for one in roads}.values())
+
+    def on(one: Road) -> Callable[[AbstractVehicle], Ride]:
+        return lambda vehicle: Ride(vehicle, one, metrics=metrics, **run)
+
+    return [on(one) for one in distinct]
+
+
+def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]) -> list[str]:
+    """A sentence if the step is too long or too coarse for the tuned vehicle, or if its laws need more substeps."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("ignore")
+        taken = ride_of(start).substeps
+        warnings.simplefilter("always", CoarseStepWarning)
+        try:
+            needed = ride_of(tuned).substeps
+        except ValueError as error:
+            return [f"The tuned vehicle does not bear the step. {error}"]
+    notes = [str(warning.message) for warning in caught]
+    if needed > taken:
+        notes.append(
+            f"The tuned laws need {needed} steps between two instants, and the search took {taken}: tune again from "
+            "this result."
+        )
+    return notes
+
+
+def range_notes(
+    start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]
+) -> tuple[list[str], list[str]]:
+    """A sentence for each damper used outside its fitted range, before and after the tuning; and those far outside."""
+    if not has_fitted_range((start, tuned)):
+        return [], []
+    notes, uses = [], {}
+    for when, vehicle in (("At the start", start), ("After the tuning", tuned)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", CoarseStepWarning)  # reported by the notes on the step
+            ride = ride_of(vehicle)
+        reach = f" (velocities of {DEVIATIONS:g} standard deviations)" if isinstance(ride.road, WhiteRoad) else ""
+        uses = ride.range_use()
+        notes += [f"{when}{reach}, {sentence}" for sentence in range_sentences(uses)]
+    beyond = {name: used for name, used in uses.items() if any((use.share or 0.0) >= FAR for use in used)}
+    return notes, list(range_sentences(beyond))
 
 
 class Tolerance(NamedTuple):

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._tables import Column, Table, with_unit
 from jaxdamp.dampers import MonoTube
 
 
@@ -129,16 +129,9 @@ class ValvingResult(AbstractResult):
 
     def content(self) -> dict[str, Any]:
         """The result as numbers with units and words, ready for JSON; the law is written by `export.to_json`."""
-        return {
-            "feasible": self.feasible,
-            "rmse": with_unit(self.rmse, "N"),
-            "error": with_unit(self.error_percent, "%"),
-            "parameters": [plain(p._asdict()) for p in self.parameters],
-            "out_of_reach": [plain(part._asdict()) for part in self.out_of_reach],
-            "velocity": with_unit(self.velocity, "m/s"),
-            "target_force": with_unit(self.target_force, "N"),
-            "force": with_unit(self.force, "N"),
-        }
+        forces = self._data(rmse="N", velocity="m/s", target_force="N", force="N")
+        error = {"error": with_unit(self.error_percent, "%")}
+        return self._data("feasible", "parameters", "out_of_reach") | forces | error
 
     plot = drawn_by("valving", "Wanted and reached force over velocity with the parts out of reach; the error.")
 
