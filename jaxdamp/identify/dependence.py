@@ -8,11 +8,11 @@ from jaxtyping import Float, Int
 
 from jaxdamp import _checks
 from jaxdamp._triangles import rows_of_products
-from jaxdamp.identify.lanes import Products
 from jaxdamp.parameters import Bounds, FreeParameters, match_paths, name_patterns
 from jaxdamp.solve import Linearisation
 
 
+Products = Float[np.ndarray, "_lanes _columns _columns"]
 OWN = -1  # in place of a degree: every damper has its own value
 
 
@@ -96,6 +96,8 @@ def dependence(
     dampers: int,
 ) -> Dependence | None:
     """The dependence that the arguments of `fit_many` state; `None` if every damper has its own values."""
+    if settings is not None and len(settings) != dampers:
+        _checks.refuse("settings", f"give one number for each of {dampers} dampers", f"{len(settings)} numbers")
     degrees = dict(shared) if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
     if not degrees:
         return None

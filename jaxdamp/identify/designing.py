@@ -227,8 +227,7 @@ def _check(
     if limits is None and tests is None:
         remedy = "Write `limits=MachineLimits(stroke=0.05, velocity=1.0)` or `tests=[...]`."
         _checks.refuse("limits", "be given, or `tests`", "neither", remedy)
-    if runs < 1:
-        _checks.refuse("runs", "be 1 or more", runs)
+    _checks.counts(runs=runs)
     _checks.positive("force_noise", force_noise)
     _checks.one_of("criterion", criterion, CRITERIA)
     if (criterion == "c") != (function is not None):

@@ -185,9 +185,7 @@ def fit_targets(
     """
     goals = _goals(targets, tolerance)
     _checks.one_of("loss", loss, LOSSES)
-    for name, count in (("starts", starts), ("max_steps", max_steps)):
-        if count < 1:
-            _checks.refuse(name, "be 1 or more", count)
+    _checks.counts(starts=starts, max_steps=max_steps)
     free = _free(start, over, freeze, bounds, tie)
     expected = priors_on(free, priors or {}, 1.0)
     padding = max(free.values.size + 1 - len(goals), 0)

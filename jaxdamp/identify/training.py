@@ -210,9 +210,7 @@ def _check(runs: Sequence[BenchRun], held_out: Sequence[BenchRun], steps: int, p
     both = [run.name for run in held_out if any(run is other for other in runs)]
     if both:
         _checks.refuse("held_out", "hold records that are not trained on", ", ".join(both))
-    for name, count in (("steps", steps), ("patience", patience)):
-        if count < 1:
-            _checks.refuse(name, "be 1 or more", count)
+    _checks.counts(steps=steps, patience=patience)
 
 
 @functools.lru_cache

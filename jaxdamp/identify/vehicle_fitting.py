@@ -129,9 +129,7 @@ def fit_vehicle(
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "fit_vehicle(vehicle, records)")
     rides = checked_records(vehicle, records)
-    for name, count in (("max_steps", max_steps), ("starts", starts)):
-        if count < 1:
-            _checks.refuse(name, "be 1 or more", count)
+    _checks.counts(max_steps=max_steps, starts=starts)
     _checks.one_of("loss", loss, LOSSES)
     _checks.nonnegative("settling", settling)
     if settling > 0.5 * min(len(ride) * ride.dt for ride in rides):

@@ -124,9 +124,7 @@ def valving(
     """
     check_module("start", start, (MonoTube,), "valving(target, start)")
     _checks.positive("tolerance", tolerance)
-    for name, number in (("starts", starts), ("substeps", substeps), ("max_steps", max_steps)):
-        if number < 1:
-            _checks.refuse(name, "be 1 or more", number)
+    _checks.counts(starts=starts, substeps=substeps, max_steps=max_steps)
     wanted = _wanted(target, start, velocities, motions)
     size = float(np.sqrt(np.mean(wanted.all_forces**2)))
     if not size > 0.0:
