@@ -98,16 +98,9 @@ def dependence(
     """The dependence that the arguments of `fit_many` state; `None` if every damper has its own values."""
     if settings is not None and len(settings) != dampers:
         _checks.refuse("settings", f"give one number for each of {dampers} dampers", f"{len(settings)} numbers")
-    degrees = dict(shared) if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
-    if not degrees:
+    degree = _degrees(free, shared)
+    if np.all(degree == OWN):
         return None
-    degree = np.full(len(free.names), OWN)
-    paths = [p.path for p in free.chosen]
-    for name, d in degrees.items():
-        if not isinstance(d, int) or d < 0:
-            _checks.refuse(f"shared[{name!r}]", "be the degree of a polynomial, 0 or more", d)
-        named = match_paths(paths, [name])
-        degree[[p.path in named for p in free.owners]] = d
     most = int(degree.max())
     if most > 0 and settings is None:
         remedy = "Give one number for each damper, such as its clicks, or share with degree 0."
@@ -121,3 +114,15 @@ def dependence(
         size += dampers if d == OWN else int(d) + 1
     ends = (float(number.min()), float(number.max()))
     return Dependence(degree, legendre(number, ends, most + 1), column, size, ends)
+
+
+def _degrees(free: FreeParameters, shared: Mapping[str, int] | Sequence[str]) -> Int[np.ndarray, " free"]:
+    """The degree of each number in the setting, `OWN` where every damper has its own."""
+    degrees = dict(shared) if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
+    degree = np.full(len(free.names), OWN)
+    for name, d in degrees.items():
+        if not isinstance(d, int) or d < 0:
+            _checks.refuse(f"shared[{name!r}]", "be the degree of a polynomial, 0 or more", d)
+        named = match_paths([p.path for p in free.chosen], [name])
+        degree[[p.path in named for p in free.owners]] = d
+    return degree

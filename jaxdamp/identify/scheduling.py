@@ -27,6 +27,7 @@ from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
+from jaxdamp.rig import Rig
 
 
 if TYPE_CHECKING:
@@ -289,16 +290,16 @@ class Chain:
         At the settings, where all records are, interpolated parameters and blended forces are one law. So laws of equal
         structure are fitted with interpolated parameters, which takes the states and the time of one law.
         """
-        laws, rigs = [at.law for at in alone.values()], [at.rig for at in alone.values() if at.rig is not None]
+        laws = [at.law for at in alone.values()]
         alike = Scheduled.of_equal_structure(laws)
         shared = self._shared_by(laws)
         means = {path: np.mean([np.asarray(get(law, path)) for law in laws], axis=0) for path in shared}
-        machine = jax.tree.map(lambda *leaves: sum(leaves) / len(leaves), *rigs) if rigs else None
-        place = "law.laws" if rigs else "laws"
+        machine = _mean_machine(alone)
+        place = "laws" if machine is None else "law.laws"
         tie = {f"{place}.{k}.{path}": f"{place}.0.{path}" for path in shared for k in range(1, len(laws))}
         blended = tuple(with_values(law, means) for law in laws)
         scheduled = Scheduled(blended, list(alone), min(alone), "parameters" if alike else "force")
-        held = _held_by_machine(scheduled) if rigs else []
+        held = [] if machine is None else _held_by_machine(scheduled)
         options: dict[str, Any] = self.options | {"starts": 1, "tie": tie, "freeze": [*self.options["freeze"], *held]}
         result = fit(scheduled, [run for setting in alone for run in self.at(setting)], rig=machine, **options)
         return with_blended_forces(result) if alike and blend == "force" else result
@@ -315,6 +316,12 @@ class Chain:
         shown(f"all but {setting:g} as one law")
         result, runs, own = self.together(alone, blend), tuple(self.at(setting)), self.own[setting]
         return LeftOutSetting(setting, runs, result, *result.score(runs)[:2], own.fit_percent, own.rmse)
+
+
+def _mean_machine(alone: Alone) -> Rig | None:
+    """The mean of the machines that were fitted."""
+    rigs = [at.rig for at in alone.values() if at.rig is not None]
+    return jax.tree.map(lambda *leaves: sum(leaves) / len(leaves), *rigs) if rigs else None
 
 
 def _held_by_machine(law: AbstractDamper) -> list[str]:

@@ -20,6 +20,7 @@ from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
 from jaxdamp.identify.left_out import on_free_scale, on_sensors, on_signs
 from jaxdamp.identify.machine import Machine, started_machine
+from jaxdamp.identify.model import VehicleTest
 from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, Solver, search
@@ -154,11 +155,16 @@ def fit_vehicle(
     problem, solution = _solved(data, problem, **how)
     problem, solution, refused = _accepted(data, problem, solution, begin, how | {"starts": 1})
     result = _judged(data, problem, solution, scale, at_start, refused)
-    paths = [p.path for p in parameters(model)]
-    named = matched_in_words([path for path in paths if path.startswith("vehicle.")], over=over or ())
-    others = matched_in_words(paths, freeze=freeze, bounds=bounds or {}, per_record=per_record)
     criterion = criterion_in_words(problem, loss, priors or {})
-    return dataclasses.replace(result, patterns="; ".join(filter(None, (named, others))), criterion=criterion)
+    words = _patterns(model, over=over or (), freeze=freeze, bounds=bounds or {}, per_record=per_record)
+    return dataclasses.replace(result, patterns=words, criterion=criterion)
+
+
+def _patterns(model: VehicleTest, over: Sequence[str], **names: Iterable[str]) -> str:
+    """What each pattern in the call stood for, in words."""
+    paths = [p.path for p in parameters(model)]
+    of_vehicle = matched_in_words([path for path in paths if path.startswith("vehicle.")], over=over)
+    return "; ".join(filter(None, (of_vehicle, matched_in_words(paths, **names))))
 
 
 def _solved(
