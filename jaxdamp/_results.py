@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jaxdamp._status import Status
-from jaxdamp._tables import Table
+from jaxdamp._tables import Table, plain, with_unit
 
 
 if TYPE_CHECKING:
@@ -33,6 +33,23 @@ class Derived:
         if instance is None:
             raise AttributeError(f"{self.name} belongs to a result, not to its class")
         return self.function(instance)
+
+
+def drawn_by(name: str, text: str) -> "Callable[..., matplotlib.figure.Figure]":
+    """The method `plot` of a result.
+
+    Arguments:
+        name: of the function in `jaxdamp.plots`, which gets the result and all further arguments.
+        text: what it shows.
+    """
+
+    def plot(self: Any, *values: Any, **options: Any) -> "matplotlib.figure.Figure":
+        from jaxdamp import plots
+
+        return getattr(plots, name)(self, *values, **options)
+
+    plot.__doc__ = f"{text} (`plots.{name}`)"
+    return plot
 
 
 class AbstractResult(ABC):
@@ -73,6 +90,11 @@ class AbstractResult(ABC):
     def content(self) -> dict[str, Any]:
         """What `to_dict` holds beside status, summary and warnings: all tables, unless a class says more."""
         return {name: table.to_dict() for name, table in self.tables().items()}
+
+    def _data(self, *names: str, **units: str) -> dict[str, Any]:
+        """Attributes as plain data, those with a unit as a value with its unit."""
+        values = {name: plain(getattr(self, name)) for name in names}
+        return values | {name: with_unit(getattr(self, name), unit) for name, unit in units.items()}
 
     def to_dict(self) -> dict[str, Any]:
         """The result as numbers with units and words, ready for JSON; numbers that are not finite are None."""

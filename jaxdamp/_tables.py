@@ -184,9 +184,11 @@ def comparison_table(
 
 
 def plain(value: Any) -> Any:
-    """Numbers, words, lists and dictionaries as JSON has them; numbers that are not finite become None."""
+    """Numbers, words, lists, records and dictionaries as JSON has them; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
+    if hasattr(value, "_asdict"):
+        return plain(value._asdict())
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     if value is None or isinstance(value, str | bool | int):

@@ -4,59 +4,26 @@ import dataclasses
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_tied, with_unit
+from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_unit
 from jaxdamp.tune.limits import LimitRange, written
 from jaxdamp.tune.objective import Objective, Targets
-from jaxdamp.tune.rescoring import Rescore
+from jaxdamp.tune.ranges import Change
+from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
 from jaxdamp.tune.scenarios import Road
-from jaxdamp.tune.spectra import Spectrum, spectra
 from jaxdamp.tune.verdict import Verdict, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
 
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-
 V = TypeVar("V", bound=AbstractVehicle)
 NAMED = 2  # parameters at bounds that a summary names; of more it says how many, and the table which
-
-
-class Change(NamedTuple):
-    """One parameter before and after.
-
-    Attributes:
-        name: path of the parameter.
-        before: value of the start, in the unit.
-        after: tuned value, in the unit.
-        unit: in SI.
-        note: empty, "at its lower bound" or "at its upper bound".
-        lower: lower bound of the search.
-        upper: upper bound of the search.
-        tied: the numbers that have the same value.
-    """
-
-    name: str
-    before: float
-    after: float
-    unit: str
-    note: str  # "", "at its lower bound" or "at its upper bound"
-    lower: float
-    upper: float
-    tied: tuple[str, ...] = ()  # the numbers that have the same value
-
-    @property
-    def remark(self) -> str:
-        """The note, and the names of the numbers tied to this one."""
-        return with_tied(self.note, self.tied)
 
 
 class ScenarioValues(NamedTuple):
@@ -181,11 +148,7 @@ class TuneResult(AbstractResult, Generic[V]):
         """Better or not, by how much and at what price: on fresh roads if there are any."""
         return verdict_of(self)
 
-    def plot(self, **options: Any) -> "Figure":
-        """The laws and the metrics before and after."""
-        from jaxdamp.plots import tuning
-
-        return tuning(self, **options)
+    plot = drawn_by("tuning", "The laws and the metrics before and after.")
 
     @property
     def summary(self) -> str:
@@ -316,24 +279,15 @@ class TuneResult(AbstractResult, Generic[V]):
     def content(self) -> dict[str, Any]:
         """The tuning as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         sides = {"before": self.before, "after": self.after}
-        return {
+        words = ("metric", "violated", "active", "active_limits", "without_effect")
+        return self._data(*words, "parameters", "scenarios", "starts", "tolerances", "history") | {
             "verdict": self.verdict.outcome.name,
-            "violated": self.violated,
-            "metric": self.metric,
             "metrics": {
                 name: {side: plain(values[name]) for side, values in sides.items()} | {"unit": unit}
                 for name, unit in self.units.items()
             },
-            "parameters": [plain(change._asdict()) for change in self.parameters],
             "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
-            "active_limits": list(self.active_limits),
-            "active": list(self.active),
-            "without_effect": list(self.without_effect),
             "fresh": None if self.fresh is None else self.fresh.to_dict(),
-            "scenarios": None if self.scenarios is None else plain(self.scenarios._asdict()),
-            "starts": [plain(attempt._asdict()) for attempt in self.starts],
-            "tolerances": [plain(effect._asdict()) for effect in self.tolerances],
-            "history": plain(self.history),
         }
 
     def __repr__(self) -> str:
