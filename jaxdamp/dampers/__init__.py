@@ -6,7 +6,6 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 
 from jaxdamp._guesses import answer_guesses
 from jaxdamp.dampers._commands import command_paths as command_paths
-from jaxdamp.dampers._points import drives_motion as drives_motion
 from jaxdamp.dampers._starts import Reach as Reach, from_samples as from_samples
 from jaxdamp.dampers.acceleration_surface import AccelerationSurface
 from jaxdamp.dampers.base import (
@@ -33,6 +32,7 @@ from jaxdamp.dampers.digressive_progressive import DigressiveProgressive
 from jaxdamp.dampers.fitted_range import (
     UNITS as UNITS,
     FittedRange,
+    Motion as Motion,
     OutsideFittedRangeWarning,
     has_fitted_range as has_fitted_range,
     without_fitted_ranges as without_fitted_ranges,
@@ -49,7 +49,6 @@ from jaxdamp.dampers.linear import Linear
 from jaxdamp.dampers.lugre import LuGre
 from jaxdamp.dampers.modified_bouc_wen import ModifiedBoucWen
 from jaxdamp.dampers.mono_tube import MonoTube
-from jaxdamp.dampers.motion import Motion as Motion
 from jaxdamp.dampers.motion_ratio import MotionRatio
 from jaxdamp.dampers.neural_hysteresis import NeuralHysteresis
 from jaxdamp.dampers.piecewise_linear import PiecewiseLinear
@@ -65,7 +64,6 @@ from jaxdamp.dampers.range_use import (
     warn_outside as warn_outside,
 )
 from jaxdamp.dampers.saturating import Saturating
-from jaxdamp.dampers.scaled import Scaled as Scaled
 from jaxdamp.dampers.scheduled import Scheduled
 from jaxdamp.dampers.segmented_polynomial import SegmentedPolynomial
 from jaxdamp.dampers.series_spring import SeriesSpring
@@ -73,8 +71,8 @@ from jaxdamp.dampers.spline_table import SplineTable
 from jaxdamp.dampers.spring import Spring
 from jaxdamp.dampers.stribeck_friction import StribeckFriction
 from jaxdamp.dampers.stroke_dependent import StrokeDependent
-from jaxdamp.dampers.sum import Sum as Sum
-from jaxdamp.dampers.table import Table
+from jaxdamp.dampers.sum import Scaled as Scaled, Sum as Sum
+from jaxdamp.dampers.table import Table, drives_motion as drives_motion
 from jaxdamp.dampers.temperature_scaled import TemperatureScaled
 from jaxdamp.dampers.traits import Traits
 from jaxdamp.dampers.visco_plastic import ViscoPlastic

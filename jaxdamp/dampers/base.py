@@ -18,8 +18,7 @@ from jaxdamp._types import Scalar, ScalarLike, State
 from jaxdamp.dampers._conditions import Condition, check_conditions
 from jaxdamp.dampers._functions import by_name, with_functions
 from jaxdamp.dampers._starts import Reach, from_samples, starts_of_bends
-from jaxdamp.dampers.fitted_range import FittedRange, RangeNote
-from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.fitted_range import FittedRange, Motion, RangeNote
 from jaxdamp.dampers.traits import Traits, combined_traits
 from jaxdamp.parameters import Module, check_parameters, readable
 
@@ -211,7 +210,7 @@ class AbstractDamper(Module):
         """The force times a factor."""
         if isinstance(factor, AbstractDamper):
             return NotImplemented
-        from jaxdamp.dampers.scaled import Scaled
+        from jaxdamp.dampers.sum import Scaled
 
         return Scaled(self, factor)
 

@@ -10,8 +10,7 @@ from jaxtyping import Bool, Float
 from jaxdamp._traced import is_traced, of_known_numbers
 from jaxdamp.dampers._commands import commands_of
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.fitted_range import OutsideFittedRangeWarning, has_fitted_range, shown_unit, span
-from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.fitted_range import Motion, OutsideFittedRangeWarning, has_fitted_range, shown_unit, span
 
 
 TOLERANCE = 0.05  # of the larger limit, by which a use may leave the range without a warning

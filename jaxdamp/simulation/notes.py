@@ -1,12 +1,70 @@
-"""What a response says of itself in words: one function for each kind of note, a sentence for each thing to know."""
+"""Notes on a response: laws beyond the range of their fit, tyres in tension."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float, PyTree
 
+from jaxdamp import _checks
 from jaxdamp._types import Signal
-from jaxdamp.vehicles import ChannelKind, System
+from jaxdamp.dampers import AbstractDamper, Motion, RangeUse, has_fitted_range, range_use, sentence
+from jaxdamp.vehicles import AbstractVehicle, ChannelKind, PortForm, System
+
+
+def range_uses(
+    vehicle: AbstractVehicle,
+    form: PortForm,
+    motion: Float[Array, "time n"],
+    road: Float[Array, "time wheels"],
+    road_rate: Float[Array, "time wheels"],
+    port_force: Float[Array, "time ports"],
+) -> dict[str, list[RangeUse]]:
+    """What each damper did beside what its law was fitted to, by the name of the damper.
+
+    Arguments:
+        vehicle: with its laws.
+        form: its matrices.
+        motion: coordinates and their rates [m, m/s] at each instant.
+        road: heights [m].
+        road_rate: their rates [m/s].
+        port_force: force of each element [N].
+
+    Returns:
+        The dampers whose law has a range; empty if none has one, or while JAX traces the run.
+    """
+    tree: PyTree = (vehicle, motion)
+    if not has_fitted_range(vehicle) or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(tree)):
+        return {}
+    position, rate = jnp.split(motion, 2, axis=1)
+    strokes, velocities = (np.asarray(form.at_ports(*at), dtype=float) for at in ((position, road), (rate, road_rate)))
+    forces = np.asarray(port_force, dtype=float)
+    uses_of = {}
+    for i, (name, law) in enumerate(named_laws(vehicle).items()):
+        uses = range_use(law, Motion(strokes[:, i], velocities[:, i], forces[:, i]))
+        if uses:
+            uses_of[name] = uses
+    return uses_of
+
+
+def named_laws(vehicle: AbstractVehicle) -> dict[str, AbstractDamper]:
+    """The law at each port by the name of its element, such as "front_damper".
+
+    Arguments:
+        vehicle: the vehicle.
+    """
+    return dict(zip(vehicle.layout.ports, vehicle.elements(), strict=True))
+
+
+def range_sentences(uses: dict[str, Sequence[RangeUse]] | dict[str, list[RangeUse]]) -> tuple[str, ...]:
+    """A sentence for each damper that leaves its range.
+
+    Arguments:
+        uses: by the name of the damper.
+    """
+    texts = (sentence(name.replace("_", " "), of_damper) for name, of_damper in uses.items())
+    return tuple(text for text in texts if text)
 
 
 LEAST = 1e-3  # of the static load, by which a load must be below zero

@@ -28,7 +28,7 @@ from jaxdamp.dampers import (
 from jaxdamp.parameters import free_parameters
 from jaxdamp.rig import march
 from jaxdamp.simulation import Ride
-from jaxdamp.testing._require import require, require_equal
+from jaxdamp.testing._probes import require, require_equal
 from jaxdamp.vehicles import Corner, HalfCar
 
 

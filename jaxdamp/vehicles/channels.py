@@ -4,8 +4,7 @@ import enum
 from typing import NamedTuple
 
 from jaxdamp.vehicles.frame import Frame
-from jaxdamp.vehicles.parts import Body, Element, Link, Wheel, prefixed
-from jaxdamp.vehicles.points import Point
+from jaxdamp.vehicles.parts import Body, Element, Link, Point, Wheel, prefixed
 
 
 class ChannelKind(enum.Enum):

@@ -9,8 +9,7 @@ from jaxdamp import _checks
 from jaxdamp._types import Number
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import Module, as_float, parameter, positive
-from jaxdamp.vehicles.parts import AbstractPart, Body, Link
-from jaxdamp.vehicles.points import Point
+from jaxdamp.vehicles.parts import AbstractPart, Body, Link, Point
 from jaxdamp.vehicles.suspension import Suspension
 
 

@@ -16,7 +16,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric
 from jaxdamp.vehicles.channels import Channel, ChannelKind, Measured, channels_of, signals
 from jaxdamp.vehicles.frame import Frame
-from jaxdamp.vehicles.points import matrix
+from jaxdamp.vehicles.parts import matrix
 from jaxdamp.vehicles.port_form import LinearMap, PortForm
 from jaxdamp.vehicles.ride_metrics import ride_metrics_of
 

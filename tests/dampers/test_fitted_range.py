@@ -26,7 +26,7 @@ from jaxdamp.dampers import (
 )
 from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles import presets
-from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.port_form import Ports
 
 
 SLOW = FittedRange(velocity=(-0.1, 0.2), stroke=(-0.02, 0.02), force=(-300.0, 500.0))

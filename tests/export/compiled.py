@@ -11,7 +11,7 @@ import pytest
 
 from jaxdamp.dampers import without_fitted_ranges
 from jaxdamp.export._law_program import LawProgram, law_numbers
-from jaxdamp.export._law_source import DERIVATIVES, law_source
+from jaxdamp.export._vehicle_source import DERIVATIVES, law_source
 from jaxdamp.parameters import with_values
 
 

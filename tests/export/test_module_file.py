@@ -23,7 +23,7 @@ from jaxdamp.dampers import (
     with_fitted_range,
 )
 from jaxdamp.export import from_json, to_json
-from jaxdamp.export._plain import known_classes
+from jaxdamp.export._rebuild import known_classes
 from jaxdamp.parameters import get, parameter, positive, replace, setting
 from jaxdamp.tune import minimise
 from jaxdamp.vehicles import Body, Element, Frame, Link, LumpedVehicle, Seat, SeatMass, Wheel, presets
