@@ -5,8 +5,6 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 """
 
 from jaxdamp._guesses import answer_guesses
-from jaxdamp.dampers._commands import command_paths as command_paths
-from jaxdamp.dampers._starts import Reach as Reach, from_samples as from_samples
 from jaxdamp.dampers.acceleration_surface import AccelerationSurface
 from jaxdamp.dampers.base import (
     AbstractDamper,
@@ -22,9 +20,8 @@ from jaxdamp.dampers.bouc_wen import BoucWen
 from jaxdamp.dampers.bump_stop import BumpStop
 from jaxdamp.dampers.bushing import Bushing
 from jaxdamp.dampers.command import takes_command as takes_command, with_command
-from jaxdamp.dampers.conditions import keeps_conditions as keeps_conditions, margins as margins
+from jaxdamp.dampers.contract import Reach as Reach, Traits, from_samples as from_samples
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
-from jaxdamp.dampers.coverage import coverage as coverage, require_finite_force as require_finite_force
 from jaxdamp.dampers.creeping_visco_plastic import CreepingViscoPlastic
 from jaxdamp.dampers.dahl import Dahl
 from jaxdamp.dampers.degressive import Degressive
@@ -43,6 +40,13 @@ from jaxdamp.dampers.gas_spring import GasSpring
 from jaxdamp.dampers.heated import Heated
 from jaxdamp.dampers.hybrid import Hybrid
 from jaxdamp.dampers.hyperbolic_tangent import HyperbolicTangent
+from jaxdamp.dampers.inside import (
+    command_paths as command_paths,
+    coverage as coverage,
+    keeps_conditions as keeps_conditions,
+    margins as margins,
+    require_finite_force as require_finite_force,
+)
 from jaxdamp.dampers.karadayi_masada import KaradayiMasada
 from jaxdamp.dampers.lag import Lag
 from jaxdamp.dampers.linear import Linear
@@ -62,6 +66,7 @@ from jaxdamp.dampers.range_use import (
     range_use as range_use,
     sentence as sentence,
     warn_outside as warn_outside,
+    with_fitted_range,
 )
 from jaxdamp.dampers.saturating import Saturating
 from jaxdamp.dampers.scheduled import Scheduled
@@ -74,9 +79,7 @@ from jaxdamp.dampers.stroke_dependent import StrokeDependent
 from jaxdamp.dampers.sum import Scaled as Scaled, Sum as Sum
 from jaxdamp.dampers.table import Table, drives_motion as drives_motion
 from jaxdamp.dampers.temperature_scaled import TemperatureScaled
-from jaxdamp.dampers.traits import Traits
 from jaxdamp.dampers.visco_plastic import ViscoPlastic
-from jaxdamp.dampers.with_range import with_fitted_range
 from jaxdamp.dampers.wrapper import AbstractWrapper
 
 

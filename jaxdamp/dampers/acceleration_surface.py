@@ -10,6 +10,7 @@ import numpy as np
 from jaxdamp._types import Matrix, Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers._steps import follow
 from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.force_surface import (
     CONSENT,
     Axis,
@@ -18,7 +19,6 @@ from jaxdamp.dampers.force_surface import (
     surface_force,
     surface_least_squares,
 )
-from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import around_zero, nonnegative, parameter, positive, setting
 
 

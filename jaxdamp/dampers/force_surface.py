@@ -12,7 +12,7 @@ from jaxdamp import _checks
 from jaxdamp._limits import within
 from jaxdamp._types import Matrix, Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers.base import AbstractStateless
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import around_zero, ends, nonnegative, parameter, setting
 
 

@@ -11,8 +11,8 @@ from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most, within
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.table import Table, check_points, refuse_active
-from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import as_float, increasing, parameter, setting
 
 

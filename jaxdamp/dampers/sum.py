@@ -11,9 +11,9 @@ from jaxdamp import _checks
 from jaxdamp._traced import behind
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers.base import START, AbstractDamper
+from jaxdamp.dampers.contract import Traits, combined_traits
 from jaxdamp.dampers.fitted_range import Motion
-from jaxdamp.dampers.traits import Traits, combined_traits
-from jaxdamp.dampers.with_range import with_fitted_range
+from jaxdamp.dampers.range_use import with_fitted_range
 from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import nonnegative, parameter, real
 

@@ -11,8 +11,8 @@ from jaxdamp._guesses import Elsewhere
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers._guesses import velocity_grid
 from jaxdamp.dampers.base import AbstractMemoryless
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.piecewise_linear import hinges
-from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import as_float, increasing, parameter, setting
 
 

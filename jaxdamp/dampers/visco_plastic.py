@@ -14,8 +14,8 @@ from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers._guesses import sliding_fit
 from jaxdamp.dampers._steps import travels
 from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.play import dead_zone
-from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import interval, nonnegative, parameter, positive
 
 

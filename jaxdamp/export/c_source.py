@@ -10,10 +10,9 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.export._c_text import INCLUDES, array_text
+from jaxdamp.export._c_text import DERIVATIVES, INCLUDES, array_text, law_source, vehicle_source
 from jaxdamp.export._law_program import LawProgram, identifier
 from jaxdamp.export._vehicle_program import VehicleProgram
-from jaxdamp.export._vehicle_source import DERIVATIVES, law_source, vehicle_source
 from jaxdamp.rig import respond
 from jaxdamp.roads import from_profile
 from jaxdamp.simulation import simulate, substeps_needed

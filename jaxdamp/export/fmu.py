@@ -21,9 +21,9 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.export._c_text import law_source, vehicle_source
 from jaxdamp.export._law_program import LawNumber, LawProgram, identifier
 from jaxdamp.export._vehicle_program import VehicleProgram
-from jaxdamp.export._vehicle_source import law_source, vehicle_source
 from jaxdamp.simulation import substeps_needed
 from jaxdamp.vehicles import AbstractVehicle
 

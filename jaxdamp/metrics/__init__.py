@@ -39,7 +39,17 @@ Array([0.707107, 1.414214, 2.828427], dtype=float64)
 from typing import Any
 
 from jaxdamp.metrics._linear_system import StateSpace as StateSpace
-from jaxdamp.metrics.amplitude import crest_factor, peak, rms, smooth_peak
+from jaxdamp.metrics.amplitude import (
+    crest_factor,
+    gaussian_exceedance,
+    peak,
+    rms,
+    smooth_peak,
+    working_space_exceedance,
+    working_space_mean,
+    working_space_peak_to_peak,
+    working_space_rms,
+)
 from jaxdamp.metrics.comfort import (
     AXES,
     Evaluation as Evaluation,
@@ -52,10 +62,12 @@ from jaxdamp.metrics.comfort import (
 )
 from jaxdamp.metrics.decay import damping_ratio, logarithmic_decrement, settling_time, smooth_settling_time
 from jaxdamp.metrics.dissipation import (
+    damper_temperature,
     dissipated_energy,
     dissipated_power,
     dissipation_histogram,
     equivalent_damping,
+    temperature_rise,
     velocity_histogram,
 )
 from jaxdamp.metrics.dose import (
@@ -65,7 +77,6 @@ from jaxdamp.metrics.dose import (
     vibration_dose_value,
 )
 from jaxdamp.metrics.fatigue import rainflow_cycles, spectral_damage, spectral_moments
-from jaxdamp.metrics.heat import damper_temperature, temperature_rise
 from jaxdamp.metrics.metric import Metric
 from jaxdamp.metrics.names import (
     RENAMED,
@@ -95,13 +106,6 @@ from jaxdamp.metrics.weighted import (
     weighting_factor,
     weighting_response,
     weighting_state_space as weighting_state_space,
-)
-from jaxdamp.metrics.working_space import (
-    gaussian_exceedance,
-    working_space_exceedance,
-    working_space_mean,
-    working_space_peak_to_peak,
-    working_space_rms,
 )
 
 

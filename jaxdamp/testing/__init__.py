@@ -6,8 +6,7 @@
 They need neither pytest nor a test runner: each check raises an `AssertionError` that says what is wrong.
 """
 
-from jaxdamp.testing.law_checks import CHECKS as CHECKS, check_law
-from jaxdamp.testing.places import check_alike_ports, check_inside_wrappers
+from jaxdamp.testing.law_checks import CHECKS as CHECKS, check_alike_ports, check_inside_wrappers, check_law
 
 
 __all__ = [

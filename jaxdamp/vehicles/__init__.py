@@ -13,7 +13,7 @@ from jaxdamp._guesses import answer_guesses
 from jaxdamp.vehicles import presets
 from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle
 from jaxdamp.vehicles.cars import FullCar, HalfCar, QuarterCar, RollCar
-from jaxdamp.vehicles.channels import Channel as Channel, ChannelKind as ChannelKind
+from jaxdamp.vehicles.channels import Channel as Channel, ChannelKind as ChannelKind, is_stationary as is_stationary
 from jaxdamp.vehicles.corner import Axle, Corner
 from jaxdamp.vehicles.equilibrium import (
     refuse_restless as refuse_restless,
@@ -23,7 +23,7 @@ from jaxdamp.vehicles.equilibrium import (
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
 from jaxdamp.vehicles.guided import ForceDriven, Guide, Guided
-from jaxdamp.vehicles.linear import LinearVehicle as LinearVehicle, linearise
+from jaxdamp.vehicles.linear import LinearVehicle as LinearVehicle, linearise, with_weightings as with_weightings
 from jaxdamp.vehicles.modes import Modes as Modes, Oscillations as Oscillations, modes, oscillations
 from jaxdamp.vehicles.parts import Body, Element, Link, Place, Point, Wheel, prefixed as prefixed
 from jaxdamp.vehicles.port_form import (
@@ -33,15 +33,12 @@ from jaxdamp.vehicles.port_form import (
     Ports as Ports,
     States as States,
 )
-from jaxdamp.vehicles.ride_metrics import is_stationary as is_stationary
-from jaxdamp.vehicles.seat import Seat, SeatMass
 from jaxdamp.vehicles.stationary import EquivalentDamper as EquivalentDamper, equivalent_dampers, stationary_rms
 from jaxdamp.vehicles.statistical import nonlinear_variables as nonlinear_variables
-from jaxdamp.vehicles.suspension import CubicSpring, Suspension
+from jaxdamp.vehicles.suspension import CubicSpring, Seat, SeatMass, Suspension
 from jaxdamp.vehicles.system import Layout as Layout, System as System
 from jaxdamp.vehicles.tandem_truck import Cab, IndependentTandem, TandemTruck, WalkingBeam
 from jaxdamp.vehicles.tracked_hull import PitchDecay as PitchDecay, TrackedHull
-from jaxdamp.vehicles.weighted import with_weightings as with_weightings
 
 
 __all__ = [

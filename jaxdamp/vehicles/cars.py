@@ -10,7 +10,7 @@ from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.corner import AbstractCorner, Axle, Corner
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Body, Place
-from jaxdamp.vehicles.seat import Seat, seat_parts
+from jaxdamp.vehicles.suspension import Seat, seat_parts
 
 
 @final

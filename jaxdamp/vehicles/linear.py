@@ -1,11 +1,13 @@
 """The linearised vehicle: about the static equilibrium, for a given amplitude of its laws, or on a random road."""
 
+from collections.abc import Sequence
 from typing import Any, final
 
 import equinox as eqx
 import jax
 import jax.flatten_util
 import jax.numpy as jnp
+import jax.scipy.linalg
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -14,11 +16,12 @@ from jaxdamp._field_types import check_module
 from jaxdamp._matrices import solve
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.dampers import coverage
+from jaxdamp.metrics import weighting_state_space
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position
-from jaxdamp.vehicles.linear_laws import LinearLaws, with_linear_laws
 from jaxdamp.vehicles.port_form import Ports, States
 from jaxdamp.vehicles.statistical import NoiseAtLaw, statistical_laws
+from jaxdamp.vehicles.system import LinearLaws, with_linear_laws
 
 
 POINTS = 256  # in a cycle
@@ -263,3 +266,51 @@ def as_linear(vehicle: AbstractVehicle | LinearVehicle) -> LinearVehicle:
     """The vehicle linearised about its static equilibrium, unless it is linear already."""
     check_module("vehicle", vehicle, (AbstractVehicle, LinearVehicle))
     return vehicle if isinstance(vehicle, LinearVehicle) else linearise(vehicle)
+
+
+def with_weightings(linear: LinearVehicle, weightings: Sequence[tuple[str, str]]) -> LinearVehicle:
+    """The linearised vehicle with added channels `weighted_…`: ẇ = A_w w + B_w y, output C_w w, for a channel y.
+
+    `stationary_rms` then gives the weighted RMS of a white road, `frequency_response` the weighted response.
+
+    Arguments:
+        linear: result of `linearise`.
+        weightings: pairs of a channel and a weighting, such as `[("sprung_acceleration", "Wk")]`.
+
+    Raises:
+        ValueError: an unknown channel or weighting.
+
+    >>> from jaxdamp.vehicles import linearise, stationary_rms
+    >>> from jaxdamp.vehicles.presets import quarter_car_000
+    >>> weighted = with_weightings(linearise(quarter_car_000()), [("sprung_acceleration", "Wk")])
+    >>> rms = stationary_rms(weighted, 3e-3)
+    >>> [round(float(rms[name]), 3) for name in ("sprung_acceleration", "weighted_sprung_acceleration")]
+    [1.6, 1.026]
+    """
+    for name, _ in weightings:
+        _checks.one_of("channel", name, linear.channels)
+    filters = [weighting_state_space(weighting) for _, weighting in weightings]
+    picked = jnp.array([linear.channels.index(name) for name, _ in weightings], dtype=int)
+    size, inner = linear.state_matrix.shape[0], sum(f.input_vector.size for f in filters)
+    into = jax.scipy.linalg.block_diag(*[f.input_vector[:, None] for f in filters])
+    out = jax.scipy.linalg.block_diag(*[f.output_vector[None, :] for f in filters])
+    own = jax.scipy.linalg.block_diag(*[f.state_matrix for f in filters])
+    above = jnp.concatenate([linear.state_matrix, jnp.zeros((size, inner))], axis=1)
+    below = jnp.concatenate([into @ linear.output[picked], own], axis=1)
+    unweighted = jnp.concatenate([linear.output, jnp.zeros((len(linear.channels), inner))], axis=1)
+    weighted = jnp.concatenate([jnp.zeros((len(filters), size)), out], axis=1)
+    wheels = linear.road_input.shape[1]
+    nothing = jnp.zeros((len(filters), wheels))
+    return LinearVehicle(
+        jnp.concatenate([above, below]),
+        jnp.concatenate([linear.road_input, into @ linear.road_feed[picked]]),
+        jnp.concatenate([linear.road_rate_input, into @ linear.feed_through[picked]]),
+        jnp.concatenate([unweighted, weighted]),
+        jnp.concatenate([linear.road_feed, nothing]),
+        jnp.concatenate([linear.feed_through, nothing]),
+        linear.behind,
+        linear.left,
+        linear.coordinates,
+        (*linear.channels, *[f"weighted_{name}" for name, _ in weightings]),
+        linear.axles,
+    )

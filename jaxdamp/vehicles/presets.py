@@ -6,7 +6,7 @@ With `tyre_lifts=True` all tyres can lift off.
 from jaxdamp.dampers import AbstractDamper, Besinger, Linear
 from jaxdamp.vehicles.cars import FullCar, HalfCar, QuarterCar
 from jaxdamp.vehicles.corner import Axle, Corner
-from jaxdamp.vehicles.seat import Seat
+from jaxdamp.vehicles.suspension import Seat
 from jaxdamp.vehicles.tandem_truck import IndependentTandem, TandemTruck, WalkingBeam
 from jaxdamp.vehicles.tracked_hull import TrackedHull
 

@@ -11,8 +11,7 @@ from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.corner import Corner
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import AbstractPart, Body, Link, Parts, Place, Wheel
-from jaxdamp.vehicles.seat import Seat, seat_parts
-from jaxdamp.vehicles.suspension import Suspension
+from jaxdamp.vehicles.suspension import Seat, Suspension, seat_parts
 
 
 @final

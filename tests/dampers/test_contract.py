@@ -52,7 +52,7 @@ from jaxdamp.dampers import (
     ViscoPlastic,
 )
 from jaxdamp.testing import CHECKS, check_alike_ports, check_inside_wrappers, check_law
-from jaxdamp.testing.places import SLOTS
+from jaxdamp.testing.law_checks import SLOTS
 
 
 pytestmark = pytest.mark.users_flags
