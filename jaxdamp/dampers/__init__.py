@@ -137,29 +137,5 @@ __all__ = [
     "with_command",
     "with_fitted_range",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "UNITS",
-    "Motion",
-    "RangeUse",
-    "Reach",
-    "Scaled",
-    "Sum",
-    "command_paths",
-    "coverage",
-    "drives_motion",
-    "extrapolated",
-    "from_samples",
-    "has_fitted_range",
-    "keeps_conditions",
-    "laws_inside",
-    "margins",
-    "range_use",
-    "require_finite_force",
-    "sentence",
-    "takes_command",
-    "warn_outside",
-    "without_fitted_ranges",
-]
 
 answer_guesses(__name__, __all__)

@@ -166,19 +166,6 @@ __all__ = [
     "working_space_peak_to_peak",
     "working_space_rms",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "Evaluation",
-    "Gathered",
-    "MetricValues",
-    "RoughnessBySegment",
-    "ShockRatios",
-    "StateSpace",
-    "current_name",
-    "current_names",
-    "discrete_weighting",
-    "weighting_state_space",
-]
 
 
 def __getattr__(name: str) -> Any:

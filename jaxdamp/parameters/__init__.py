@@ -66,22 +66,3 @@ __all__ = [
     "weight",
     "with_values",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "Bounds",
-    "Domain",
-    "FreeParameters",
-    "Module",
-    "Parameter",
-    "as_float",
-    "check_parameters",
-    "checked",
-    "declared_inside",
-    "domain_of",
-    "match_paths",
-    "matched_in_words",
-    "matching",
-    "modules_inside",
-    "name_patterns",
-    "readable",
-]

@@ -81,11 +81,5 @@ __all__ = [
     "wave_course",
     "white",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "Columns",
-    "RoughnessAssessment",
-    "WhiteRoad",
-]
 
 answer_guesses(__name__, __all__)

@@ -45,16 +45,3 @@ __all__ = [
     "simulate",
     "substeps_needed",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "DEVIATIONS",
-    "AbstractObserver",
-    "AxleTiming",
-    "MetricObserver",
-    "RunCheck",
-    "moves_axles",
-    "named_laws",
-    "range_sentences",
-    "recorded",
-    "stationary_notes",
-]

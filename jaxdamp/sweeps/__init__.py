@@ -12,8 +12,3 @@ __all__ = [
     "sobol",
     "sweep",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "SweepFunction",
-    "without_effect",
-]

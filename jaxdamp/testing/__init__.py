@@ -14,7 +14,3 @@ __all__ = [
     "check_inside_wrappers",
     "check_law",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "CHECKS",
-]

@@ -79,28 +79,5 @@ __all__ = [
     "static_equilibrium",
     "stationary_rms",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "Channel",
-    "ChannelKind",
-    "Earlier",
-    "EquivalentDamper",
-    "Layout",
-    "LinearMap",
-    "LinearVehicle",
-    "Modes",
-    "Oscillations",
-    "PitchDecay",
-    "PortForm",
-    "Ports",
-    "States",
-    "System",
-    "is_stationary",
-    "nonlinear_variables",
-    "prefixed",
-    "refuse_restless",
-    "rest_position",
-    "with_weightings",
-]
 
 answer_guesses(__name__, __all__)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers, parameters
+from jaxdamp._guesses import shared_names
 from jaxdamp.dampers import (
     AbstractMemoryless,
     Bilinear,
@@ -228,4 +229,4 @@ def test_laws_that_are_mixed_from_others_do_not_notice_their_ranges():
 
 def test_the_names_are_public():
     assert {"FittedRange", "OutsideFittedRangeWarning", "with_fitted_range"} <= set(dampers.__all__)
-    assert "range_use" in dampers.__shared__
+    assert "range_use" in shared_names(dampers)

@@ -17,7 +17,7 @@ from jaxdamp.dampers import (
     OutsideFittedRangeWarning,
     with_fitted_range,
 )
-from jaxdamp.simulation import range_notes
+from jaxdamp.simulation import notes
 from jaxdamp.vehicles import AbstractVehicle, presets
 
 
@@ -61,7 +61,7 @@ def test_within_the_range_and_without_one_nothing_is_said(monkeypatch):
     for law in (with_fitted_range(LAW, WIDE), LAW):
         response = simulate(*half_car(law), **TIMES)
         assert response.notes == () and bool(response.range_use()) == (law is not LAW)
-    monkeypatch.setattr(range_notes, "named_laws", None)  # it would raise if it were called
+    monkeypatch.setattr(notes, "named_laws", None)  # it would raise if it were called
     assert simulate(*half_car(LAW), **TIMES).notes == ()
 
 
