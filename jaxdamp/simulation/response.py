@@ -17,10 +17,8 @@ from jaxdamp._types import Scalar, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import Metric
 from jaxdamp.simulation.energy import absorbed_by, energy_balance
-from jaxdamp.simulation.notes import tyres_in_tension
-from jaxdamp.simulation.range_notes import range_sentences, range_uses
-from jaxdamp.simulation.ride_metrics import Comfort, comfort, ride_metrics
-from jaxdamp.simulation.tables import comfort_table, comfort_units, metrics_table
+from jaxdamp.simulation.notes import range_sentences, range_uses, tyres_in_tension
+from jaxdamp.simulation.ride_metrics import Comfort, comfort, comfort_table, comfort_units, metrics_table, ride_metrics
 from jaxdamp.simulation.wheels import AxleTiming
 from jaxdamp.vehicles import AbstractVehicle, LinearMap, System
 
