@@ -10,7 +10,16 @@ from jaxdamp.identify.designing import ExperimentDesign, design_experiment, exte
 from jaxdamp.identify.estimates import Estimate, rounded
 from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.judging import judge
-from jaxdamp.identify.ladder import LAWS, NAMED_LAWS, LearntStart, NamedLaw, default_ladder, ladder_starts, laws_table
+from jaxdamp.identify.ladder import (
+    LAWS,
+    NAMED_LAWS,
+    LearntStart,
+    NamedLaw,
+    default_ladder,
+    ladder_starts,
+    laws_table,
+    suited_laws as suited_laws,
+)
 from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import OFFSET, machine_names, without_machine
 from jaxdamp.identify.many import fit_many
@@ -93,5 +102,6 @@ __all__ = [
     "virtual_ride",
     "without_machine",
 ]
+__shared__ = ["suited_laws"]
 
 answer_guesses(__name__, __all__)
