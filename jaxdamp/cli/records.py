@@ -100,11 +100,13 @@ class Reading:
 
 
 def law_names(asked: Sequence[str]) -> list[str]:
-    """The laws to fit: all that are not optional, or those named, each once.
+    """The laws to fit: all that are not optional, or those named, each once; none for those that suit the records.
 
     >>> law_names(["linear, besinger", "linear"])
     ['linear', 'besinger']
     """
+    if not asked:
+        return []
     asked = words("law", asked)
     if not asked:
         _checks.refuse("law", "name a law", "empty", 'See "jaxdamp laws".')
