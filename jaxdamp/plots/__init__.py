@@ -7,6 +7,7 @@ touches pyplot or its global state, and matplotlib is loaded by the first call o
 from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
 from jaxdamp.plots.curves import force_velocity
+from jaxdamp.plots.damper_sheet import damper_sheet as damper_sheet
 from jaxdamp.plots.damper_use import damper_use
 from jaxdamp.plots.decisions import damper_comparison as damper_comparison
 from jaxdamp.plots.errors import ladder
@@ -57,6 +58,7 @@ __all__ = [
 __shared__ = [
     "cross_validation",
     "damper_comparison",
+    "damper_sheet",
     "experiment",
     "fit_loops",
     "gas_and_friction",
