@@ -26,6 +26,7 @@ from jaxdamp.plots.modes import modes
 from jaxdamp.plots.preflight import preflight
 from jaxdamp.plots.profiles import profile as profile
 from jaxdamp.plots.records import records
+from jaxdamp.plots.ride_sheet import ride_sheet as ride_sheet
 from jaxdamp.plots.rides import ride
 from jaxdamp.plots.roughness import (
     roughness_by_segment as roughness_by_segment,
@@ -68,6 +69,7 @@ __shared__ = [
     "profile",
     "record_sensitivity",
     "rescore",
+    "ride_sheet",
     "roughness_by_segment",
     "roughness_spectrum",
     "targets",

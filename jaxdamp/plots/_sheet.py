@@ -3,7 +3,7 @@
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from jaxdamp.plots import _style
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 A4 = (8.27, 11.69)  # inch
 SMALL = 7.5  # pt, of tables
-_TEXT = {"va": "top", "linespacing": 1.35}
+_TEXT: dict[str, Any] = {"va": "top", "linespacing": 1.35}
 
 
 def page() -> "matplotlib.figure.Figure":
     """An empty page with margins."""
     figure = _style.new_figure(*A4)
-    figure.get_layout_engine().set(rect=(0.05, 0.03, 0.91, 0.94))  # pyright: ignore[reportOptionalMemberAccess]
+    figure.set_layout_engine("constrained", rect=(0.05, 0.03, 0.91, 0.94))
     return figure
 
 
@@ -30,12 +30,15 @@ def lettering() -> Iterator[None]:
     """Letters of a printed page while a sheet is drawn."""
     from matplotlib import rc_context
 
-    sizes = {"axes.titlesize": 8.5, "axes.labelsize": 8.0, "xtick.labelsize": 7.5, "ytick.labelsize": 7.5}
-    with rc_context({"font.size": 8.5, "legend.fontsize": 7.5, "figure.titlesize": 8.5, **sizes}):
+    sizes: dict[Any, Any] = {"font.size": 8.5, "legend.fontsize": 7.5, "figure.titlesize": 8.5}
+    sizes |= {"axes.titlesize": 8.5, "axes.labelsize": 8.0, "xtick.labelsize": 7.5, "ytick.labelsize": 7.5}
+    with rc_context(sizes):
         yield
 
 
-def head(axes: "matplotlib.axes.Axes", name: str, sentence: str, facts: str, colour: str = _style.BLACK) -> None:
+def head(
+    axes: "matplotlib.axes.Axes", name: str, sentence: str, facts: str, *, answer: str = "", colour: str = _style.BLACK
+) -> None:
     """The head of a sheet: its name, the sentence that says what to do, and what was measured or driven.
 
     Arguments:
@@ -43,15 +46,19 @@ def head(axes: "matplotlib.axes.Axes", name: str, sentence: str, facts: str, col
         name: of the damper or vehicle.
         sentence: the finding.
         facts: in small print below.
-        colour: of the sentence: what it says, good or bad.
+        answer: in a few words before the sentence: build it or not.
+        colour: of the answer, or of the sentence without one: good or bad.
     """
     blank(axes)
-    lines = textwrap.wrap(_style.typeset(sentence), 80)
-    if len(lines) > 3:
-        lines = [*lines[:2], f"{lines[2].rstrip(' ,;.')} …"]
-    axes.text(0.0, 1.0, _style.typeset(name), fontsize=9.0, color=_style.GREY, **_TEXT)
-    axes.text(0.0, 0.78, "\n".join(lines), fontsize=11.5, fontweight="bold", color=colour, **_TEXT)
-    axes.text(0.0, 0.0, textwrap.shorten(_style.typeset(facts), 150, placeholder=" …"), color=_style.GREY, va="bottom")
+    axes.text(0.0, 1.0, f"{_style.typeset(name)}   ·   {_style.typeset(facts)}"[:130], color=_style.GREY, **_TEXT)
+    if answer:
+        axes.text(0.0, 0.79, answer, fontsize=14.0, fontweight="bold", color=colour, **_TEXT)
+        look, width, top = {"fontsize": 8.5}, 118, 0.46
+    else:
+        look, width, top = {"fontsize": 10.5, "fontweight": "bold", "color": colour}, 80, 0.76
+    lines = textwrap.wrap(_style.typeset(sentence), width)
+    lines = [*lines[:2], f"{lines[2].rstrip(' ,;.')} …"] if len(lines) > 3 else lines
+    axes.text(0.0, top, "\n".join(lines), **look, **_TEXT)
 
 
 def blank(axes: "matplotlib.axes.Axes") -> None:

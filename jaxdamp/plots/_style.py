@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._tables import typeset_unit
 from jaxdamp.dampers import AbstractDamper, Sum
 
 
@@ -115,6 +116,16 @@ def short(value: float) -> str:
     else:
         text = f"{value:.0f}" if abs(value) >= 1e3 else f"{value:.3g}"
     return "0" if value == 0.0 else text.replace("-", "−")
+
+
+def quantity(value: float, unit: str) -> str:
+    """A number with its unit for people: strokes in mm.
+
+    >>> quantity(0.0745, "m"), quantity(1.25, "m/s^2"), quantity(3.0, "")
+    ('74.5 mm', '1.25 m/s²', '3')
+    """
+    value, unit = (1e3 * value, "mm") if unit == "m" else (value, typeset_unit(unit))
+    return f"{short(value)} {unit}".rstrip()
 
 
 def percent(value: float, digits: int = 0) -> str:
@@ -260,10 +271,10 @@ def law_name(law: AbstractDamper) -> str:
     """The classes of a law in words: "Besinger + series spring", "linear + Coulomb friction"."""
     if isinstance(law, Sum):
         return " + ".join(law_name(term) for term in law.terms)
-    words, inside = _class_words(law), law.inner_laws()
+    words, inside = class_words(law), law.inner_laws()
     return f"{law_name(inside[0])} + {words}" if len(inside) == 1 else words
 
 
-def _class_words(law: AbstractDamper) -> str:
-    """The name of a class in words: "digressive progressive" of DigressiveProgressive."""
-    return in_words(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(law).__name__).lower())
+def class_words(part: Any) -> str:
+    """The name of a class in words: "digressive progressive" of a DigressiveProgressive, "half car" of a HalfCar."""
+    return in_words(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(part).__name__).lower())

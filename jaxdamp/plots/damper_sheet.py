@@ -44,8 +44,7 @@ class _Damper:
         if isinstance(result, Evaluation):
             gas = [each.gas_force for each in result.gas_and_friction.values()]
             return cls(result, None, None, {}, float(np.mean(gas)) if gas else 0.0, "Damper records")
-        rung = result.best if isinstance(result, Comparison) else None
-        fit = result if rung is None else rung.result
+        rung, fit = (result.best, result.best.result) if isinstance(result, Comparison) else (None, result)
         measured = evaluate(fit.runs) if evaluation is None else evaluation
         name = _style.law_name(fit.law) if rung is None else _style.in_words(rung.name)
         laws = {_style.in_words(name): law for name, law in rung.laws().items()} if rung else {name: fit.law}
@@ -108,12 +107,12 @@ def damper_sheet(
     damper = _Damper.of(result, evaluation)
     if not sentence:
         sentence = result.verdict[0] if isinstance(result, Comparison) else result.summary
-    if warnings is None:
-        warnings = result.notes if damper.fit is None else damper.fit.main_warnings or damper.fit.warnings
+    fit = damper.fit
+    doubts = damper.evaluation.notes if fit is None else fit.main_warnings or fit.warnings
     with _sheet.lettering():
         figure = _sheet.page()
         rows = figure.add_gridspec(4, 1, height_ratios=(0.95, 4.6, 3.0, 2.5), hspace=0.02)
-        _sheet.head(figure.add_subplot(rows[0]), name or damper.name, sentence, _facts(damper))
+        _sheet.head(figure.add_subplot(rows[0].subgridspec(1, 1)[0]), name or damper.name, sentence, _facts(damper))
         first = rows[1].subgridspec(1, 2, width_ratios=(2.5, 1.0))
         _force_velocity(figure.add_subplot(first[0]), damper, baseline, band, limits)
         _forces(figure.add_subplot(first[1]), damper)
@@ -123,8 +122,8 @@ def damper_sheet(
         _gas_and_friction(second[2], damper)
         third = [figure.add_subplot(at) for at in rows[3].subgridspec(1, 2, width_ratios=(1.15, 1.0))]
         _parameters(third[0], damper)
-        doubts = "No warnings: what was fitted is determined, and the residual looks like noise."
-        _sheet.remarks(third[1], "Warnings", warnings, width=62, none=doubts if damper.fit else "No warnings.")
+        none = "No warnings" + ": what was fitted is determined, and the residual looks like noise." * bool(fit)
+        _sheet.remarks(third[1], "Warnings", doubts if warnings is None else warnings, width=62, none=none)
     return figure
 
 
@@ -150,21 +149,7 @@ def _force_velocity(
 ) -> None:
     """Points at peak velocity over loops, and the law."""
     reach = _MM * max(run.peak_velocity for run in damper.runs)
-    lines: list[Any] = []
-    for setting, runs in damper.evaluation.settings.items():
-        colour = damper.colours[setting]
-        for run in spread(runs, _MOST_LOOPS):
-            part = last_steady_cycle(run)
-            loop = {"color": colour, "linewidth": 0.7, "alpha": 0.55, "zorder": 1.2}
-            axes.plot(_MM * run.velocity[part], run.force[part] - damper.static_force, **loop)
-        peaks = peak_velocity_points(runs)
-        velocity, force = (np.asarray(a).ravel() for a in (peaks.velocity, peaks.force))
-        order = np.argsort(velocity)
-        points = _MM * velocity[order], force[order] - damper.static_force
-        several = len(damper.evaluation.settings) > 1 and damper.fit is None
-        look = {"color": colour, "linestyle": "-" if several else "", "linewidth": 1.4}
-        look |= {"marker": "o", "markersize": 4.5, "markerfacecolor": "white", "zorder": 3.0}
-        lines += axes.plot(*points, label=setting or "peak-velocity points", **look)
+    lines = _records(axes, damper)
     for number, (label, law) in enumerate(damper.laws.items()):
         alone = len(damper.laws) == 1
         style = _style.AFTER if alone else _style.AFTER | {"color": _style.graded(number, len(damper.laws))}
@@ -184,6 +169,26 @@ def _force_velocity(
     else:
         axes.plot([], [], color=_style.GREY, linewidth=0.7, label="loops (CVP)")
         axes.legend(loc="best", frameon=False)
+
+
+def _records(axes: "matplotlib.axes.Axes", damper: _Damper) -> list[Any]:
+    """Loops and peak-velocity points of each setting; the lines through the points."""
+    lines: list[Any] = []
+    for setting, runs in damper.evaluation.settings.items():
+        colour = damper.colours[setting]
+        for run in spread(runs, _MOST_LOOPS):
+            part = last_steady_cycle(run)
+            loop = {"color": colour, "linewidth": 0.7, "alpha": 0.55, "zorder": 1.2}
+            axes.plot(_MM * run.velocity[part], run.force[part] - damper.static_force, **loop)
+        peaks = peak_velocity_points(runs)
+        velocity, force = (np.asarray(a).ravel() for a in (peaks.velocity, peaks.force))
+        order = np.argsort(velocity)
+        points = _MM * velocity[order], force[order] - damper.static_force
+        several = len(damper.evaluation.settings) > 1 and damper.fit is None
+        look = {"color": colour, "linestyle": "-" if several else "", "linewidth": 1.4}
+        look |= {"marker": "o", "markersize": 4.5, "markerfacecolor": "white", "zorder": 3.0}
+        lines += axes.plot(*points, label=setting or "peak-velocity points", **look)
+    return lines
 
 
 def _force_title(damper: _Damper) -> str:
@@ -251,24 +256,21 @@ def _loops(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
     shown = spread(damper.runs, _MOST_LOOPS)
     fitted = damper.expected
     for number, run in enumerate(shown):
-        part, colour = last_steady_cycle(run), _style.graded(number, len(shown))
+        cycle, colour = np.arange(len(run))[last_steady_cycle(run)], _style.graded(number, len(shown))
+        part = np.append(cycle, cycle[0])  # closed
         stroke = _MM * run.stroke[part]
         force = run.force[part] - damper.static_force
-        broad = {"linewidth": 3.0, "alpha": 0.35} if fitted else {"linewidth": 1.2}
-        axes.plot(_closed(stroke), _closed(force), color=colour, **broad)
+        broad: dict[str, Any] = {"linewidth": 3.0, "alpha": 0.35} if fitted else {"linewidth": 1.2}
+        axes.plot(stroke, force, color=colour, **broad)
         if run.name in fitted:
             expected = fitted[run.name][part] - damper.static_force
-            axes.plot(_closed(stroke), _closed(expected), color=colour, linewidth=1.0)
+            axes.plot(stroke, expected, color=colour, linewidth=1.0)
     fastest, slowest = (_style.short(_MM * shown[i].peak_velocity) for i in (-1, 0))
     speeds = f"{slowest} (dark) to {fastest} mm/s" if len(shown) > 1 else f"{fastest} mm/s"
     _style.dress(
         axes, "stroke [mm]", "force [N]", f"Loops, {speeds}" + ("\nbroad: measured, thin: law" if fitted else "")
     )
     _style.cross(axes)
-
-
-def _closed(values: np.ndarray) -> np.ndarray:
-    return np.append(values, values[:1])
 
 
 def _errors(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:

@@ -44,7 +44,9 @@ def ladder(comparison: Comparison) -> "matplotlib.figure.Figure":
     share = f"{_style.short(best.error)} N = {_style.short(100.0 * best.error / largest)} % of the largest force"
     title = f"{_style.in_words(best.name)}: {share}"
     _style.dress(axes, "RMS of the force error [N]   (free parameters in brackets)", "", title)
-    shares = axes.secondary_xaxis("top", functions=(lambda x: 100.0 * x / largest, lambda x: 0.01 * x * largest))
+    factor = 100.0 / largest
+    to_percent, back = (lambda x: np.multiply(x, factor)), (lambda x: np.divide(x, factor))
+    shares = axes.secondary_xaxis("top", functions=(to_percent, back))
     shares.set_xlabel("% of the largest force")
     axes.grid(False, axis="y")
     axes.set_yticks(rows, [f"{_style.in_words(r.name)} ({r.parameters})" for r in rungs])

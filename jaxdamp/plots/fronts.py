@@ -144,7 +144,7 @@ def _curves(
     for i in sorted(shown):
         force = np.asarray(quasi_static(laws[i], points).force)
         knee = i == front.knee
-        colour = _style.COLOURS[1] if knee else _style.graded(shades[i])
+        colour = _style.COLOURS[1] if knee else _style.graded(float(shades[i]))
         axes.plot(points, force, color=colour, linewidth=2.2 if knee else 1.1, zorder=3 if knee else 2)
     _style.dress(axes, _style.VELOCITY, _style.FORCE, f"{title}, in the colours of the front")
     _style.cross(axes)
