@@ -1,9 +1,10 @@
 """Tables of results: columns with units, rows of words and numbers; as text, HTML, CSV and plain data."""
 
 import csv
+import dataclasses
 import html
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -88,6 +89,10 @@ class Table:
     def texts(self) -> list[tuple[str, ...]]:
         """The rows for reading."""
         return [tuple(c.text(cell) for c, cell in zip(self.columns, row, strict=True)) for row in self.rows]
+
+    def only(self, first_cells: Collection[str]) -> "Table":
+        """The rows whose first cell is one of these."""
+        return dataclasses.replace(self, rows=tuple(row for row in self.rows if row[0] in first_cells))
 
     def records(self) -> list[dict[str, Cell]]:
         """The rows as dictionaries by the names of the columns: a list that `pandas.DataFrame` takes as it is."""

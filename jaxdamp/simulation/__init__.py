@@ -10,7 +10,12 @@ from jaxdamp.simulation.equations import Equations, RoadInput, StepState, settle
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
 from jaxdamp.simulation.observer import MetricObserver as MetricObserver
-from jaxdamp.simulation.range_notes import named_laws as named_laws, range_sentences as range_sentences
+from jaxdamp.simulation.range_notes import (
+    far_outside as far_outside,
+    named_laws as named_laws,
+    over_runs as over_runs,
+    range_sentences as range_sentences,
+)
 from jaxdamp.simulation.recorder import recorded as recorded
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride
@@ -54,8 +59,10 @@ __shared__ = [
     "AxleTiming",
     "MetricObserver",
     "RunCheck",
+    "far_outside",
     "moves_axles",
     "named_laws",
+    "over_runs",
     "range_sentences",
     "recorded",
     "stationary_notes",

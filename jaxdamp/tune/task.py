@@ -128,16 +128,14 @@ class DesignTask(Generic[V]):
 
     def notes_on_runs(self, design: AbstractVehicle) -> tuple[list[str], list[str]]:
         """Notes on the step and on the fitted ranges for a design, on every road; and the dampers far outside."""
-        rides, far, white = rides_on(self.road, self.objective.metrics, self.run), [], is_white(self.road)
+        rides, white = rides_on(self.road, self.objective.metrics, self.run), is_white(self.road)
         road = rides[0](design).road if white else None
         notes = stationary_notes(design, road) if isinstance(road, WhiteRoad) else []
-        for ride_of in rides:
-            coarse = [] if white else step_notes(self.vehicle, design, ride_of)
-            notes += coarse
-            if not any("does not bear" in note for note in coarse):
-                ranges, outside = range_notes(self.vehicle, design, ride_of)
-                notes, far = notes + ranges, far + outside
-        return notes, list(dict.fromkeys(far))
+        coarse = [[] if white else step_notes(self.vehicle, design, ride_of) for ride_of in rides]
+        notes += [note for of_ride in coarse for note in of_ride]
+        sound = [on for on, bad in zip(rides, coarse, strict=True) if not any("does not bear" in note for note in bad)]
+        ranges, far = range_notes(self.vehicle, design, sound)
+        return notes + ranges, far
 
 
 @final

@@ -22,7 +22,17 @@ def changes_of(space: SearchRange, values: np.ndarray) -> tuple[Change, ...]:
     """Every free number before and after, with its bounds."""
     free = space.free
     notes = [f"at its {side} bound" if side else "" for side in space.side(values)]
-    columns = (free.names, space.start, values, free.owners, notes, space.lower, space.upper, free.followers)
+    zeros = np.abs(values) < _ROUNDING * np.abs(space.unit)
+    columns = (
+        free.names,
+        space.start,
+        np.where(zeros, 0.0, values),
+        free.owners,
+        notes,
+        space.lower,
+        space.upper,
+        free.followers,
+    )
     return tuple(
         Change(name, float(before), float(after), p.unit, note, float(lower), float(upper), followers)
         for name, before, after, p, note, lower, upper, followers in zip(*columns, strict=True)

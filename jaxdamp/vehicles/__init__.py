@@ -36,7 +36,7 @@ from jaxdamp.vehicles.points import Point
 from jaxdamp.vehicles.port_form import LinearMap as LinearMap, PortForm as PortForm
 from jaxdamp.vehicles.ports import Earlier as Earlier, Ports as Ports, States as States
 from jaxdamp.vehicles.quarter_car import QuarterCar
-from jaxdamp.vehicles.ride_metrics import is_stationary as is_stationary
+from jaxdamp.vehicles.ride_metrics import GOALS as GOALS, is_stationary as is_stationary
 from jaxdamp.vehicles.roll_car import RollCar
 from jaxdamp.vehicles.seat import Seat, SeatMass
 from jaxdamp.vehicles.stationary import EquivalentDamper as EquivalentDamper, equivalent_dampers, stationary_rms
@@ -89,6 +89,7 @@ __all__ = [
 ]
 # What the other packages of the library import, and what is only returned: a user writes none of these.
 __shared__ = [
+    "GOALS",
     "Channel",
     "ChannelKind",
     "Earlier",
