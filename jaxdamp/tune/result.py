@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult, drawn_by
+from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_unit
 from jaxdamp.tune.limits import LimitRange, written
@@ -148,7 +148,16 @@ class TuneResult(AbstractResult, Generic[V]):
         """Better or not, by how much and at what price: on fresh roads if there are any."""
         return verdict_of(self)
 
-    plot = drawn_by("tuning", "The laws and the metrics before and after.")
+    def plot(self, kind: str = "changes", **options: Any) -> "Figure":
+        """The laws and the metrics before and after, or the sheet of the ride.
+
+        Arguments:
+            kind: "changes" (`plots.tuning`), or "sheet" for one A4 page (`plots.ride_sheet`).
+            options: of that function.
+        """
+        from jaxdamp.plots import ride_sheet, tuning
+
+        return plotted(kind, {"changes": tuning, "sheet": ride_sheet}, self, **options)
 
     @property
     def summary(self) -> str:
