@@ -166,8 +166,3 @@ def limit_ends(limits: Iterable[Limit]) -> list[LimitEnd]:
 def margins(ends: Iterable[LimitEnd], values: Mapping[str, Any]) -> np.ndarray:
     """Relative distances to ends of limits, negative beyond them."""
     return np.array([end.sign * (end.value - values[end.name]) / end.scale for end in ends])
-
-
-def margin_slopes(ends: Iterable[LimitEnd], slopes: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The derivatives of `margins`."""
-    return np.array([-end.sign * slopes[end.name] / end.scale for end in ends])

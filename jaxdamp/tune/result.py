@@ -26,17 +26,11 @@ V = TypeVar("V", bound=AbstractVehicle)
 
 
 class ScenarioValues(NamedTuple):
-    """All metrics in every scenario.
+    """All metrics in every scenario."""
 
-    Attributes:
-        names: of the scenarios.
-        before: metrics of the start, shape (scenarios,).
-        after: metrics of the tuned vehicle.
-    """
-
-    names: tuple[str, ...]
-    before: dict[str, Float[np.ndarray, " scenarios"]]
-    after: dict[str, Float[np.ndarray, " scenarios"]]
+    names: tuple[str, ...]  # of the scenarios
+    before: dict[str, Float[np.ndarray, " scenarios"]]  # metrics of the start, shape (scenarios,)
+    after: dict[str, Float[np.ndarray, " scenarios"]]  # metrics of the tuned vehicle
 
 
 class Drive(NamedTuple):
@@ -47,37 +41,22 @@ class Drive(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """The search from one start.
+    """The search from one start."""
 
-    Attributes:
-        start: the free numbers at its start.
-        end: the free numbers at its end.
-        metric: the metric at its end.
-        meets_limits: whether all limits are met there.
-        converged: whether it ended at an optimum.
-    """
-
-    start: np.ndarray
-    end: np.ndarray
-    metric: float
-    meets_limits: bool
-    converged: bool
+    start: np.ndarray  # the free numbers at its start
+    end: np.ndarray  # the free numbers at its end
+    metric: float  # the metric at its end
+    meets_limits: bool  # whether all limits are met there
+    converged: bool  # whether it ended at an optimum
 
 
 class ToleranceEffect(NamedTuple):
-    """The effect of the scatter of one parameter on a metric, to second order.
+    """The effect of the scatter of one parameter on a metric, to second order."""
 
-    Attributes:
-        parameter: its name.
-        scatter: its standard deviation relative to its value.
-        mean: mean change of the metric, relative: half the second derivative times the variance.
-        deviation: standard deviation of the metric, relative: slope times deviation, and the part of the curvature.
-    """
-
-    parameter: str
-    scatter: float
-    mean: float
-    deviation: float
+    parameter: str  # its name
+    scatter: float  # its standard deviation relative to its value
+    mean: float  # mean change of the metric, relative: half the second derivative times the variance
+    deviation: float  # standard deviation of the metric, relative: slope times deviation, and the part of the curvature
 
     def sentence(self, metric: str) -> str:
         """In words, such as "A 10 % scatter of damper.blow_off_rate costs 1.4 % of rms_sprung_acceleration"."""

@@ -44,15 +44,10 @@ class Outcome(enum.Enum):
 
 
 class Verdict(NamedTuple):
-    """The outcome of a tuning and the sentence that says it.
+    """The outcome of a tuning and the sentence that says it."""
 
-    Attributes:
-        outcome: what it came to.
-        sentence: with its numbers.
-    """
-
-    outcome: Outcome
-    sentence: str
+    outcome: Outcome  # what it came to
+    sentence: str  # with its numbers
 
     @property
     def better(self) -> bool:
