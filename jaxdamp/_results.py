@@ -2,10 +2,11 @@
 
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp._tables import Table, plain, with_unit
 
@@ -115,6 +116,28 @@ class AbstractResult(ABC):
 
     def __repr__(self) -> str:
         return "\n".join([self.summary, self.table().to_text(), *(f"warning: {text}" for text in self.warnings)])
+
+
+def plotted(
+    kind: Any, kinds: Mapping[str, Callable[..., Any]], result: "AbstractResult", before: str = "", **options: Any
+) -> Any:
+    """The picture of a result of the kind that `result.plot(kind)` names.
+
+    Arguments:
+        kind: a name among the kinds.
+        kinds: the function for each; the first is the default.
+        result: what is drawn.
+        before: the option that stood in the place of the kind in earlier releases.
+        options: of the function.
+
+    Raises:
+        ValueError: an unknown kind.
+    """
+    if before and not isinstance(kind, str):
+        warnings.warn(f"Write `plot({before}=...)`: `kind` comes first now.", DeprecationWarning, stacklevel=3)
+        kind, options = next(iter(kinds)), {before: kind, **options}
+    _checks.one_of("kind", kind, kinds)
+    return kinds[kind](result, **options)
 
 
 def worst_status(statuses: Iterable[Status]) -> Status:

@@ -58,14 +58,16 @@ def imported_modules(source: str, package: list[str]) -> Iterator[tuple[list[str
 
 
 def public_names(part: str) -> set[str] | None:
-    """What a package hands to the others, `__all__` and `__shared__` of its `__init__`; None of a single module."""
+    """What a package hands to the others, `__all__` and `X as X` of its `__init__`; None of a single module."""
     door = ROOT / part / "__init__.py"
     if not door.exists():
         return None
     names: set[str] = set()
     for node in ast.parse(door.read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) in ("__all__", "__shared__"):
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
             names |= set(ast.literal_eval(node.value))
+        if isinstance(node, ast.ImportFrom):
+            names |= {alias.name for alias in node.names if alias.asname == alias.name}
     return names
 
 

@@ -17,6 +17,7 @@ from jaxdamp.identify.ladder import (
     default_ladder,
     ladder_starts,
     laws_table,
+    suited_laws as suited_laws,
 )
 from jaxdamp.identify.law_result import FitResult as FitResult
 from jaxdamp.identify.machine import (
@@ -81,42 +82,6 @@ __all__ = [
     "solve",
     "train",
     "virtual_ride",
-]
-__shared__ = [
-    "NAMED_LAWS",
-    "OFFSET",
-    "Band",
-    "ChannelScore",
-    "Comparison",
-    "CrossValidation",
-    "ErrorShares",
-    "Estimate",
-    "Evidence",
-    "ExperimentDesign",
-    "Failure",
-    "Fit",
-    "FitResult",
-    "InitialMotion",
-    "LeftOutSetting",
-    "ManyFits",
-    "NamedLaw",
-    "Posterior",
-    "ProfileCurve",
-    "Propagated",
-    "RecordSensitivity",
-    "Rung",
-    "ScheduledFit",
-    "Score",
-    "Spread",
-    "TargetFit",
-    "Training",
-    "VehicleFit",
-    "VehicleTest",
-    "extent",
-    "fit_each",
-    "machine_names",
-    "rounded",
-    "without_machine",
 ]
 
 answer_guesses(__name__, __all__)

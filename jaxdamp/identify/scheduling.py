@@ -72,7 +72,7 @@ class LeftOutSetting(NamedTuple):
 
     def plot(self) -> "Figure":
         """Loops at the setting left out, measured and interpolated, with residuals."""
-        return self.result.plot(self.runs)
+        return self.result.plot(runs=self.runs)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

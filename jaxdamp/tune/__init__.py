@@ -64,17 +64,6 @@ __all__ = [
     "tolerances",
     "valving",
 ]
-__shared__ = [
-    "DamperComparison",
-    "ParetoFront",
-    "Rescore",
-    "Sensitivity",
-    "TuneResult",
-    "ValvingResult",
-    "damper_paths",
-    "hypervolume",
-    "limit_spans",
-]
 
 answer_old_names(
     __name__,

@@ -28,6 +28,7 @@ INSIDE = 1e-6  # distance from the open ends of a domain, relative to the unit o
 DAMPERS = ("**damper.**",)  # what is tuned by default, as far as it is adjustable
 MOST_CHOICES = 6  # numbers of which all combinations of two neighbours are tried
 NO_BOUND = (-math.inf, math.inf)
+_ROUNDING = 1e-12  # of its unit, below which the end of a parameter is zero
 
 
 @final
@@ -111,7 +112,8 @@ class SearchRange:
         """Every free number before and after, with its bounds."""
         free = self.free
         notes = [f"at its {side} bound" if side else "" for side in self.side(values)]
-        columns = (free.names, self.start, values, free.owners, notes, self.lower, self.upper, free.followers)
+        ended = np.where(np.abs(values) < _ROUNDING * np.abs(self.unit), 0.0, values)
+        columns = (free.names, self.start, ended, free.owners, notes, self.lower, self.upper, free.followers)
         return tuple(
             Change(name, float(before), float(after), p.unit, note, float(lower), float(upper), followers)
             for name, before, after, p, note, lower, upper, followers in zip(*columns, strict=True)

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult, drawn_by
+from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_unit
 from jaxdamp.tune.limits import LimitRange, written
@@ -23,6 +23,7 @@ from jaxdamp.vehicles import AbstractVehicle
 
 
 V = TypeVar("V", bound=AbstractVehicle)
+NAMED = 2  # parameters at bounds that a summary names; of more it says how many, and the table which
 
 
 class ScenarioValues(NamedTuple):
@@ -90,7 +91,7 @@ class TuneResult(AbstractResult, Generic[V]):
         drive: what was driven over.
         without_effect: names of the parameters by which the derivative of the minimised metric is zero.
         violated: each metric or shape beyond its limit, in words with its number.
-        extrapolated: each damper that the tuned vehicle takes out of its fitted range for 1 % of the time or more.
+        extrapolated: by how much each damper of the tuned vehicle leaves its fitted range for 1 % of the time or more.
         allowed: the limits as they are written, which may be relative to the start on each road.
         elsewhere: where the numbers hold if there are no fresh roads, in words.
         tolerances: the effect of the scatter of each parameter on the metric, at the tuned vehicle, of `robust`.
@@ -126,7 +127,16 @@ class TuneResult(AbstractResult, Generic[V]):
         """Better or not, by how much and at what price: on fresh roads if there are any."""
         return verdict_of(self)
 
-    plot = drawn_by("tuning", "The laws and the metrics before and after.")
+    def plot(self, kind: str = "changes", **options: Any) -> "Figure":
+        """The laws and the metrics before and after, or the sheet of the ride.
+
+        Arguments:
+            kind: "changes" (`plots.tuning`), or "sheet" for one A4 page (`plots.ride_sheet`).
+            options: of that function.
+        """
+        from jaxdamp.plots import ride_sheet, tuning
+
+        return plotted(kind, {"changes": tuning, "sheet": ride_sheet}, self, **options)
 
     @property
     def summary(self) -> str:
@@ -134,8 +144,10 @@ class TuneResult(AbstractResult, Generic[V]):
         before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
         share = f" ({100 * (after / before - 1):+.1f} %)" if before else ""
         stops = [f"{name} at its limit" for name in self.active_limits]
-        stops += [f"{change.name} {change.note}" for change in self.parameters if change.note]
-        inside = "all parameters inside their bounds" if not any(c.note for c in self.parameters) else ""
+        at_bounds = [f"{change.name} {change.note}" for change in self.parameters if change.note]
+        inside = "" if at_bounds else "all parameters inside their bounds"
+        few = len(at_bounds) <= NAMED
+        stops += at_bounds if few else [f"{len(at_bounds)} of {len(self.parameters)} parameters at their bounds"]
         stops = [*(f"{name} beyond its limit" for name in self.violated), *stops]
         state = "an optimum" if self.converged else "not an optimum"
         stops += [f"no effect of {name}" for name in self.without_effect]

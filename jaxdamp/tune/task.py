@@ -12,7 +12,15 @@ from jaxdamp._field_types import check_module
 from jaxdamp.dampers import has_fitted_range
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import DEVIATIONS, CoarseStepWarning, Ride, range_sentences, stationary_notes
+from jaxdamp.simulation import (
+    DEVIATIONS,
+    CoarseStepWarning,
+    Ride,
+    far_outside,
+    over_runs,
+    range_sentences,
+    stationary_notes,
+)
 from jaxdamp.solve import Evaluation, Region
 from jaxdamp.tune.limits import Limit, LimitRange, limit_ends, limit_ranges, scaled
 from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
@@ -23,9 +31,6 @@ from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import LEAST, RUN
 from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
-
-
-FAR = 0.01  # share of the time outside the fitted range from which a verdict cannot be trusted
 
 
 def rides_on(
@@ -61,21 +66,28 @@ def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable
 
 
 def range_notes(
-    start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]
+    start: AbstractVehicle, tuned: AbstractVehicle, rides: Sequence[Callable[[AbstractVehicle], Ride]]
 ) -> tuple[list[str], list[str]]:
-    """A sentence for each damper used outside its fitted range, before and after the tuning; and those far outside."""
-    if not has_fitted_range((start, tuned)):
+    """A sentence for each damper used outside its fitted range, before and after the tuning; and by how much, briefly.
+
+    Arguments:
+        start: the vehicle before.
+        tuned: the vehicle after.
+        rides: the ride of a vehicle on each road; on a white road, velocities up to three standard deviations are
+            compared.
+    """
+    if not rides or not has_fitted_range((start, tuned)):
         return [], []
     notes, uses = [], {}
     for when, vehicle in (("At the start", start), ("After the tuning", tuned)):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", CoarseStepWarning)  # reported by the notes on the step
-            ride = ride_of(vehicle)
-        reach = f" (velocities of {DEVIATIONS:g} standard deviations)" if isinstance(ride.road, WhiteRoad) else ""
-        uses = ride.range_use()
+            ridden = [ride_of(vehicle) for ride_of in rides]
+        white = isinstance(ridden[0].road, WhiteRoad)
+        reach = f" (velocities of {DEVIATIONS:g} standard deviations)" if white else ""
+        uses = over_runs([ride.range_use() for ride in ridden])
         notes += [f"{when}{reach}, {sentence}" for sentence in range_sentences(uses)]
-    beyond = {name: used for name, used in uses.items() if any((use.share or 0.0) >= FAR for use in used)}
-    return notes, list(range_sentences(beyond))
+    return notes, far_outside(uses)
 
 
 class Tolerance(NamedTuple):
@@ -171,16 +183,14 @@ class DesignTask(Generic[V]):
 
     def notes_on_runs(self, design: AbstractVehicle) -> tuple[list[str], list[str]]:
         """Notes on the step and on the fitted ranges for a design, on every road; and the dampers far outside."""
-        rides, far, white = rides_on(self.road, self.objective.metrics, self.run), [], is_white(self.road)
+        rides, white = rides_on(self.road, self.objective.metrics, self.run), is_white(self.road)
         road = rides[0](design).road if white else None
         notes = stationary_notes(design, road) if isinstance(road, WhiteRoad) else []
-        for ride_of in rides:
-            coarse = [] if white else step_notes(self.vehicle, design, ride_of)
-            notes += coarse
-            if not any("does not bear" in note for note in coarse):
-                ranges, outside = range_notes(self.vehicle, design, ride_of)
-                notes, far = notes + ranges, far + outside
-        return notes, list(dict.fromkeys(far))
+        coarse = [[] if white else step_notes(self.vehicle, design, ride_of) for ride_of in rides]
+        notes += [note for of_ride in coarse for note in of_ride]
+        sound = [on for on, bad in zip(rides, coarse, strict=True) if not any("does not bear" in note for note in bad)]
+        ranges, far = range_notes(self.vehicle, design, sound)
+        return notes + ranges, far
 
 
 @final

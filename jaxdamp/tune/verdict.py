@@ -73,8 +73,9 @@ def verdict_of(result: "TuneResult[Any]") -> Verdict:
     elif not gain + error < -NOTICED:
         outcome, first = Outcome.NOT_SHOWN, f"Not shown to be better: {words}"
     elif result.extrapolated:
-        outcome, first = Outcome.EXTRAPOLATED, f"Not known to be better: {words} by the law, but outside its records"
-        held += "".join(f"; {sentence.rstrip('.')}" for sentence in result.extrapolated)
+        outside = "; ".join(result.extrapolated)
+        outcome = Outcome.EXTRAPOLATED
+        first = f"Not known to be better: {words} by the law, but outside its records ({outside})"
     elif name and price > -gain:
         outcome, first = Outcome.TRADE, f"A trade: {words}"
     else:
