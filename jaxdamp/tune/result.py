@@ -4,7 +4,7 @@ import dataclasses
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -18,8 +18,12 @@ from jaxdamp.tune.objective import Objective, Targets
 from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
 from jaxdamp.tune.scenarios import Road
-from jaxdamp.tune.verdict import Verdict, verdict_of
+from jaxdamp.tune.verdict import Verdict, mean_change, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 V = TypeVar("V", bound=AbstractVehicle)
@@ -180,7 +184,7 @@ class TuneResult(AbstractResult, Generic[V]):
         """The ride metrics before and after, with notes on the minimised metric and on limits."""
         rows = []
         for (name, before), after in zip(self.before.items(), self.after.values(), strict=True):
-            on_fresh = () if self.fresh is None else (_mean_change(self.fresh, name),)
+            on_fresh = () if self.fresh is None else (mean_change(self, name),)
             more = (*on_fresh, self._note(name))
             rows.append(Compared(name, self.units[name], (before, after), percent_change(before, after), more))
         fresh = () if self.fresh is None else (Column("on fresh roads", "%", "+.1f"),)
@@ -281,9 +285,3 @@ class TuneResult(AbstractResult, Generic[V]):
     def __repr__(self) -> str:
         tables = [table.to_text() for table in self.tables().values()]
         return "\n".join([self.summary, *tables, *(f"warning: {warning}" for warning in self.warnings)])
-
-
-def _mean_change(fresh: Rescore, name: str) -> float | None:
-    """Mean change of a metric on fresh roads [%]; none from zero."""
-    change = fresh.change(name)
-    return 100.0 * float(np.mean(change)) if np.all(np.isfinite(change)) else None

@@ -188,7 +188,9 @@ def scenario_ride(
     first, rides = _checked_rides(vehicle, scenarios, changes, options)
     white = isinstance(scenarios[0].road, WhiteRoad)
     inputs: Any = [ride.road if white else ride.heights for ride in rides]
-    common = eqx.tree_at(lambda r: (r.vehicle, r.road), first, (vehicle, inputs[0] if white else None), is_leaf=_none)
+    common = eqx.tree_at(
+        lambda r: (r.vehicle, r.road), first, (vehicle, inputs[0] if white else None), is_leaf=lambda leaf: leaf is None
+    )
     stacked = {path: [jnp.stack(side) for side in zip(*pairs, strict=True)] for path, pairs in changes.items()}
     ride = ScenarioRide(
         ride=common.side_by_side(),
@@ -230,10 +232,6 @@ def _checked_rides(
         lengths = ", ".join(sorted(f"{(count - 1) * most.dt:g} s" for count in counts))
         _checks.refuse("roads", "be driven for the same time", lengths, "Pass `duration`.")
     return most, rides
-
-
-def _none(leaf: Any) -> bool:
-    return leaf is None
 
 
 def _changes(vehicle: AbstractVehicle, conditions: Sequence["Condition"]) -> dict[str, list[tuple[Array, Array]]]:
