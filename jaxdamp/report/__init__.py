@@ -27,6 +27,7 @@ from jaxdamp.report.fits import (
     fitted_velocities as fitted_velocities,
     parameters_of as parameters_of,
 )
+from jaxdamp.report.force_velocity import table_report as table_report
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import fitted_range_table as fitted_range_table, range_use_table as range_use_table
 from jaxdamp.report.records import add_records as add_records, records_table as records_table
@@ -80,6 +81,7 @@ __shared__ = [
     "ride_records_table",
     "ride_tables",
     "ride_verdict",
+    "table_report",
 ]
 
 answer_guesses(__name__, __all__)
