@@ -1,10 +1,11 @@
 """Tables of results: columns with units, rows of words and numbers; as text, HTML, CSV and plain data."""
 
 import csv
+import dataclasses
 import html
 import io
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -117,6 +118,10 @@ class Table:
     def headings(self) -> list[str]:
         """The names of the columns with the units that are shown."""
         return [column.heading for column in self.shown().columns]
+
+    def only(self, first_cells: Collection[str]) -> "Table":
+        """The rows whose first cell is one of these."""
+        return dataclasses.replace(self, rows=tuple(row for row in self.rows if row[0] in first_cells))
 
     def records(self) -> list[dict[str, Cell]]:
         """The rows as dictionaries by the names of the columns: a list that `pandas.DataFrame` takes as it is."""
@@ -241,9 +246,11 @@ def comparison_table(
 
 
 def plain(value: Any) -> Any:
-    """Numbers, words, lists and dictionaries as JSON has them; numbers that are not finite become None."""
+    """Numbers, words, lists, records and dictionaries as JSON has them; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
+    if hasattr(value, "_asdict"):
+        return plain(value._asdict())
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     if value is None or isinstance(value, str | bool | int):

@@ -104,11 +104,16 @@ class ForceVelocityTable:
         rows = ((v, *(of.get(v) for of in cells)) for v in grid.tolist())
         return Table(f"Forces of {self.name} (velocity positive in rebound)", columns, tuple(rows))
 
-    def plot(self) -> "matplotlib.figure.Figure":
-        """Force over velocity of all settings (`plots.force_velocity_family`)."""
+    def plot(self, kind: str = "family") -> "matplotlib.figure.Figure":
+        """Force over velocity of all settings.
+
+        Arguments:
+            kind: "family", or "sheet" for an A4 page with the forces in a table.
+        """
         from jaxdamp import plots
 
-        return plots.force_velocity_family(self)
+        _checks.one_of("kind", kind, ("family", "sheet"))
+        return plots.force_velocity_family(self, page=kind == "sheet")
 
     def __repr__(self) -> str:
         return "\n".join([f"{self.table()}", *self.notes])

@@ -33,7 +33,6 @@ class Reading:
         cycles: full cycles to keep: 3 or last:3, or skip:2.
         keep_rest: keep the rest before and after the motion, which is cut off otherwise.
         side: of a force-velocity table with one direction only: rebound, compression, or symmetric for both alike.
-        verbose: print all findings on the records.
     """
 
     read: Annotated[Call, "bench.read"]
@@ -41,7 +40,6 @@ class Reading:
     cycles: str | None = None
     keep_rest: bool = False
     side: str | None = None
-    verbose: bool = False
 
     def raw(self, files: Sequence[Path]) -> BenchSet:
         """The records as they are in the files."""
@@ -106,7 +104,7 @@ class Reading:
         """The worst findings, or all."""
         screen.heading(found.summary)
         sentences = found.sentences()
-        shown = sentences if self.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
+        shown = sentences if screen.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
         for sentence in shown:
             screen.points([in_command_line(sentence)], style=_COLOURS[sentence.split(",")[0]])
         if len(sentences) > len(shown):
@@ -116,11 +114,13 @@ class Reading:
 
 
 def law_names(asked: Sequence[str]) -> list[str]:
-    """The laws to fit: all that are not optional, or those named, each once.
+    """The laws to fit: all that are not optional, or those named, each once; none for those that suit the records.
 
     >>> law_names(["linear, besinger", "linear"])
     ['linear', 'besinger']
     """
+    if not asked:
+        return []
     asked = words("law", asked)
     if not asked:
         _checks.refuse("law", "name a law", "empty", 'See "jaxdamp laws".')

@@ -26,6 +26,8 @@ class Refused(NamedTuple):
 def through_points(law: Sequence[str]) -> type[dampers.Table] | type[dampers.SplineTable] | None:
     """The law that goes through the points of a table, if it is asked for; None for laws to be fitted."""
     asked = words("law", law)
+    if not asked:
+        return dampers.Table
     if len(asked) == 1 and asked[0] in THROUGH_POINTS:
         return THROUGH_POINTS[asked[0]]
     for name in asked:
@@ -53,6 +55,8 @@ def fit_table(
         with work.saving("Laws and tables") as draft:
             best = _write_laws(draft, table, kind)
             write_tables(draft / "tables", {"forces": table.table()})
+            with work.attempts.part("sheet.pdf"):
+                table.plot("sheet").savefig(draft / "sheet.pdf")
         screen.say(best, style="bold")
         work.page(table_report, table)
 

@@ -28,7 +28,11 @@ def test_a_sheet_becomes_a_family_and_a_best_click(sheet: Path, monkeypatch: pyt
     rows = list(csv.reader((folder / "fit/tables/forces.csv").read_text().splitlines()))
     assert rows[0] == ["velocity [in/s]", "force at 1 [lbf]", "force at 2 [lbf]", "force at 3 [lbf]"]
     assert [float(cell) for cell in rows[-1]] == pytest.approx([10.0, 50.0, 80.0, 110.0])
-    assert (folder / "fit/family.png").is_file() and (folder / "fit/laws/3.json").is_file()
+    assert (
+        (folder / "fit/sheet.pdf").read_bytes()[:4] == b"%PDF"
+        and (folder / "fit/family.png").is_file()
+        and (folder / "fit/laws/3.json").is_file()
+    )
     ride = ("quarter_car_000", "iso:A", "--start", folder / "fit/best_law.json", "--duration", "1")
     said = jaxdamp("tune", *ride, "--limit", "grip=+20%", "--out", folder / "tune").output
     assert "The best setting is" in said and "Shown in units metric" in said and "(from jaxdamp.toml)" in said
@@ -38,6 +42,7 @@ def test_a_sheet_becomes_a_family_and_a_best_click(sheet: Path, monkeypatch: pyt
 
 
 def test_what_says_nothing_of_a_sheet_is_refused(sheet: Path) -> None:
-    assert "without hysteresis" in refused(sheet.parent, "fit", sheet, "--law", "bouc_wen", "--out", sheet.parent / "a")
-    assert "force-velocity table" in refused(sheet.parent, "fit", sheet, "--cross-validate", "--out", sheet.parent / "a")
-    assert "'imperial'" in refused(sheet.parent, "fit", sheet, "--units", "imperal", "--out", sheet.parent / "a")
+    words = ("fit", sheet, "--out", sheet.parent / "a")
+    assert "without hysteresis" in refused(sheet.parent, *words, "--law", "bouc_wen")
+    assert "force-velocity table" in refused(sheet.parent, *words, "--cross-validate")
+    assert "'imperial'" in refused(sheet.parent, *words, "--units", "imperal")
