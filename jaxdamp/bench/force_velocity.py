@@ -168,8 +168,8 @@ def read_table(
     A column of velocities, and of forces either one column with settings in another ("clicks"), or a column for each
     setting ("4 clicks [lbf]", "R 4", "0.5A"), on several sheets or in several blocks if need be. The direction stands
     in the headers or in the names of sheets and files (rebound, compression), in a column of words, or in the signs of
-    velocity or force, which `sign` then must explain. Forces may be magnitudes. Units must be named by the headers or
-    by `units`.
+    velocity or force, which `sign` then must explain. Forces may be magnitudes; then there is none at rest. Units must
+    be named by the headers or by `units`.
 
     Arguments:
         paths: a file or several, which are one table.
@@ -200,6 +200,7 @@ def read_table(
     velocity [m/s]  force at 1 [N]  force at 2 [N]
             -0.127          -111.2          -133.4
            -0.0254          -44.48          -53.38
+                 0               0               0
             0.0254           88.96           133.4
              0.127           266.9           400.3
     """

@@ -188,6 +188,8 @@ def curves_of(sides: Sequence[Side], how: How) -> tuple[tuple[Curve, ...], list[
         if not points[direction]:
             _refuse_half(sides[0].where, word)
         _share(points[direction], points[-direction], word, notes)
+    if all(np.all(side.force >= 0.0) or np.all(side.force <= 0.0) for side in sides):
+        _rest(points[1].values(), notes)
     names = sorted({*points[1], *points[-1]}, key=natural_key)
     lacking = [name for name in names if name not in points[1] or name not in points[-1]]
     if lacking:
@@ -196,6 +198,14 @@ def curves_of(sides: Sequence[Side], how: How) -> tuple[tuple[Curve, ...], list[
     if len(curves) > 1:
         notes.append(f"{len(curves)} settings, by columns, rows or sheets: {', '.join(names)}")
     return tuple(sorted(curves, key=lambda c: np.inf if c.command is None else c.command)), notes
+
+
+def _rest(settings: Iterable[list[np.ndarray]], notes: list[str]) -> None:
+    """A point of no force at zero velocity, for settings that have none there."""
+    for parts in settings:
+        if not any(np.any(part[0] == 0.0) for part in parts):
+            parts.append(np.zeros((2, 1)))
+    notes.append("no force at rest, since forces are given as magnitudes by direction")
 
 
 def _share(own: dict[str, list[np.ndarray]], others: Iterable[str], word: str, notes: list[str]) -> None:
