@@ -111,7 +111,7 @@ def cross(axes: "matplotlib.axes.Axes", horizontal: bool = True, vertical: bool 
 
 def legend_beside(
     figure: "matplotlib.figure.Figure",
-    handles: Sequence[Any],
+    handles: Sequence[object],
     title: str = "",
     place: Literal["upper", "lower"] = "upper",
 ) -> None:
@@ -120,14 +120,14 @@ def legend_beside(
     figure.legend(handles=list(handles), loc=where, frameon=False, title=title or None, alignment="left")
 
 
-def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[Any], columns: int = 3) -> None:
+def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[object], columns: int = 3) -> None:
     """A legend above all axes, for pictures that need their width."""
     figure.legend(
         handles=list(handles), loc="outside upper center", frameon=False, ncols=min(columns, max(len(handles), 1))
     )
 
 
-def by_name(argument: str, given: Any, kind: type, words: str, remedy: str, alone: str = "") -> dict[str, Any]:
+def by_name(argument: str, given: object, kind: type, words: str, remedy: str, alone: str = "") -> dict[str, Any]:
     """One object to draw, or several by name, as a dictionary; `alone` names a single one.
 
     Arguments:
