@@ -95,7 +95,7 @@ def predicted(batch: Batch, model: Model) -> Float[np.ndarray, "runs time"] | No
 
 def _of_row(batch: Batch, model: Model, row: int) -> Model:
     """The model of one record, with the values that it has for each."""
-    number = int(batch.number[row])
+    number = int(np.asarray(batch.number)[row])
     own = {path: np.asarray(values)[row] for path, values in batch.fixed.items()}
     own |= {path: np.asarray(get(model, path))[number] for path in batch.per_record}
     return with_values(model, {path: np.asarray(value) for path, value in own.items()})

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Hashable
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
@@ -103,8 +104,12 @@ class PrintedLaw:
         self.free, shapes = free, [array.shape for array in numbers.arrays]
         self.slopes = sum(numbers.arrays[i].size for i in free)
         self.lanes = LANES * max(-(-self.slopes // LANES), 1)
-        self.states = int(law_of(model).initial_state().size)
-        self.conditions = int(margins(model).size) if any(law.has_conditions() for _, law in laws_inside(model)) else 0
+        self.states = int(jax.eval_shape(lambda: law_of(model).initial_state()).size)
+        self.conditions = (
+            int(jax.eval_shape(lambda: margins(model)).size)
+            if any(law.has_conditions() for _, law in laws_inside(model))
+            else 0
+        )
         m, printed = self.states, functools.partial(with_slopes, shapes=shapes, free=free)
 
         def force(arrays: list[Any], s: Any, x: Any, v: Any) -> Any:

@@ -96,9 +96,10 @@ class _Keyed:
 def _settled(question: _Keyed) -> QuasiStatic:
     """The curve, which a table, a picture and a page ask for one after the other."""
     law, velocities = question.content
-    states = jnp.broadcast_to(law.initial_state(), (velocities.size, law.initial_state().size))
+    begin = np.asarray(law.initial_state())
+    states = on_device(np.broadcast_to(begin, (velocities.size, begin.size)).copy())
     states, force = _hold(law, velocities, states, jnp.asarray(0))
-    if law.initial_state().size == 0:
+    if begin.size == 0:
         settled = np.isfinite(force)
         note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
         return QuasiStatic(velocities, force, settled, note, states)
@@ -114,7 +115,7 @@ def _settled(question: _Keyed) -> QuasiStatic:
     alone = change <= limit * size
     settled = np.isfinite(size) & (alone | (change <= limit * np.max(size, where=alone, initial=0.0)))
     note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
-    return QuasiStatic(velocities, jnp.where(settled, force, jnp.nan), settled, note, states)
+    return QuasiStatic(velocities, on_device(np.where(settled, force, np.nan)), settled, note, states)
 
 
 def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled: np.ndarray) -> str:
