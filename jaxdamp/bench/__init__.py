@@ -32,7 +32,14 @@ from jaxdamp.bench.evaluation import (
     read_limits,
     separate_gas_and_friction,
 )
-from jaxdamp.bench.preflight import Finding as Finding, Preflight as Preflight, preflight, usable
+from jaxdamp.bench.preflight import (
+    Finding as Finding,
+    Preflight as Preflight,
+    clock_jitter as clock_jitter,
+    mains_lines as mains_lines,
+    preflight,
+    usable,
+)
 from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import Excitation, RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable
@@ -93,9 +100,11 @@ __shared__ = [
     "VelocityLoops",
     "as_runs",
     "by_number",
+    "clock_jitter",
     "contradictions_in_words",
     "fold_cycles",
     "last_steady_cycle",
+    "mains_lines",
     "moving_part",
     "settings_apart",
     "steady_cycles",
