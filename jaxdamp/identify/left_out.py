@@ -98,7 +98,7 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
         residual = named[-1].rest
     left, alike = _repeated(residual, records), _alike(residual, records)
     sure = SURE * float(residual @ residual) * np.sqrt(alike / residual.size)
-    static = bool(named) and named[-1].effect.name == "offset"
+    static = [found.effect.name for found in named] == ["offset"]
     if (named and named[-1].effect.name in OF_LAW) or (
         not static and repeated > 0 and left > max(OF_THE_LAW * repeated, sure)
     ):
@@ -158,9 +158,9 @@ def _search(
         found = _clearest([*effects, hysteresis(records, late)], span, residual, records, squares, numbers)
         if found is None or found.share < least:
             break
-        if _is_static(found):
+        if not named and _is_static(found):
             constant = (_explained(e, span, residual, squares) for e in effects if e.name == "offset")
-            return [*named, *(one for one in constant if one is not None)]
+            return [one for one in constant if one is not None]
         named.append(found)
         effects = [effect for effect in effects if effect.name != found.effect.name]
         residual, span = found.rest, found.span
