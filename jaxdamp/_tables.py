@@ -129,13 +129,15 @@ class Table:
     def to_html(self) -> str:
         """The rows for reading, as HTML."""
         sides = [' class="number"' if self.is_number(i) else "" for i in range(len(self.columns))]
-        head = "".join(f"<th{s}>{html.escape(c.heading)}</th>" for c, s in zip(self.columns, sides, strict=True))
+        head = "".join(
+            f'<th scope="col"{s}>{html.escape(c.heading)}</th>' for c, s in zip(self.columns, sides, strict=True)
+        )
         lines = [
             "<tr>" + "".join(f"<td{s}>{html.escape(text)}</td>" for text, s in zip(row, sides, strict=True)) + "</tr>"
             for row in self.texts()
         ]
         caption = f"<caption>{html.escape(self.title)}</caption>"
-        return "\n".join([f"<table>{caption}", f"<tr>{head}</tr>", *lines, "</table>"])
+        return "\n".join([f"<table>{caption}", f"<thead><tr>{head}</tr></thead><tbody>", *lines, "</tbody></table>"])
 
     _repr_html_ = to_html
     __repr__ = to_text
