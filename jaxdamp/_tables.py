@@ -13,6 +13,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._display import Display, display
+from jaxdamp._types import Contents
 
 
 Cell = str | float | int | None
@@ -127,7 +128,7 @@ class Table:
         """The rows as dictionaries by the names of the columns: a list that `pandas.DataFrame` takes as it is."""
         return [dict(zip((c.name for c in self.columns), row, strict=True)) for row in self.rows]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Contents:
         """Title, columns with units, and rows, ready for JSON; numbers that are not finite are None."""
         columns = [{"name": column.name, "unit": column.unit} for column in self.columns]
         return {"title": self.title, "columns": columns, "rows": plain(self.rows)}
@@ -158,13 +159,14 @@ class Table:
     def to_html(self) -> str:
         """The rows for reading, as HTML."""
         sides = [' class="number"' if self.is_number(i) else "" for i in range(len(self.columns))]
-        head = "".join(f"<th{s}>{html.escape(c)}</th>" for c, s in zip(self.headings(), sides, strict=True))
+        cells = zip(self.headings(), sides, strict=True)
+        head = "".join(f'<th scope="col"{side}>{html.escape(heading)}</th>' for heading, side in cells)
         lines = [
             "<tr>" + "".join(f"<td{s}>{html.escape(text)}</td>" for text, s in zip(row, sides, strict=True)) + "</tr>"
             for row in self.texts()
         ]
         caption = f"<caption>{html.escape(display().text(self.title))}</caption>"
-        return "\n".join([f"<table>{caption}", f"<tr>{head}</tr>", *lines, "</table>"])
+        return "\n".join([f"<table>{caption}", f"<thead><tr>{head}</tr></thead><tbody>", *lines, "</tbody></table>"])
 
     _repr_html_ = to_html
     __repr__ = to_text
@@ -245,7 +247,7 @@ def comparison_table(
     return Table(title, columns, tuple(cells))
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Numbers, words, lists, records and dictionaries as JSON has them; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
@@ -266,7 +268,7 @@ def plain(value: Any) -> Any:
     return plain(array.tolist())
 
 
-def with_unit(value: Any, unit: str) -> dict[str, Any]:
+def with_unit(value: object, unit: str) -> Contents:
     """A number or an array with its unit, as plain data."""
     return {"value": plain(value), "unit": unit}
 
