@@ -27,7 +27,7 @@ MOST_KEPT = 2_000_000_000  # bytes of compiled programs in .pytest_cache
 # a program of 15 ms, instead of with NumPy or in one `jax.jit`. Those that need more for what they show are named.
 MOST_PROGRAMS = 100
 MORE_PROGRAMS = {
-    "test_contract": 150,
+    "test_contract": 250,
     "test_c": 300,
     "test_the_residual_of_a_problem_gives_the_truth_within_bounds_where_a_start_at_rest_does_not": 200,
     "test_the_slopes_of_the_pressure_drop_are_those_of_its_formula": 180,
