@@ -105,11 +105,11 @@ def _price(result: "TuneResult[Any]") -> tuple[float, str]:
     metrics = {m.name: m for m in result.objective.metrics} if result.objective else {}
     named = {result.metric, *result.limits}
     limited = {metrics[name].channel for name in result.limits if name in metrics}
-    known = {mean_change(result, name) for name in named}
+    changes = {mean_change(result, name) for name in named}
     worst = (NOTICED, "")
     for name in result.units:
         change, metric = mean_change(result, name), metrics.get(name)
-        if change is None or name in named or any(x is not None and np.isclose(change, x, 1e-6) for x in known):
+        if change is None or name in named or any(x is not None and np.isclose(change, x, 1e-6) for x in changes):
             continue
         channels = result.start.layout.by_name
         if metric is None or (
@@ -276,10 +276,10 @@ def start_notes(attempts: Sequence["Attempt"], metric: str) -> list[str]:
     alike = sum(value - best <= ALIKE * abs(best) for value in allowed)
     if alike == len(attempts):
         return []
-    rest = f", the worst at {furthest:.5g}" if furthest - best > ALIKE * abs(best) else ""
+    worst = f", the worst at {furthest:.5g}" if furthest - best > ALIKE * abs(best) else ""
     unmet = len(attempts) - len(allowed)
     failed = f", and {unmet} met no limits" if unmet and unmet < len(attempts) else ""
-    return [f"{alike} of {len(attempts)} starts ended at the best {metric}, {best:.5g}{rest}{failed}."]
+    return [f"{alike} of {len(attempts)} starts ended at the best {metric}, {best:.5g}{worst}{failed}."]
 
 
 def violations(short: Sequence[Limit], values: Mapping[str, float]) -> dict[str, str]:
