@@ -111,12 +111,14 @@ def _price(result: "TuneResult[Any]") -> tuple[float, str]:
         change, metric = mean_change(result, name), metrics.get(name)
         if change is None or name in named or any(x is not None and np.isclose(change, x, 1e-6) for x in changes):
             continue
-        channels = result.start.layout.by_name
-        if metric is None or (
-            metric.channel not in limited and not metric.statistic.signed and channels[metric.channel].kind in PRICED
-        ):
+        if metric is None or (metric.channel not in limited and _has_price(metric, result.start)):
             worst = max(worst, (change, name))
     return worst
+
+
+def _has_price(metric: Metric, vehicle: AbstractVehicle) -> bool:
+    """Whether a rise of a metric is a price."""
+    return not metric.statistic.signed and vehicle.layout.by_name[metric.channel].kind in PRICED
 
 
 def mean_change(result: "TuneResult[Any]", name: str) -> float | None:
