@@ -18,7 +18,7 @@ from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, share
 from jaxdamp.tune.limits import Limit, limit_ends, margins
 from jaxdamp.tune.measuring import LANES, ride_on
 from jaxdamp.tune.objective import Function, check_objective, exact_counterpart
-from jaxdamp.tune.ranges import start_points
+from jaxdamp.tune.ranges import SearchRange, start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenarios import Road, Scenarios

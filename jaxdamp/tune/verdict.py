@@ -9,11 +9,12 @@ from jaxtyping import Float
 
 from jaxdamp._status import Status
 from jaxdamp._tables import percent_change, typeset_unit
+from jaxdamp.metrics import Metric
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.limits import Limit, LimitRange
 from jaxdamp.tune.objective import Objective, exact_counterpart
 from jaxdamp.tune.ranges import FACTOR, Change, SearchRange
-from jaxdamp.vehicles import ChannelKind
+from jaxdamp.vehicles import AbstractVehicle, ChannelKind
 
 
 if TYPE_CHECKING:
