@@ -45,7 +45,7 @@ def drawn_by(name: str, text: str) -> "Callable[..., matplotlib.figure.Figure]":
         text: what it shows.
     """
 
-    def plot(self: Any, *values: Any, **options: Any) -> "matplotlib.figure.Figure":
+    def plot(self: "AbstractResult", *values: object, **options: object) -> "matplotlib.figure.Figure":
         from jaxdamp import plots
 
         return getattr(plots, name)(self, *values, **options)

@@ -155,5 +155,5 @@ def criterion_in_words(problem: Problem, loss: str, priors: Mapping[str, Sequenc
     parts = []
     if loss != "squares":
         parts.append(f"loss {loss}: {100 * problem.share_left_out:.2g} % of the samples have less than half weight")
-    known = [f"{name} {mean:.5g} ± {deviation:.2g}" for name, (mean, deviation) in priors.items()]
-    return "; ".join([*parts, *[f"priors {', '.join(known)}"] * bool(known)])
+    expected = [f"{name} {mean:.5g} ± {deviation:.2g}" for name, (mean, deviation) in priors.items()]
+    return "; ".join([*parts, *[f"priors {', '.join(expected)}"] * bool(expected)])

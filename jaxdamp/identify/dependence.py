@@ -71,12 +71,12 @@ class Dependence(NamedTuple):
         """The problem of all dampers together, by the vector."""
         together = np.zeros((self.size + 1, self.size + 1))
         slopes = np.zeros((*here.margins.shape, self.size))
-        for damper, (own, by_y) in enumerate(zip(products, here.margin_slopes, strict=True)):
+        for damper, (of_damper, by_y) in enumerate(zip(products, here.margin_slopes, strict=True)):
             columns, weights = self.rows(damper)
             slopes[damper][:, columns] = by_y @ weights
             columns, weights = np.append(columns, self.size), np.pad(weights, ((0, 1), (0, 1)))
             weights[-1, -1] = 1.0
-            together[np.ix_(columns, columns)] += weights.T @ own @ weights
+            together[np.ix_(columns, columns)] += weights.T @ of_damper @ weights
         margins = np.append(np.ravel(here.margins), 1.0 if inside else -1.0)
         by_vector = np.concatenate([slopes.reshape(-1, self.size), np.zeros((1, self.size))])
         rows, samples = rows_of_products(together[None]), np.sum(here.samples, keepdims=True)

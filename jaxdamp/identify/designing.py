@@ -73,8 +73,8 @@ class ExperimentDesign(AbstractResult):
         for i, (p, value) in enumerate(zip(self.free.owners, np.asarray(self.free.values), strict=True)):
             error = self.standard_errors[self.free.names[i]]
             note = "not identifiable" if error > WEAK * abs(value) else ""
-            beside = () if others is None else (float(others[i]),)
-            rows.append((self.free.names[i], p.unit or "–", float(value), error, *beside, note))
+            of_programme = () if others is None else (float(others[i]),)
+            rows.append((self.free.names[i], p.unit or "–", float(value), error, *of_programme, note))
         return Table("Expected standard errors", tuple(columns), tuple(rows))
 
     def tables(self) -> dict[str, Table]:
@@ -100,8 +100,8 @@ class ExperimentDesign(AbstractResult):
         """Number of runs, and how many are as good as the programme."""
         if self.programme_covariance is None:
             return f"{len(self.tests)} runs chosen by the criterion {self.criterion}."
-        whole, match = len(self.programme), self.runs_to_match
-        return f"{match or f'More than {whole}'} such runs are as good as the {whole} of the programme."
+        count, match = len(self.programme), self.runs_to_match
+        return f"{match or f'More than {count}'} such runs are as good as the {count} of the programme."
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -256,11 +256,13 @@ class _Pool:
     free: FreeParameters
 
     @classmethod
-    def of(cls, candidates: Mapping[Any, Excitation], known: Information, limits: MachineLimits | None) -> "_Pool":
+    def of(
+        cls, candidates: Mapping[Any, Excitation], information: Information, limits: MachineLimits | None
+    ) -> "_Pool":
         """Those within the limits of force and heat."""
         bears = [
             limits is None or (force <= limits.force and power <= limits.power)
-            for force, power in zip(known.force, known.power, strict=True)
+            for force, power in zip(information.force, information.power, strict=True)
         ]
         if not any(bears):
             assert limits is not None
@@ -269,7 +271,9 @@ class _Pool:
                 "limits", "leave tests to choose from", value, "Allow more, or add slower and shorter tests."
             )
         items = [item for item, within in zip(candidates.items(), bears, strict=True) if within]
-        return cls([k for k, _ in items], [t for _, t in items], known.matrices[np.array(bears)], known.free)
+        return cls(
+            [k for k, _ in items], [t for _, t in items], information.matrices[np.array(bears)], information.free
+        )
 
     def joined(self, other: "_Pool") -> "_Pool":
         """Both together."""
@@ -286,11 +290,11 @@ def _compared(
     how: Mapping[str, Any],
 ) -> ExperimentDesign:
     """The design beside a programme of tests."""
-    whole = information(design.law, programme, **how).matrices.sum(axis=0)
-    aim = float(goal.value(whole))
+    of_programme = information(design.law, programme, **how).matrices.sum(axis=0)
+    aim = float(goal.value(of_programme))
     longest = goal.added(chosen, max(len(programme) - len(chosen), 0), pool.matrices)
     reached = goal.value(np.cumsum(pool.matrices[longest[: len(programme)]], axis=0)) <= aim
-    covariance = goal.covariance(whole)
+    covariance = goal.covariance(of_programme)
     return dataclasses.replace(
         design,
         programme=programme,

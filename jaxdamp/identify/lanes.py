@@ -101,23 +101,23 @@ class Lanes(NamedTuple):
         return [residual for residual, _ in self._residuals_and_drift(y)]
 
     def _residuals_and_drift(self, y: Float[np.ndarray, "dampers free"]) -> list[tuple[np.ndarray, np.ndarray]]:
-        found = []
+        of_groups = []
         for group in self.groups:
-            parts = [own for _, own in self._chunks(group, y, group.damper, np.arange(group.damper.size))]
-            residual, drift = (np.concatenate([own[k] for own in parts]) for k in (3, 4))
-            found.append((residual * group.level[:, None], drift))
-        return found
+            parts = [outputs for _, outputs in self._chunks(group, y, group.damper, np.arange(group.damper.size))]
+            residual, drift = (np.concatenate([outputs[k] for outputs in parts]) for k in (3, 4))
+            of_groups.append((residual * group.level[:, None], drift))
+        return of_groups
 
     def missed(self, y: Float[np.ndarray, "dampers free"]) -> list[list[Missed]]:
         """What the law misses in every record of each damper, with one lane for each, at the samples that count."""
-        found: list[list[Missed]] = [[] for _ in range(y.shape[0])]
+        by_damper: list[list[Missed]] = [[] for _ in range(y.shape[0])]
         for group, (residual, drift) in zip(self.groups, self._residuals_and_drift(y), strict=True):
             force, weight = np.asarray(group.batch.force), np.asarray(group.batch.weight)
             for k, (i, number) in enumerate(zip(group.damper, np.asarray(group.batch.number), strict=True)):
                 used = weight[k] > 0
-                own = (force[k][used], residual[k][used], weight[k][used])
-                found[i].append(Missed(int(number), *own, float(drift[k])))
-        return found
+                samples = (force[k][used], residual[k][used], weight[k][used])
+                by_damper[i].append(Missed(int(number), *samples, float(drift[k])))
+        return by_damper
 
     def levels(self) -> Float[np.ndarray, " dampers"]:
         """Size of the force of each damper, root of the weighted sum of squares."""
@@ -146,11 +146,11 @@ class Lanes(NamedTuple):
         problem = _flattened((self.coordinates, group.batch))
 
         def compared(part: slice) -> list[np.ndarray]:
-            own, rows = (np.pad(a[part], (0, group.chunk - a[part].size), "edge") for a in (lane, record))
-            point, level = y[own].astype(dtype), group.level[rows].astype(dtype)
+            places, rows = (np.pad(a[part], (0, group.chunk - a[part].size), "edge") for a in (lane, record))
+            point, level = y[places].astype(dtype), group.level[rows].astype(dtype)
             with jax.enable_x64(double):  # a thread begins with the precision of the process
-                found = _compared(problem.structure, problem.arrays, point, rows, level)
-            return [np.asarray(a, np.float64)[: lane[part].size] for a in found]
+                computed = _compared(problem.structure, problem.arrays, point, rows, level)
+            return [np.asarray(a, np.float64)[: lane[part].size] for a in computed]
 
         parts = group.parts(lane.size)
         each = _workers().map(compared, parts) if len(parts) > 1 else map(compared, parts)
@@ -183,8 +183,8 @@ class _Flattened(NamedTuple):
 
 def _flattened(tree: Any) -> _Flattened:
     dynamic, static = eqx.partition(tree, lambda leaf: isinstance(leaf, jax.Array | np.ndarray))
-    (arrays, shape), (others, rest) = jax.tree.flatten(dynamic), jax.tree.flatten(static)
-    return _Flattened((shape, rest, tuple(others)), arrays)
+    (arrays, shape), (others, static_shape) = jax.tree.flatten(dynamic), jax.tree.flatten(static)
+    return _Flattened((shape, static_shape, tuple(others)), arrays)
 
 
 @functools.partial(jax.jit, static_argnums=0)
@@ -196,8 +196,8 @@ def _compared(
     level: Any,  # Float[Array, " pairs"]
 ) -> tuple[Array, Array, Array, Array, Array]:
     """For each pair of a lane and a record: products of Jacobian and residual, margins and slopes, residual, drift."""
-    shape, rest, others = structure
-    coordinates, batch = eqx.combine(jax.tree.unflatten(shape, arrays), jax.tree.unflatten(rest, others))
+    shape, static_shape, others = structure
+    coordinates, batch = eqx.combine(jax.tree.unflatten(shape, arrays), jax.tree.unflatten(static_shape, others))
     free = coordinates.free
     fields = ("dt", "stroke", "velocity", "force", "weight", "number", "fixed", "temperature", "cycle")
     rows = {name: jax.tree.map(lambda a: a[record][:, None], getattr(batch, name)) for name in fields}
@@ -226,7 +226,9 @@ def grouped_records(
     """The records of all dampers in groups of equal length, prepared as `traces.batches` does for one damper."""
     owner = np.repeat(np.arange(len(records)), [len(runs) for runs in records])
     together = [run for runs in records for run in runs]
-    batches = record_batches(model, together, [s for own in sigma for s in own], samples_per_cycle, initial_state)
+    batches = record_batches(
+        model, together, [s for of_damper in sigma for s in of_damper], samples_per_cycle, initial_state
+    )
     squares = np.zeros(len(records))
     for batch in batches:
         weighted = np.asarray(batch.force) * np.asarray(batch.weight)

@@ -139,13 +139,13 @@ class ProfileCurve(AbstractResult):
 
 def profile_curve(evidence: Evidence, name: str, linear: tuple[float, float]) -> ProfileCurve:
     """`FitResult.profile`."""
-    problem, found = evidence.problem, evidence.minimum
+    problem, minimum = evidence.problem, evidence.minimum
     i, level = problem.free.names.index(name), evidence.quantile**2
     error = float(np.sqrt(evidence.covariance[i, i]))
-    side = _Side(evidence, i, error if 0 < error < np.inf else 0.1 * (abs(found.values[i]) or 1.0))
+    side = _Side(evidence, i, error if 0 < error < np.inf else 0.1 * (abs(minimum.values[i]) or 1.0))
     below, lower = side.walk(-1.0, level)
     above, upper = side.walk(1.0, level)
-    points = sorted([*below, (float(found.values[i]), 0.0), *above])
+    points = sorted([*below, (float(minimum.values[i]), 0.0), *above])
     values, cost = (np.array(column) for column in zip(*points, strict=True))
     return ProfileCurve(name, problem.free.owners[i].unit, values, cost, (lower, upper), level, linear)
 

@@ -119,10 +119,10 @@ def sensitivity_to_records(
     by_residual = (adjoint @ minimum.jacobian.T)[:, at.used]
     by_force = by_residual * at.weight
     weighed = by_residual * minimum.residual[at.used]
-    own = [at.owner == i for i in range(len(runs))]
-    pull = np.stack([weighed[:, k].sum(axis=1) for k in own])  # adjoint times the gradient of each record
-    gain = np.stack([(by_force[:, k] * at.force[k]).sum(axis=1) for k in own])
-    offset = np.stack([by_force[:, k].sum(axis=1) for k in own])
+    of_record = [at.owner == i for i in range(len(runs))]
+    pull = np.stack([weighed[:, k].sum(axis=1) for k in of_record])  # adjoint times the gradient of each record
+    gain = np.stack([(by_force[:, k] * at.force[k]).sum(axis=1) for k in of_record])
+    offset = np.stack([by_force[:, k].sum(axis=1) for k in of_record])
     if problem.each:  # each record is divided by its own RMS force, which changes too
         squares = np.array([np.sum(run.force**2) for run in runs])
         sums = np.array([np.sum(run.force) for run in runs])
@@ -138,9 +138,9 @@ def sensitivity_to_records(
         values=dict(zip(names, values.tolist(), strict=True)),
         by_gain=dict(zip(names, gain.T, strict=True)),
         by_offset=dict(zip(names, offset.T, strict=True)),
-        by_sample={name: tuple(row[k] for k in own) for name, row in zip(names, by_force, strict=True)},
-        velocity=tuple(at.velocity[k] for k in own),
-        stroke=tuple(at.stroke[k] for k in own),
+        by_sample={name: tuple(row[k] for k in of_record) for name, row in zip(names, by_force, strict=True)},
+        velocity=tuple(at.velocity[k] for k in of_record),
+        stroke=tuple(at.stroke[k] for k in of_record),
         held=tuple(map(str, held)),
         warnings=warnings,
     )
@@ -167,8 +167,8 @@ def _refined(problem: Problem, values: np.ndarray) -> _Minimum:
 
 def _moving(problem: Problem, values: np.ndarray) -> np.ndarray:
     """Which numbers are not at a bound of their own."""
-    ends, own = at_ends(problem.coordinates, values) != 0, problem.coordinates.at_ends(values) != 0
-    shared = ends & (problem.coordinates.ordered | ~own)
+    ends, at_bounds = at_ends(problem.coordinates, values) != 0, problem.coordinates.at_ends(values) != 0
+    shared = ends & (problem.coordinates.ordered | ~at_bounds)
     if shared.any():
         names = ", ".join(np.array(problem.free.names)[shared])
         remedy = "Fit with fewer free parameters."

@@ -125,9 +125,9 @@ class ScheduledFit(AbstractResult):
         columns += [Column("as one law", "%", ".1f"), Column("interpolated", "%", ".1f")]
         between = {left.setting: left.fit_percent for left in self.between}
         rows = []
-        for setting, own in self.alone.items():
-            percent = self.result.score(own.runs)[0]
-            rows.append((setting, len(own.runs), own.fit_percent, percent, between.get(setting)))
+        for setting, at in self.alone.items():
+            percent = self.result.score(at.runs)[0]
+            rows.append((setting, len(at.runs), at.fit_percent, percent, between.get(setting)))
         between_settings = "parameters interpolated" if self.choice.blend == "parameters" else "forces blended"
         return Table(f"Fit by setting ({between_settings} between settings)", tuple(columns), tuple(rows))
 
@@ -306,8 +306,8 @@ class Chain:
         """The score at a setting of the law interpolated from all others; its records have no part in any start."""
         alone = self.alone([other for other in self.settings if other != setting], shown)
         shown(f"all but {setting:g} as one law")
-        result, runs, own = self.together(alone, blend), tuple(self.at(setting)), self.own[setting]
-        return LeftOutSetting(setting, runs, result, *result.score(runs)[:2], own.fit_percent, own.rmse)
+        result, runs, there = self.together(alone, blend), tuple(self.at(setting)), self.own[setting]
+        return LeftOutSetting(setting, runs, result, *result.score(runs)[:2], there.fit_percent, there.rmse)
 
 
 def _mean_machine(alone: Alone) -> Rig | None:

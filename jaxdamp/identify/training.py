@@ -225,16 +225,16 @@ def _model(coordinates: Coordinates, raw: Array) -> Model:
     return coordinates.free.build(coordinates.to_physical(raw))
 
 
-def _mean_square(coordinates: Coordinates, raw: Array, made: Sequence[AbstractResiduals]) -> Array:
+def _mean_square(coordinates: Coordinates, raw: Array, residuals: Sequence[AbstractResiduals]) -> Array:
     """Mean squared error [N²] of the law over the samples that count, each as often as it was measured."""
     model = _model(coordinates, raw)
-    squares = jnp.stack([jnp.sum(jnp.square(part(model))) for part in made])
-    return jnp.sum(squares) / jnp.sum(jnp.stack([part.total_weight() for part in made]))
+    squares = jnp.stack([jnp.sum(jnp.square(part(model))) for part in residuals])
+    return jnp.sum(squares) / jnp.sum(jnp.stack([part.total_weight() for part in residuals]))
 
 
 @eqx.filter_jit
-def _error(coordinates: Coordinates, raw: Array, made: Sequence[AbstractResiduals]) -> Array:
-    return jnp.sqrt(_mean_square(coordinates, raw, made))
+def _error(coordinates: Coordinates, raw: Array, residuals: Sequence[AbstractResiduals]) -> Array:
+    return jnp.sqrt(_mean_square(coordinates, raw, residuals))
 
 
 @eqx.filter_jit
@@ -242,7 +242,7 @@ def _descend(
     coordinates: Coordinates,
     raw: Array,
     state: Any,
-    made: Sequence[AbstractResiduals],
+    residuals: Sequence[AbstractResiduals],
     rule: optax.GradientTransformation,
     level: float,
     count: Array,
@@ -251,7 +251,7 @@ def _descend(
 
     def step(_: Any, now: tuple[Array, Any]) -> tuple[Array, Any]:
         raw, state = now
-        slope = jax.grad(lambda raw: _mean_square(coordinates, raw, made) / level**2)(raw)
+        slope = jax.grad(lambda raw: _mean_square(coordinates, raw, residuals) / level**2)(raw)
         with jax.numpy_dtype_promotion("standard"):  # optax mixes its integer count with floats
             change, state = rule.update(slope, state, raw)
         return optax.apply_updates(raw, change), state  # type: ignore[return-value]

@@ -165,11 +165,11 @@ def vehicle_test(
 
 def frozen_paths(model: VehicleTest, over: Sequence[str] | None, freeze: Sequence[str]) -> list[str]:
     """Paths that are held: those asked for, what `over` leaves out, what sensors and test machine do not have."""
-    known, held = [p.path for p in parameters(model)], not_chosen(model, over, "sensors.", "starts.", "rig.")
+    paths, held = [p.path for p in parameters(model)], not_chosen(model, over, "sensors.", "starts.", "rig.")
     for name, sensor in model.sensors.items():
         held += [f"sensors.{name}.{p.path}" for p in parameters(sensor) if p.path not in sensor.given]
     held += absent_paths(model.rig)
-    return [*held, *match_paths(known, name_patterns("freeze", freeze))]
+    return [*held, *match_paths(paths, name_patterns("freeze", freeze))]
 
 
 def per_record_paths(model: VehicleTest, names: Sequence[str], count: int) -> tuple[str, ...]:
@@ -240,8 +240,8 @@ def in_units(free: FreeParameters, units: Mapping[str, str]) -> FreeParameters:
     """The same with the units of the channels for the offsets of their sensors."""
     changed = []
     for p in free.chosen:
-        kind, _, rest = p.path.partition(".")
-        channel, _, field = rest.partition(".")
+        kind, _, name = p.path.partition(".")
+        channel, _, field = name.partition(".")
         unit = units[channel] if kind == "sensors" and field == "offset" else p.unit
         changed.append(dataclasses.replace(p, unit=unit))
     return FreeParameters(free.tree, tuple(changed), free.ties)

@@ -209,17 +209,17 @@ def _damped_step(xp: Any, state: State, step_size: Any, lower: Any, upper: Any) 
     high = xp.concatenate([xp.broadcast_to(upper, scale.shape), xp.full_like(state.least, np.inf)], axis=-1)
 
     def solved(held: Any, at: Any) -> Any:
-        own, rows, values = held[..., :n], held[..., n:], xp.where(held[..., :n], at[..., :n], 0.0)
+        coordinates, rows, values = held[..., :n], held[..., n:], xp.where(held[..., :n], at[..., :n], 0.0)
         firmly = xp.where(rows, firm, 0.0)
         blocks = [
-            xp.where(own[..., None, :], 0.0, r),
-            xp.eye(n, dtype=r.dtype) * xp.where(own, 1.0, damping)[..., None],
+            xp.where(coordinates[..., None, :], 0.0, r),
+            xp.eye(n, dtype=r.dtype) * xp.where(coordinates, 1.0, damping)[..., None],
         ]
-        blocks += [xp.where(own[..., None, :], 0.0, firmly[..., None] * conditions)]
+        blocks += [xp.where(coordinates[..., None, :], 0.0, firmly[..., None] * conditions)]
         aims = [-q - _times(r, values), values, firmly * (at[..., n:] - _times(conditions, values))]
         matrix, target = xp.concatenate(blocks, axis=-2), xp.concatenate(aims, axis=-1)
-        whole = xp.linalg.qr(xp.concatenate([matrix, target[..., None]], axis=-1), mode="r")
-        return _back_substituted(xp, whole[..., :n, :n], whole[..., :n, n])
+        reduced = xp.linalg.qr(xp.concatenate([matrix, target[..., None]], axis=-1), mode="r")
+        return _back_substituted(xp, reduced[..., :n, :n], reduced[..., :n, n])
 
     def body(carry: tuple[Any, ...]) -> tuple[Any, ...]:
         held, at, _, _ = carry

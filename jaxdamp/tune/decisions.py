@@ -246,8 +246,8 @@ def _chosen(car: AbstractVehicle, roads: Sequence[Any], metrics: Sequence[str | 
     """The metrics to compare: those asked for, or all that have a derivative and one sign."""
     if metrics is not None:
         return list(metrics)
-    known = Ride(car, roads[0]).metrics if isinstance(roads[0], WhiteRoad) else car.ride_metrics
-    return [m for m in known if m.statistic.differentiable and not m.statistic.signed]
+    available = Ride(car, roads[0]).metrics if isinstance(roads[0], WhiteRoad) else car.ride_metrics
+    return [m for m in available if m.statistic.differentiable and not m.statistic.signed]
 
 
 def _metrics_of(

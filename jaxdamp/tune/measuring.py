@@ -110,7 +110,7 @@ class Measurement(eqx.Module):
 
     def by(self, ride: Ride | ScenarioRide) -> "Measurement":
         """The same by another ride of the vehicle."""
-        return eqx.tree_at(lambda whole: whole.ride, self, ride)
+        return eqx.tree_at(lambda measured: measured.ride, self, ride)
 
 
 @eqx.filter_jit

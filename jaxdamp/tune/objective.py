@@ -117,8 +117,8 @@ class Objective(NamedTuple):
 
     def of(self, values: Mapping[str, Scalar]) -> dict[str, Scalar]:
         """The metrics, and the values of the functions."""
-        known = MetricValues(values)
-        return {**values, **{name: function(known) for name, function in self.functions}}
+        metrics = MetricValues(values)
+        return {**values, **{name: function(metrics) for name, function in self.functions}}
 
     def of_each(self, values: Mapping[str, Array]) -> dict[str, Array]:
         """The same of several vehicles or scenarios, along the first axis of each value."""
@@ -159,24 +159,24 @@ def objective_of(
 ) -> Objective:
     """The objectives of a search on a road."""
     extra = vehicle.chosen_metrics(list(more), "metrics", white=white) if more else []
-    own = [one for one in wanted if isinstance(one, Metric)]
-    extra += vehicle.chosen_metrics(own, argument) if own else []
+    given = [one for one in wanted if isinstance(one, Metric)]
+    extra += vehicle.chosen_metrics(given, argument) if given else []
     beside = tuple(exact for exact in map(exact_counterpart, extra) if exact is not None)
     extra += beside
-    known = _available(vehicle, extra, white=white)
+    available = _available(vehicle, extra, white=white)
     names, functions, used = [], {}, [m.name for m in extra]
     for one in wanted:
         if isinstance(one, str | Metric):
-            names.append(current_name(one, known) if isinstance(one, str) else one.name)
+            names.append(current_name(one, available) if isinstance(one, str) else one.name)
             used.append(names[-1])
             continue
         names.append(_name(one))
         functions[names[-1]] = one
-        used += _metrics_used_by(one, list(known), argument)
-    _refuse_same_names(names, functions, known, argument)
-    _refuse_unusable(known, {argument: used, "limits": limited})
+        used += _metrics_used_by(one, list(available), argument)
+    _refuse_same_names(names, functions, available, argument)
+    _refuse_unusable(available, {argument: used, "limits": limited})
     # Further metrics for information: those without weightings, counts and means, which may be negative.
-    chosen = [m for m in known.values() if m.name in (*used, *limited) or _for_information(m)]
+    chosen = [m for m in available.values() if m.name in (*used, *limited) or _for_information(m)]
     return Objective(tuple(names), tuple(functions.items()), tuple(chosen), beside)
 
 
@@ -187,11 +187,11 @@ def _available(vehicle: AbstractVehicle, extra: Sequence[Metric], *, white: bool
 
 
 def _refuse_same_names(
-    names: Sequence[str], functions: Mapping[str, Function], known: Mapping[str, Metric], argument: str
+    names: Sequence[str], functions: Mapping[str, Function], available: Mapping[str, Metric], argument: str
 ) -> None:
     """Refuse two objectives of one name, and functions with the name of a metric."""
     for name in functions:
-        if name in known:
+        if name in available:
             remedy = "Give the function another name."
             _checks.refuse(argument, "have a name that no metric has", repr(name), remedy)
     if len(set(names)) < len(names):
@@ -199,12 +199,12 @@ def _refuse_same_names(
         _checks.refuse(argument, "have different names", names, remedy)
 
 
-def _refuse_unusable(known: Mapping[str, Metric], names_by_argument: Mapping[str, Sequence[str]]) -> None:
+def _refuse_unusable(available: Mapping[str, Metric], names_by_argument: Mapping[str, Sequence[str]]) -> None:
     """Refuse metrics that are unknown, or have no derivative."""
     for argument, names in names_by_argument.items():
         for name in names:
-            _checks.one_of(argument, name, known)
-            if not known[name].statistic.differentiable:
+            _checks.one_of(argument, name, available)
+            if not available[name].statistic.differentiable:
                 remedy = (
                     "Tune on the dynamic load coefficient; limit `Metric('relative_tyre_load', 'minimum')` to "
                     "(-1, None)."

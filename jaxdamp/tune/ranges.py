@@ -177,9 +177,9 @@ def start_points(space: SearchRange, count: int, seed: int) -> np.ndarray:
 
 def _adjustable(vehicle: Any) -> list[str]:
     """The parameters of the dampers that a workshop can change."""
-    known = {p.path: p for p in parameters(vehicle)}
-    inside = match_paths(list(known), DAMPERS)
-    adjustable = [path for path in inside if known[path].adjustable]
+    by_path = {p.path: p for p in parameters(vehicle)}
+    inside = match_paths(list(by_path), DAMPERS)
+    adjustable = [path for path in inside if by_path[path].adjustable]
     if not adjustable:
         remedy = "Name parameters in `over` to move them nevertheless."
         must = "be given where no workshop can change a parameter of the dampers"
@@ -192,10 +192,10 @@ def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> di
     if not isinstance(bounds, Mapping):
         remedy = "Write `{'damper.rate': (1000.0, 5000.0)}`."
         _checks.refuse(argument, "be a mapping of parameters to bounds", _checks.described(bounds), remedy)
-    known, leaders, by_path = [p.path for p in parameters(free.tree)], dict(free.ties), {}
+    every, leaders, by_path = [p.path for p in parameters(free.tree)], dict(free.ties), {}
     paths = [p.path for p in free.chosen]
     for name, bound in bounds.items():
-        named = [leaders.get(path, path) for path in match_paths(known, [name])]
+        named = [leaders.get(path, path) for path in match_paths(every, [name])]
         chosen = [path for path in named if path in paths]
         if not chosen:
             remedy = f"The free parameters are {', '.join(paths)}: add it to `over`, or leave its bounds out."

@@ -184,11 +184,11 @@ def rescore(
     for i, road in enumerate(roads):
         if not isinstance(road, Scenarios):
             check_module(f"roads[{i}]", road, (AbstractRoad, WhiteRoad), call)
-    known, objective = list(result.start.ride_metrics), result.objective
-    known += [m for m in (objective.metrics if objective else ()) if m not in known]
-    units = {m.name: m.unit(result.start.units) for m in known} | (objective.units(result.start) if objective else {})
+    metrics, objective = list(result.start.ride_metrics), result.objective
+    metrics += [m for m in (objective.metrics if objective else ()) if m not in metrics]
+    units = {m.name: m.unit(result.start.units) for m in metrics} | (objective.units(result.start) if objective else {})
     cars = (result.start, result.vehicle)
-    return rescored(cars, roads, known, objective, units, result.metric, completed("rescore", run, RUN))
+    return rescored(cars, roads, metrics, objective, units, result.metric, completed("rescore", run, RUN))
 
 
 def rescored(

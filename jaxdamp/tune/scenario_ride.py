@@ -143,7 +143,7 @@ class ScenarioRide(eqx.Module):
 
     def of_vehicle(self, vehicle: AbstractVehicle) -> "ScenarioRide":
         """The same scenarios for another vehicle."""
-        return eqx.tree_at(lambda whole: whole.ride, self, self.ride.of_vehicle(vehicle))
+        return eqx.tree_at(lambda scenarios: scenarios.ride, self, self.ride.of_vehicle(vehicle))
 
     def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
@@ -266,9 +266,9 @@ def numbers(tree: Any) -> dict[str, Any]:
     return by_path
 
 
-def _by_path(known: Mapping[str, Any], changes: Mapping[str, Any], argument: str) -> dict[str, Any]:
+def _by_path(numbers: Mapping[str, Any], changes: Mapping[str, Any], argument: str) -> dict[str, Any]:
     if not isinstance(changes, Mapping):
         _checks.refuse(
             argument, "be a mapping of parameters to numbers", repr(changes), "Write `{'sprung_mass': 1e3}`."
         )
-    return {path: value for name, value in changes.items() for path in match_paths(list(known), [name])}
+    return {path: value for name, value in changes.items() for path in match_paths(list(numbers), [name])}

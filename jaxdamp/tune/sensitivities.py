@@ -110,19 +110,19 @@ def sensitivity(
     first, run = (make(**given) if given else make), {name: asked[name] for name in RUN}
     objective = _objective(wanted, vehicle, white=is_white(first))
     hatted, paths = _with_curves(vehicle, first, asked, run)
-    own, free = _free(vehicle, hatted, asked["over"], asked["freeze"])
+    of_vehicle, free = _free(vehicle, hatted, asked["over"], asked["freeze"])
     point = np.array([*np.asarray(free.values, float), *given.values()])
     measured = _measured(hatted, make, list(given), objective, free, run)
     names = [name for name in objective.units(vehicle) if name in objective.names]
     values, slopes = _derivatives(measured, names, point)
     is_curve = np.array([is_hat(p.path, hatted) for p in free.owners] + [False] * len(given), bool)
     chosen = np.flatnonzero(~is_curve)
-    units = [*(p.unit for p in own.owners), *("m/s" if name == "speed" else "" for name in given)]
+    units = [*(p.unit for p in of_vehicle.owners), *("m/s" if name == "speed" else "" for name in given)]
     second = _second(measured, names, point, chosen) if second_order else None
     return Sensitivity(
         values=dict(zip(names, values.tolist(), strict=True)),
         units={name: objective.units(vehicle)[name] for name in names},
-        parameters=(*own.names, *given),
+        parameters=(*of_vehicle.names, *given),
         parameter_units=tuple(units),
         point=point[chosen],
         gradient=dict(zip(names, slopes[:, chosen], strict=True)),
@@ -181,10 +181,10 @@ def _check(wanted: Sequence[Any], vehicle: Any, road: Any, quantities: Mapping[s
 
 def _curves(vehicle: AbstractVehicle, pattern: str) -> list[str]:
     """The laws whose curves are looked at."""
-    known = damper_paths(vehicle)
-    chosen = matching(known, pattern)
+    paths = damper_paths(vehicle)
+    chosen = matching(paths, pattern)
     if not chosen:
-        _checks.refuse("dampers", f"name a law of the vehicle ({', '.join(known)})", repr(pattern), "None for none.")
+        _checks.refuse("dampers", f"name a law of the vehicle ({', '.join(paths)})", repr(pattern), "None for none.")
     return chosen
 
 
@@ -204,13 +204,13 @@ def _free(
     vehicle: AbstractVehicle, hatted: AbstractVehicle, over: Sequence[str], freeze: Sequence[str]
 ) -> tuple[FreeParameters, FreeParameters]:
     """The parameters of the vehicle, and the same of the vehicle with hats, with the forces of the hats."""
-    own = free_parameters(vehicle, over=name_patterns("over", over), freeze=freeze)
-    known = [p.path for p in parameters(vehicle)]
+    of_vehicle = free_parameters(vehicle, over=name_patterns("over", over), freeze=freeze)
+    paths = [p.path for p in parameters(vehicle)]
     moved = [p.path for p in parameters(hatted)]
     hats = [path for path in moved if is_hat(path, hatted)]
-    places = dict(zip(known, [path for path in moved if path not in hats], strict=True))
-    exact = [places[path] for path in match_paths(known, [p.path for p in own.chosen])]
-    return own, free_parameters(hatted, over=[*exact, *hats])
+    places = dict(zip(paths, [path for path in moved if path not in hats], strict=True))
+    exact = [places[path] for path in match_paths(paths, [p.path for p in of_vehicle.chosen])]
+    return of_vehicle, free_parameters(hatted, over=[*exact, *hats])
 
 
 def _measured(

@@ -129,15 +129,15 @@ class DesignTask(Generic[V]):
         self.run = {name: settings[name] for name in RUN}
         metrics, white = settings["metrics"], is_white(road)
         further = [m.name for m in metrics if isinstance(m, Metric)]
-        known = [*(m.name for m in vehicle.ride_metrics), *further]
+        metric_names = [*(m.name for m in vehicle.ride_metrics), *further]
         objectives = [
             one if one in further else goal_objective(one, vehicle, white=white, argument=argument)
             for one in objectives
         ]
         limits = goal_limits(settings["limits"], vehicle, white=white, known=further)
-        self.allowed = limit_ranges(limits, known)
+        self.allowed = limit_ranges(limits, metric_names)
         limited = [metric for metric in limits or {} if isinstance(metric, Metric)]
-        of_targets = _metrics_of_targets(objectives, known, limited)
+        of_targets = _metrics_of_targets(objectives, metric_names, limited)
         more = [*metrics, *limited, *of_targets]
         self.objective = objective_of(objectives, vehicle, more, list(self.allowed), white=white, argument=argument)
         _refuse_negative(self.allowed, self.objective.metrics)
@@ -245,13 +245,15 @@ class Evaluator:
         return Region(space.lower / space.unit, space.upper / space.unit, *space.coordinates.order())
 
 
-def _metrics_of_targets(objectives: Sequence[Any], known: Sequence[str], limited: Sequence[Metric]) -> list[Metric]:
+def _metrics_of_targets(
+    objectives: Sequence[Any], metric_names: Sequence[str], limited: Sequence[Metric]
+) -> list[Metric]:
     """The metrics that targets are given for, after a check of their names."""
     targets = [one for one in objectives if isinstance(one, Targets)]
     of_targets = [metric for one in targets for metric in one.metrics]
     for name in (name for one in targets for name in one.values):
-        with_targets = [*known, *(metric.name for metric in (*limited, *of_targets))]
-        _checks.one_of("targets", current_name(name, known), with_targets)
+        with_targets = [*metric_names, *(metric.name for metric in (*limited, *of_targets))]
+        _checks.one_of("targets", current_name(name, metric_names), with_targets)
     return of_targets
 
 

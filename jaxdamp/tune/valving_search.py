@@ -286,11 +286,11 @@ def _search(space: SearchRange, force_of: ForceOf, wanted: np.ndarray, begin: np
         end = least_squares_on_host(at, solver, (values / space.unit)[None], max_steps)
         values = np.clip(end.y[0] * space.unit, space.lower, space.upper)
         reached = float(np.sum(end.aux**2))
-        beside = np.clip(values * changes.reshape(-1, len(begin)), space.lower, space.upper)
-        others = [squares(point) for point in beside]
+        near = np.clip(values * changes.reshape(-1, len(begin)), space.lower, space.upper)
+        others = [squares(point) for point in near]
         if not min(others) < (1.0 - LOWER) * reached:
             return _End(values, reached, end.status[0])
-        values = beside[int(np.argmin(others))]
+        values = near[int(np.argmin(others))]
 
 
 def _out_of_reach(

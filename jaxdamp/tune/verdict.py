@@ -9,11 +9,12 @@ from jaxtyping import Float
 
 from jaxdamp._status import Status
 from jaxdamp._tables import percent_change, typeset_unit
+from jaxdamp.metrics import Metric
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.limits import Limit, LimitRange
 from jaxdamp.tune.objective import Objective, exact_counterpart
 from jaxdamp.tune.ranges import FACTOR, Change, SearchRange
-from jaxdamp.vehicles import ChannelKind
+from jaxdamp.vehicles import AbstractVehicle, ChannelKind
 
 
 if TYPE_CHECKING:
@@ -105,18 +106,20 @@ def _price(result: "TuneResult[Any]") -> tuple[float, str]:
     metrics = {m.name: m for m in result.objective.metrics} if result.objective else {}
     named = {result.metric, *result.limits}
     limited = {metrics[name].channel for name in result.limits if name in metrics}
-    known = {mean_change(result, name) for name in named}
+    changes = {mean_change(result, name) for name in named}
     worst = (NOTICED, "")
     for name in result.units:
         change, metric = mean_change(result, name), metrics.get(name)
-        if change is None or name in named or any(x is not None and np.isclose(change, x, 1e-6) for x in known):
+        if change is None or name in named or any(x is not None and np.isclose(change, x, 1e-6) for x in changes):
             continue
-        channels = result.start.layout.by_name
-        if metric is None or (
-            metric.channel not in limited and not metric.statistic.signed and channels[metric.channel].kind in PRICED
-        ):
+        if metric is None or (metric.channel not in limited and _has_price(metric, result.start)):
             worst = max(worst, (change, name))
     return worst
+
+
+def _has_price(metric: Metric, vehicle: AbstractVehicle) -> bool:
+    """Whether a rise of a metric is a price."""
+    return not metric.statistic.signed and vehicle.layout.by_name[metric.channel].kind in PRICED
 
 
 def mean_change(result: "TuneResult[Any]", name: str) -> float | None:
@@ -276,10 +279,10 @@ def start_notes(attempts: Sequence["Attempt"], metric: str) -> list[str]:
     alike = sum(value - best <= ALIKE * abs(best) for value in allowed)
     if alike == len(attempts):
         return []
-    rest = f", the worst at {furthest:.5g}" if furthest - best > ALIKE * abs(best) else ""
+    worst = f", the worst at {furthest:.5g}" if furthest - best > ALIKE * abs(best) else ""
     unmet = len(attempts) - len(allowed)
     failed = f", and {unmet} met no limits" if unmet and unmet < len(attempts) else ""
-    return [f"{alike} of {len(attempts)} starts ended at the best {metric}, {best:.5g}{rest}{failed}."]
+    return [f"{alike} of {len(attempts)} starts ended at the best {metric}, {best:.5g}{worst}{failed}."]
 
 
 def violations(short: Sequence[Limit], values: Mapping[str, float]) -> dict[str, str]:
