@@ -18,10 +18,11 @@ from jaxdamp._results import AbstractResult, worst_status
 from jaxdamp._status import Status
 from jaxdamp._tables import Table
 from jaxdamp.parameters import free_parameters
-from jaxdamp.tune.comparison import Difference
+from jaxdamp.tune.decisions import Difference
 from jaxdamp.tune.front import FrontParameter
 from jaxdamp.tune.measuring import Measurement
-from jaxdamp.tune.result import Change, ScenarioValues
+from jaxdamp.tune.ranges import Change
+from jaxdamp.tune.result import ScenarioValues
 from jaxdamp.tune.valving_result import OutOfReach, ValveParameter
 
 

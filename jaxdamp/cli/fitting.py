@@ -47,7 +47,7 @@ def fit(
     screen: Screen,
     files: Sequence[Path],
     *,
-    law: Sequence[str] = ("all",),
+    law: Sequence[str] = (),
     held_out: Sequence[str] = (),
     reading: Reading,
     how: Annotated[Call, "identify.fit"],
@@ -65,7 +65,7 @@ def fit(
     and tables are in the folder before the first picture is drawn.
 
     Arguments:
-        law: names of laws, see "jaxdamp laws": "linear,besinger"; or "all".
+        law: names of laws, see "jaxdamp laws": "linear,besinger"; or "all"; six that suit the records if left out.
         held_out: records to score on, not to fit: a name or a pattern, such as "30mm_*".
         rig: what the test machine adds.
         cross_validate: predict each record by the best law fitted to the others.
@@ -171,7 +171,7 @@ def fit_laws(
 
     Arguments:
         screen: the terminal.
-        names: of the laws.
+        names: of the laws; those that suit the records if there are none.
         runs: records to fit.
         held_out: records to score on.
         rig: effects of the test machine.
@@ -180,6 +180,7 @@ def fit_laws(
     Raises:
         ValueError: not one law could be fitted.
     """
+    names = names or identify.suited_laws(runs)
     title = f"Fitting {len(names)} law{'s' * (len(names) > 1)} to {len(runs)} record{'s' * (len(runs) > 1)}"
     outcomes: list[Rung | Failure] = []
     with screen.stage(title, total=len(names)) as advance:

@@ -17,6 +17,7 @@ from jaxtyping import Array, Float
 from jaxdamp._status import Status
 from jaxdamp._triangles import triangle
 from jaxdamp.dampers import laws_inside, margins
+from jaxdamp.identify.printed import Evaluator, evaluator
 from jaxdamp.identify.problem import AbstractResiduals, Problem, linearised
 from jaxdamp.parameters import Coordinates
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_squares_on_host
@@ -85,8 +86,10 @@ def search(
     kind = problem.free.values.dtype
     bounded = dataclasses.replace(solver, lower=lower, upper=upper, precision=float(jnp.finfo(kind).eps))
 
+    printed = evaluator(problem.free, problem.residuals) if kind == np.float64 else None
+
     def at(y: Float[np.ndarray, "1 free"], _: Any) -> tuple[Linearisation, _Point]:
-        return _linearised(problem, coordinates, jnp.asarray(y[0], kind))
+        return _linearised(problem, coordinates, y[0] if printed else jnp.asarray(y[0], kind), printed)
 
     end = least_squares_on_host(at, bounded, start[None], max_steps)
     point: _Point = end.aux
@@ -94,10 +97,18 @@ def search(
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _linearised(problem: Problem, coordinates: Coordinates, y: Float[Array, " free"]) -> tuple[Linearisation, _Point]:
-    """The problem at coordinates, by the one compiled program."""
-    arrays = [np.asarray(a, np.float64) for a in _evaluated(coordinates, y, problem.residuals)]
-    values, residual, jacobian, units, of_law, slopes = arrays
+def _linearised(
+    problem: Problem, coordinates: Coordinates, y: Any, printed: Evaluator | None = None
+) -> tuple[Linearisation, _Point]:
+    """The problem at coordinates, by the one compiled program: printed C, or XLA's."""
+    if printed is None:
+        arrays = [np.asarray(a, np.float64) for a in _evaluated(coordinates, y, problem.residuals)]
+        values, residual, jacobian, units, of_law, slopes = arrays
+    else:
+        values, units = coordinates.with_slopes(y)
+        residual, jacobian = printed(values)
+        of_law, slopes = printed.margins(values)
+        slopes = slopes @ units
     residual, jacobian = problem.anchored(values, residual, jacobian)
     rows = triangle(np.concatenate([jacobian, residual[:, None]], axis=1))
     rows = np.concatenate([rows[:, :-1] @ units, rows[:, -1:]], axis=1) / problem.level

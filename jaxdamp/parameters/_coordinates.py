@@ -67,13 +67,32 @@ class Coordinates(eqx.Module):
         """Physical values of coordinates; NumPy arrays for NumPy arrays."""
         parts = zip(self.free.chosen, self.units, self.free.split(y), strict=True)
         maps = ((p.domain.from_raw, p, u, a) for p, u, a in parts)
-        return _joined([of(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a * u for of, p, u, a in maps])
+        return _joined([of(_plain(p, a), _scale(p)) if self._is_smooth(p) else a * u for of, p, u, a in maps])
+
+    def with_slopes(
+        self, y: Float[np.ndarray, " free"]
+    ) -> tuple[Float[np.ndarray, " free"], Float[np.ndarray, "free free"]]:
+        """Physical values and their derivatives by the coordinates, of NumPy arrays and without JAX.
+
+        Raises:
+            NotImplementedError: a smooth map whose derivative is not written down.
+        """
+        slopes, ends = np.zeros((y.size, y.size)), np.cumsum([p.value.size for p in self.free.chosen])
+        for p, unit, raw, end in zip(self.free.chosen, self.units, self.free.split(y), ends, strict=True):
+            own = slice(end - raw.size, end)
+            if not self._is_smooth(p):
+                slopes[own, own] = np.diag(np.ravel(np.asarray(unit)))
+            elif p.domain.slopes is None:
+                raise NotImplementedError(p.domain.name)
+            else:
+                slopes[own, own] = p.domain.slopes(raw, np.asarray(_scale(p)))
+        return np.asarray(self.to_physical(y)), slopes
 
     def from_physical(self, values: Vector) -> Vector:
         """Coordinates of physical values; NumPy arrays for NumPy arrays."""
         parts = zip(self.free.chosen, self.units, self.free.split(values), strict=True)
         maps = ((p.domain.to_raw, p, u, a) for p, u, a in parts)
-        return _joined([of(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a / u for of, p, u, a in maps])
+        return _joined([of(_plain(p, a), _scale(p)) if self._is_smooth(p) else a / u for of, p, u, a in maps])
 
     @property
     def start(self) -> Float[np.ndarray, " free"]:
@@ -146,10 +165,15 @@ def _magnitude(value: PyTree) -> PyTree:
     return xp.where(magnitude > floor, magnitude, xp.where(largest == 0, 1.0, largest)).astype(value.dtype)
 
 
-def _scale(p: Parameter) -> Array:
+def _plain(p: Parameter, values: Any) -> Any:
+    """As a map takes them: those of ordered vectors compute NumPy arrays by NumPy."""
+    return values if p.domain.ordered and isinstance(values, np.ndarray) else jnp.asarray(values)
+
+
+def _scale(p: Parameter) -> Any:
     """The scale of the smooth map of a domain: the magnitude of the start, or of the steps of an ordered vector."""
-    scale = _magnitude(p.value if p.domain.steps is None else p.domain.steps(p.value))
-    return jnp.asarray(scale, scale.dtype)
+    value = p.value if isinstance(p.value, Tracer) else np.asarray(p.value)
+    return _magnitude(value if p.domain.steps is None else p.domain.steps(value))
 
 
 def _joined(pieces: list[PyTree]) -> PyTree:

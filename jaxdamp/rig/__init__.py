@@ -14,11 +14,3 @@ __all__ = [
     "quasi_static",
     "respond",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "AbstractLawEngine",
-    "QuasiStatic",
-    "Readings",
-    "march",
-    "solve_law",
-]

@@ -9,7 +9,12 @@ from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver as Abstra
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState as StepState, settled
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
-from jaxdamp.simulation.notes import named_laws as named_laws, range_sentences as range_sentences
+from jaxdamp.simulation.notes import (
+    far_outside as far_outside,
+    named_laws as named_laws,
+    over_runs as over_runs,
+    range_sentences as range_sentences,
+)
 from jaxdamp.simulation.observer import MetricObserver as MetricObserver, recorded as recorded
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride

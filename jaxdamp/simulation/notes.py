@@ -1,6 +1,6 @@
 """Notes on a response: laws beyond the range of their fit, tyres in tension."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +11,9 @@ from jaxdamp import _checks
 from jaxdamp._types import Signal
 from jaxdamp.dampers import AbstractDamper, Motion, RangeUse, has_fitted_range, range_use, sentence
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind, PortForm, System
+
+
+FAR = 0.01  # share of the time outside the fitted range from which a verdict cannot be trusted
 
 
 def range_uses(
@@ -57,7 +60,27 @@ def named_laws(vehicle: AbstractVehicle) -> dict[str, AbstractDamper]:
     return dict(zip(vehicle.layout.ports, vehicle.elements(), strict=True))
 
 
-def range_sentences(uses: dict[str, Sequence[RangeUse]] | dict[str, list[RangeUse]]) -> tuple[str, ...]:
+def over_runs(runs: Sequence[Mapping[str, Sequence[RangeUse]]]) -> dict[str, list[RangeUse]]:
+    """The uses of each damper in several runs of one length as one: the extremes, and the mean share of the time.
+
+    Arguments:
+        runs: uses by the name of the damper, of one vehicle on several roads.
+    """
+    together: dict[str, dict[tuple[str, str], list[RangeUse]]] = {}
+    for uses in runs:
+        for name, of_damper in uses.items():
+            for use in of_damper:
+                together.setdefault(name, {}).setdefault((use.law, use.quantity), []).append(use)
+    return {name: [_over_runs(same) for same in groups.values()] for name, groups in together.items()}
+
+
+def _over_runs(uses: Sequence[RangeUse]) -> RangeUse:
+    used = min(use.used[0] for use in uses), max(use.used[1] for use in uses)
+    shares = [use.share for use in uses if use.share is not None]
+    return uses[0]._replace(used=used, share=sum(shares) / len(uses) if shares else None)
+
+
+def range_sentences(uses: Mapping[str, Sequence[RangeUse]]) -> tuple[str, ...]:
     """A sentence for each damper that leaves its range.
 
     Arguments:
@@ -89,3 +112,23 @@ def tyres_in_tension(
         return ()
     remedy = "Pass `tyre_lifts=True` to the vehicle if its wheels can leave the road."
     return (f"Wheel loads fell below zero, as linear tyres pull on the road: {'; '.join(pulled)}. {remedy}",)
+
+
+def far_outside(uses: Mapping[str, Sequence[RangeUse]]) -> list[str]:
+    """By how much each damper leaves the range of its law, where it does so for 1 % of the time or more.
+
+    As in "front damper at 5.6 times the velocity and 1.8 times the stroke of its records, 46 % of the time".
+
+    Arguments:
+        uses: by the name of the damper.
+    """
+    texts = []
+    for name, of_damper in uses.items():
+        far = [use for use in of_damper if use.outside and use.times is not None and (use.share or 0.0) >= FAR]
+        fast = any(use.quantity == "velocity" for use in far)
+        far = [use for use in far if use.quantity != "force" or not fast]  # a force follows from the velocity
+        if far:
+            times = " and ".join(f"{use.times:.2g} times the {use.quantity}" for use in far)
+            share = 100.0 * max(use.share or 0.0 for use in far)
+            texts.append(f"{name.replace('_', ' ')} at {times} of its records, {share:.0f} % of the time")
+    return texts

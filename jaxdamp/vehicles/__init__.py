@@ -13,7 +13,12 @@ from jaxdamp._guesses import answer_guesses
 from jaxdamp.vehicles import presets
 from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle
 from jaxdamp.vehicles.cars import FullCar, HalfCar, QuarterCar, RollCar
-from jaxdamp.vehicles.channels import Channel as Channel, ChannelKind as ChannelKind, is_stationary as is_stationary
+from jaxdamp.vehicles.channels import (
+    GOALS as GOALS,
+    Channel as Channel,
+    ChannelKind as ChannelKind,
+    is_stationary as is_stationary,
+)
 from jaxdamp.vehicles.corner import Axle, Corner
 from jaxdamp.vehicles.equilibrium import (
     refuse_restless as refuse_restless,

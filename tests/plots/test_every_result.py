@@ -103,7 +103,7 @@ def test_every_result_with_a_table_has_a_picture() -> None:
 
 def test_figures_say_what_they_show(runs: BenchSet) -> None:
     law = Bilinear(2600.0, 1200.0)
-    assert titles(plots.force_velocity(law, runs=list(runs)[:1])) == ["Force over velocity: Bilinear, 0.5Hz"]
+    assert titles(plots.force_velocity(law, runs=list(runs)[:1])) == ["Force over velocity: bilinear, 0.5Hz"]
     assert titles(plots.force_velocity({"a": law}, runs=list(runs))) == ["Force over velocity: 3 records"]
     assert titles(plots.force_velocity(law, title="Twin")) == ["Twin"]
     pair = {"A": law, "B": Bilinear(3000.0, 1500.0)}
