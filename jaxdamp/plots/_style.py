@@ -14,7 +14,6 @@ from jaxdamp.dampers import AbstractDamper, Sum
 
 
 if TYPE_CHECKING:
-    import matplotlib.artist
     import matplotlib.axes
     import matplotlib.axis
     import matplotlib.figure
@@ -251,7 +250,7 @@ def cross(axes: "matplotlib.axes.Axes", horizontal: bool = True, vertical: bool 
 
 def legend_beside(
     figure: "matplotlib.figure.Figure",
-    handles: "Sequence[matplotlib.artist.Artist]",
+    handles: Sequence[object],
     title: str = "",
     place: Literal["upper", "lower"] = "upper",
 ) -> None:
@@ -261,9 +260,7 @@ def legend_beside(
     figure.legend(handles=list(handles), loc=where, frameon=False, title=title or None, alignment="left")
 
 
-def legend_above(
-    figure: "matplotlib.figure.Figure", handles: "Sequence[matplotlib.artist.Artist]", columns: int = 3
-) -> None:
+def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[object], columns: int = 3) -> None:
     """A legend above all axes, for pictures that need their width."""
     _in_words(handles)
     figure.legend(
@@ -271,7 +268,7 @@ def legend_above(
     )
 
 
-def _in_words(handles: "Sequence[matplotlib.artist.Artist]") -> None:
+def _in_words(handles: Sequence[Any]) -> None:
     """The labels of a legend in the units that are shown."""
     for handle in handles:
         handle.set_label(display().words(str(handle.get_label())))
