@@ -247,7 +247,7 @@ def comparison_table(
     return Table(title, columns, tuple(cells))
 
 
-def plain(value: object) -> Any:
+def plain(value: Any) -> Any:
     """Numbers, words, lists, records and dictionaries as JSON has them; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
