@@ -14,7 +14,7 @@ from jaxdamp.identify.criteria import Priors
 from jaxdamp.identify.estimates import WIDER, Estimate, Minimum
 from jaxdamp.identify.identifiability import on_identifiability
 from jaxdamp.identify.model import START_PATH
-from jaxdamp.identify.noise import Noise, noise_of
+from jaxdamp.identify.noise import Noise, noise_of, spread_over_parts
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.profile import Profile, profile
 from jaxdamp.identify.search import SearchEnd
@@ -27,8 +27,6 @@ BOUND_Z_SCORE = 3.0  # standard errors beyond an edge from which a parameter cou
 NEARLY = 9.0  # largest increase in chi-square of another minimum that is reported: three standard errors
 APART = 3.0  # standard errors beyond which a parameter of another minimum counts as different
 TAKES_PART = 0.1  # force of a parameter in a direction, relative to the largest, above which it belongs to it
-PARTS = 8  # of a cycle, that are left out in turn
-FEWEST_RECORDS = 3  # to be left out in turn
 AT_LIMIT = 1e-4  # distance from a limit given by other parameters, relative to the start, that counts as zero
 
 
@@ -213,43 +211,6 @@ def on_minima(minima: Sequence[Minimum], estimates: Sequence[Estimate]) -> list[
                 " The standard errors hold for the minimum given only; add records that tell them apart."
             )
     return notes
-
-
-def spread_over_parts(problem: Problem, found: SearchEnd) -> list[float]:
-    """The standard error of each free number with what the law misses, by the jackknife.
-
-    Without one part of the records, one Gauss-Newton step from the minimum gives the numbers θ₍b₎; their error is
-    √((B − 1)/B Σ (θ₍b₎ − mean)²), the bootstrap's to first order. Parts are the eighths of the cycles of each record,
-    all cycles together since what a law misses returns in each, and the records where there are three or more; the
-    larger error counts. It says how much the numbers depend on which motion was measured, not how far the law is from
-    the damper.
-
-    Arguments:
-        problem: the problem that was minimised.
-        found: the minimum.
-    """
-    scaled, scale = unit_columns(found.jacobian)
-    part, record = np.full(problem.owner.size, -1), np.where(problem.used, problem.owner, -1)
-    for i, run in enumerate(problem.runs):
-        at = np.flatnonzero(record == i)
-        cycle = 1.0 / (problem.sample_steps[i] * run.frequency) if run.frequency > 0 else float(at.size)
-        part[at] = PARTS * i + (PARTS * (np.arange(at.size) % cycle) / max(cycle, 1.0)).astype(int).clip(0, PARTS - 1)
-    errors = [_jackknife(scaled, found.residual, part)]
-    if np.unique(record[record >= 0]).size >= FEWEST_RECORDS:
-        errors.append(_jackknife(scaled, found.residual, record))
-    return [float(error) for error in np.max(errors, axis=0) / scale]
-
-
-def _jackknife(jacobian: np.ndarray, residual: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Standard errors by leaving out each part in turn; samples of a negative part are never left out."""
-    whole, right = jacobian.T @ jacobian, jacobian.T @ residual
-    steps = []
-    for number in np.unique(part[part >= 0]):
-        rows = part == number
-        left = whole - jacobian[rows].T @ jacobian[rows]
-        steps.append(-np.linalg.lstsq(left, right - jacobian[rows].T @ residual[rows], rcond=1e-10)[0])
-    values = np.array(steps)
-    return np.sqrt((len(steps) - 1) * np.mean((values - values.mean(axis=0)) ** 2, axis=0))
 
 
 def on_misfit(noise: Noise, estimates: Sequence[Estimate] = ()) -> list[str]:
