@@ -176,6 +176,13 @@ def instance(argument: str, value: Any, kinds: type | tuple[type, ...], must: st
         refuse(argument, must, described(value), remedy)
 
 
+def counts(**values: int | None) -> None:
+    """Refuse counts below one; None stands for one that was left out."""
+    for argument, value in values.items():
+        if value is not None and value < 1:
+            refuse(argument, "be 1 or more", value)
+
+
 def one_of(argument: str, value: str, choices: Iterable[str]) -> None:
     """Refuse a text that is not among the choices; suggest the nearest one."""
     choices = list(choices)

@@ -1,8 +1,11 @@
 """Wrong guesses of public names, answered with the right one."""
 
+import ast
+import inspect
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
+from types import ModuleType
 from typing import Any, NoReturn
 
 
@@ -27,6 +30,12 @@ GUESSES = {  # what people look for, and where it is
     "jaxdamp.tune.optimize": "`jaxdamp.tune.minimise`",
     "jaxdamp.vehicles.load": "`jaxdamp.export.from_json(path)`",
 }
+
+
+def shared_names(package: ModuleType) -> list[str]:
+    """What a package imports as itself (`X as X`): for other packages, or only returned; a user writes `__all__`."""
+    imports = [node for node in ast.parse(inspect.getsource(package)).body if isinstance(node, ast.ImportFrom)]
+    return sorted(alias.name for node in imports for alias in node.names if alias.asname == alias.name)
 
 
 def answer(module: str, name: str, public: Sequence[str]) -> NoReturn:

@@ -13,6 +13,8 @@ import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, ArrayLike, Float
 
+from jaxdamp._types import ScalarLike
+
 
 Numbers = Float[Array, "..."]
 AnyNumbers = Float[ArrayLike, "..."]
@@ -72,3 +74,21 @@ def root(power: Numbers, order: int = 2) -> Numbers:
     for _ in range(order // 2):  # order 2 or 4
         positive = jnp.sqrt(positive)
     return jnp.where(zero, jnp.zeros_like(power), positive)
+
+
+def smooth_abs(v: Float[ArrayLike, "..."], width: ScalarLike) -> Float[Array, "..."]:
+    """√(v² + w²) − w: zero at zero, |v| − w far away; exactly |v| for width 0."""
+    v = jnp.asarray(v)
+    safe = jnp.where(width > 0, width, 1.0)
+    return jnp.where(width > 0, jnp.sqrt(v * v + safe * safe) - safe, jnp.abs(v))
+
+
+def ramp(v: Float[ArrayLike, "..."], width: ScalarLike) -> Float[Array, "..."]:
+    """max(v, 0), its knee rounded over `width` [unit of v]: w ln(1 + exp(v/w)); exact for width 0.
+
+    The error is largest at the knee, w ln 2.
+    """
+    v = jnp.asarray(v)
+    exact = at_least(v, 0.0)
+    safe = jnp.where(width > 0, width, 1.0)
+    return jnp.where(width > 0, safe * jax.nn.softplus(v / safe), exact)

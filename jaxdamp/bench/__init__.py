@@ -78,27 +78,5 @@ __all__ = [
     "separate_gas_and_friction",
     "usable",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "OEM_VELOCITIES",
-    "Contradiction",
-    "Evaluation",
-    "Finding",
-    "FoldedCycles",
-    "GasAndFriction",
-    "LimitCheck",
-    "Measurement",
-    "PeakVelocityPoints",
-    "Preflight",
-    "VelocityLoops",
-    "as_runs",
-    "by_number",
-    "contradictions_in_words",
-    "fold_cycles",
-    "last_steady_cycle",
-    "moving_part",
-    "settings_apart",
-    "steady_cycles",
-]
 
 answer_guesses(__name__, __all__)

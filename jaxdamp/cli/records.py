@@ -31,14 +31,12 @@ class Reading:
         steps: as in `bench.Steps`.
         cycles: full cycles to keep: 3 or last:3, or skip:2.
         keep_rest: keep the rest before and after the motion, which is cut off otherwise.
-        verbose: print all findings on the records.
     """
 
     read: Annotated[Call, "bench.read"]
     steps: Annotated[Call, "bench.Steps"]
     cycles: str | None = None
     keep_rest: bool = False
-    verbose: bool = False
 
     def raw(self, files: Sequence[Path]) -> BenchSet:
         """The records as they are in the files."""
@@ -81,7 +79,7 @@ class Reading:
             found = bench.preflight(runs).without(() if self.keep_rest else _CUT_OFF)
         screen.heading(found.summary)
         sentences = found.sentences()
-        shown = sentences if self.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
+        shown = sentences if screen.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
         for sentence in shown:
             screen.points([in_command_line(sentence)], style=_COLOURS[sentence.split(",")[0]])
         if len(sentences) > len(shown):

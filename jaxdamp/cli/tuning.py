@@ -13,7 +13,7 @@ from jaxdamp import Ride, _checks, export, sweep, tune
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.riding import Driving, unusual
+from jaxdamp.cli.riding import Driving, headline, unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
 from jaxdamp.cli.wording import in_command_line
 from jaxdamp.dampers import AbstractDamper
@@ -94,10 +94,11 @@ def tuned(screen: Screen, call: Mapping[str, Any]) -> TuneResult[Any]:
     """The result of `tune.minimise` with these arguments, shown at the terminal."""
     with screen.stage("Tuning") as advance:
         result = tune.minimise(**call, progress=lambda step, value: advance(f"step {step}: {value:.5g}", step))
-    screen.say(result.summary)
-    for table in (result.parameter_table(), result.table()):
-        screen.table(table)
-    screen.points([in_command_line(warning) for warning in result.warnings], style="yellow")
+    screen.answer(result.verdict.sentence)
+    screen.say(result.summary.removeprefix(result.verdict.sentence).strip())
+    screen.table(result.parameter_table())
+    screen.table(headline(screen, result.table(), result.vehicle, {result.metric, *result.limits}))
+    screen.remarks([in_command_line(warning) for warning in result.warnings], style="yellow")
     return result
 
 

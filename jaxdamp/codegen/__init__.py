@@ -29,16 +29,3 @@ __all__ = [
     "lower",
     "symbols",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "AbstractLanguage",
-    "Constant",
-    "Program",
-    "Signature",
-    "Symbols",
-    "is_printing",
-    "library",
-    "printed_scan",
-    "printing",
-    "with_slopes",
-]

@@ -11,8 +11,7 @@ from jaxdamp import _checks
 from jaxdamp._documents import parse_json, read_text
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper, has_fitted_range
-from jaxdamp.export._plain import FITTED_TO, plain_module
-from jaxdamp.export._rebuild import rebuilt
+from jaxdamp.export._rebuild import FITTED_TO, plain_module, rebuilt
 from jaxdamp.parameters import checked
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.vehicles import AbstractVehicle

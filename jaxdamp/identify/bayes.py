@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -11,14 +11,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table
 from jaxdamp.identify.propagation import Evidence, Propagated
 from jaxdamp.parameters import Coordinates
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 INSIDE = 0.5  # standard errors from an edge at which a chain starts, if the fit ended there
@@ -94,11 +90,7 @@ class Posterior(AbstractResult):
         """Numbers of samples and of parameters."""
         return f"{len(self.samples)} samples of the posterior of {len(self.parameters)} numbers."
 
-    def plot(self) -> "matplotlib.figure.Figure":
-        """Histograms of the samples (`plots.posterior`)."""
-        from jaxdamp import plots
-
-        return plots.posterior(self)
+    plot = drawn_by("posterior", "Histograms of the samples.")
 
     def table(self) -> Table:
         """The posterior of every number."""

@@ -254,9 +254,7 @@ def solve(
     Raises:
         ValueError: counts below one; a solver of another kind.
     """
-    for name, count in (("max_steps", max_steps), ("starts", starts)):
-        if count is not None and count < 1:
-            _checks.refuse(name, "be 1 or more", count)
+    _checks.counts(max_steps=max_steps, starts=starts)
     if solver is not None and not isinstance(solver, Solver):
         remedy = "For example `optimistix.Dogleg(rtol=1e-8, atol=1e-8)`."
         _checks.refuse("solver", "be a least-squares solver or minimiser of optimistix", solver, remedy)

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -11,17 +11,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
-from jaxdamp._tables import Column, Table, plain
+from jaxdamp._results import AbstractResult, drawn_by
+from jaxdamp._tables import Column, Table
 from jaxdamp.identify.estimating import at_ends
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 GAIN, OFFSET = 0.01, 10.0  # changes of the force that tables state: 1 %, 10 N
@@ -72,8 +68,7 @@ class RecordSensitivity(AbstractResult):
 
     def content(self) -> dict[str, Any]:
         """All derivatives as plain data, ready for JSON; numbers that are not finite are None."""
-        fields = (field.name for field in dataclasses.fields(self) if field.name != "warnings")
-        return plain({name: getattr(self, name) for name in fields})
+        return self._data(*(field.name for field in dataclasses.fields(self) if field.name != "warnings"))
 
     @property
     def summary(self) -> str:
@@ -84,11 +79,7 @@ class RecordSensitivity(AbstractResult):
             most.append(f"1 % more force in {self.records[i]} changes {name} by {GAIN * slopes[i]:+.3g}.")
         return " ".join(most)
 
-    def plot(self) -> "matplotlib.figure.Figure":
-        """See `jaxdamp.plots.record_sensitivity`."""
-        from jaxdamp import plots
-
-        return plots.record_sensitivity(self)
+    plot = drawn_by("record_sensitivity", "See `jaxdamp.plots.record_sensitivity`.")
 
     def __repr__(self) -> str:
         return "\n".join([self.table().to_text(), *(f"warning: {warning}" for warning in self.warnings)])

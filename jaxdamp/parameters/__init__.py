@@ -13,6 +13,7 @@ from jaxdamp.parameters._declaration import (
     Module as Module,
     Parameter as Parameter,
     as_float as as_float,
+    declared_inside as declared_inside,
     domain_of as domain_of,
     modules_inside as modules_inside,
     parameter,
@@ -64,22 +65,4 @@ __all__ = [
     "setting",
     "weight",
     "with_values",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "Bounds",
-    "Domain",
-    "FreeParameters",
-    "Module",
-    "Parameter",
-    "as_float",
-    "check_parameters",
-    "checked",
-    "domain_of",
-    "match_paths",
-    "matched_in_words",
-    "matching",
-    "modules_inside",
-    "name_patterns",
-    "readable",
 ]

@@ -164,7 +164,7 @@ def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list[Any]:
     """Bars from the least to the largest force at stated velocities; one-sided limits end at the measured value."""
     from matplotlib.lines import Line2D
 
-    colours = {True: _style.COLOURS[2], False: _style.COLOURS[1]}
+    colours = {True: _style.GOOD, False: _style.BAD}
     seen = set()
     for limit, measured in limits.results:
         if limit.velocity is None or measured is None or measured.unit != "N":
@@ -182,8 +182,10 @@ def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list[Any]:
 
 
 def _dress(panels: Mapping[str, "matplotlib.axes.Axes"]) -> None:
-    _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Mean cycles: force over velocity")
-    _style.dress(panels["peaks"], _style.VELOCITY, _style.FORCE, "Forces at peak and at stated velocities")
+    _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Continuous plot (CVP): mean cycles")
+    _style.dress(
+        panels["peaks"], _style.VELOCITY, _style.FORCE, "Peak-velocity plot (PVP), and forces at stated velocities"
+    )
     _style.dress(panels["x"], _style.STROKE, _style.FORCE, "Force over stroke")
     _style.dress(panels["a"], "acceleration [m/s²]   (+ rebound)", _style.FORCE, "Force over acceleration")
     _style.dress(panels["t"], "time in the cycle, over its period [–]", _style.FORCE, "Force over time")
@@ -207,7 +209,7 @@ def limit_check(check: LimitCheck) -> "matplotlib.figure.Figure":
         size = np.nanmax(np.abs([*ends, value])) or 1.0
         low, high = (-1.2 if np.isnan(ends[0]) else ends[0] / size), (1.2 if np.isnan(ends[1]) else ends[1] / size)
         axes.barh(row, high - low, left=low, height=0.5, color="0.85")
-        colour = _style.COLOURS[2] if measured is not None and limit.kept_by(value) else _style.COLOURS[1]
+        colour = _style.GOOD if measured is not None and limit.kept_by(value) else _style.BAD
         axes.plot(value / size, row, "o", color=colour)
         where = limit.setting if measured is None else measured.record or measured.setting
         shown = "not measured" if measured is None else f"{_style.short(value)} {measured.unit}".strip()

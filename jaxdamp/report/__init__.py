@@ -57,29 +57,5 @@ __all__ = [
     "tuning_report",
     "vehicle_fit_report",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "Attempts",
-    "Column",
-    "add_evaluation",
-    "add_other_fits",
-    "add_records",
-    "add_rides",
-    "add_tuning",
-    "axles_sentence",
-    "baseline_table",
-    "failure_sentences",
-    "fit_verdict",
-    "fitted_range_table",
-    "fitted_velocities",
-    "law_evaluation",
-    "notes_of",
-    "parameters_of",
-    "range_use_table",
-    "records_table",
-    "ride_records_table",
-    "ride_tables",
-    "ride_verdict",
-]
 
 answer_guesses(__name__, __all__)

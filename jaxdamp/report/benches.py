@@ -70,7 +70,11 @@ def add_evaluation(
     """
     report.heading("Evaluation")
     report.points(evaluation.notes)
-    report.picture(lambda: evaluation.plot(baseline, limits), "Mean cycles and forces over velocity", "evaluation.png")
+    report.picture(
+        lambda: evaluation.plot(baseline=baseline, limits=limits),
+        "Mean cycles and forces over velocity",
+        "evaluation.png",
+    )
     for name, table in evaluation.tables().items():
         if name != "measurements":
             report.table(table)

@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jaxdamp._display import display
 from jaxdamp._tables import Table
 from jaxdamp.report.attempts import Attempts
 
@@ -92,7 +93,7 @@ class Report:
     def heading(self, text: str) -> None:
         """Start a section; the page begins with links to all of them."""
         self._headings.append(text)
-        self._blocks.append(f'<h2 id="{len(self._headings)}">{html.escape(text)}</h2>')
+        self._blocks.append(f'<h2 id="{len(self._headings)}">{html.escape(display().words(text))}</h2>')
 
     def verdict(self, *sentences: str) -> None:
         """The result in words, each sentence on a line, in a box; nothing if there are no words."""
@@ -108,10 +109,10 @@ class Report:
     def points(self, items: Sequence[str]) -> None:
         """A list of remarks; nothing if it is empty."""
         if items:
-            self._blocks.append(_points([self.attempts.words(item) for item in items]))
+            self._blocks.append(_points([display().words(self.attempts.words(item)) for item in items]))
 
     def _escaped(self, sentence: str) -> str:
-        return html.escape(self.attempts.words(sentence))
+        return html.escape(display().words(self.attempts.words(sentence)))
 
     def table(self, table: Table) -> None:
         """A table."""
@@ -134,7 +135,7 @@ class Report:
             shown.savefig(drawn, dpi=150, format="png")
             if self._folder is not None:
                 (self._folder / name).write_bytes(drawn.getvalue())
-            data, words = base64.b64encode(drawn.getvalue()).decode("ascii"), html.escape(caption)
+            data, words = base64.b64encode(drawn.getvalue()).decode("ascii"), html.escape(display().words(caption))
             width = round(PIXELS * shown.get_figwidth())
             image = f'<img alt="{words}" width="{width}" src="data:image/png;base64,{data}">'
             self._blocks.append(f"<figure>{image}<figcaption>{words}</figcaption></figure>")

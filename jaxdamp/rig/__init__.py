@@ -15,14 +15,3 @@ __all__ = [
     "quasi_static",
     "respond",
 ]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "AbstractLawEngine",
-    "LawNumbers",
-    "QuasiStatic",
-    "Readings",
-    "is_number",
-    "march",
-    "numbers_of",
-    "solve_law",
-]

@@ -9,17 +9,20 @@ from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver as Abstra
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState, settled
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
-from jaxdamp.simulation.observer import MetricObserver as MetricObserver
-from jaxdamp.simulation.range_notes import named_laws as named_laws, range_sentences as range_sentences
-from jaxdamp.simulation.recorder import recorded as recorded
+from jaxdamp.simulation.notes import (
+    far_outside as far_outside,
+    named_laws as named_laws,
+    over_runs as over_runs,
+    range_sentences as range_sentences,
+)
+from jaxdamp.simulation.observer import MetricObserver as MetricObserver, recorded as recorded
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride
-from jaxdamp.simulation.ride_metrics import comfort, ride_metrics
+from jaxdamp.simulation.ride_metrics import comfort, comfort_table, metrics_table, ride_metrics
 from jaxdamp.simulation.run import simulate
 from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.stationary import DEVIATIONS as DEVIATIONS, stationary_notes as stationary_notes
 from jaxdamp.simulation.step_size import CoarseStepWarning, RunCheck as RunCheck, TracedStepWarning
-from jaxdamp.simulation.tables import comfort_table, metrics_table
 from jaxdamp.simulation.wheels import AxleTiming as AxleTiming, moves_axles as moves_axles
 
 
@@ -46,17 +49,4 @@ __all__ = [
     "settled",
     "simulate",
     "substeps_needed",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "DEVIATIONS",
-    "AbstractObserver",
-    "AxleTiming",
-    "MetricObserver",
-    "RunCheck",
-    "moves_axles",
-    "named_laws",
-    "range_sentences",
-    "recorded",
-    "stationary_notes",
 ]

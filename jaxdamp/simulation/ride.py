@@ -27,9 +27,8 @@ from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation.engine import AbstractEngine, chosen_engine
 from jaxdamp.simulation.equations import Equations, settled
 from jaxdamp.simulation.exponential import Exponential
-from jaxdamp.simulation.observer import MetricObserver
-from jaxdamp.simulation.range_notes import range_uses
-from jaxdamp.simulation.recorder import recorded
+from jaxdamp.simulation.notes import range_uses
+from jaxdamp.simulation.observer import MetricObserver, recorded
 from jaxdamp.simulation.run import refuse_stacked, run_check, sampled
 from jaxdamp.simulation.stationary import in_motion, stationary_dampers, stationary_metrics, stationary_range_use
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles

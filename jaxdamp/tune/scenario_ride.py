@@ -82,11 +82,7 @@ RISKS: dict[str, Risk] = {"mean": mean, "worst": worst}
 
 
 def risk_of(risk: str | Risk) -> Risk:
-    """The risk of a name, or the function itself.
-
-    Raises:
-        ValueError: an unknown name.
-    """
+    """The risk of a name, or the function itself."""
     if not isinstance(risk, str):
         if not callable(risk):
             must = "be 'mean', 'worst', `tune.CVaR(share)`, or a function of values and weights"

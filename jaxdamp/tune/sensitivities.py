@@ -286,10 +286,6 @@ class ForceHats(AbstractMemoryless):
     """A force that is linear between velocities at equal distances, zero at standstill, constant beyond the ends.
 
     Its derivative by one of its forces is the hat function around that velocity, exactly.
-
-    Arguments:
-        spacing: of the velocities [m/s], which are ±1, ±2, ... times this.
-        forces: at these velocities, increasing [N], shape (2 k,).
     """
 
     spacing: Number = setting("m/s", "spacing of the velocities", positive)
@@ -311,14 +307,7 @@ class ForceHats(AbstractMemoryless):
 
 
 def with_hats(vehicle: V, path: str, reach: float, count: int) -> V:
-    """The vehicle with hats of zero force beside the law at a path.
-
-    Arguments:
-        vehicle: with the law.
-        path: of the law.
-        reach: largest velocity of the hats [m/s].
-        count: number of hats on each side.
-    """
+    """The vehicle with hats of zero force beside the law at a path."""
     hats = ForceHats(reach / count, np.zeros(2 * count))
     return eqx.tree_at(lambda car: get(car, path), vehicle, get(vehicle, path) + hats)
 

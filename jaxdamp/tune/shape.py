@@ -134,13 +134,9 @@ def _mean_bend(v: Curve, f: Curve) -> Array:
 
 @final
 class ShapeNumbers(NamedTuple):
-    """The numbers that shape constraints limit, as a function of the vehicle.
+    """The numbers that shape constraints limit, as a function of the vehicle."""
 
-    Attributes:
-        pairs: each constraint with the path of a law.
-    """
-
-    pairs: tuple[tuple[Shape, str], ...]
+    pairs: tuple[tuple[Shape, str], ...]  # each constraint with the path of a law
 
     @classmethod
     def of(cls, vehicle: AbstractVehicle, shape: Sequence[Shape] | Shape) -> "ShapeNumbers":

@@ -1,19 +1,15 @@
 """The result of a choice of valving."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._tables import Column, Table, with_unit
 from jaxdamp.dampers import MonoTube
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class ValveParameter(NamedTuple):
@@ -133,22 +129,11 @@ class ValvingResult(AbstractResult):
 
     def content(self) -> dict[str, Any]:
         """The result as numbers with units and words, ready for JSON; the law is written by `export.to_json`."""
-        return {
-            "feasible": self.feasible,
-            "rmse": with_unit(self.rmse, "N"),
-            "error": with_unit(self.error_percent, "%"),
-            "parameters": [plain(p._asdict()) for p in self.parameters],
-            "out_of_reach": [plain(part._asdict()) for part in self.out_of_reach],
-            "velocity": with_unit(self.velocity, "m/s"),
-            "target_force": with_unit(self.target_force, "N"),
-            "force": with_unit(self.force, "N"),
-        }
+        forces = self._data(rmse="N", velocity="m/s", target_force="N", force="N")
+        error = {"error": with_unit(self.error_percent, "%")}
+        return self._data("feasible", "parameters", "out_of_reach") | forces | error
 
-    def plot(self) -> "Figure":
-        """Wanted and reached force over velocity, with the parts out of reach, and the error below."""
-        from jaxdamp.plots import valving
-
-        return valving(self)
+    plot = drawn_by("valving", "Wanted and reached force over velocity with the parts out of reach; the error.")
 
     def __repr__(self) -> str:
         return f"{self.summary}\n{self.table().to_text()}"

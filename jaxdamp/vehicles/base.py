@@ -15,10 +15,9 @@ from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.parameters import Module, check_parameters, readable
-from jaxdamp.vehicles.channels import channels_of
+from jaxdamp.vehicles.channels import GOALS, channels_of, chosen_metrics, metrics_of_goal
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
-from jaxdamp.vehicles.ride_metrics import GOALS, chosen_metrics, metrics_of_goal
 from jaxdamp.vehicles.system import Layout, System, assemble, layout_of
 
 

@@ -18,8 +18,7 @@ from jaxdamp._sharded import varying_as
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import coverage
 from jaxdamp.vehicles.base import AbstractVehicle
-from jaxdamp.vehicles.port_form import PortForm
-from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.port_form import PortForm, Ports
 from jaxdamp.vehicles.system import System
 
 

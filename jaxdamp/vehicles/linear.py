@@ -1,11 +1,13 @@
 """The linearised vehicle: about the static equilibrium, for a given amplitude of its laws, or on a random road."""
 
+from collections.abc import Sequence
 from typing import Any, final
 
 import equinox as eqx
 import jax
 import jax.flatten_util
 import jax.numpy as jnp
+import jax.scipy.linalg
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -14,12 +16,48 @@ from jaxdamp._field_types import check_module
 from jaxdamp._matrices import solve
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.dampers import coverage
+from jaxdamp.metrics import weighting_state_space
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position
-from jaxdamp.vehicles.equivalent import equivalent_slopes
-from jaxdamp.vehicles.linear_laws import LinearLaws, with_linear_laws
-from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.port_form import Ports, States
 from jaxdamp.vehicles.statistical import NoiseAtLaw, statistical_laws
+from jaxdamp.vehicles.system import LinearLaws, with_linear_laws
+
+
+POINTS = 256  # in a cycle
+CYCLES = 8  # the last one is evaluated; laws with states settle before
+
+
+def equivalent_slopes(
+    ports: Ports, centre: Float[Array, " ports"], amplitude: Float[Array, "..."], frequency: Scalar
+) -> tuple[Float[Array, " ports"], Float[Array, " ports"]]:
+    """First harmonic of each force for x = centre + X sin ωt: F ≈ k (x − centre) + c v.
+
+    k = (2/X) mean(F sin ωt) [N/m], c = (2/(Xω)) mean(F cos ωt) [N s/m] over the last of eight cycles of 256 points. c
+    dissipates the same energy as the law, k is its part in phase with the stroke. Zeros without elements.
+
+    Arguments:
+        ports: the laws at the ports.
+        centre: mean deflection [m], shape (ports,).
+        amplitude: X [m], one for all or one for each port.
+        frequency: ω/2π [Hz].
+    """
+    x_max = jnp.broadcast_to(jnp.abs(amplitude), centre.shape)
+    rate = 2.0 * jnp.pi * frequency
+    phase = 2.0 * jnp.pi * jnp.arange(CYCLES * POINTS + 1.0, dtype=centre.dtype) / POINTS
+    sine, cosine = jnp.sin(phase), jnp.cos(phase)
+    x = centre[None, :] + sine[:, None] * x_max[None, :]
+    v = cosine[:, None] * (rate * x_max)[None, :]
+
+    def step(states: States, ends: tuple[Array, ...]) -> tuple[States, Array]:
+        x0, v0, x1, v1 = ends
+        states = ports.advance(x0, v0, x1, v1, states, 1.0 / (frequency * POINTS))
+        return states, ports.force(x1, v1, states)
+
+    _, forces = jax.lax.scan(step, ports.initial(), (x[:-1], v[:-1], x[1:], v[1:]))
+    last, of_cycle = forces[-POINTS:], slice(-POINTS, None)
+    stiffness = 2.0 * jnp.mean(last * sine[of_cycle, None], axis=0) / x_max
+    return stiffness, 2.0 * jnp.mean(last * cosine[of_cycle, None], axis=0) / (rate * x_max)
 
 
 INSTEAD = 'Drive over a random road instead: `roads.iso8608("C", speed=20.0, length=1200.0, seed=1)`.'
@@ -228,3 +266,51 @@ def as_linear(vehicle: AbstractVehicle | LinearVehicle) -> LinearVehicle:
     """The vehicle linearised about its static equilibrium, unless it is linear already."""
     check_module("vehicle", vehicle, (AbstractVehicle, LinearVehicle))
     return vehicle if isinstance(vehicle, LinearVehicle) else linearise(vehicle)
+
+
+def with_weightings(linear: LinearVehicle, weightings: Sequence[tuple[str, str]]) -> LinearVehicle:
+    """The linearised vehicle with added channels `weighted_…`: ẇ = A_w w + B_w y, output C_w w, for a channel y.
+
+    `stationary_rms` then gives the weighted RMS of a white road, `frequency_response` the weighted response.
+
+    Arguments:
+        linear: result of `linearise`.
+        weightings: pairs of a channel and a weighting, such as `[("sprung_acceleration", "Wk")]`.
+
+    Raises:
+        ValueError: an unknown channel or weighting.
+
+    >>> from jaxdamp.vehicles import linearise, stationary_rms
+    >>> from jaxdamp.vehicles.presets import quarter_car_000
+    >>> weighted = with_weightings(linearise(quarter_car_000()), [("sprung_acceleration", "Wk")])
+    >>> rms = stationary_rms(weighted, 3e-3)
+    >>> [round(float(rms[name]), 3) for name in ("sprung_acceleration", "weighted_sprung_acceleration")]
+    [1.6, 1.026]
+    """
+    for name, _ in weightings:
+        _checks.one_of("channel", name, linear.channels)
+    filters = [weighting_state_space(weighting) for _, weighting in weightings]
+    picked = jnp.array([linear.channels.index(name) for name, _ in weightings], dtype=int)
+    size, inner = linear.state_matrix.shape[0], sum(f.input_vector.size for f in filters)
+    into = jax.scipy.linalg.block_diag(*[f.input_vector[:, None] for f in filters])
+    out = jax.scipy.linalg.block_diag(*[f.output_vector[None, :] for f in filters])
+    own = jax.scipy.linalg.block_diag(*[f.state_matrix for f in filters])
+    above = jnp.concatenate([linear.state_matrix, jnp.zeros((size, inner))], axis=1)
+    below = jnp.concatenate([into @ linear.output[picked], own], axis=1)
+    unweighted = jnp.concatenate([linear.output, jnp.zeros((len(linear.channels), inner))], axis=1)
+    weighted = jnp.concatenate([jnp.zeros((len(filters), size)), out], axis=1)
+    wheels = linear.road_input.shape[1]
+    nothing = jnp.zeros((len(filters), wheels))
+    return LinearVehicle(
+        jnp.concatenate([above, below]),
+        jnp.concatenate([linear.road_input, into @ linear.road_feed[picked]]),
+        jnp.concatenate([linear.road_rate_input, into @ linear.feed_through[picked]]),
+        jnp.concatenate([unweighted, weighted]),
+        jnp.concatenate([linear.road_feed, nothing]),
+        jnp.concatenate([linear.feed_through, nothing]),
+        linear.behind,
+        linear.left,
+        linear.coordinates,
+        (*linear.channels, *[f"weighted_{name}" for name, _ in weightings]),
+        linear.axles,
+    )

@@ -25,12 +25,10 @@ from jaxdamp._limits import at_least, within
 from jaxdamp._matrices import solve
 from jaxdamp._types import Scalar, State
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.vehicles.covariance import channel_covariance
 from jaxdamp.vehicles.equilibrium import rest_position
-from jaxdamp.vehicles.gaussian_points import gaussian_points
-from jaxdamp.vehicles.linear_laws import LinearLaws, motions_of, with_linear_laws
-from jaxdamp.vehicles.ports import Ports
-from jaxdamp.vehicles.system import System
+from jaxdamp.vehicles.gaussian import channel_covariance, gaussian_points
+from jaxdamp.vehicles.port_form import Ports
+from jaxdamp.vehicles.system import LinearLaws, System, motions_of, with_linear_laws
 
 
 BODY, WHEEL = 1.5, 10.0  # Hz, of a vehicle, to start the search from

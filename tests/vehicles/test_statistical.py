@@ -10,7 +10,7 @@ import jaxdamp
 from jaxdamp import Ride, dampers, roads
 from jaxdamp.parameters import replace
 from jaxdamp.vehicles import CubicSpring, QuarterCar, equivalent_dampers, stationary_rms
-from jaxdamp.vehicles.gaussian_points import gaussian_points
+from jaxdamp.vehicles.gaussian import gaussian_points
 from jaxdamp.vehicles.presets import half_car_002, m113_003, quarter_car_000
 from jaxdamp.vehicles.statistical import nonlinear_variables
 
