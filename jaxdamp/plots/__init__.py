@@ -6,6 +6,7 @@ touches pyplot or its global state, and matplotlib is loaded by the first call o
 
 from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
+from jaxdamp.plots.curve_family import force_velocity_family as force_velocity_family
 from jaxdamp.plots.curves import force_velocity
 from jaxdamp.plots.damper_sheet import damper_sheet as damper_sheet
 from jaxdamp.plots.damper_use import damper_use

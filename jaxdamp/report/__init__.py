@@ -27,6 +27,7 @@ from jaxdamp.report.fits import (
     fitted_velocities as fitted_velocities,
     parameters_of as parameters_of,
 )
+from jaxdamp.report.force_velocity import table_report as table_report
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import fitted_range_table as fitted_range_table, range_use_table as range_use_table
 from jaxdamp.report.records import add_records as add_records, records_table as records_table

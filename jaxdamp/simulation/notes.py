@@ -1,6 +1,6 @@
 """Notes on a response: laws beyond the range of their fit, tyres in tension."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import jax
 import jax.numpy as jnp
