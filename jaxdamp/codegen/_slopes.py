@@ -178,8 +178,8 @@ def _hoisted(statements: Sequence[Statement], known: set[str]) -> tuple[list[Def
     early: list[Define] = []
     later: list[Statement] = []
     for statement in statements:
-        plain = isinstance(statement, Define) and statement.target.dtype in ("float64", "bool")
-        if plain and _reads(statement) <= known:
+        kinds = ("float64", "bool")
+        if isinstance(statement, Define) and statement.target.dtype in kinds and _reads(statement) <= known:
             early.append(statement)
             known.add(statement.target.name)
         else:

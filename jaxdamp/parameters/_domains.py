@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, PyTree
 
 from jaxdamp._traced import of_known_numbers
 
@@ -52,7 +52,7 @@ class Domain:
         return self.steps is not None
 
 
-Numbers: TypeAlias = Any  # arrays of JAX or NumPy, as the arguments are
+Numbers: TypeAlias = PyTree  # arrays of JAX or NumPy, as the arguments are
 
 
 def _library(array: object) -> ModuleType:
