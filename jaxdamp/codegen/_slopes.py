@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Array, PyTree
 
 from jaxdamp.codegen._languages import C
 from jaxdamp.codegen._lowering import Program, Symbols, lower, symbols
-from jaxdamp.codegen._program import Branch, Define, Leave, Loop, Statement, Variable, names, operands_of
+from jaxdamp.codegen._program import Atom, Branch, Define, Leave, Loop, Statement, Variable, names, operands_of
 
 
 class Signature(NamedTuple):
@@ -40,7 +41,7 @@ def in_lanes(name: str, count: int) -> Symbols:
 
 def with_slopes(
     signature: Signature,
-    function: Callable[..., Any],
+    function: Callable[..., Array],
     shapes: Sequence[tuple[int, ...]],
     free: Sequence[int],
     states: int,
@@ -65,8 +66,8 @@ def with_slopes(
     arrays = _cut(symbols("p", (numbers,)), shapes)
     of_arrays = _cut(in_lanes("dp", slopes), [shapes[i] for i in free])
 
-    def both(arrays: list[Any], states: Any, of_arrays: list[Any], of_states: Any, *rest: Any) -> Any:
-        def of(some: list[Any], states: Any) -> Any:
+    def both(arrays: list[Array], states: Array, of_arrays: list[Array], of_states: Array, *rest: Array) -> PyTree:
+        def of(some: list[Array], states: Array) -> PyTree:
             moved = dict(zip(free, some, strict=True))
             return function([moved.get(i, array) for i, array in enumerate(arrays)], states, *rest)
 
@@ -134,7 +135,7 @@ def _numbered(line: str, stored: Sequence[Variable]) -> list[str]:
     return [line.format(i, v.name, type=C().types[v.dtype]) for i, v in enumerate(stored)]
 
 
-def _put(atoms: Sequence[Any], targets: Sequence[str], name: str, depth: int) -> list[str]:
+def _put(atoms: Sequence[Atom], targets: Sequence[str], name: str, depth: int) -> list[str]:
     """The lines that assign results, after all of them are computed: a target may be an input too."""
     space = "    " * depth
     before = [f"{space}const double {name}{i} = {C().atom(atom)};" for i, atom in enumerate(atoms)]
@@ -177,8 +178,8 @@ def _hoisted(statements: Sequence[Statement], known: set[str]) -> tuple[list[Def
     early: list[Define] = []
     later: list[Statement] = []
     for statement in statements:
-        plain = isinstance(statement, Define) and statement.target.dtype in ("float64", "bool")
-        if plain and _reads(statement) <= known:
+        kinds = ("float64", "bool")
+        if isinstance(statement, Define) and statement.target.dtype in kinds and _reads(statement) <= known:
             early.append(statement)
             known.add(statement.target.name)
         else:

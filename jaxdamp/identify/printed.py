@@ -9,27 +9,27 @@ once for each reason.
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, PyTree
 
 from jaxdamp._traced import is_traced
 from jaxdamp.dampers import laws_inside
 from jaxdamp.identify.model import Model, starts_in
 from jaxdamp.identify.printed_law import PrintedLaw, Record, numbers_on_rig, plain_rig, printed_law, say
+from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters, get, with_values
 from jaxdamp.rig import is_number
 
 
-def _blank(tree: Any) -> Any:
+def _blank(tree: PyTree) -> PyTree:
     """With −1 in place of every number."""
     return jax.tree.map(lambda leaf: np.full(leaf.shape, -1.0) if is_number(leaf) else leaf, tree)
 
 
-def _refusal(parts: Sequence[Any], model: Model) -> str:
+def _refusal(parts: Sequence[object], model: Model) -> str:
     """Why these records with this model are left to XLA; empty if they are not."""
     for part in parts:
         if not isinstance(part, Batch):
@@ -154,16 +154,18 @@ class Evaluator:
     parts: tuple[slice, ...] = ()
 
 
-def evaluator(free: FreeParameters, residuals: Sequence[Any]) -> Evaluator | None:
+def evaluator(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> Evaluator | None:
     """The residuals of records as printed C; None where XLA computes them."""
+    batches = [part for part in residuals if isinstance(part, Batch)]
     reason = _refusal(residuals, free.tree)
-    if reason or (any(part.per_record for part in residuals) and free_has_conditions(free)):
-        say(f"Computed by XLA: {reason or 'a value for each record beside conditions'}.")
+    if not reason and free_has_conditions(free) and any(batch.per_record for batch in batches):
+        reason = "a value for each record beside conditions"
+    if reason:
+        say(f"Computed by XLA: {reason}.")
         return None
-    numbered = dict(zip((p.path for p in free.chosen), free.split(np.arange(float(free.values.size))), strict=True))
-    taken_tree = with_values(_blank(free.tree), numbered | {path: numbered[leader] for path, leader in free.ties})
+    taken_tree = _taken(free)
     places, rows, offset, first = [], [], 0, None
-    for batch in residuals:
+    for batch in batches:
         for row, record in enumerate(_records(batch)):
             numbers = numbers_on_rig(_of_row(batch, free.tree, row))
             marked = _of_row(dataclasses.replace(batch, fixed={}), _marked(taken_tree, batch), row)
@@ -180,7 +182,14 @@ def evaluator(free: FreeParameters, residuals: Sequence[Any]) -> Evaluator | Non
     return Evaluator(law, rows, offset, free.values.size, parts)
 
 
-def _marked(taken: Any, batch: Batch) -> Any:
+def _taken(free: FreeParameters) -> PyTree:
+    """The tree with the number of each free value in its place, and −1 elsewhere."""
+    numbers = free.split(np.arange(float(free.values.size)))
+    numbered = dict(zip((p.path for p in free.chosen), numbers, strict=True))
+    return with_values(_blank(free.tree), numbered | {path: numbered[leader] for path, leader in free.ties})
+
+
+def _marked(taken: PyTree, batch: Batch) -> PyTree:
     """Values that the records state take no free number."""
     return with_values(taken, {path: np.asarray(-1.0) for path in batch.fixed})
 

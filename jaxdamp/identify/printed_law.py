@@ -5,12 +5,12 @@ import functools
 import logging
 import threading
 from collections.abc import Hashable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Array, Float, Int
 
 from jaxdamp.codegen import Signature, library, symbols, with_slopes
 from jaxdamp.dampers import laws_inside, margins
@@ -112,7 +112,7 @@ class PrintedLaw:
         )
         m, printed = self.states, functools.partial(with_slopes, shapes=shapes, free=free)
 
-        def force(arrays: list[Any], s: Any, x: Any, v: Any) -> Any:
+        def force(arrays: list[Array], s: Array, x: Array, v: Array) -> Array:
             law, rig = numbers.built(arrays).law, numbers.built(arrays).rig
             assert rig is not None
             inside = x - rig.stroke_offset
@@ -120,7 +120,7 @@ class PrintedLaw:
             friction = rig.friction * jnp.tanh(v / rig.friction_velocity)
             return law.force(inside, v, s) + gas + friction + rig.force_offset
 
-        def advance(arrays: list[Any], s: Any, x0: Any, v0: Any, x1: Any, v1: Any, h: Any) -> Any:
+        def advance(arrays: list[Array], s: Array, x0: Array, v0: Array, x1: Array, v1: Array, h: Array) -> Array:
             law, rig = numbers.built(arrays).law, numbers.built(arrays).rig
             assert rig is not None
             return law.advance(x0 - rig.stroke_offset, v0, x1 - rig.stroke_offset, v1, s, h)

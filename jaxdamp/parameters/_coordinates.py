@@ -10,6 +10,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Bool, Float, PyTree
 
 from jaxdamp.parameters._declaration import Parameter
+from jaxdamp.parameters._domains import Domain
 from jaxdamp.parameters._free import FreeParameters
 
 
@@ -153,7 +154,7 @@ class HostMap(NamedTuple):
 
     units: Float[np.ndarray, " free"]
     slopes: Float[np.ndarray, "free free"]
-    smooth: tuple[tuple[slice, Any, Float[np.ndarray, " _"]], ...]
+    smooth: tuple[tuple[slice, Domain, Float[np.ndarray, " _"]], ...]
 
     def __call__(
         self, y: Float[np.ndarray, " free"]
@@ -183,12 +184,12 @@ def _magnitude(value: PyTree) -> PyTree:
     return xp.where(magnitude > floor, magnitude, xp.where(largest == 0, 1.0, largest)).astype(value.dtype)
 
 
-def _plain(p: Parameter, values: Any) -> Any:
+def _plain(p: Parameter, values: Array | np.ndarray) -> Array | np.ndarray:
     """As a map takes them: those of ordered vectors compute NumPy arrays by NumPy."""
     return values if p.domain.ordered and isinstance(values, np.ndarray) else jnp.asarray(values)
 
 
-def _scale(p: Parameter) -> Any:
+def _scale(p: Parameter) -> Array | np.ndarray:
     """The scale of the smooth map of a domain: the magnitude of the start, or of the steps of an ordered vector."""
     value = p.value if isinstance(p.value, Tracer) else np.asarray(p.value)
     return _magnitude(value if p.domain.steps is None else p.domain.steps(value))

@@ -3,12 +3,13 @@
 import dataclasses
 import functools
 from collections.abc import Callable
-from typing import Any
+from types import ModuleType
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, PyTree
 
 from jaxdamp._traced import of_known_numbers
 
@@ -51,11 +52,14 @@ class Domain:
         return self.steps is not None
 
 
-def _library(array: Any) -> Any:
+Numbers: TypeAlias = PyTree  # arrays of JAX or NumPy, as the arguments are
+
+
+def _library(array: object) -> ModuleType:
     return np if isinstance(array, np.ndarray | np.generic) else jnp
 
 
-def _softplus(raw: Any) -> Any:
+def _softplus(raw: Numbers) -> Numbers:
     return _library(raw).logaddexp(raw, 0.0)
 
 
@@ -63,7 +67,7 @@ def _sigmoid(raw: np.ndarray) -> np.ndarray:
     return 0.5 * (1.0 + np.tanh(0.5 * raw))
 
 
-def _inverse_softplus(y: Any) -> Any:
+def _inverse_softplus(y: Numbers) -> Numbers:
     xp = _library(y)
     return xp.where(y > 30.0, y, xp.log(xp.expm1(xp.minimum(y, 30.0))))
 
@@ -72,17 +76,17 @@ def _positive_to_raw(value: Array, scale: Array) -> Array:
     return _inverse_softplus(jnp.maximum(value / scale, 1e-12))
 
 
-def _steps_up(value: Any) -> Any:
+def _steps_up(value: Numbers) -> Numbers:
     xp = _library(value)
     return xp.diff(value, prepend=xp.zeros(1, value.dtype))
 
 
-def _steps_to_zero(value: Any) -> Any:
+def _steps_to_zero(value: Numbers) -> Numbers:
     xp = _library(value)
     return xp.diff(value, append=xp.zeros(1, value.dtype))
 
 
-def _increasing_from_raw(raw: Any, scale: Any) -> Any:
+def _increasing_from_raw(raw: Numbers, scale: Numbers) -> Numbers:
     xp = _library(raw)
     return xp.cumsum(xp.concatenate([scale[:1] * raw[:1], scale[1:] * _softplus(raw[1:])]))
 
@@ -91,16 +95,16 @@ def _increasing_slopes(raw: np.ndarray, scale: np.ndarray) -> np.ndarray:
     return np.tril(np.ones((raw.size, raw.size))) * np.append(scale[:1], scale[1:] * _sigmoid(raw[1:]))
 
 
-def _increasing_to_raw(value: Any, scale: Any) -> Any:
+def _increasing_to_raw(value: Numbers, scale: Numbers) -> Numbers:
     xp = _library(value)
     return xp.concatenate([value[:1] / scale[:1], _inverse_softplus(xp.diff(value) / scale[1:])])
 
 
-def _increasing_from_raw_positive(raw: Any, scale: Any) -> Any:
+def _increasing_from_raw_positive(raw: Numbers, scale: Numbers) -> Numbers:
     return _library(raw).cumsum(scale * _softplus(raw))
 
 
-def _increasing_to_raw_positive(value: Any, scale: Any) -> Any:
+def _increasing_to_raw_positive(value: Numbers, scale: Numbers) -> Numbers:
     return _inverse_softplus(_steps_up(value) / scale)
 
 
@@ -189,7 +193,7 @@ def _logit(share: Array) -> Array:
     return jnp.log(share / (1 - share))
 
 
-def _gap_shares(raw: Any) -> Any:
+def _gap_shares(raw: Numbers) -> Numbers:
     """The shares that the gaps have of the range, a softmax."""
     xp = _library(raw)
     raw = xp.concatenate([raw, xp.zeros(1, raw.dtype)])
@@ -197,7 +201,7 @@ def _gap_shares(raw: Any) -> Any:
     return size / size.sum()
 
 
-def _ordered_shares(raw: Any) -> Any:
+def _ordered_shares(raw: Numbers) -> Numbers:
     return _library(raw).cumsum(_gap_shares(raw))[:-1]
 
 
@@ -206,7 +210,7 @@ def _slopes_of_ordered_shares(raw: np.ndarray) -> np.ndarray:
     return (np.tril(np.ones((raw.size, raw.size))) - np.cumsum(gaps)[:, None]) * gaps
 
 
-def _raw_of_ordered_shares(shares: Any) -> Any:
+def _raw_of_ordered_shares(shares: Numbers) -> Numbers:
     xp = _library(shares)
     zero, one = xp.zeros(1, shares.dtype), xp.ones(1, shares.dtype)
     gaps = xp.maximum(xp.diff(shares, prepend=zero, append=one), 1e-12)

@@ -3,14 +3,14 @@
 import ctypes
 import functools
 import math
-from collections.abc import Hashable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Hashable
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
@@ -82,7 +82,9 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
 class _Keyed:
     """What is remembered by a key, and with what it is computed."""
 
-    def __init__(self, key: Hashable, *content: Any) -> None:
+    content: tuple[PyTree, ...]
+
+    def __init__(self, key: Hashable, *content: object) -> None:
         self.key, self.content = key, content
 
     def __hash__(self) -> int:
@@ -183,7 +185,7 @@ void hold(const double *p, int64_t points, const double *v, int64_t count, doubl
 
 
 @functools.lru_cache(maxsize=MOST_REMEMBERED)
-def _printed_hold(structure: _Keyed) -> Any:
+def _printed_hold(structure: _Keyed) -> Callable[..., None] | None:
     """`_hold` as a C function, which ends where the states stand still; None where XLA computes it."""
     (numbers,) = structure.content
     count, shapes = int(numbers.built(numbers.arrays).initial_state().size), [a.shape for a in numbers.arrays]
@@ -191,10 +193,10 @@ def _printed_hold(structure: _Keyed) -> Any:
     cut = zip(ends, shapes, strict=True)
     arrays = [Symbols(names[end - math.prod(shape) : end].reshape(shape)) for end, shape in cut]
 
-    def advance(arrays: Any, v: Any, s: Any) -> Any:
+    def advance(arrays: list[Array], v: Array, s: Array) -> Array:
         return numbers.built(arrays).advance(jnp.zeros(()), v, jnp.zeros(()), v, s, jnp.asarray(1e-3))
 
-    def force(arrays: Any, v: Any, s: Any) -> Any:
+    def force(arrays: list[Array], v: Array, s: Array) -> Array:
         return numbers.built(arrays).force(jnp.zeros(()), v, s)
 
     try:

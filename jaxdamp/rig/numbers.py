@@ -1,10 +1,11 @@
 """A law as plain numbers and the structure that a printed program is made for."""
 
 from collections.abc import Hashable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxdamp.dampers import without_fitted_ranges
 
@@ -20,11 +21,11 @@ class LawNumbers(NamedTuple):
     """
 
     key: Hashable
-    tree: Any
-    others: tuple[Any, ...]
+    tree: PyTree
+    others: tuple[object, ...]
     arrays: list[np.ndarray]
 
-    def built(self, arrays: Sequence[Any]) -> Any:
+    def built(self, arrays: Sequence[object]) -> PyTree:
         """The same with other numbers."""
         rest = iter(arrays)
         return jax.tree.unflatten(self.tree, [next(rest) if leaf is None else leaf for leaf in self.others])
@@ -35,12 +36,12 @@ class LawNumbers(NamedTuple):
         return np.concatenate([np.zeros(0), *map(np.ravel, self.arrays)])
 
 
-def is_number(leaf: Any) -> bool:
+def is_number(leaf: object) -> bool:
     """Whether a leaf of a law is an array of numbers that a program takes."""
     return isinstance(leaf, jax.Array | np.ndarray) and np.issubdtype(leaf.dtype, np.floating)
 
 
-def numbers_of(law: Any) -> LawNumbers:
+def numbers_of(law: PyTree) -> LawNumbers:
     """The numbers of a law whose values are known; the range that it was fitted to is left out."""
     leaves, tree = jax.tree.flatten(without_fitted_ranges(law))
     others = tuple(None if is_number(leaf) else leaf for leaf in leaves)

@@ -2,6 +2,7 @@
 
 import logging
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -122,3 +123,22 @@ def test_what_was_changed_on_disk_is_not_loaded(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(_native, "compiler", lambda: None)
     with pytest.raises(NotImplementedError, match="compiler"):
         _native.library.__wrapped__(text)
+
+
+def test_a_second_ladder_of_other_records_compiles_next_to_nothing(runs) -> None:
+    """Of a first one all programs but a few are single operations; the laws themselves are C."""
+    names = ["piecewise_linear", "besinger_lag"]
+    identify.compare(identify.default_ladder(runs, names), runs, starts=1)
+    programs: list[str] = []
+
+    def note(event: str, duration_secs: float, **_: str | int) -> None:
+        if event == "/jax/core/compile/backend_compile_duration":
+            programs.append(event)
+
+    others = VirtualDyno(TRUTH, sampling_rate=300.0, force_noise=10.0).run(TESTS)
+    jax.monitoring.register_event_duration_secs_listener(note)
+    try:
+        identify.compare(identify.default_ladder(others, names), others, starts=1)
+    finally:
+        jax.monitoring.unregister_event_duration_listener(note)
+    assert len(programs) <= 5
