@@ -93,10 +93,7 @@ def choose(
         white: whether the road is white.
     """
     levels = settings_of(car)
-    combinations = list(itertools.product(*levels.values()))
-    if len(combinations) > MOST:
-        many = f"{len(combinations)} combinations of settings are more than {MOST}"
-        raise ValueError(f"{many}: name parameters with --over.")
+    combinations = _combinations(levels)
     wanted = car.goal_metrics(metric, white=white)
     allowed = {name: limit for word, limit in limits.items() for name in car.goal_metrics(word, white=white)}
     names = list(dict.fromkeys([*wanted, *allowed]))
@@ -117,17 +114,34 @@ def choose(
     score = np.array([np.mean([row[name] for name in wanted]) for row in rows])
     best = int(np.argmin(np.where(met, score, np.inf) if any(met) else score))
     units = {m.name: typeset_unit(m.unit(car.units)) for m in rides[0].metrics}
+    settings = [_words(levels, setting) for setting in combinations]
     columns = [Column("setting"), *(Column(name, units[name]) for name in names), Column("limits")]
-    cells = []
-    for setting, row, ok in zip(combinations, rows, met, strict=True):
-        cells.append((_words(levels, setting), *(row[name] for name in names), "met" if ok else "not met"))
-    name, words = wanted[0], _words(levels, combinations[best])
-    number = f"{name} {rows[best][name]:.4g} {units[name]}"
+    cells = [
+        (setting, *row.values(), "met" if ok else "not met")
+        for setting, row, ok in zip(settings, rows, met, strict=True)
+    ]
+    number = f"{wanted[0]} {rows[best][wanted[0]]:.4g} {units[wanted[0]]}"
+    return Chosen(
+        vehicles[best],
+        _verdict(settings[best], number, met),
+        Table("All settings", tuple(columns), tuple(cells)),
+        any(met),
+    )
+
+
+def _verdict(setting: str, number: str, met: Sequence[bool]) -> str:
+    """The best setting in words."""
     if any(met):
-        verdict = f"The best setting is {words}: {number}. {sum(met)} of {len(rows)} settings meet the limits."
-    else:
-        verdict = f"No setting meets the limits; the smallest {number} is that of {words}."
-    return Chosen(vehicles[best], verdict, Table("All settings", tuple(columns), tuple(cells)), any(met))
+        return f"The best setting is {setting}: {number}. {sum(met)} of {len(met)} settings meet the limits."
+    return f"No setting meets the limits; the smallest {number} is that of {setting}."
+
+
+def _combinations(levels: Mapping[str, Sequence[float]]) -> list[tuple[float, ...]]:
+    combinations = list(itertools.product(*levels.values()))
+    if len(combinations) > MOST:
+        many = f"{len(combinations)} combinations of settings are more than {MOST}"
+        raise ValueError(f"{many}: name parameters with --over.")
+    return combinations
 
 
 def _words(levels: Mapping[str, Sequence[float]], setting: Sequence[float]) -> str:
