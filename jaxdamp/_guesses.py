@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from types import ModuleType
-from typing import Any, NoReturn
+from typing import NoReturn
 
 
 GUESSES = {  # what people look for, and where it is
@@ -69,5 +69,5 @@ class Elsewhere:
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = f"type object {owner.__name__!r} has no attribute {name!r}"
 
-    def __get__(self, instance: Any, owner: type) -> NoReturn:
+    def __get__(self, instance: object, owner: type) -> NoReturn:
         raise AttributeError(f"{self._name}; did you mean {self._remedy}?")

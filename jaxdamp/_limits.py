@@ -6,8 +6,6 @@ the arguments. When differentiated, their value is selected by the same comparis
 too (see `jaxdamp._elementary` on loops that lose custom derivatives).
 """
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
@@ -43,15 +41,17 @@ def largest(numbers: Numbers, axis: int = 0) -> Numbers:
     return jnp.take_along_axis(numbers, first, axis).squeeze(axis)
 
 
-def _slope_of_least(primals: tuple[Any, Any], tangents: tuple[Any, Any]) -> tuple[Numbers, Numbers]:
+def _slope_of_least(primals: tuple[Numbers, Numbers], tangents: tuple[Numbers, Numbers]) -> tuple[Numbers, Numbers]:
     return _selected(primals, jnp.subtract(*primals), tangents)
 
 
-def _slope_of_most(primals: tuple[Any, Any], tangents: tuple[Any, Any]) -> tuple[Numbers, Numbers]:
+def _slope_of_most(primals: tuple[Numbers, Numbers], tangents: tuple[Numbers, Numbers]) -> tuple[Numbers, Numbers]:
     return _selected(primals, jnp.subtract(*reversed(primals)), tangents)
 
 
-def _selected(values: tuple[Any, Any], lead: Numbers, changes: tuple[Any, Any]) -> tuple[Numbers, Numbers]:
+def _selected(
+    values: tuple[Numbers, Numbers], lead: Numbers, changes: tuple[Numbers, Numbers]
+) -> tuple[Numbers, Numbers]:
     """The selected value and its change; for equal values the mean of both."""
     one, other = (jnp.asarray(value, lead.dtype) for value in values)
     ans = jnp.where(lead > 0, one, jnp.where(lead < 0, other, 0.5 * one + 0.5 * other))

@@ -13,6 +13,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._display import Display, display
+from jaxdamp._types import Contents
 
 
 Cell = str | float | int | None
@@ -127,7 +128,7 @@ class Table:
         """The rows as dictionaries by the names of the columns: a list that `pandas.DataFrame` takes as it is."""
         return [dict(zip((c.name for c in self.columns), row, strict=True)) for row in self.rows]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Contents:
         """Title, columns with units, and rows, ready for JSON; numbers that are not finite are None."""
         columns = [{"name": column.name, "unit": column.unit} for column in self.columns]
         return {"title": self.title, "columns": columns, "rows": plain(self.rows)}
@@ -245,7 +246,7 @@ def comparison_table(
     return Table(title, columns, tuple(cells))
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Numbers, words, lists, records and dictionaries as JSON has them; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
@@ -266,7 +267,7 @@ def plain(value: Any) -> Any:
     return plain(array.tolist())
 
 
-def with_unit(value: Any, unit: str) -> dict[str, Any]:
+def with_unit(value: object, unit: str) -> Contents:
     """A number or an array with its unit, as plain data."""
     return {"value": plain(value), "unit": unit}
 

@@ -183,7 +183,7 @@ class AbstractDamper(Module):
         _checks.refuse("law", "be a class that defines `guess`", f"the class {cls.__name__}", remedy)
 
     @classmethod
-    def from_runs(cls, runs: Sequence[Any]) -> "AbstractDamper":
+    def from_runs(cls, runs: Sequence[object]) -> "AbstractDamper":
         """A law of this class with starting values for a fit to bench records; by default `guess` of all samples."""
         return from_samples(cls.guess, runs)
 
@@ -212,7 +212,7 @@ class AbstractDamper(Module):
 
         return Sum(terms_of(self) + terms_of(other))
 
-    def __mul__(self, factor: Any) -> "AbstractDamper":
+    def __mul__(self, factor: ScalarLike | int) -> "AbstractDamper":
         """The force times a factor."""
         if isinstance(factor, AbstractDamper):
             return NotImplemented

@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxdamp import _checks
 from jaxdamp._traced import row, rows
+from jaxdamp._types import ScalarLike
 
 
 class Traits(NamedTuple):
@@ -68,7 +70,7 @@ class Reach(NamedTuple):
     velocity: float  # largest magnitude [m/s]
 
 
-def from_samples(make: Callable[..., Any], runs: Sequence[Any]) -> Any:
+def from_samples(make: Callable[..., Any], runs: Sequence[object]) -> Any:
     """The law that a function makes from the samples of all records one after the other.
 
     The function gets velocity and force as its first two arguments, and `stroke` and `time` if it has arguments of
@@ -84,7 +86,7 @@ def from_samples(make: Callable[..., Any], runs: Sequence[Any]) -> Any:
     return make(velocity, force, **dict(zip(channels[2:], others, strict=True)))
 
 
-def starts_of_bends(law: Any, reach: Reach) -> list[dict[str, float]]:
+def starts_of_bends(law: PyTree, reach: Reach) -> list[dict[str, float]]:
     """A quarter and four times each positive parameter that may determine where the force curve bends.
 
     These are the parameters in m/s, m or s in which the force is not linear; the values are limited to between 1 % and
@@ -109,12 +111,12 @@ class Condition(NamedTuple):
     """A lower limit of one parameter of a law that depends on its other parameters."""
 
     parameter: str
-    least: Any  # in the unit of the parameter
+    least: ScalarLike  # in the unit of the parameter
     formula: str  # the limit in words
     reason: str  # the consequence of a lower value, a sentence
 
 
-def check_conditions(law: Any) -> None:
+def check_conditions(law: PyTree) -> None:
     """Refuse parameters that violate a condition between them (inside `jax.jit` they are not known)."""
     values = rows(law) if law.has_conditions() else None
     if not values:

@@ -12,7 +12,7 @@ import numpy as np
 from jax.tree_util import Partial
 
 from jaxdamp import _checks
-from jaxdamp._types import Number
+from jaxdamp._types import Contents, Number
 from jaxdamp.dampers import UNITS, AbstractDamper, FittedRange, with_fitted_range
 from jaxdamp.parameters import as_float
 
@@ -33,14 +33,14 @@ def known_classes() -> dict[str, type[eqx.Module]]:
     return {c.__name__: c for c in [*classes, *ours] if not c.__name__.startswith("Abstract")}
 
 
-def known_functions() -> dict[str, Any]:
+def known_functions() -> Contents:
     """The functions of the roads of this package, of which a road can hold one, by name."""
     modules = [module for name, module in list(sys.modules.items()) if name.startswith("jaxdamp.roads.")]
     functions = [f for module in modules for f in vars(module).values() if inspect.isfunction(f)]
     return {f.__name__: f for f in functions if f.__module__.startswith("jaxdamp.roads.")}
 
 
-def declared(field: dataclasses.Field) -> dict[str, Any] | None:
+def declared(field: dataclasses.Field) -> Contents | None:
     """The declaration of a field, if it is a parameter or a setting."""
     return field.metadata.get("parameter") or field.metadata.get("setting")
 
@@ -50,7 +50,7 @@ def own_fields(module: eqx.Module | type[eqx.Module]) -> list[dataclasses.Field]
     return [field for field in dataclasses.fields(module) if field.name != "range_note"]
 
 
-def plain_module(module: eqx.Module) -> dict[str, Any]:
+def plain_module(module: eqx.Module) -> Contents:
     """A module with all modules inside."""
     name = type(module).__name__
     if type(module).__module__.split(".")[0] in BORROWED:
@@ -64,7 +64,7 @@ def plain_module(module: eqx.Module) -> dict[str, Any]:
         remedy = "Give your class a unique name; after redefining it, create its objects again."
         wrong = f"a {name} that differs from another {name}"
         _checks.refuse("module", "be of a class that can be found by its name", wrong, remedy)
-    result: dict[str, Any] = {"class": name}
+    result: Contents = {"class": name}
     for field in own_fields(module):
         value, where, number = getattr(module, field.name), f"{name}.{field.name}", declared(field)
         result[field.name] = _plain(value, where) if number is None else _quantity(value, number["unit"], where)
@@ -94,7 +94,7 @@ def _plain(value: object, where: str) -> Any:
     _checks.refuse(where, must, f"a {type(value).__name__}", remedy)
 
 
-def _plain_function(value: Partial, where: str) -> dict[str, Any]:
+def _plain_function(value: Partial, where: str) -> Contents:
     """A function of this package with its fixed arguments."""
     name = getattr(value.func, "__name__", "")
     if value.args or known_functions().get(name) is not value.func:
@@ -103,7 +103,7 @@ def _plain_function(value: Partial, where: str) -> dict[str, Any]:
     return {"function": name, "options": {key: _plain(item, f"{where}.{key}") for key, item in value.keywords.items()}}
 
 
-def _quantity(value: Any, unit: str | None, where: str) -> dict[str, Any]:
+def _quantity(value: object, unit: str | None, where: str) -> Contents:
     numbers = _known_number(value, where)
     if not np.issubdtype(numbers.dtype, np.floating):
         _checks.refuse(where, "hold floating-point numbers", f"of type {numbers.dtype}")
@@ -138,7 +138,7 @@ def rebuilt(plain: object, where: str) -> Any:
     return _filled(object.__new__(kind), given, plain.get(FITTED_TO) if is_law else None)
 
 
-def _filled(module: Any, given: dict[str, Any], fitted_to: Any) -> Any:
+def _filled(module: Any, given: Contents, fitted_to: Any) -> Any:
     """An empty module with the values of a file; fields that it does not give have their default."""
     name, fields = type(module).__name__, own_fields(type(module))
     for field in fields:
@@ -165,7 +165,7 @@ def _class_named(name: str, where: str) -> type:
     return classes[name]
 
 
-def _of_field(field: dataclasses.Field, plain: Any, where: str) -> Any:
+def _of_field(field: dataclasses.Field, plain: object, where: str) -> Any:
     """The value of a field as it is written."""
     number = declared(field)
     return _value(plain, where) if number is None else _number(plain, number["unit"], where)
@@ -222,7 +222,7 @@ def _number(plain: object, unit: str | None, where: str) -> jax.Array:
     return as_float(numbers)
 
 
-def _same_names(owner: str, expected: list[str], plain: dict[str, Any]) -> None:
+def _same_names(owner: str, expected: list[str], plain: Contents) -> None:
     missing = [name for name in expected if name not in plain]
     extra = [name for name in plain if name not in expected]
     if missing or extra:

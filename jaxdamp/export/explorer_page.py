@@ -14,6 +14,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._types import Contents
 from jaxdamp._writing import write_whole
 from jaxdamp.bench import BenchRun
 from jaxdamp.codegen import JavaScript, PrintedFunction, Program, lower, symbols
@@ -175,7 +176,7 @@ def to_explorer(
     return write_whole(file, _assembled(data, programs))
 
 
-def _of_profile(road: AbstractRoad | str, ride: Ride) -> dict[str, Any]:
+def _of_profile(road: AbstractRoad | str, ride: Ride) -> Contents:
     """The heights of a road that was given."""
     if isinstance(road, str):
         return {}
@@ -191,7 +192,7 @@ def _check_vehicle(vehicle: AbstractVehicle) -> None:
         _checks.refuse("vehicle", must, f"a {type(vehicle).__name__} with {wheels}", "Take a `QuarterCar`.")
 
 
-def _of_car(car: RideProgram) -> dict[str, Any]:
+def _of_car(car: RideProgram) -> Contents:
     """The vehicle with its numbers, metrics and the channels that these need."""
     vehicle = car.vehicle
     channels = [
@@ -204,7 +205,7 @@ def _of_car(car: RideProgram) -> dict[str, Any]:
     }
 
 
-def _assembled(data: dict[str, Any], programs: str) -> str:
+def _assembled(data: Contents, programs: str) -> str:
     """The page of its parts."""
     text = {name: (_PARTS / name).read_text(encoding="utf-8") for name in ("page.html", "style.css", *_SCRIPTS)}
     parts = {
@@ -217,7 +218,7 @@ def _assembled(data: dict[str, Any], programs: str) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], text["page.html"])
 
 
-def _of_law(program: LawProgram, car: RideProgram, title: str) -> dict[str, Any]:
+def _of_law(program: LawProgram, car: RideProgram, title: str) -> Contents:
     commands = [n.name for n in program.numbers if n.kind == "command"]
     return {
         "title": title,
@@ -228,7 +229,7 @@ def _of_law(program: LawProgram, car: RideProgram, title: str) -> dict[str, Any]
     }
 
 
-def _of_number(number: LawNumber) -> dict[str, Any]:
+def _of_number(number: LawNumber) -> Contents:
     """A parameter for the page: what it is, the allowed values, and the ranges of its sliders."""
     domain, values = number.domain, number.value.ravel()
     return {
@@ -267,13 +268,13 @@ def _range(number: LawNumber, value: float, largest: float) -> tuple[float, floa
     return max(value - 2.0 * size, domain.lower), min(value + 2.0 * size, domain.upper)
 
 
-def _of_metric(metric: Any, vehicle: AbstractVehicle) -> dict[str, Any]:
+def _of_metric(metric: Any, vehicle: AbstractVehicle) -> Contents:
     title = metric.name.replace("_", " ") + (f", {metric.weighting}" if metric.weighting else "")
     unit, main = metric.unit(vehicle.units), bool(_MAIN.match(metric.name))
     return {"name": metric.name, "title": title, "unit": unit, "main": main, "signed": metric.statistic.signed}
 
 
-def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> dict[str, Any]:
+def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> Contents:
     """Amplitudes and phases of random roads of class A, of which those of all classes and speeds follow."""
     longest = max(speed, _FASTEST) * duration
     made = [iso8608("A", 1.0, seed=seed + k, length=max(1000.0, longest)) for k in range(_SEEDS)]
@@ -287,7 +288,7 @@ def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> dict
     return {"class": road_class, "speed": speed, "iso": lines, "profile": None}
 
 
-def _of_record(run: BenchRun) -> dict[str, Any]:
+def _of_record(run: BenchRun) -> Contents:
     """A record for the page: every sample, or so few of them as it takes to drive the law, from the beginning."""
     per_cycle = run.sampling_rate / max(run.frequency, 1.0 / run.duration)
     stride = max(1, min(int(per_cycle / _PER_CYCLE), -(-len(run) // _SAMPLES)))
@@ -299,6 +300,6 @@ def _of_record(run: BenchRun) -> dict[str, Any]:
     return about | {key: _packed(values) for key, values in shown.items()}
 
 
-def _packed(values: Any) -> str:
+def _packed(values: object) -> str:
     """Numbers in 64 bits as text of 64 characters."""
     return base64.b64encode(np.asarray(values, "<f8").tobytes()).decode("ascii")

@@ -103,7 +103,7 @@ def _of_number(number: LawNumber) -> Iterator[Variable]:
         )
 
 
-def description(model: Any, known: list[Variable], name: str, guid: str) -> str:
+def description(model: object, known: list[Variable], name: str, guid: str) -> str:
     """The model description as XML."""
     root = ET.Element(
         "fmiModelDescription",

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from jaxdamp._jacobian import value_and_jacobian
+from jaxdamp._jacobian import value_and_jacobian, with_jacobian
 from jaxdamp._triangles import rows_of_products
 from jaxdamp.bench import BenchRun
 from jaxdamp.identify.criteria import HALF, LOSSES, ROUNDS, SETTLED, Priors, noise_factor
@@ -135,9 +135,8 @@ class Lanes(NamedTuple):
 
     def _pairs(self, group: Group, lanes: Int[np.ndarray, " some"]) -> tuple[np.ndarray, np.ndarray]:
         """Each record of a group with each of these lanes of its damper: the place of the lane, and the record."""
-        fits = self.damper[lanes][:, None] == group.damper[None, :]
-        which, record = np.nonzero(fits)
-        return which, record
+        place, record = np.nonzero(self.damper[lanes][:, None] == group.damper[None, :])
+        return place, record
 
     def _chunks(
         self, group: Group, y: np.ndarray, lane: np.ndarray, record: np.ndarray
@@ -169,11 +168,7 @@ def _prior_rows(coordinates: Coordinates, y: Any, priors: Priors) -> Array:
     """For each lane the derivatives of the residuals of priors, and these in the last column."""
 
     def one(y: Array) -> Array:
-        def residual(y: Array) -> tuple[Array, Array]:
-            missed = priors(coordinates.free.build(coordinates.to_physical(y)))
-            return missed, missed
-
-        slopes, missed = jax.jacfwd(residual, has_aux=True)(y)
+        missed, slopes = with_jacobian(lambda y: priors(coordinates.free.build(coordinates.to_physical(y))))(y)
         return jnp.concatenate([slopes, missed[:, None]], axis=1)
 
     return jax.vmap(one)(y)

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._jacobian import with_jacobian
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table
 from jaxdamp.identify.estimating import at_ends
@@ -193,13 +194,12 @@ def _second_order(
 ) -> tuple[Array, Array, Array, Array]:
     """Gradient and second derivatives of half the sum of squares; residual and Jacobian."""
 
-    def residual(values: Array) -> tuple[Array, Array]:
+    def residual(values: Array) -> Array:
         model = free.build(values)
-        together = jnp.concatenate([part(model) for part in residuals])
-        return together, together
+        return jnp.concatenate([part(model) for part in residuals])
 
     def gradient(values: Array) -> tuple[Array, tuple[Array, Array, Array]]:
-        jacobian, together = jax.jacfwd(residual, has_aux=True)(values)
+        together, jacobian = with_jacobian(residual)(values)
         pull = jacobian.T @ together
         return pull, (pull, together, jacobian)
 
@@ -213,7 +213,7 @@ def _function(
     """Names, values and derivatives of the functions by the free numbers."""
     names: list[str] = []
 
-    def stacked(values: Array) -> tuple[Array, Array]:
+    def stacked(values: Array) -> Array:
         results = function(evidence.model(values))
         by_name = dict(results) if isinstance(results, Mapping) else {"value": results}
         for name, value in by_name.items():
@@ -221,11 +221,10 @@ def _function(
                 remedy = "Return a number, or a dictionary of numbers such as the metrics of a `Ride`."
                 _checks.refuse("function", f"give one number as {name!r}", f"of shape {jnp.shape(value)}", remedy)
         names[:] = [str(name) for name in by_name]
-        together = jnp.stack([jnp.asarray(value, float) for value in by_name.values()])
-        return together, together
+        return jnp.stack([jnp.asarray(value, float) for value in by_name.values()])
 
     centre = jnp.asarray(values, evidence.problem.free.values.dtype)
-    slopes, at = eqx.filter_jit(jax.jacfwd(stacked, has_aux=True))(centre)
+    at, slopes = eqx.filter_jit(with_jacobian(stacked))(centre)
     return names, np.asarray(at, np.float64), np.asarray(slopes, np.float64)
 
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
-from jaxdamp._results import AbstractResult
-from jaxdamp._status import Status
+from jaxdamp._results import AbstractResult, Derived
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
@@ -104,15 +103,8 @@ class ScheduledFit(AbstractResult):
         assert isinstance(self.result.law, Scheduled)
         return self.result.law
 
-    @property
-    def status(self) -> Status:
-        """How the search of the common fit ended."""
-        return self.result.status
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Doubts about the common fit."""
-        return self.result.warnings
+    status = Derived(lambda self: self.result.status)
+    warnings = Derived(lambda self: self.result.warnings)
 
     @property
     def summary(self) -> str:

@@ -9,7 +9,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxdamp._results import drawn_by
+from jaxdamp._results import Derived, drawn_by
 from jaxdamp._tables import Column, Table, with_unit
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.estimates import parameter_table
@@ -80,10 +80,7 @@ class VehicleFit(Fit):
         least = min(self.scores, key=lambda score: score.fit_percent)
         return f"the least fit is {least.fit_percent:.1f} %, of {least.channel} in {least.record}"
 
-    @property
-    def model(self) -> AbstractVehicle:
-        """`vehicle`."""
-        return self.vehicle
+    model = Derived(lambda self: self.vehicle)
 
     @property
     def problem(self) -> Problem:

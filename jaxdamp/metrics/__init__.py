@@ -51,7 +51,7 @@ from jaxdamp.metrics.amplitude import (
     working_space_rms,
 )
 from jaxdamp.metrics.comfort import (
-    AXES,
+    AXES as AXES,
     Evaluation as Evaluation,
     ShockRatios as ShockRatios,
     comfort_reaction,
@@ -104,13 +104,12 @@ from jaxdamp.metrics.weighted import (
     weighted_rms,
     weighted_signal,
     weighting_factor,
-    weighting_response,
+    weighting_response as weighting_response,
     weighting_state_space as weighting_state_space,
 )
 
 
 __all__ = [
-    "AXES",
     "STATISTICS",
     "Metric",
     "Reduction",
@@ -160,7 +159,6 @@ __all__ = [
     "weighted_rms",
     "weighted_signal",
     "weighting_factor",
-    "weighting_response",
     "working_space_exceedance",
     "working_space_mean",
     "working_space_peak_to_peak",

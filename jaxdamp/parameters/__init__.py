@@ -8,7 +8,7 @@ parameter inside a composition. Freezing, ties and extra bounds are arguments of
 """
 
 from jaxdamp.parameters._checking import check_parameters as check_parameters, checked as checked
-from jaxdamp.parameters._coordinates import Bounds as Bounds, Coordinates
+from jaxdamp.parameters._coordinates import Bounds as Bounds, Coordinates as Coordinates
 from jaxdamp.parameters._declaration import (
     Module as Module,
     Parameter as Parameter,
@@ -23,16 +23,16 @@ from jaxdamp.parameters._declaration import (
 )
 from jaxdamp.parameters._domains import (
     Domain as Domain,
-    around_zero,
-    ends,
+    around_zero as around_zero,
+    ends as ends,
     increasing,
-    increasing_negative,
+    increasing_negative as increasing_negative,
     interval,
     nonnegative,
-    ordered_interval,
+    ordered_interval as ordered_interval,
     positive,
     real,
-    weight,
+    weight as weight,
 )
 from jaxdamp.parameters._free import FreeParameters as FreeParameters, free_parameters
 from jaxdamp.parameters._paths import (
@@ -42,27 +42,20 @@ from jaxdamp.parameters._paths import (
     matching as matching,
     name_patterns as name_patterns,
     replace,
-    with_values,
+    with_values as with_values,
 )
 
 
 __all__ = [
-    "Coordinates",
-    "around_zero",
-    "ends",
     "free_parameters",
     "get",
     "increasing",
-    "increasing_negative",
     "interval",
     "nonnegative",
-    "ordered_interval",
     "parameter",
     "parameters",
     "positive",
     "real",
     "replace",
     "setting",
-    "weight",
-    "with_values",
 ]

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PyTree
 
 from jaxdamp.parameters._declaration import Parameter
 from jaxdamp.parameters._free import FreeParameters
@@ -54,7 +54,7 @@ class Coordinates(eqx.Module):
     smooth: Literal["none", "ordered", "all"] = eqx.field(static=True)
 
     @property
-    def units(self) -> list[Any]:
+    def units(self) -> list[PyTree]:
         """The unit of each parameter: its value where a coordinate without a smooth map is one."""
         return [
             np.full(p.value.shape, p.domain.upper - p.domain.lower, p.value.dtype)
@@ -152,7 +152,7 @@ def _has_range(p: Parameter) -> bool:
     return not p.domain.ordered and bool(np.isfinite(p.domain.upper - p.domain.lower))
 
 
-def _magnitude(value: Any) -> Any:
+def _magnitude(value: PyTree) -> PyTree:
     """Typical magnitude of each number, never zero; numbers much smaller than the largest are increased.
 
     Numbers that JAX does not trace are computed by NumPy, because JAX would compile each operation separately.
@@ -176,7 +176,7 @@ def _scale(p: Parameter) -> Any:
     return _magnitude(value if p.domain.steps is None else p.domain.steps(value))
 
 
-def _joined(pieces: list[Any]) -> Any:
+def _joined(pieces: list[PyTree]) -> PyTree:
     xp: Any = np if all(isinstance(piece, np.ndarray | np.generic) for piece in pieces) else jnp
     return xp.concatenate([xp.ravel(piece) for piece in pieces])
 

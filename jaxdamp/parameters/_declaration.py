@@ -16,7 +16,7 @@ from jaxdamp._traced import is_traced
 from jaxdamp.parameters._domains import Domain, real
 
 
-def as_float(value: Any, name: str = "value") -> Array:
+def as_float(value: object, name: str = "value") -> Array:
     """A JAX array of the default float type; arrays that are floating already keep their type.
 
     Arguments:
@@ -88,7 +88,7 @@ def setting(unit: str, meaning: str, domain: Domain = real, *, command: bool = F
 def _number(kind: str, declared: dict[str, Any], options: dict[str, Any]) -> Any:
     """A field that converts numbers to arrays, with an error that names the field."""
 
-    def convert(value: Any) -> Array:
+    def convert(value: object) -> Array:
         return as_float(value, field.name)
 
     field = eqx.field(converter=convert, metadata={kind: declared}, **options)
@@ -206,7 +206,7 @@ def readable(module: eqx.Module) -> str:
         module: the module.
     """
 
-    def text(value: Any) -> str:
+    def text(value: object) -> str:
         if isinstance(value, tuple | list):
             return f"({', '.join(map(text, value))}{',' if len(value) == 1 else ''})"
         if isinstance(value, jax.Array | np.ndarray):

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.parameters._declaration import Parameter, parameters
@@ -79,7 +79,7 @@ def _check_alike(argument: str, follower: Parameter, leader: Parameter) -> None:
     if kind(follower) != kind(leader):
         both = f"{follower.path} is {kind(follower)}; {leader.path} is {kind(leader)}"
         _checks.refuse(argument, "tie parameters of one kind", f"of two: {both}")
-    values: list[Any] = [_checks.concrete(p.value) for p in (follower, leader)]
+    values: list[PyTree] = [_checks.concrete(p.value) for p in (follower, leader)]
     if not any(value is None for value in values) and not np.array_equal(*values):
         both = f"{follower.path} = {values[0]} and {leader.path} = {values[1]}"
         remedy = f"Set them equal first, with `jaxdamp.parameters.replace(..., {{{follower.path!r}: ...}})`."
@@ -105,7 +105,7 @@ class FreeParameters(eqx.Module):
         ties: tied parameters, each as (path, path that it takes its value from).
     """
 
-    tree: Any
+    tree: PyTree
     chosen: tuple[Parameter, ...]
     ties: tuple[tuple[str, str], ...] = eqx.field(static=True, default=())
 
@@ -137,17 +137,17 @@ class FreeParameters(eqx.Module):
         values = np.concatenate([np.ravel(p.value) for p in self.chosen])  # an operation of JAX would be compiled
         return jnp.asarray(values, values.dtype)
 
-    def split(self, vector: Array | np.ndarray) -> list[Any]:
+    def split(self, vector: Array | np.ndarray) -> list[PyTree]:
         """A vector of numbers cut into the shapes of the parameters."""
         ends = np.cumsum([p.value.size for p in self.chosen])[:-1]
         pieces = (np if isinstance(vector, np.ndarray) else jnp).split(vector, ends)
         return [piece.reshape(p.value.shape) for piece, p in zip(pieces, self.chosen, strict=True)]
 
-    def build(self, values: Float[Array, " free"]) -> Any:
+    def build(self, values: Float[Array, " free"]) -> PyTree:
         """The tree with these physical values, unchecked."""
         return self._placed(self.split(values))
 
-    def _placed(self, pieces: list[Any]) -> Any:
+    def _placed(self, pieces: list[PyTree]) -> PyTree:
         by_path = {p.path: piece for p, piece in zip(self.chosen, pieces, strict=True)}
         return with_values(self.tree, by_path | {path: by_path[leader] for path, leader in self.ties})
 
@@ -169,7 +169,7 @@ def _numbered(path: str, p: Parameter) -> list[str]:
 
 
 def free_parameters(
-    tree: Any,
+    tree: object,
     *,
     over: Sequence[str] | None = None,
     freeze: Sequence[str] = (),
@@ -242,7 +242,7 @@ def _limits_by_path(
     return limits
 
 
-def _limited(p: Parameter, limits: tuple[float, float] | None) -> Any:
+def _limited(p: Parameter, limits: tuple[float, float] | None) -> PyTree:
     """The domain of a parameter within extra limits."""
     if limits is None:
         return p.domain

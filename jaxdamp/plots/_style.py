@@ -250,7 +250,7 @@ def cross(axes: "matplotlib.axes.Axes", horizontal: bool = True, vertical: bool 
 
 def legend_beside(
     figure: "matplotlib.figure.Figure",
-    handles: Sequence[Any],
+    handles: Sequence[object],
     title: str = "",
     place: Literal["upper", "lower"] = "upper",
 ) -> None:
@@ -260,7 +260,7 @@ def legend_beside(
     figure.legend(handles=list(handles), loc=where, frameon=False, title=title or None, alignment="left")
 
 
-def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[Any], columns: int = 3) -> None:
+def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[object], columns: int = 3) -> None:
     """A legend above all axes, for pictures that need their width."""
     _in_words(handles)
     figure.legend(
@@ -274,7 +274,7 @@ def _in_words(handles: Sequence[Any]) -> None:
         handle.set_label(display().words(str(handle.get_label())))
 
 
-def by_name(argument: str, given: Any, kind: type, words: str, remedy: str, alone: str = "") -> dict[str, Any]:
+def by_name(argument: str, given: object, kind: type, words: str, remedy: str, alone: str = "") -> dict[str, Any]:
     """One object to draw, or several by name, as a dictionary; `alone` names a single one.
 
     Arguments:

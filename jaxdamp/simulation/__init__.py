@@ -4,9 +4,9 @@ Engines are `Exponential` and `Adaptive`; one of your own derives from `Abstract
 """
 
 from jaxdamp.simulation.adaptive import Adaptive
-from jaxdamp.simulation.energy import absorbed_by, energy_balance
-from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver as AbstractObserver, Outcome
-from jaxdamp.simulation.equations import Equations, RoadInput, StepState, settled
+from jaxdamp.simulation.energy import absorbed_by as absorbed_by, energy_balance
+from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver as AbstractObserver, Outcome as Outcome
+from jaxdamp.simulation.equations import Equations, RoadInput, StepState as StepState, settled
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
 from jaxdamp.simulation.notes import (
@@ -18,7 +18,12 @@ from jaxdamp.simulation.notes import (
 from jaxdamp.simulation.observer import MetricObserver as MetricObserver, recorded as recorded
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.ride import Ride
-from jaxdamp.simulation.ride_metrics import comfort, comfort_table, metrics_table, ride_metrics
+from jaxdamp.simulation.ride_metrics import (
+    comfort,
+    comfort_table as comfort_table,
+    metrics_table as metrics_table,
+    ride_metrics,
+)
 from jaxdamp.simulation.run import simulate
 from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.stationary import DEVIATIONS as DEVIATIONS, stationary_notes as stationary_notes
@@ -34,17 +39,12 @@ __all__ = [
     "CoarseStepWarning",
     "Equations",
     "Exponential",
-    "Outcome",
     "Response",
     "Ride",
     "RoadInput",
-    "StepState",
     "TracedStepWarning",
-    "absorbed_by",
     "comfort",
-    "comfort_table",
     "energy_balance",
-    "metrics_table",
     "ride_metrics",
     "settled",
     "simulate",

@@ -8,7 +8,7 @@ and Ostermann, Exponential integrators, Acta Numerica 2010).
 """
 
 import dataclasses
-from typing import Any, Literal, NamedTuple, final
+from typing import Literal, NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -139,7 +139,7 @@ class ExponentialStepper(AbstractStepper):
         """
         again = self.equations.at(now.motion, now.states, road)
 
-        def before(old: Any, then: Any, present: Any) -> Any:
+        def before(old: object, then: object, present: object) -> PyTree:
             return jax.tree.map(lambda old, then, present: present + ratio * (old - then), old, then, present)
 
         held = [None if old is None else state for old, state in zip(now.memory.states[0], now.states, strict=True)]

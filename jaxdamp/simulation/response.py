@@ -13,7 +13,7 @@ from jaxtyping import Array, Float, Int
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._tables import Table, with_unit
-from jaxdamp._types import Scalar, Signal
+from jaxdamp._types import Contents, Scalar, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import Metric
 from jaxdamp.simulation.energy import absorbed_by, energy_balance
@@ -219,7 +219,7 @@ class Response(eqx.Module, AbstractResult):
         """Comfort by ISO 2631-1 of every acceleration, with units."""
         return comfort_table({"value": self})
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Metrics, comfort, energies and notes of the run, ready for JSON; numbers that are not finite are None."""
         values, comfort = self.metrics(), self.comfort()
         return {

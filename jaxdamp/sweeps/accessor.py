@@ -1,12 +1,13 @@
 """What a sweep's `xarray.Dataset` can do: `data.jaxdamp.table()`, `.to_dict()`, `.plot(metric)`."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 import xarray
 
 from jaxdamp._tables import Column, Table, plain, typeset_unit
+from jaxdamp._types import Contents
 
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ class SweepResults:
         flat = [f"; no effect of {', '.join(over)} on {name}" for name, over in without_effect(data).items()]
         return Table(f"Sweep over {', '.join(map(str, axes))}{''.join(flat)}", tuple(columns), rows)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Contents:
         """As `Dataset.to_dict`, ready for JSON: numbers that are not finite are None."""
         return plain(self._data.to_dict())
 
@@ -97,7 +98,7 @@ class SweepResults:
         return sweep(self._data, metric, over)
 
 
-def _is_in(axis: xarray.DataArray, dims: tuple[Any, ...]) -> bool:
+def _is_in(axis: xarray.DataArray, dims: tuple[object, ...]) -> bool:
     """Whether a coordinate belongs to the points, not to an axis of a result."""
     return bool(axis.dims) and set(axis.dims) <= set(dims)
 

@@ -50,7 +50,7 @@ def largest(*numbers: float | bool) -> np.ndarray:
     return mine
 
 
-def of_first(tree: Any) -> Any:
+def of_first(tree: object) -> Any:
     """What the first process says."""
     if several():
         from jax.experimental import multihost_utils
@@ -68,7 +68,7 @@ def text_of_first(text: str) -> str:
     return np.asarray(of_first(padded)).tobytes().decode().rstrip()
 
 
-def choose_devices(devices: Any) -> list[Any]:
+def choose_devices(devices: object) -> list[Any]:
     """The devices to use: all, so many of each process, or those given."""
     if devices is None:
         return jax.devices() if several() else jax.local_devices()

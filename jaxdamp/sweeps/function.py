@@ -79,12 +79,14 @@ class HasDomain(Protocol):
 class SweepFunction(HasUnits, HasLanes, HasDerivatives, HasSideBySide, HasPrinted, HasDomain, Protocol):
     """A function that says all of it, as `jaxdamp.Ride` does."""
 
-    def __call__(self, point: Mapping[str, Any]) -> Mapping[str, Any]:
+    def __call__(self, point: Mapping[str, object]) -> Mapping[str, Any]:
         """The results by name at a point."""
         ...
 
 
-def chosen_mode(function: Any, gradients: bool | Mode, inputs: int, results: int, *, reversible: bool) -> Mode | None:
+def chosen_mode(
+    function: object, gradients: bool | Mode, inputs: int, results: int, *, reversible: bool
+) -> Mode | None:
     """The mode of differentiation: the one asked for, or the cheaper of those that pass; None for values alone.
 
     Arguments:
@@ -234,7 +236,7 @@ def evaluate(traced: Traced, arrays: list[Array], lanes: dict[str, Array]) -> di
     return {name: values[name].astype(result.dtype) for name, result in traced.results.items()}
 
 
-def _stored(dtype: Any) -> np.dtype:
+def _stored(dtype: object) -> np.dtype:
     """Results are of single or double precision."""
     return np.dtype(dtype) if dtype in (np.float32, np.float64) else number_type()
 

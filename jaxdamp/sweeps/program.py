@@ -80,7 +80,7 @@ class Program:
         return collected
 
 
-def prepare(traced: Traced, count: int, asked: int | None, devices: Any, lanes: int | None) -> Program:
+def prepare(traced: Traced, count: int, asked: int | None, devices: object, lanes: int | None) -> Program:
     """Choose devices and chunk, and compile; a chunk that nobody asked for is made to fit into the memory."""
     mesh = Mesh(np.array(choose_devices(devices)), ("points",))
     fixed = asked is not None

@@ -6,7 +6,7 @@ import re
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, final
+from typing import TYPE_CHECKING, Literal, final
 
 import numpy as np
 from jaxtyping import Array
@@ -149,10 +149,10 @@ COMPILED, PRINTED = "compiled by XLA", "printed as C"
 @of_known_numbers
 def sweep(
     function: Callable[[dict[str, Scalar]], Mapping[str, Array]],
-    over: Mapping[str, Any] | AbstractPoints,
+    over: Mapping[str, object] | AbstractPoints,
     *,
     chunk: int | None = None,
-    devices: int | Sequence[Any] | None = None,
+    devices: int | Sequence[object] | None = None,
     gradients: bool | Literal["forward", "reverse"] = False,
     file: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -234,7 +234,7 @@ def sweep(
     return data.assign_attrs(loop=loop) if isinstance(function, HasPrinted) else data
 
 
-def _printed(function: Any, traced: Traced, count: int, chunk: int | None, devices: Any) -> Program | None:
+def _printed(function: object, traced: Traced, count: int, chunk: int | None, devices: object) -> Program | None:
     """The program with its loop printed as C, if the function has one that this machine can compile."""
     on_cpu = choose_devices(devices)[0].platform == "cpu" and not several()
     printed = function.printed_side_by_side() if isinstance(function, HasPrinted) else None
@@ -248,11 +248,11 @@ def _printed(function: Any, traced: Traced, count: int, chunk: int | None, devic
         return None
 
 
-def _lanes(function: Any) -> int | None:
+def _lanes(function: object) -> int | None:
     return function.lanes if isinstance(function, HasLanes) else None
 
 
-def _leave_out(function: Any, table: Table) -> None:
+def _leave_out(function: object, table: Table) -> None:
     """Mark the points that the function cannot take; refuse if that is all of them."""
     if not isinstance(function, HasDomain):
         return

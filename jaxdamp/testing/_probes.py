@@ -17,13 +17,13 @@ from jaxdamp.parameters import FreeParameters, parameters
 from jaxdamp.rig import march
 
 
-def require(condition: Any, message: str) -> None:
+def require(condition: object, message: str) -> None:
     """Raise an `AssertionError` with the message unless the condition holds."""
     if not condition:
         raise AssertionError(message)
 
 
-def require_equal(found: Any, expected: Any, message: str, *, rtol: float = 0.0, atol: float = 0.0) -> None:
+def require_equal(found: object, expected: object, message: str, *, rtol: float = 0.0, atol: float = 0.0) -> None:
     """Raise an `AssertionError` with the message and the largest difference unless two arrays agree."""
     found, expected = np.asarray(found), np.asarray(expected)
     require(found.shape == expected.shape, f"{message} Their shapes are {found.shape} and {expected.shape}.")

@@ -5,13 +5,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, Unpack, runtime_checkable
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._jacobian import with_jacobian
 from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table, plain, plus_minus, typeset_unit
@@ -41,34 +41,28 @@ class FittedLaw(Protocol):
     @property
     def law(self) -> AbstractDamper:
         """The law."""
+        ...
 
     @property
     def parameters(self) -> Sequence[Any]:
         """The estimates."""
+        ...
 
     @property
     def covariance(self) -> Float[np.ndarray, "free free"]:
         """Of the estimates."""
+        ...
 
 
 class Difference(NamedTuple):
-    """The change of a metric from the first damper to another one, relative to the first.
+    """The change of a metric from the first damper to another one, relative to the first."""
 
-    Attributes:
-        damper: name of the other damper.
-        metric: name of the metric.
-        change: mean over the roads [%].
-        from_parameters: standard error due to the fitted parameters [%].
-        from_roads: standard error due to the choice of roads, the same for both dampers [%].
-        margin: half the width of the 95 % interval from both sources [%].
-    """
-
-    damper: str
-    metric: str
-    change: float
-    from_parameters: float
-    from_roads: float
-    margin: float
+    damper: str  # name of the other damper
+    metric: str  # name of the metric
+    change: float  # mean over the roads [%]
+    from_parameters: float  # standard error due to the fitted parameters [%]
+    from_roads: float  # standard error due to the choice of roads, the same for both dampers [%]
+    margin: float  # half the width of the 95 % interval from both sources [%]
 
     @property
     def significant(self) -> bool:
@@ -317,16 +311,14 @@ def _metrics_on_roads(
 ) -> tuple[Array, Array]:
     """The metrics on each road (roads, metrics), and their derivatives by the estimates (roads, metrics, estimates)."""
 
-    def metrics(step: Array) -> tuple[Array, Array]:
+    def metrics(step: Array) -> Array:
         each = ride.of_vehicle(vehicle(free.build(free.values + effects @ step))).each()
-        values = jnp.stack([each[name] for name in order], axis=-1)
-        return values, values
+        return jnp.stack([each[name] for name in order], axis=-1)
 
     if not effects.shape[1]:
-        values, _ = metrics(jnp.zeros(0))
+        values = metrics(jnp.zeros(0))
         return values, jnp.zeros((*values.shape, 0))
-    slopes, values = jax.jacfwd(metrics, has_aux=True)(jnp.zeros(effects.shape[1], free.values.dtype))
-    return values, slopes
+    return with_jacobian(metrics)(jnp.zeros(effects.shape[1], free.values.dtype))
 
 
 def _standard_error(values: Float[np.ndarray, " roads"]) -> float:

@@ -85,7 +85,12 @@ class Descent:
 
         solver.solve(self._evaluator.at, states, note)
         for _ in range(RESTARTS):
-            again = [i for i, state in enumerate(states) if self._ended_early(state, solver.scaling)]
+            again = [
+                i
+                for i, state in enumerate(states)
+                if not _slope_left(self._evaluator, state, solver.scaling) < self.task.tolerance.slope
+                and state.steps < self._max_steps
+            ]
             for i in again:
                 steps, states[i] = states[i].steps, solver.init(aim, states[i].y, states[i].evaluation)
                 states[i].steps, states[i].fixed = steps, fixed
@@ -105,10 +110,6 @@ class Descent:
             rounding=tolerance.rounding,
             feasible=0.1 * tolerance.limit,
         )
-
-    def _ended_early(self, state: SearchState, scaling: Scaling) -> bool:
-        left = _slope_left(self._evaluator, state, scaling)
-        return not left < self.task.tolerance.slope and state.steps < self._max_steps
 
     def _ended(self, state: SearchState, history: tuple[float, ...], scaling: Scaling) -> Ended:
         space, tolerance = self.task.space, self.task.tolerance

@@ -31,15 +31,6 @@ class LimitRange(NamedTuple):
         lower, upper = (start + end * abs(start) if relative else end for end, relative in ends)
         return lower, upper
 
-    def nearer(self, value: float, start: float, unit: str) -> str:
-        """The nearer end in words: "<= 0.1 m", "<= start +10 %"."""
-        lower, upper = self.at(start)
-        is_upper = upper - value <= value - lower
-        sign, end = ("<=", upper) if is_upper else (">=", lower)
-        if self.relative[is_upper]:
-            return f"{sign} start {100 * (self.upper if is_upper else self.lower):+.4g} %"
-        return f"{sign} {end:.4g} {typeset_unit(unit)}".rstrip()
-
 
 class Limit(NamedTuple):
     """The allowed range of one number."""
@@ -166,8 +157,3 @@ def limit_ends(limits: Iterable[Limit]) -> list[LimitEnd]:
 def margins(ends: Iterable[LimitEnd], values: Mapping[str, Any]) -> np.ndarray:
     """Relative distances to ends of limits, negative beyond them."""
     return np.array([end.sign * (end.value - values[end.name]) / end.scale for end in ends])
-
-
-def margin_slopes(ends: Iterable[LimitEnd], slopes: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The derivatives of `margins`."""
-    return np.array([-end.sign * slopes[end.name] / end.scale for end in ends])

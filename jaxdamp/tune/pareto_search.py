@@ -18,7 +18,7 @@ from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, share
 from jaxdamp.tune.limits import Limit, limit_ends, margins
 from jaxdamp.tune.measuring import LANES, ride_on
 from jaxdamp.tune.objective import Function, check_objective, exact_counterpart
-from jaxdamp.tune.ranges import SearchRange, start_points
+from jaxdamp.tune.ranges import start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenarios import Road, Scenarios
@@ -88,7 +88,9 @@ def pareto(
     task = DesignTask(objectives, vehicle, road, argument="objectives", settings=asked)
     names, space, evaluator = task.objective.names, task.space, Evaluator(task, LANES)
     given = _reference(reference, names)
-    _refuse_choices(space)
+    if space.is_choice.any():
+        remedy = "Choose by `minimise`, from a point of the front."
+        _checks.refuse("over", "have bounds along a front", "with a `Choice`", remedy)
     starts = start_points(space, asked["starts"], asked["seed"]) / space.unit
     evaluations, limits = evaluator.begin(starts)
     usable = [i for i, one in enumerate(evaluations) if i == 0 or all(np.all(np.isfinite(a)) for a in one)]
@@ -118,7 +120,9 @@ def pareto(
         values={name: numbers[name] for name in task.units},
         before={name: before[name] for name in task.units},
         units=task.units,
-        parameters=_parameters(space),
+        parameters=tuple(
+            FrontParameter(c.name, c.unit, c.before, c.lower, c.upper) for c in space.changes(space.start)
+        ),
         designs=designs,
         limits=task.shown_limits(before),
         reference=worst | given,
@@ -134,12 +138,6 @@ def pareto(
     return dataclasses.replace(front, warnings=(*notes, *_notes_on_points(front, task, start_on_fresh)))
 
 
-def _parameters(space: SearchRange) -> tuple[FrontParameter, ...]:
-    """The free numbers with their bounds."""
-    free = zip(space.free.names, space.free.owners, space.start, space.lower, space.upper, strict=True)
-    return tuple(FrontParameter(n, p.unit, float(a), float(b), float(c)) for n, p, a, b, c in free)
-
-
 def _check(objectives: Any, vehicle: Any, road: Any, points: int, counts: Mapping[str, Any]) -> None:
     call = "pareto([metric, metric], vehicle, road)"
     if isinstance(objectives, str) or not isinstance(objectives, Sequence) or len(objectives) not in (2, 3):
@@ -152,12 +150,6 @@ def _check(objectives: Any, vehicle: Any, road: Any, points: int, counts: Mappin
     least = 3 * (len(objectives) - 1)  # the ends and one point between them
     if points < least:
         _checks.refuse("points", f"be {least} or more for {len(objectives)} objectives", points)
-
-
-def _refuse_choices(space: SearchRange) -> None:
-    if space.is_choice.any():
-        remedy = "Choose by `minimise`, from a point of the front."
-        _checks.refuse("over", "have bounds along a front", "with a `Choice`", remedy)
 
 
 def _reference(reference: Mapping[str, float] | None, names: Sequence[str]) -> dict[str, float]:

@@ -62,26 +62,15 @@ class Choice:
 
 
 class Change(NamedTuple):
-    """One parameter before and after.
+    """One parameter before and after."""
 
-    Attributes:
-        name: path of the parameter.
-        before: value of the start, in the unit.
-        after: tuned value, in the unit.
-        unit: in SI.
-        note: empty, "at its lower bound" or "at its upper bound".
-        lower: lower bound of the search.
-        upper: upper bound of the search.
-        tied: the numbers that have the same value.
-    """
-
-    name: str
-    before: float
-    after: float
-    unit: str
+    name: str  # path of the parameter
+    before: float  # value of the start, in the unit
+    after: float  # tuned value, in the unit
+    unit: str  # in SI
     note: str  # "", "at its lower bound" or "at its upper bound"
-    lower: float
-    upper: float
+    lower: float  # lower bound of the search
+    upper: float  # upper bound of the search
     tied: tuple[str, ...] = ()  # the numbers that have the same value
 
     @property

@@ -34,15 +34,10 @@ LOWEST, HIGHEST = 0.3, 30.0  # Hz
 
 
 class Spectrum(NamedTuple):
-    """A one-sided power spectral density.
+    """A one-sided power spectral density."""
 
-    Attributes:
-        frequency: [Hz].
-        density: [unit²/Hz].
-    """
-
-    frequency: Float[np.ndarray, " lines"]
-    density: Float[np.ndarray, " lines"]
+    frequency: Float[np.ndarray, " lines"]  # [Hz]
+    density: Float[np.ndarray, " lines"]  # [unit²/Hz]
 
 
 def spectra(

@@ -4,7 +4,7 @@ import dataclasses
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -18,8 +18,12 @@ from jaxdamp.tune.objective import Objective, Targets
 from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
 from jaxdamp.tune.scenarios import Road
-from jaxdamp.tune.verdict import Verdict, verdict_of
+from jaxdamp.tune.verdict import Verdict, mean_change, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 V = TypeVar("V", bound=AbstractVehicle)
@@ -27,17 +31,11 @@ NAMED = 2  # parameters at bounds that a summary names; of more it says how many
 
 
 class ScenarioValues(NamedTuple):
-    """All metrics in every scenario.
+    """All metrics in every scenario."""
 
-    Attributes:
-        names: of the scenarios.
-        before: metrics of the start, shape (scenarios,).
-        after: metrics of the tuned vehicle.
-    """
-
-    names: tuple[str, ...]
-    before: dict[str, Float[np.ndarray, " scenarios"]]
-    after: dict[str, Float[np.ndarray, " scenarios"]]
+    names: tuple[str, ...]  # of the scenarios
+    before: dict[str, Float[np.ndarray, " scenarios"]]  # metrics of the start, shape (scenarios,)
+    after: dict[str, Float[np.ndarray, " scenarios"]]  # metrics of the tuned vehicle
 
 
 class Drive(NamedTuple):
@@ -48,37 +46,22 @@ class Drive(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """The search from one start.
+    """The search from one start."""
 
-    Attributes:
-        start: the free numbers at its start.
-        end: the free numbers at its end.
-        metric: the metric at its end.
-        meets_limits: whether all limits are met there.
-        converged: whether it ended at an optimum.
-    """
-
-    start: np.ndarray
-    end: np.ndarray
-    metric: float
-    meets_limits: bool
-    converged: bool
+    start: np.ndarray  # the free numbers at its start
+    end: np.ndarray  # the free numbers at its end
+    metric: float  # the metric at its end
+    meets_limits: bool  # whether all limits are met there
+    converged: bool  # whether it ended at an optimum
 
 
 class ToleranceEffect(NamedTuple):
-    """The effect of the scatter of one parameter on a metric, to second order.
+    """The effect of the scatter of one parameter on a metric, to second order."""
 
-    Attributes:
-        parameter: its name.
-        scatter: its standard deviation relative to its value.
-        mean: mean change of the metric, relative: half the second derivative times the variance.
-        deviation: standard deviation of the metric, relative: slope times deviation, and the part of the curvature.
-    """
-
-    parameter: str
-    scatter: float
-    mean: float
-    deviation: float
+    parameter: str  # its name
+    scatter: float  # its standard deviation relative to its value
+    mean: float  # mean change of the metric, relative: half the second derivative times the variance
+    deviation: float  # standard deviation of the metric, relative: slope times deviation, and the part of the curvature
 
     def sentence(self, metric: str) -> str:
         """In words, such as "A 10 % scatter of damper.blow_off_rate costs 1.4 % of rms_sprung_acceleration"."""
@@ -201,7 +184,7 @@ class TuneResult(AbstractResult, Generic[V]):
         """The ride metrics before and after, with notes on the minimised metric and on limits."""
         rows = []
         for (name, before), after in zip(self.before.items(), self.after.values(), strict=True):
-            on_fresh = () if self.fresh is None else (_mean_change(self.fresh, name),)
+            on_fresh = () if self.fresh is None else (mean_change(self, name),)
             more = (*on_fresh, self._note(name))
             rows.append(Compared(name, self.units[name], (before, after), percent_change(before, after), more))
         fresh = () if self.fresh is None else (Column("on fresh roads", "%", "+.1f"),)
@@ -302,9 +285,3 @@ class TuneResult(AbstractResult, Generic[V]):
     def __repr__(self) -> str:
         tables = [table.to_text() for table in self.tables().values()]
         return "\n".join([self.summary, *tables, *(f"warning: {warning}" for warning in self.warnings)])
-
-
-def _mean_change(fresh: Rescore, name: str) -> float | None:
-    """Mean change of a metric on fresh roads [%]; none from zero."""
-    change = fresh.change(name)
-    return 100.0 * float(np.mean(change)) if np.all(np.isfinite(change)) else None

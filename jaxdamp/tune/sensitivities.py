@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._jacobian import with_jacobian
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers import AbstractMemoryless
@@ -239,31 +240,23 @@ def _derivatives(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The metrics, shape (names,), and their derivatives, shape (names, numbers)."""
 
-    @eqx.filter_jit
-    def both(x: jax.Array) -> tuple[jax.Array, jax.Array]:
-        def stacked(x: jax.Array) -> tuple[jax.Array, jax.Array]:
-            results = measured(x)
-            values = jnp.stack([results[name] for name in names])
-            return values, values
+    def stacked(x: jax.Array) -> jax.Array:
+        results = measured(x)
+        return jnp.stack([results[name] for name in names])
 
-        return jax.jacfwd(stacked, has_aux=True)(x)
-
-    slopes, values = both(jnp.asarray(point))
+    values, slopes = eqx.filter_jit(with_jacobian(stacked))(jnp.asarray(point))
     return np.asarray(values, float), np.asarray(slopes, float)
 
 
 def _second(measured: Callable[[Any], Any], names: Sequence[str], point: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """Second derivatives by some of the numbers, shape (names, chosen, chosen)."""
+    start = jnp.asarray(point)
 
-    @eqx.filter_jit
-    def twice(x: jax.Array) -> jax.Array:
-        def stacked(part: jax.Array) -> jax.Array:
-            results = measured(x.at[chosen].set(part))
-            return jnp.stack([results[name] for name in names])
+    def stacked(part: jax.Array) -> jax.Array:
+        results = measured(start.at[chosen].set(part))
+        return jnp.stack([results[name] for name in names])
 
-        return jax.jacfwd(jax.jacfwd(stacked))(x[chosen])
-
-    return np.asarray(twice(jnp.asarray(point)), float)
+    return np.asarray(eqx.filter_jit(jax.jacfwd(jax.jacfwd(stacked)))(start[chosen]), float)
 
 
 def _curve_parts(

@@ -16,17 +16,11 @@ COST = 0.01  # of the metric, for which flat directions are stated
 
 
 class CurveSensitivity(NamedTuple):
-    """Derivatives by the force at each velocity of one damper curve.
+    """Derivatives by the force at each velocity of one damper curve."""
 
-    Attributes:
-        velocity: where the hats are [m/s], shape (points,).
-        force: of the curve there [N], with settled states.
-        gradient: for each metric its derivative by the height of each hat [unit of the metric per N].
-    """
-
-    velocity: Float[np.ndarray, " points"]
-    force: Float[np.ndarray, " points"]
-    gradient: dict[str, Float[np.ndarray, " points"]]
+    velocity: Float[np.ndarray, " points"]  # where the hats are [m/s], shape (points,)
+    force: Float[np.ndarray, " points"]  # of the curve there [N], with settled states
+    gradient: dict[str, Float[np.ndarray, " points"]]  # of each metric by the height of each hat [its unit per N]
 
 
 @final

@@ -13,47 +13,27 @@ from jaxdamp.dampers import MonoTube
 
 
 class ValveParameter(NamedTuple):
-    """A chosen number with its bounds.
+    """A chosen number with its bounds."""
 
-    Attributes:
-        name: path of the parameter.
-        unit: in SI.
-        start: value of the start, in the unit.
-        value: chosen value, in the unit.
-        lower: lower bound of the search.
-        upper: upper bound of the search.
-        note: empty, "at its lower bound" or "at its upper bound".
-        meaning: in words.
-    """
-
-    name: str
-    unit: str
-    start: float
-    value: float
-    lower: float
-    upper: float
+    name: str  # path of the parameter
+    unit: str  # in SI
+    start: float  # value of the start, in the unit
+    value: float  # chosen value, in the unit
+    lower: float  # lower bound of the search
+    upper: float  # upper bound of the search
     note: str  # "", "at its lower bound" or "at its upper bound"
-    meaning: str
+    meaning: str  # in words
 
 
 class OutOfReach(NamedTuple):
-    """A part of the target that the damper does not reach.
+    """A part of the target that the damper does not reach."""
 
-    Attributes:
-        side: `"rebound"` or `"compression"`.
-        slowest: lowest speed with a large error [m/s].
-        fastest: highest speed with a large error [m/s].
-        largest_error: reached minus wanted force where they differ most [N].
-        at: velocity there [m/s].
-        binding: names of the parameters beyond whose bounds the error would be smaller, the most effective first.
-    """
-
-    side: str
-    slowest: float
-    fastest: float
-    largest_error: float
-    at: float
-    binding: tuple[str, ...]
+    side: str  # `"rebound"` or `"compression"`
+    slowest: float  # lowest speed with a large error [m/s]
+    fastest: float  # highest speed with a large error [m/s]
+    largest_error: float  # reached minus wanted force where they differ most [N]
+    at: float  # velocity there [m/s]
+    binding: tuple[str, ...]  # parameters beyond whose bounds the error would be smaller, the most effective first
 
     @property
     def sentence(self) -> str:

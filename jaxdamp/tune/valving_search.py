@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._jacobian import with_jacobian
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
@@ -234,27 +235,25 @@ def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> ForceOf:
 
     @eqx.filter_jit
     def forces(free: FreeParameters, values: Array) -> tuple[Array, Array]:
-        def one(values: Array) -> tuple[Array, Array]:
+        def one(values: Array) -> Array:
             law = free.build(values)
             still = law.incompressible()
             curve = jax.vmap(lambda v: still.force(0.0, v, still.initial_state()))(jnp.asarray(wanted.velocity))
-            marched = [
-                march(law, jnp.asarray(loop.dt), jnp.asarray(loop.stroke), jnp.asarray(loop.velocity), substeps)[
-                    loop.first :
-                ]
-                for loop in wanted.loops
-            ]
-            force = jnp.concatenate([curve, *marched])
-            return force, force
+            return jnp.concatenate([curve, *(_marched(law, loop, substeps) for loop in wanted.loops)])
 
-        slopes, force = jax.jacfwd(one, has_aux=True)(values)
-        return force, slopes
+        return with_jacobian(one)(values)
 
     def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         computed = forces(free, jnp.asarray(values, free.values.dtype))
         return np.asarray(computed[0], np.float64), np.asarray(computed[1], np.float64)
 
     return evaluate
+
+
+def _marched(law: MonoTube, loop: Loop, substeps: int) -> Array:
+    """The force of a law at the compared samples of a motion."""
+    dt, stroke, velocity = (jnp.asarray(values) for values in (loop.dt, loop.stroke, loop.velocity))
+    return march(law, dt, stroke, velocity, substeps)[loop.first :]
 
 
 def _starts(space: SearchRange, count: int) -> list[np.ndarray]:

@@ -9,12 +9,11 @@ from jaxtyping import Float
 
 from jaxdamp._status import Status
 from jaxdamp._tables import percent_change, typeset_unit
-from jaxdamp.metrics import Metric
 from jaxdamp.solve import Evaluation
 from jaxdamp.tune.limits import Limit, LimitRange
 from jaxdamp.tune.objective import Objective, exact_counterpart
 from jaxdamp.tune.ranges import FACTOR, Change, SearchRange
-from jaxdamp.vehicles import AbstractVehicle, ChannelKind
+from jaxdamp.vehicles import ChannelKind
 
 
 if TYPE_CHECKING:
@@ -44,15 +43,10 @@ class Outcome(enum.Enum):
 
 
 class Verdict(NamedTuple):
-    """The outcome of a tuning and the sentence that says it.
+    """The outcome of a tuning and the sentence that says it."""
 
-    Attributes:
-        outcome: what it came to.
-        sentence: with its numbers.
-    """
-
-    outcome: Outcome
-    sentence: str
+    outcome: Outcome  # what it came to
+    sentence: str  # with its numbers
 
     @property
     def better(self) -> bool:
@@ -111,23 +105,21 @@ def _price(result: "TuneResult[Any]") -> tuple[float, str]:
     metrics = {m.name: m for m in result.objective.metrics} if result.objective else {}
     named = {result.metric, *result.limits}
     limited = {metrics[name].channel for name in result.limits if name in metrics}
-    known = {_mean_change(result, name) for name in named}
+    known = {mean_change(result, name) for name in named}
     worst = (NOTICED, "")
     for name in result.units:
-        change, metric = _mean_change(result, name), metrics.get(name)
+        change, metric = mean_change(result, name), metrics.get(name)
         if change is None or name in named or any(x is not None and np.isclose(change, x, 1e-6) for x in known):
             continue
-        if metric is None or (metric.channel not in limited and _has_price(metric, result.start)):
+        channels = result.start.layout.by_name
+        if metric is None or (
+            metric.channel not in limited and not metric.statistic.signed and channels[metric.channel].kind in PRICED
+        ):
             worst = max(worst, (change, name))
     return worst
 
 
-def _has_price(metric: Metric, vehicle: AbstractVehicle) -> bool:
-    """Whether a rise of a metric is a price."""
-    return not metric.statistic.signed and vehicle.layout.by_name[metric.channel].kind in PRICED
-
-
-def _mean_change(result: "TuneResult[Any]", name: str) -> float | None:
+def mean_change(result: "TuneResult[Any]", name: str) -> float | None:
     """The change of a metric [%], the mean on fresh roads if there are any; none from zero."""
     if result.fresh is None or name not in result.fresh.before:
         return percent_change(result.before[name], result.after[name])
@@ -139,7 +131,7 @@ def _limits_in_words(result: "TuneResult[Any]") -> str:
     """How much of each limit is used, and on how many fresh roads it is broken."""
     texts = []
     for name in result.limits:
-        after, change = result.after[name], _mean_change(result, name)
+        after, change = result.after[name], mean_change(result, name)
         share = f"{after:.4g} {typeset_unit(result.units[name])}".rstrip() if change is None else f"{change:+.1f} %"
         text = f"{name} {share}{', at its limit' * (name in result.active_limits)}"
         if result.fresh is not None and name in result.allowed:

@@ -30,7 +30,7 @@ from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
 from jaxdamp.vehicles.guided import ForceDriven, Guide, Guided
 from jaxdamp.vehicles.linear import LinearVehicle as LinearVehicle, linearise, with_weightings as with_weightings
 from jaxdamp.vehicles.modes import Modes as Modes, Oscillations as Oscillations, modes, oscillations
-from jaxdamp.vehicles.parts import Body, Element, Link, Place, Point, Wheel, prefixed as prefixed
+from jaxdamp.vehicles.parts import Body, Element as Element, Link, Place, Point as Point, Wheel, prefixed as prefixed
 from jaxdamp.vehicles.port_form import (
     Earlier as Earlier,
     LinearMap as LinearMap,
@@ -53,7 +53,6 @@ __all__ = [
     "Cab",
     "Corner",
     "CubicSpring",
-    "Element",
     "ForceDriven",
     "Frame",
     "FullCar",
@@ -64,7 +63,6 @@ __all__ = [
     "Link",
     "LumpedVehicle",
     "Place",
-    "Point",
     "QuarterCar",
     "RollCar",
     "Seat",

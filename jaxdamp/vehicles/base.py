@@ -3,7 +3,7 @@
 import functools
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 import jax
@@ -139,7 +139,7 @@ class AbstractVehicle(Module):
 
 
 @functools.lru_cache(maxsize=256)
-def _layout_of(structure: Any, leaves: tuple[Any, ...]) -> Layout:
+def _layout_of(structure: object, leaves: tuple[object, ...]) -> Layout:
     """The layout of vehicles of this structure, whose arrays have these shapes: their values do not change it."""
     layouts = []
 

@@ -1,10 +1,10 @@
 """One wheel with its suspension, the building block of all cars, and two of them on an axle."""
 
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 
-from jaxdamp._types import Number
+from jaxdamp._types import Number, ScalarLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import Module, nonnegative, parameter, positive
 from jaxdamp.vehicles.parts import AbstractPart, Body, Link, Parts, Point, Wheel, prefixed
@@ -30,8 +30,8 @@ class AbstractCorner(Module):
         name: str,
         mount: Point,
         *,
-        behind: Any = 0.0,
-        left: Any = 0.0,
+        behind: ScalarLike | int = 0.0,
+        left: ScalarLike | int = 0.0,
         beside: bool = False,
         sides: int = 1,
     ) -> tuple[Body, Link, Wheel]:
@@ -93,7 +93,9 @@ class Axle(AbstractPart):
     track_width: Number = parameter("m", "distance between the left and the right wheel", positive, adjustable=False)
     anti_roll_rate: Number = parameter("N m/rad", "stiffness of the anti-roll bar", nonnegative, default=0.0)
 
-    def parts(self, name: str, body: Body, *, ahead: Any = None, behind: Any = 0.0) -> Parts:
+    def parts(
+        self, name: str, body: Body, *, ahead: ScalarLike | int | None = None, behind: ScalarLike | int = 0.0
+    ) -> Parts:
         """Left corner, right corner and anti-roll bar under a body that rolls.
 
         Arguments:

@@ -1,7 +1,7 @@
 """The linearised vehicle: about the static equilibrium, for a given amplitude of its laws, or on a random road."""
 
 from collections.abc import Sequence
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 import jax
@@ -9,7 +9,7 @@ import jax.flatten_util
 import jax.numpy as jnp
 import jax.scipy.linalg
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
@@ -111,10 +111,10 @@ class LinearVehicle(eqx.Module):
 def linearise(
     vehicle: AbstractVehicle,
     *,
-    amplitude: Any = None,
-    frequency: Any = None,
-    velocity_psd: Any = None,
-    speed: Any = None,
+    amplitude: ArrayLike | Sequence[float] | None = None,
+    frequency: ScalarLike | int | None = None,
+    velocity_psd: ScalarLike | int | None = None,
+    speed: ScalarLike | int | None = None,
     in_phase: bool = False,
 ) -> LinearVehicle:
     """Linearise the laws of a vehicle: at its static equilibrium, for a sinusoidal stroke or on a random road.
@@ -166,15 +166,17 @@ def linearise(
     if amplitude is not None:
         _checks.positive("amplitude", amplitude)
         _checks.positive("frequency", frequency)
-        amplitude, frequency = jnp.asarray(amplitude, dtype=float), jnp.asarray(frequency, dtype=float)
-    linear = _linearise(vehicle, amplitude, frequency)
+    sinusoidal = (None if a is None else jnp.asarray(a, dtype=float) for a in (amplitude, frequency))
+    linear = _linearise(vehicle, *sinusoidal)
     matrix = _checks.concrete(linear.state_matrix)
     if matrix is not None and not np.all(np.isfinite(matrix)):
         refuse_restless(vehicle)
     return linear
 
 
-def _on_random_road(vehicle: AbstractVehicle, velocity_psd: Any, speed: Any, in_phase: bool) -> LinearVehicle:
+def _on_random_road(
+    vehicle: AbstractVehicle, velocity_psd: ScalarLike | int, speed: ScalarLike | int | None, in_phase: bool
+) -> LinearVehicle:
     """With the nearest linear laws in the stationary motion."""
     _checks.positive("velocity_psd", velocity_psd)
     behind = jnp.stack([wheel.behind for wheel in vehicle.frame().wheels])

@@ -1,7 +1,7 @@
 """Natural modes of a vehicle: frequencies, damping, shapes."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +10,7 @@ from jaxtyping import Array, Complex, Float
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._types import Contents
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear, linearise
 
@@ -76,7 +77,7 @@ class Modes(AbstractResult):
             "Modes", columns, tuple((*plain(row), words) for row, words in zip(numbers, amplitudes, strict=True))
         )
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Frequencies, damping ratios and shapes with units, ready for JSON; complex shapes as magnitude and phase."""
         magnitude, phase = np.abs(self.damped_shapes), np.angle(self.damped_shapes)
         return {

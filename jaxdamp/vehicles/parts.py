@@ -52,7 +52,7 @@ class Point(eqx.Module):
     def __sub__(self, other: "Point") -> "Point":
         return self + -other
 
-    def of(self, values: Mapping[str, Any]) -> Any:
+    def of(self, values: Mapping[str, object]) -> Any:
         """Its value for given values of the coordinates by name, such as a mode shape.
 
         >>> Point({"z_sprung": 1.0, "pitch": -1.0}).of({"z_sprung": 0.5, "pitch": 0.25})
@@ -88,7 +88,7 @@ def prefixed(name: str, word: str) -> str:
     return f"{name}_{word}" if name else word
 
 
-def _maybe(value: Any) -> Any:
+def _maybe(value: object) -> Any:
     return None if value is None else as_float(value)
 
 
@@ -137,7 +137,14 @@ class Body(AbstractPart):
     mass: Number = parameter("kg", "mass of the body", positive, adjustable=False)
     turns: tuple[Inertia, ...]
 
-    def __init__(self, name: str, mass: Any, *, pitch_inertia: Any = None, roll_inertia: Any = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        mass: ScalarLike | int,
+        *,
+        pitch_inertia: ScalarLike | int | None = None,
+        roll_inertia: ScalarLike | int | None = None,
+    ) -> None:
         self.name, self.mass = name, mass
         given = (("pitch", pitch_inertia), ("roll", roll_inertia))
         self.turns = tuple(Inertia(axis, moment) for axis, moment in given if moment is not None)
@@ -166,7 +173,7 @@ class Body(AbstractPart):
         """The roll angle, left side up [rad]."""
         return self._turn("roll")
 
-    def at(self, ahead: Any = None, left: Any = None) -> Point:
+    def at(self, ahead: ScalarLike | int | None = None, left: ScalarLike | int | None = None) -> Point:
         """The height of a point `ahead` and `left` of the centre of gravity [m], z + ahead θ + left φ."""
         point = Point({f"z_{self.name}": 1.0})
         point = point if ahead is None else point + as_float(ahead) * self.pitch

@@ -14,7 +14,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp._matrices import solve
 from jaxdamp._types import Scalar, State
@@ -119,7 +119,7 @@ class Ports(eqx.Module):
     ) -> States:
         """An approximation of `advance`, third order: smooth states are extrapolated, which costs almost nothing."""
 
-        def step(law: AbstractDamper, *arguments: Any) -> State:
+        def step(law: AbstractDamper, *arguments: PyTree) -> State:
             x0, v0, x1, v1, state, before, two_before = arguments
             return law.predict(x0, v0, x1, v1, state, dt) if before is None else 3.0 * (state - before) + two_before
 
@@ -157,7 +157,7 @@ class Ports(eqx.Module):
         return results
 
 
-def _stacked(*leaves: Any) -> Any:
+def _stacked(*leaves: PyTree) -> PyTree:
     return jnp.stack(leaves) if eqx.is_array(leaves[0]) else leaves[0]
 
 

@@ -1,10 +1,10 @@
 """A truck with a front axle, two axles close together behind and a cab, seen from the side."""
 
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 
-from jaxdamp._types import Number
+from jaxdamp._types import Number, ScalarLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import nonnegative, parameter, positive
 from jaxdamp.vehicles.base import AbstractVehicle
@@ -50,7 +50,7 @@ class WalkingBeam(AbstractPart):
     bump_stop: AbstractDamper | None = None
     friction: AbstractDamper | None = None
 
-    def parts(self, body: Body, ahead: Any, behind: Any) -> Parts:
+    def parts(self, body: Body, ahead: ScalarLike | int, behind: ScalarLike | int) -> Parts:
         """The beam under a point `ahead` of the centre of gravity, its middle `behind` the front axle [m]."""
         beam, half = Body("beam", self.mass, pitch_inertia=self.pitch_inertia), 0.5 * self.spread
         laws = self.damper, self.extra_spring, self.bump_stop, self.friction
@@ -82,7 +82,7 @@ class IndependentTandem(AbstractPart):
     axle: Corner
     spread: Number = parameter("m", "distance between the two axles", positive, adjustable=False)
 
-    def parts(self, body: Body, ahead: Any, behind: Any) -> Parts:
+    def parts(self, body: Body, ahead: ScalarLike | int, behind: ScalarLike | int) -> Parts:
         """The axles about a point `ahead` of the centre of gravity, `behind` the front axle [m]."""
         half = 0.5 * self.spread
         axles = [
