@@ -98,24 +98,19 @@ def choose(
     allowed = {name: limit for word, limit in limits.items() for name in car.goal_metrics(word, white=white)}
     names = list(dict.fromkeys([*wanted, *allowed]))
     rides = [Ride(car, road, metrics=names, **run) for road in roads]
-
-    def driven(vehicle: AbstractVehicle) -> dict[str, float]:
-        each = [ride.of_vehicle(vehicle)() for ride in rides]
-        return {name: float(np.mean([float(values[name]) for values in each])) for name in names}
-
-    with screen.stage("Driving every setting", total=len(combinations)) as advance, without_range_warnings():
-        spans = limit_spans(allowed, names, driven(car))
-        rows, vehicles = [], []
-        for setting in combinations:
-            advance(_words(levels, setting), len(rows))
-            vehicles.append(_at(car, dict(zip(levels, setting, strict=True))))
-            rows.append(driven(vehicles[-1]))
+    vehicles = [_at(car, dict(zip(levels, setting, strict=True))) for setting in combinations]
+    settings = [_words(levels, setting) for setting in combinations]
+    with screen.stage("Driving every setting", total=len(vehicles)) as advance, without_range_warnings():
+        spans = limit_spans(allowed, names, _driven(rides, car))
+        rows = []
+        for vehicle, setting in zip(vehicles, settings, strict=True):
+            advance(setting, len(rows))
+            rows.append(_driven(rides, vehicle))
     met = [all(low <= row[name] <= high for name, (low, high) in spans.items()) for row in rows]
-    score = np.array([np.mean([row[name] for name in wanted]) for row in rows])
+    score = np.mean([list(map(row.get, wanted)) for row in rows], axis=1)
     best = int(np.argmin(np.where(met, score, np.inf) if any(met) else score))
     units = {m.name: typeset_unit(m.unit(car.units)) for m in rides[0].metrics}
-    settings = [_words(levels, setting) for setting in combinations]
-    columns = [Column("setting"), *(Column(name, units[name]) for name in names), Column("limits")]
+    columns = [Column("setting"), *(Column(name, units[name]) for name in rows[0]), Column("limits")]
     cells = [
         (setting, *row.values(), "met" if ok else "not met")
         for setting, row, ok in zip(settings, rows, met, strict=True)
@@ -127,6 +122,12 @@ def choose(
         Table("All settings", tuple(columns), tuple(cells)),
         any(met),
     )
+
+
+def _driven(rides: Sequence[Ride], vehicle: AbstractVehicle) -> dict[str, float]:
+    """The metrics of a vehicle, their mean over the rides."""
+    each = [ride.of_vehicle(vehicle)() for ride in rides]
+    return {name: float(np.mean([float(values[name]) for values in each])) for name in each[0]}
 
 
 def _verdict(setting: str, number: str, met: Sequence[bool]) -> str:
