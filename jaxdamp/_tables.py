@@ -159,13 +159,14 @@ class Table:
     def to_html(self) -> str:
         """The rows for reading, as HTML."""
         sides = [' class="number"' if self.is_number(i) else "" for i in range(len(self.columns))]
-        head = "".join(f"<th{s}>{html.escape(c)}</th>" for c, s in zip(self.headings(), sides, strict=True))
+        cells = zip(self.headings(), sides, strict=True)
+        head = "".join(f'<th scope="col"{side}>{html.escape(heading)}</th>' for heading, side in cells)
         lines = [
             "<tr>" + "".join(f"<td{s}>{html.escape(text)}</td>" for text, s in zip(row, sides, strict=True)) + "</tr>"
             for row in self.texts()
         ]
         caption = f"<caption>{html.escape(display().text(self.title))}</caption>"
-        return "\n".join([f"<table>{caption}", f"<tr>{head}</tr>", *lines, "</table>"])
+        return "\n".join([f"<table>{caption}", f"<thead><tr>{head}</tr></thead><tbody>", *lines, "</tbody></table>"])
 
     _repr_html_ = to_html
     __repr__ = to_text

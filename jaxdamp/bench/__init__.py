@@ -33,7 +33,14 @@ from jaxdamp.bench.evaluation import (
     separate_gas_and_friction,
 )
 from jaxdamp.bench.force_velocity import ForceVelocityTable as ForceVelocityTable, are_tables as are_tables, read_table
-from jaxdamp.bench.preflight import Finding as Finding, Preflight as Preflight, preflight, usable
+from jaxdamp.bench.preflight import (
+    Finding as Finding,
+    Preflight as Preflight,
+    clock_jitter as clock_jitter,
+    mains_lines as mains_lines,
+    preflight,
+    usable,
+)
 from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import Excitation, RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable

@@ -94,9 +94,8 @@ def _text(signature: Signature, program: Program, numbers: set[str], of_numbers:
     before, once = _hoisted(once, set(numbers))
     known = numbers | {statement.target.name for statement in before}
     before_lane, lane = _hoisted(lane, known | of_numbers)
-    atoms = {atom.name for atom in [*value, *slope] if isinstance(atom, Variable)}
-    used = atoms.union(*map(_reads, once), *map(_reads, lane))
-    if {atom.name for atom in value if isinstance(atom, Variable)} & {n for s in lane for n in _writes(s)}:
+    used = names([*value, *slope]).union(*map(_reads, once), *map(_reads, lane))
+    if names(value) & set().union(*map(_writes, lane)):
         raise NotImplementedError("A value is computed together with its derivatives.")
     stored = [s.target for s in before if s.target.name in used]
     stored_lane = [s.target for s in before_lane if s.target.name in used]
@@ -107,29 +106,39 @@ def _text(signature: Signature, program: Program, numbers: set[str], of_numbers:
         f"static void {name}_prepare(const double *restrict p)",
         "{",
         *c.lines(before, 1),
-        *(f"    {name}_once[{i}] = {v.name};" for i, v in enumerate(stored)),
+        *_numbered(f"    {name}_once[{{}}] = {{}};", stored),
         "    for (int k = 0; k < LANES; k++) {",
         *c.lines(before_lane, 2),
-        *(f"        {name}_lane[{i}][k] = {v.name};" for i, v in enumerate(stored_lane)),
+        *_numbered(f"        {name}_lane[{{}}][k] = {{}};", stored_lane),
         "    }",
         "}",
         f"static void {name}(const double *restrict p, {signature.head})",
         "{",
-        *(f"    const {c.types[v.dtype]} {v.name} = {name}_once[{i}];" for i, v in enumerate(stored)),
+        *_numbered(f"    const {{type}} {{1}} = {name}_once[{{0}}];", stored),
         *c.lines(once, 1),
         "    if (slopes)",
         "    #pragma omp simd",
         "    for (int k = 0; k < LANES; k++) {",
-        *(f"        const {c.types[v.dtype]} {v.name} = {name}_lane[{i}][k];" for i, v in enumerate(stored_lane)),
+        *_numbered(f"        const {{type}} {{1}} = {name}_lane[{{0}}][k];", stored_lane),
         *c.lines(lane, 2),
-        *(f"        const double slope{i} = {c.atom(atom)};" for i, atom in enumerate(slope)),
-        *(f"        {text} = slope{i};" for i, text in enumerate(signature.slope)),
+        *_put(slope, signature.slope, "slope", 2),
         "    }",
-        *(f"    const double value{i} = {c.atom(atom)};" for i, atom in enumerate(value)),
-        *(f"    {text} = value{i};" for i, text in enumerate(signature.value)),
+        *_put(value, signature.value, "value", 1),
         "}",
     ]
     return "\n".join([*lines, ""])
+
+
+def _numbered(line: str, stored: Sequence[Variable]) -> list[str]:
+    """A line for each of some variables, with its number, name and type."""
+    return [line.format(i, v.name, type=C().types[v.dtype]) for i, v in enumerate(stored)]
+
+
+def _put(atoms: Sequence[Any], targets: Sequence[str], name: str, depth: int) -> list[str]:
+    """The lines that assign results, after all of them are computed: a target may be an input too."""
+    space = "    " * depth
+    before = [f"{space}const double {name}{i} = {C().atom(atom)};" for i, atom in enumerate(atoms)]
+    return before + [f"{space}{target} = {name}{i};" for i, target in enumerate(targets)]
 
 
 def _reads(statement: Statement) -> set[str]:

@@ -5,11 +5,13 @@ import functools
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, final
 
+import equinox as eqx
 import jax
 import numpy as np
 
 from jaxdamp import _checks, dampers
 from jaxdamp._tables import Column, Table
+from jaxdamp._types import Scalar
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import (
     AbstractDamper,
@@ -54,7 +56,14 @@ def _friction(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
 def _rate(law: AbstractMemoryless, velocity: np.ndarray) -> float:
     """Secant slope [N s/m] at the RMS velocity."""
     v = float(np.sqrt(np.mean(velocity**2)))
-    return float(law.force_velocity(v) - law.force_velocity(-v)) / (2 * v)
+    up, down = (float(_force(law, np.asarray(speed))) for speed in (v, -v))
+    return (up - down) / (2 * v)
+
+
+@eqx.filter_jit
+def _force(law: AbstractMemoryless, v: np.ndarray) -> Scalar:
+    """In one program: JAX would compile each operation."""
+    return law.force_velocity(v)
 
 
 _MEMORYLESS = {

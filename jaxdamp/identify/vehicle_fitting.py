@@ -18,13 +18,13 @@ from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
-from jaxdamp.identify.left_out import on_free_scale, on_sensors, on_signs
 from jaxdamp.identify.machine import Machine, started_machine
 from jaxdamp.identify.model import VehicleTest
 from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, Solver, search
 from jaxdamp.identify.several import Solution, search_scattered
+from jaxdamp.identify.vehicle_left_out import on_free_scale, on_sensors, on_signs
 from jaxdamp.identify.vehicle_preparing import (
     FreeScale,
     VehicleData,

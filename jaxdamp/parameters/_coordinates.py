@@ -69,24 +69,19 @@ class Coordinates(eqx.Module):
         maps = ((p.domain.from_raw, p, u, a) for p, u, a in parts)
         return _joined([of(_plain(p, a), _scale(p)) if self._is_smooth(p) else a * u for of, p, u, a in maps])
 
-    def with_slopes(
-        self, y: Float[np.ndarray, " free"]
-    ) -> tuple[Float[np.ndarray, " free"], Float[np.ndarray, "free free"]]:
-        """Physical values and their derivatives by the coordinates, of NumPy arrays and without JAX.
-
-        Raises:
-            NotImplementedError: a smooth map whose derivative is not written down.
-        """
-        slopes, ends = np.zeros((y.size, y.size)), np.cumsum([p.value.size for p in self.free.chosen])
-        for p, unit, raw, end in zip(self.free.chosen, self.units, self.free.split(y), ends, strict=True):
-            own = slice(end - raw.size, end)
+    def on_host(self) -> "HostMap | None":
+        """The map to physical values with its derivatives, by NumPy alone; None if a domain has not written them."""
+        slopes, ends = np.zeros((self.free.values.size,) * 2), np.cumsum([p.value.size for p in self.free.chosen])
+        smooth = []
+        for p, unit, end in zip(self.free.chosen, self.units, ends, strict=True):
+            own = slice(int(end) - p.value.size, int(end))
             if not self._is_smooth(p):
                 slopes[own, own] = np.diag(np.ravel(np.asarray(unit)))
             elif p.domain.slopes is None:
-                raise NotImplementedError(p.domain.name)
+                return None
             else:
-                slopes[own, own] = p.domain.slopes(raw, np.asarray(_scale(p)))
-        return np.asarray(self.to_physical(y)), slopes
+                smooth.append((own, p.domain, np.asarray(_scale(p))))
+        return HostMap(np.diag(slopes).copy(), slopes, tuple(smooth))
 
     def from_physical(self, values: Vector) -> Vector:
         """Coordinates of physical values; NumPy arrays for NumPy arrays."""
@@ -145,6 +140,29 @@ class Coordinates(eqx.Module):
 
     def _is_smooth(self, p: Parameter) -> bool:
         return self.smooth == "all" or (self.smooth == "ordered" and p.domain.ordered)
+
+
+class HostMap(NamedTuple):
+    """Physical values of coordinates, and their derivatives.
+
+    Attributes:
+        units: of the numbers without a smooth map, zero for the others.
+        slopes: the same on the diagonal of a matrix.
+        smooth: ordered vectors: their place, domain and scale.
+    """
+
+    units: Float[np.ndarray, " free"]
+    slopes: Float[np.ndarray, "free free"]
+    smooth: tuple[tuple[slice, Any, Float[np.ndarray, " _"]], ...]
+
+    def __call__(
+        self, y: Float[np.ndarray, " free"]
+    ) -> tuple[Float[np.ndarray, " free"], Float[np.ndarray, "free free"]]:
+        """Values and derivatives at coordinates."""
+        values, slopes = y * self.units, self.slopes.copy() if self.smooth else self.slopes
+        for own, domain, scale in self.smooth:
+            values[own], slopes[own, own] = domain.from_raw(y[own], scale), domain.slopes(y[own], scale)
+        return values, slopes
 
 
 def _has_range(p: Parameter) -> bool:

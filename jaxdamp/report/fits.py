@@ -60,6 +60,7 @@ def fit_report(
     """
     report = Report(title, folder, attempts)
     report.verdict(*fit_verdict(report, comparison, baseline), f"{preflight.summary}." if preflight else "")
+    report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
     records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
     add_records(report, records, comparison.held_out, remarks, preflight)
     add_fits(report, comparison, failures, baseline)

@@ -47,7 +47,10 @@ def ride_report(
     """
     rides = {"ride": responses} if isinstance(responses, Response) else dict(responses)
     report = Report(title, folder, attempts)
-    report.verdict(*ride_verdict(rides))
+    sentences = ride_verdict(rides)
+    report.verdict(*sentences)
+    report.sheet(lambda: plots.ride_sheet(rides, name=title), sentences[-1], "ride_sheet")
+    report.heading("The ride")
     report.text(axles_sentence(rides))
     report.points(notes_of(rides) if remarks is None else remarks)
     for name, law in (laws or {}).items():

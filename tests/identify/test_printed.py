@@ -10,7 +10,7 @@ from jaxdamp import identify
 from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.codegen import _native
 from jaxdamp.dampers import Besinger, Lag, Linear, LuGre, Spring
-from jaxdamp.identify import printed, search
+from jaxdamp.identify import printed, printed_law, search
 
 
 TRUTH = LuGre.guess(np.array([-0.3, 0.0, 0.3]), np.array([-600.0, 100.0, 900.0])) + Linear(1500.0) + Spring(2000.0)
@@ -44,7 +44,9 @@ def test_residual_jacobian_and_prediction_are_those_of_xla(name, runs) -> None:
     assert by_c is not None
     coordinates = problem.coordinates
     y = np.asarray(coordinates.from_physical(1.01 * np.asarray(problem.free.values)))
-    values, units = coordinates.with_slopes(y)
+    to_values = coordinates.on_host()
+    assert to_values is not None
+    values, units = to_values(y)
     expected = list(map(np.asarray, search._evaluated(coordinates, jnp.asarray(y), problem.residuals)))
     residual, jacobian = by_c(values)
     conditions, slopes = by_c.margins(values)
@@ -97,9 +99,9 @@ def test_one_program_serves_records_of_any_number_and_length(runs) -> None:
 
 def test_without_a_compiler_xla_computes_it_and_the_log_says_so(runs, monkeypatch, caplog) -> None:
     monkeypatch.setattr(_native, "compiler", lambda: None)
-    for memory in (printed._laws, printed._refused):
-        monkeypatch.setattr(printed, "_laws" if memory is printed._laws else "_refused", {})
-    printed._say.cache_clear()
+    for memory in ("_laws", "_refused"):
+        monkeypatch.setattr(printed_law, memory, {})
+    printed_law.say.cache_clear()
     problem = identify.prepare(Linear(1000.0), runs)
     with caplog.at_level(logging.INFO, "jaxdamp.identify.printed"):
         assert printed.evaluator(problem.free, problem.residuals) is None
