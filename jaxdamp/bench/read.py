@@ -47,6 +47,7 @@ def read(
     readers: Mapping[str, Reader] | None = None,
     stroke_from_velocity: bool | None = None,
     skip_bad: bool = False,
+    drop_bad_rows: bool = False,
 ) -> BenchSet:
     r"""Read bench records from text files, workbooks, MATLAB, TDMS, MDF4 and Parquet files.
 
@@ -78,6 +79,8 @@ def read(
         stroke_from_velocity: integrate the velocity of files without a stroke, as for laws that need no place of the
             stroke; `BenchRun.stroke_is_integrated` says so.
         skip_bad: leave out files that cannot be read, instead of reading none; `BenchSet.left_out` says which and why.
+        drop_bad_rows: leave out rows with a missing value or text, at most ten one after the other and 5 % of all;
+            straight lines stand in their place, and a note counts them.
 
     Returns:
         The records, named after their files, in the order of the paths, folders and patterns in natural order. A
@@ -125,7 +128,7 @@ def read(
         _checks.positive("sampling_rate", given["sampling_rate"])
     tables = ({**(given[name] or {})} for name in ("columns", "units", "gains"))
     choice = Choice(*tables, stroke_from_velocity=bool(given["stroke_from_velocity"]))
-    how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"])
+    how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"], drop_bad_rows)
     files = find_files(asked, {*FOLDER_SUFFIXES, *(readers or {})})
     runs, errors = _read_files(
         files, all_readers, given["delimiter"], lambda tables, name: _bench_runs(tables, name, how)

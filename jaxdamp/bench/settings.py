@@ -156,7 +156,11 @@ def _candidates(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
     stated = [(f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs}) for key in keys]
     words = {run.name: re.split(r"[_\s,;()]+|-(?=\D)", run.name) for run in runs}
     places = range(-1, -min(map(len, words.values())) - 1, -1)
-    return stated + [("a word of their names", {name: parts[i] for name, parts in words.items()}) for i in places]
+    named = [("a word of their names", {name: parts[i] for name, parts in words.items()}) for i in places]
+    read = {run.name: settings_in_name(run.name) for run in runs}  # such settings are words of the names first of all
+    own = [all(read[run.name].get(key) == run.settings[key] for run in runs) for key in keys]
+    first = [candidate for candidate, of_names in zip(stated, own, strict=True) if not of_names]
+    return [*first, *named, *(candidate for candidate, of_names in zip(stated, own, strict=True) if of_names)]
 
 
 def by_number(text: str) -> tuple[float, str]:

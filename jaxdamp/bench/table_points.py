@@ -195,9 +195,12 @@ def curves_of(sides: Sequence[Side], how: How) -> tuple[tuple[Curve, ...], list[
     if lacking:
         raise ValueError(f"{sides[0].where}: {', '.join(map(repr, lacking))} is there in one direction only.")
     curves = [_curve(name, [*points[-1][name], *points[1][name]], notes) for name in names]
-    if len(curves) > 1:
-        notes.append(f"{len(curves)} settings, by columns, rows or sheets: {', '.join(names)}")
-    return tuple(sorted(curves, key=lambda c: np.inf if c.command is None else c.command)), notes
+    notes += [f"{len(curves)} settings, by columns, rows or sheets: {', '.join(names)}"] * (len(curves) > 1)
+    return tuple(sorted(curves, key=_command)), notes
+
+
+def _command(curve: Curve) -> float:
+    return np.inf if curve.command is None else curve.command
 
 
 def _rest(settings: Iterable[list[np.ndarray]], notes: list[str]) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
+from jaxdamp._files import check_size
 from jaxdamp.bench.layout import (
     DELIMITERS,
     PLAIN_COMMA,
@@ -26,6 +27,7 @@ from jaxdamp.bench.raw import RawColumn, RawTable
 
 
 _LOOK_AT = 2000  # lines that decide on the delimiter
+_MOST_COLUMNS = 4096  # of a text file
 _CHUNK = 5_000  # lines that are divided at a time, to bound the memory
 _CONTENT = {  # how files of other formats begin
     b"PK\x03\x04": "an XLSX workbook (.xlsx)",
@@ -56,6 +58,7 @@ def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
     top = list(islice(((n, line) for n, line in enumerate(lines, 1) if line.strip()), _LOOK_AT))
     if not top:
         raise ValueError(f"{file} is empty: export it from the bench again.")
+    _check_width(file, top)
     layout = _choose(file, top, delimiter)
     rows = [(n, split(line, layout.delimiter)) for n, line in top]
     header = header_of(rows, layout)
@@ -132,8 +135,18 @@ def _with_names_apart(tables: list[RawTable]) -> list[RawTable]:
     return [replace(t, record=name, notes=(*t.notes, said)) for t, name in zip(tables, apart, strict=True)]
 
 
+def _check_width(file: Path, top: list[tuple[int, str]]) -> None:
+    """Refuse lines with more columns than any record has, before they are divided."""
+    number, line = max(top, key=lambda one: len(one[1]))
+    count = 1 + max(max(line.count(mark) for mark in ",;\t|"), len(line.split()) - 1)
+    if count > _MOST_COLUMNS:
+        remedy = "export the channels of one record only"
+        raise ValueError(f"{file}, line {number}: {count} columns, more than {_MOST_COLUMNS} that are read: {remedy}.")
+
+
 def text_lines(file: Path) -> list[str]:
     """The lines of a text file in UTF-8, UTF-16 or the Western code page of Windows."""
+    check_size(file, file.stat().st_size)
     raw = file.read_bytes()
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return raw.decode("utf-16", errors="replace").splitlines()

@@ -93,41 +93,56 @@ def choose(
         white: whether the road is white.
     """
     levels = settings_of(car)
-    combinations = list(itertools.product(*levels.values()))
-    if len(combinations) > MOST:
-        many = f"{len(combinations)} combinations of settings are more than {MOST}"
-        raise ValueError(f"{many}: name parameters with --over.")
+    combinations = _combinations(levels)
     wanted = car.goal_metrics(metric, white=white)
     allowed = {name: limit for word, limit in limits.items() for name in car.goal_metrics(word, white=white)}
     names = list(dict.fromkeys([*wanted, *allowed]))
     rides = [Ride(car, road, metrics=names, **run) for road in roads]
-
-    def driven(vehicle: AbstractVehicle) -> dict[str, float]:
-        each = [ride.of_vehicle(vehicle)() for ride in rides]
-        return {name: float(np.mean([float(values[name]) for values in each])) for name in names}
-
-    with screen.stage("Driving every setting", total=len(combinations)) as advance, without_range_warnings():
-        spans = limit_spans(allowed, names, driven(car))
-        rows, vehicles = [], []
-        for setting in combinations:
-            advance(_words(levels, setting), len(rows))
-            vehicles.append(_at(car, dict(zip(levels, setting, strict=True))))
-            rows.append(driven(vehicles[-1]))
+    vehicles = [_at(car, dict(zip(levels, setting, strict=True))) for setting in combinations]
+    settings = [_words(levels, setting) for setting in combinations]
+    with screen.stage("Driving every setting", total=len(vehicles)) as advance, without_range_warnings():
+        spans = limit_spans(allowed, names, _driven(rides, car))
+        rows = []
+        for vehicle, setting in zip(vehicles, settings, strict=True):
+            advance(setting, len(rows))
+            rows.append(_driven(rides, vehicle))
     met = [all(low <= row[name] <= high for name, (low, high) in spans.items()) for row in rows]
-    score = np.array([np.mean([row[name] for name in wanted]) for row in rows])
+    score = np.mean([list(map(row.get, wanted)) for row in rows], axis=1)
     best = int(np.argmin(np.where(met, score, np.inf) if any(met) else score))
     units = {m.name: typeset_unit(m.unit(car.units)) for m in rides[0].metrics}
-    columns = [Column("setting"), *(Column(name, units[name]) for name in names), Column("limits")]
-    cells = []
-    for setting, row, ok in zip(combinations, rows, met, strict=True):
-        cells.append((_words(levels, setting), *(row[name] for name in names), "met" if ok else "not met"))
-    name, words = wanted[0], _words(levels, combinations[best])
-    number = f"{name} {rows[best][name]:.4g} {units[name]}"
+    columns = [Column("setting"), *(Column(name, units[name]) for name in rows[0]), Column("limits")]
+    cells = [
+        (setting, *row.values(), "met" if ok else "not met")
+        for setting, row, ok in zip(settings, rows, met, strict=True)
+    ]
+    number = f"{wanted[0]} {rows[best][wanted[0]]:.4g} {units[wanted[0]]}"
+    return Chosen(
+        vehicles[best],
+        _verdict(settings[best], number, met),
+        Table("All settings", tuple(columns), tuple(cells)),
+        any(met),
+    )
+
+
+def _driven(rides: Sequence[Ride], vehicle: AbstractVehicle) -> dict[str, float]:
+    """The metrics of a vehicle, their mean over the rides."""
+    each = [ride.of_vehicle(vehicle)() for ride in rides]
+    return {name: float(np.mean([float(values[name]) for values in each])) for name in each[0]}
+
+
+def _verdict(setting: str, number: str, met: Sequence[bool]) -> str:
+    """The best setting in words."""
     if any(met):
-        verdict = f"The best setting is {words}: {number}. {sum(met)} of {len(rows)} settings meet the limits."
-    else:
-        verdict = f"No setting meets the limits; the smallest {number} is that of {words}."
-    return Chosen(vehicles[best], verdict, Table("All settings", tuple(columns), tuple(cells)), any(met))
+        return f"The best setting is {setting}: {number}. {sum(met)} of {len(met)} settings meet the limits."
+    return f"No setting meets the limits; the smallest {number} is that of {setting}."
+
+
+def _combinations(levels: Mapping[str, Sequence[float]]) -> list[tuple[float, ...]]:
+    combinations = list(itertools.product(*levels.values()))
+    if len(combinations) > MOST:
+        many = f"{len(combinations)} combinations of settings are more than {MOST}"
+        raise ValueError(f"{many}: name parameters with --over.")
+    return combinations
 
 
 def _words(levels: Mapping[str, Sequence[float]], setting: Sequence[float]) -> str:

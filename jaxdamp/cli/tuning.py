@@ -188,12 +188,7 @@ def sweep_command(
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     (surface,), run = driving.over(road)
     white = isinstance(surface, WhiteRoad)
-    limits = {
-        name: span
-        for word, span in (limit or {}).items()
-        if span is not None
-        for name in _metrics_of("limit", word, car, white=white)
-    }
+    limits = _limits_by_metric(limit or {}, car, white=white)
     names = [name for word in metric for name in _metrics_of("metric", word, car, white=white)]
     names = list(dict.fromkeys([*names, *limits]))
     limit_spans(limits, names, dict.fromkeys(names, 1.0))  # refuses what is no limit before anything is driven
@@ -220,6 +215,12 @@ def sweep_command(
             "baseline": None if beside is None else dict(ride.of_vehicle(beside)()),
         }
         work.page(sweep_report, data, remarks=remarks, **marks)
+
+
+def _limits_by_metric(limit: Mapping[str, Any], car: AbstractVehicle, *, white: bool) -> dict[str, Any]:
+    """The limits by the ride metrics that their words mean."""
+    given = {word: span for word, span in limit.items() if span is not None}
+    return {name: span for word, span in given.items() for name in _metrics_of("limit", word, car, white=white)}
 
 
 def _metrics_of(option: str, word: str, car: AbstractVehicle, *, white: bool) -> list[str]:

@@ -85,7 +85,7 @@ class Table(AbstractMemoryless):
     velocity: Vector = setting("m/s", "velocities of the points", increasing)
     force_points: Vector = parameter("N", "forces at the points", linear=True)
 
-    from_csv = Elsewhere("`Table(*numpy.loadtxt(path, delimiter=',', skiprows=1, usecols=(0, 1)).T)`, in m/s and N")
+    from_csv = Elsewhere("`jaxdamp.bench.read_table(path).law()`")
 
     def __init__(self, velocity: VectorLike, force: VectorLike, *, allow_active: bool = False) -> None:
         self.velocity = as_float(velocity, "velocity")
