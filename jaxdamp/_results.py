@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from jaxdamp import _checks
 from jaxdamp._status import Status
-from jaxdamp._tables import Table
+from jaxdamp._tables import Table, plain, with_unit
+from jaxdamp._types import Contents
 
 
 if TYPE_CHECKING:
@@ -29,11 +30,28 @@ class Derived:
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
-    def __get__(self, instance: Any, owner: type | None = None) -> Any:
+    def __get__(self, instance: object, owner: type | None = None) -> Any:
         """The value; a class has none."""
         if instance is None:
             raise AttributeError(f"{self.name} belongs to a result, not to its class")
         return self.function(instance)
+
+
+def drawn_by(name: str, text: str) -> "Callable[..., matplotlib.figure.Figure]":
+    """The method `plot` of a result.
+
+    Arguments:
+        name: of the function in `jaxdamp.plots`, which gets the result and all further arguments.
+        text: what it shows.
+    """
+
+    def plot(self: Any, *values: Any, **options: Any) -> "matplotlib.figure.Figure":
+        from jaxdamp import plots
+
+        return getattr(plots, name)(self, *values, **options)
+
+    plot.__doc__ = f"{text} (`plots.{name}`)"
+    return plot
 
 
 class AbstractResult(ABC):
@@ -71,11 +89,16 @@ class AbstractResult(ABC):
         """All tables of the result by name, the first is `table()`."""
         return {"table": self.table()}
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """What `to_dict` holds beside status, summary and warnings: all tables, unless a class says more."""
         return {name: table.to_dict() for name, table in self.tables().items()}
 
-    def to_dict(self) -> dict[str, Any]:
+    def _data(self, *names: str, **units: str) -> Contents:
+        """Attributes as plain data, those with a unit as a value with its unit."""
+        values = {name: plain(getattr(self, name)) for name in names}
+        return values | {name: with_unit(getattr(self, name), unit) for name, unit in units.items()}
+
+    def to_dict(self) -> Contents:
         """The result as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         status = [s.name.lower() for s in self.status] if isinstance(self.status, tuple) else self.status.name.lower()
         head = {"summary": self.summary, "status": status, "converged": self.converged, "warnings": [*self.warnings]}

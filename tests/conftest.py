@@ -17,12 +17,6 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 os.environ.setdefault("MPLBACKEND", "Agg")
-# Most of the time goes into compiling, once for each test: compile quickly instead of for speed. With the variable set,
-# even to nothing, tests run what users run.
-OLD_EMITTERS = ["--xla_cpu_use_fusion_emitters=false"] * (jax.__version_info__ < (0, 11))
-os.environ.setdefault("XLA_FLAGS", " ".join(["--xla_backend_optimization_level=0", *OLD_EMITTERS]))
-
-
 MAPS = Path("/proc/self/maps")
 MOST_MAPS = 30_000  # Linux allows a process 65 530, and every compiled program takes a few
 MOST_KEPT = 2_000_000_000  # bytes of compiled programs in .pytest_cache

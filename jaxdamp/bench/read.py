@@ -22,7 +22,8 @@ from jaxdamp.bench.ride_record import RideRecord
 from jaxdamp.bench.ride_tables import RideInterpretation, ride_record
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
-from jaxdamp.bench.settings import Settings, settings_by_name
+from jaxdamp.bench.settings import Settings, settings_by_name, settings_in_names
+from jaxdamp.bench.several_tests import tests_apart
 
 
 Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
@@ -260,6 +261,7 @@ def _bench_runs(tables: Sequence[RawTable], name: str, how: Interpretation) -> l
 
     Tables without stroke and force are left out of a file that has others, with a note.
     """
+    tables = [part for table in tables for part in tests_apart(table, how.choice)]
     tables = on_one_clock(tables, how.choice) if len(tables) > 1 else tables
     good = [table for table in tables if is_record(table, how.choice)] or tables
     left_out = ", ".join(repr(table.record) for table in tables if table not in good)
@@ -275,8 +277,19 @@ def _bench_runs(tables: Sequence[RawTable], name: str, how: Interpretation) -> l
 def _with_settings(
     runs: list[tuple[str, BenchRun]], settings: str | Mapping[str, Settings] | None
 ) -> list[tuple[str, BenchRun]]:
-    table = settings_by_name([base for base, _ in runs], settings)
-    return [(base, replace(run, settings={**run.settings, **table[base]})) for base, run in runs]
+    names = [base for base, _ in runs]
+    table, notes = (settings_by_name(names, settings), {}) if settings is not None else settings_in_names(names)
+    return [
+        (
+            base,
+            replace(
+                run,
+                settings={**table[base], **run.settings, **({} if settings is None else table[base])},
+                notes=(*run.notes[:-1], *notes.get(base, ()), *run.notes[-1:]),
+            ),
+        )
+        for base, run in runs
+    ]
 
 
 def _commanded(runs: list[tuple[str, BenchRun]], command: Command | None) -> list[BenchRun]:

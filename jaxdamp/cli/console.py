@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from jaxdamp._display import display
 from jaxdamp._tables import Column, Table
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.wording import message
@@ -40,12 +41,12 @@ class Screen:
 
     def say(self, text: str = "", style: str = "") -> None:
         """A paragraph, taken literally."""
-        self.console.print(literal(text, style), soft_wrap=False)
+        self.console.print(literal(display().words(text), style), soft_wrap=False)
 
     def heading(self, text: str) -> None:
         """A section begins."""
         self.console.print()
-        self.console.print(literal(text, "bold"))
+        self.console.print(literal(display().words(text), "bold"))
 
     def answer(self, *sentences: str) -> None:
         """What the command was asked for, in words."""
@@ -55,7 +56,7 @@ class Screen:
     def points(self, items: Sequence[str], style: str = "") -> None:
         """A list of remarks."""
         for item in items:
-            self.console.print(literal(f"  - {item}", style))
+            self.console.print(literal(f"  - {display().words(item)}", style))
 
     def remarks(self, items: Sequence[str], style: str = "") -> None:
         """The first remarks of a list that is sorted by consequence, and how many more are on the page."""
@@ -72,10 +73,11 @@ class Screen:
     def table(self, table: Table, mark: str | None = None) -> None:
         """A table without its meanings, which are for the files; rows whose first cell is `mark` in bold."""
         shown = RichTable(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+        headings = table.headings()
         visible = [index for index, column in enumerate(table.columns) if column.name != "meaning"]
         for index in visible:
             side = "right" if table.is_number(index) else "left"
-            shown.add_column(literal(table.columns[index].heading), justify=side, overflow="fold", no_wrap=index == 0)
+            shown.add_column(literal(headings[index]), justify=side, overflow="fold", no_wrap=index == 0)
         for row in table.texts():
             shown.add_row(*(literal(row[index]) for index in visible), style="bold" if row[0] == mark else "")
         self.heading(table.title)

@@ -26,11 +26,16 @@ class Output:
         out: folder to write; jaxdamp- and the name of the command if left out.
         replace: write into --out although it is not empty; earlier results go to .previous in it.
         verbose: print all tables and remarks, as the page has them.
+        show_units: units of tables, pictures and CSV: SI, metric (N, mm/s), imperial (lbf, in/s), or a force and a
+            velocity such as kgf,mm/s; --units without quantities means this too.
+        show_sign: direction in which they count positive: rebound-positive or compression-positive.
     """
 
     out: Path | None = None
     replace: bool = False
     verbose: bool = False
+    show_units: str | None = None
+    show_sign: str | None = None
 
 
 class Job(NamedTuple):

@@ -58,6 +58,7 @@ NAMES = {  # of options that differ from the argument, by function or for all; t
 }
 ALIASES = {"--force": "--replace", "--metrics": "--metric"}  # names of before, which still work
 ALIASES_OF = {"export": {"--out": "--file"}, "explore": {"--out": "--file"}}
+ALIASES_OF |= {command: {"--sign": "--show-sign"} for command in ("ride", "tune", "sweep")}  # which read no records
 SHORT = {"verbose": "-v"}
 
 

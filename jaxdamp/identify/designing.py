@@ -2,13 +2,13 @@
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import Excitation
@@ -16,10 +16,6 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.design_goal import WAVEFORMS, Goal, Information, MachineLimits, Point, grid, information, near
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import Rig
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 CRITERIA = ("D", "A", "c")
@@ -97,11 +93,7 @@ class ExperimentDesign(AbstractResult):
         rows = [(t.name, *extent(t), t.highest_frequency, t.duration) for t in self.tests]
         return Table("Runs, the most useful first", columns, tuple(rows))
 
-    def plot(self) -> "Figure":
-        """The runs over stroke and velocity, and the standard errors they give."""
-        from jaxdamp.plots import experiment
-
-        return experiment(self)
+    plot = drawn_by("experiment", "The runs over stroke and velocity, and the standard errors they give.")
 
     @property
     def summary(self) -> str:
@@ -235,8 +227,7 @@ def _check(
     if limits is None and tests is None:
         remedy = "Write `limits=MachineLimits(stroke=0.05, velocity=1.0)` or `tests=[...]`."
         _checks.refuse("limits", "be given, or `tests`", "neither", remedy)
-    if runs < 1:
-        _checks.refuse("runs", "be 1 or more", runs)
+    _checks.counts(runs=runs)
     _checks.positive("force_noise", force_noise)
     _checks.one_of("criterion", criterion, CRITERIA)
     if (criterion == "c") != (function is not None):

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from jaxdamp._triangles import determined, triangle, unit_columns
 from jaxdamp.dampers import Reach, laws_inside
 from jaxdamp.identify.criteria import Priors
-from jaxdamp.identify.estimates import Estimate, Minimum
+from jaxdamp.identify.estimates import WIDER, Estimate, Minimum
 from jaxdamp.identify.identifiability import on_identifiability
 from jaxdamp.identify.model import START_PATH
 from jaxdamp.identify.noise import Noise, noise_of
@@ -27,6 +27,8 @@ BOUND_Z_SCORE = 3.0  # standard errors beyond an edge from which a parameter cou
 NEARLY = 9.0  # largest increase in chi-square of another minimum that is reported: three standard errors
 APART = 3.0  # standard errors beyond which a parameter of another minimum counts as different
 TAKES_PART = 0.1  # force of a parameter in a direction, relative to the largest, above which it belongs to it
+PARTS = 8  # of a cycle, that are left out in turn
+FEWEST_RECORDS = 3  # to be left out in turn
 AT_LIMIT = 1e-4  # distance from a limit given by other parameters, relative to the start, that counts as zero
 
 
@@ -77,6 +79,9 @@ def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     undetermined = ~(moved.errors <= far) | moved.open_ended
     weak = np.where(sides != 0, at_zero | ~np.isfinite(errors), undetermined)
     estimates = _estimates(problem, found, moved.errors, weak, sides != 0, noise.dof)
+    if noise.systematic:
+        spreads = spread_over_parts(problem, found)
+        estimates = tuple(e._replace(spread=max(s, e.standard_error)) for e, s in zip(estimates, spreads, strict=True))
     directions = weak_directions(found.jacobian, float(np.sqrt(variance)), large, WEAK)
     estimates, notes = on_identifiability(problem, found, estimates, directions)
     further = on_minima(minima, estimates) + on_reach(estimates, spans)
@@ -210,14 +215,58 @@ def on_minima(minima: Sequence[Minimum], estimates: Sequence[Estimate]) -> list[
     return notes
 
 
-def on_misfit(noise: Noise) -> list[str]:
-    """A sentence on a residual that is not noise."""
+def spread_over_parts(problem: Problem, found: SearchEnd) -> list[float]:
+    """The standard error of each free number with what the law misses, by the jackknife.
+
+    Without one part of the records, one Gauss-Newton step from the minimum gives the numbers θ₍b₎; their error is
+    √((B − 1)/B Σ (θ₍b₎ − mean)²), the bootstrap's to first order. Parts are the eighths of the cycles of each record,
+    all cycles together since what a law misses returns in each, and the records where there are three or more; the
+    larger error counts. It says how much the numbers depend on which motion was measured, not how far the law is from
+    the damper.
+
+    Arguments:
+        problem: the problem that was minimised.
+        found: the minimum.
+    """
+    scaled, scale = unit_columns(found.jacobian)
+    part, record = np.full(problem.owner.size, -1), np.where(problem.used, problem.owner, -1)
+    for i, run in enumerate(problem.runs):
+        at = np.flatnonzero(record == i)
+        cycle = 1.0 / (problem.sample_steps[i] * run.frequency) if run.frequency > 0 else float(at.size)
+        part[at] = PARTS * i + (PARTS * (np.arange(at.size) % cycle) / max(cycle, 1.0)).astype(int).clip(0, PARTS - 1)
+    errors = [_jackknife(scaled, found.residual, part)]
+    if np.unique(record[record >= 0]).size >= FEWEST_RECORDS:
+        errors.append(_jackknife(scaled, found.residual, record))
+    return [float(error) for error in np.max(errors, axis=0) / scale]
+
+
+def _jackknife(jacobian: np.ndarray, residual: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Standard errors by leaving out each part in turn; samples of a negative part are never left out."""
+    whole, right = jacobian.T @ jacobian, jacobian.T @ residual
+    steps = []
+    for number in np.unique(part[part >= 0]):
+        rows = part == number
+        left = whole - jacobian[rows].T @ jacobian[rows]
+        steps.append(-np.linalg.lstsq(left, right - jacobian[rows].T @ residual[rows], rcond=1e-10)[0])
+    values = np.array(steps)
+    return np.sqrt((len(steps) - 1) * np.mean((values - values.mean(axis=0)) ** 2, axis=0))
+
+
+def on_misfit(noise: Noise, estimates: Sequence[Estimate] = ()) -> list[str]:
+    """A sentence on a residual that is not noise, and for what the intervals then hold."""
     if not noise.systematic:
         return []
+    factors = [
+        (e.spread / e.standard_error, e.name)
+        for e in estimates
+        if e.spread is not None and 0 < e.standard_error < np.inf and not e.note
+    ]
+    factor, name = max(factors, default=(1.0, ""))
+    wider = f"; with what the law misses, the error of {name} is {factor:.2g} times as large" * (factor > WIDER)
     return [
-        "Neighbouring residuals are alike, from cycle to cycle: the law misses something systematic. The standard"
-        " errors count that as noise with the correlation of the residual, which makes them"
-        f" {noise.inflation:.3g} times those of independent noise."
+        "The residual repeats from cycle to cycle: the law misses something systematic, or the machine is left out."
+        f" The intervals hold for this law, not for the damper{wider}. The standard errors count the residual as noise"
+        f" with its correlation, which makes them {noise.inflation:.3g} times those of independent noise."
     ]
 
 

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 import os
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
@@ -11,23 +11,23 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
-from jaxdamp._jacobian import value_and_jacobian
+from jaxdamp._jacobian import value_and_jacobian, with_jacobian
 from jaxdamp._triangles import rows_of_products
 from jaxdamp.bench import BenchRun
-from jaxdamp.identify.criteria import Priors
+from jaxdamp.identify.criteria import HALF, LOSSES, ROUNDS, SETTLED, Priors, noise_factor
+from jaxdamp.identify.dependence import Dependence, Products
 from jaxdamp.identify.model import Model
+from jaxdamp.identify.noise import CORRELATED, correlation_time
+from jaxdamp.identify.problem import ROUNDING
 from jaxdamp.identify.search import condition_margins
 from jaxdamp.identify.traces import Batch, record_batches
 from jaxdamp.parameters import Coordinates
-from jaxdamp.solve import Linearisation
+from jaxdamp.solve import Linearisation, SearchLanes
 
 
 CHUNK_SAMPLES = 32768  # of the records in one call, which should fit into the cache; all calls of a group are alike
-
-
-Products = Float[np.ndarray, "_lanes _columns _columns"]
 
 
 class Group(NamedTuple):
@@ -65,19 +65,12 @@ class Missed(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """Many dampers as one problem; a lane is a set of numbers for one of them.
+    """Many dampers as one problem; a lane is a set of numbers for one of them."""
 
-    Attributes:
-        coordinates: of the free numbers, common to all dampers.
-        groups: the records.
-        damper: the damper of each lane.
-        priors: what is known of the numbers beforehand.
-    """
-
-    coordinates: Coordinates
-    groups: tuple[Group, ...]
-    damper: Int[np.ndarray, " lanes"]
-    priors: LanePriors | None = None
+    coordinates: Coordinates  # of the free numbers, common to all dampers
+    groups: tuple[Group, ...]  # the records
+    damper: Int[np.ndarray, " lanes"]  # the damper of each lane
+    priors: LanePriors | None = None  # what is known of the numbers beforehand
 
     def linearise(
         self, y: Float[np.ndarray, "some free"], lanes: Int[np.ndarray, " some"]
@@ -142,9 +135,8 @@ class Lanes(NamedTuple):
 
     def _pairs(self, group: Group, lanes: Int[np.ndarray, " some"]) -> tuple[np.ndarray, np.ndarray]:
         """Each record of a group with each of these lanes of its damper: the place of the lane, and the record."""
-        fits = self.damper[lanes][:, None] == group.damper[None, :]
-        which, record = np.nonzero(fits)
-        return which, record
+        place, record = np.nonzero(self.damper[lanes][:, None] == group.damper[None, :])
+        return place, record
 
     def _chunks(
         self, group: Group, y: np.ndarray, lane: np.ndarray, record: np.ndarray
@@ -176,11 +168,7 @@ def _prior_rows(coordinates: Coordinates, y: Any, priors: Priors) -> Array:
     """For each lane the derivatives of the residuals of priors, and these in the last column."""
 
     def one(y: Array) -> Array:
-        def residual(y: Array) -> tuple[Array, Array]:
-            missed = priors(coordinates.free.build(coordinates.to_physical(y)))
-            return missed, missed
-
-        slopes, missed = jax.jacfwd(residual, has_aux=True)(y)
+        missed, slopes = with_jacobian(lambda y: priors(coordinates.free.build(coordinates.to_physical(y))))(y)
         return jnp.concatenate([slopes, missed[:, None]], axis=1)
 
     return jax.vmap(one)(y)
@@ -246,3 +234,96 @@ def grouped_records(
     level = np.sqrt(squares)
     numbers = [owner[np.asarray(batch.number)] for batch in batches]
     return tuple(Group(batch, number, level[number]) for batch, number in zip(batches, numbers, strict=True))
+
+
+class Fitted(NamedTuple):
+    """The ends of all dampers, one lane each, and the lanes with the weights of the last round."""
+
+    lanes: Lanes  # with the final weights
+    end: SearchLanes  # of each damper
+    factor: Float[np.ndarray, " dampers"]  # on the noise that weighted residuals show, because of a robust loss
+    share_left_out: Float[np.ndarray, " dampers"]  # of its samples, with less than half weight by a robust loss
+
+
+def noise_level(weighted: list[np.ndarray], free: float | int) -> float:
+    """Standard deviation of the weighted residual of a damper, larger where it is correlated."""
+    size = sum(residual.size for residual in weighted)
+    squares = sum(float(residual @ residual) for residual in weighted) / max(size - free, 1)
+    alike = correlation_time(weighted)
+    return float(np.sqrt(squares * (alike if alike > CORRELATED else 1.0)))
+
+
+def by_rounds(
+    plain: Lanes,
+    end: SearchLanes,
+    loss: str,
+    solve: Callable[[Lanes, Float[np.ndarray, "lanes free"]], SearchLanes],
+    depends: Dependence | None = None,
+) -> Fitted:
+    """Least squares again with new weights, until each damper moves no more; each ends by itself."""
+    free, priors = end.y.shape[1], plain.priors
+    y, products, status, steps = end.y.copy(), end.aux.copy(), list(end.status), end.steps.copy()
+    weights = _Weights(plain, loss)
+    moving = np.isfinite(products[:, -1, -1]) & (products[:, -1, -1] > ROUNDING**2)
+    lanes, levels = plain, plain.levels()
+    for _ in range(ROUNDS if loss != "squares" or priors is not None else 0):
+        noise = weights.updated(lanes.residuals(y), moving, free)
+        if not np.any(moving):
+            break
+        if priors is not None:
+            priors = priors._replace(noise=np.where(moving, noise, priors.noise))
+        lanes = plain._replace(groups=weights.groups(), priors=priors)
+        tried = np.flatnonzero(moving | (depends is not None))
+        again = solve(lanes._replace(damper=tried), y[tried])
+        length = np.sqrt(np.maximum(np.diagonal(again.aux, axis1=1, axis2=2)[:, :-1], 0.0))
+        if depends is None:
+            moved = np.abs(again.y - y[tried]) * length * levels[tried, None]
+            settled = np.all(moved < SETTLED * noise[tried, None], axis=1)
+        else:
+            moved = np.abs(depends.start(again.y) - depends.start(y)) * length[0]
+            settled = np.full(len(y), np.all(moved < SETTLED * np.mean(noise / levels)))
+        y[tried], products[tried] = again.y, again.aux
+        steps[tried] += again.steps
+        for i, ended in zip(tried, again.status, strict=True):
+            status[i] = ended
+        moving[tried[settled]] = False
+    return Fitted(lanes, SearchLanes(y, products, status, steps), weights.factor, weights.share_left_out)
+
+
+class _Weights:
+    """The roots of the weights of all samples by a loss, beside those that are stated."""
+
+    def __init__(self, plain: Lanes, loss: str) -> None:
+        self.plain, self.loss, count = plain, loss, len(plain.damper)
+        self.roots = [np.ones(np.shape(group.batch.weight)) for group in plain.groups]
+        self.factor, self.share_left_out = np.ones(count), np.zeros(count)
+
+    def updated(self, residuals: list[np.ndarray], moving: np.ndarray, free: int) -> Float[np.ndarray, " dampers"]:
+        """Take the weights from weighted residuals of the dampers that move; the noise of each, one for the others."""
+        noise = np.ones(len(self.factor))
+        for i in np.flatnonzero(moving):
+            rows = list(self._rows(int(i)))
+            weighted = [residuals[g][k][at] for g, k, at in rows]
+            noise[i] = self.factor[i] * noise_level(weighted, free)
+            together = np.concatenate([w / self.roots[g][k][at] for w, (g, k, at) in zip(weighted, rows, strict=True)])
+            spread = 1.4826 * float(np.median(np.abs(together))) if self.loss != "squares" else 1.0
+            moving[i] = spread > 0
+            if moving[i]:
+                weight = LOSSES[self.loss].weight(together / spread)
+                self.factor[i] = noise_factor(LOSSES[self.loss], together / spread)
+                self.share_left_out[i] = np.mean(weight < HALF)
+                ends = np.cumsum([w.size for w in weighted])[:-1]
+                for (g, k, at), root in zip(rows, np.split(np.sqrt(weight), ends), strict=True):
+                    self.roots[g][k, at] = root
+        return noise
+
+    def groups(self) -> tuple[Group, ...]:
+        """The records with these weights."""
+        pairs = zip(self.plain.groups, self.roots, strict=True)
+        return tuple(group._replace(batch=group.batch.reweighted(root.ravel())) for group, root in pairs)
+
+    def _rows(self, damper: int) -> Iterator[tuple[int, int, Bool[np.ndarray, " time"]]]:
+        """Group and row of each record of a damper, with its samples that count."""
+        for g, group in enumerate(self.plain.groups):
+            for k in np.flatnonzero(group.damper == damper):
+                yield g, int(k), np.asarray(group.batch.weight[k]) > 0

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Shown, Table, plain, with_unit
 from jaxdamp.bench import BenchRun
@@ -25,8 +25,6 @@ from jaxdamp.rig import Rig
 
 
 if TYPE_CHECKING:
-    import matplotlib.figure
-
     from jaxdamp.identify.law_result import FitResult
 
 
@@ -218,11 +216,7 @@ class ManyFits(AbstractResult):
             f"{type(law_of(self.free.tree)).__name__} fitted to {len(self)} dampers", tuple(columns), tuple(rows)
         )
 
-    def plot(self) -> "matplotlib.figure.Figure":
-        """The parameters and errors of all dampers side by side (`plots.many_fits`)."""
-        from jaxdamp import plots
-
-        return plots.many_fits(self)
+    plot = drawn_by("many_fits", "The parameters and errors of all dampers side by side.")
 
     def content(self) -> dict[str, Any]:
         """The fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""

@@ -141,15 +141,7 @@ def ride_batches(
     settling: float = 0.0,
     per_record: tuple[str, ...] = (),
 ) -> list[RideBatch]:
-    """Records in groups that are driven together, in the order of their first members.
-
-    Arguments:
-        records: the records.
-        drives: how each is simulated.
-        sigma: standard deviation of each channel, by which its residuals are divided.
-        settling: time at the beginning of each record that is not compared [s].
-        per_record: paths where the model has a value for each record.
-    """
+    """Records in groups that are driven together, in the order of their first members."""
     groups: dict[tuple, list[int]] = {}
     for i, (record, drive) in enumerate(zip(records, drives, strict=True)):
         forces = record.driven_by == "forces"

@@ -6,6 +6,7 @@ touches pyplot or its global state, and matplotlib is loaded by the first call o
 
 from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
+from jaxdamp.plots.curve_family import force_velocity_family as force_velocity_family
 from jaxdamp.plots.curves import force_velocity
 from jaxdamp.plots.damper_sheet import damper_sheet as damper_sheet
 from jaxdamp.plots.damper_use import damper_use
@@ -54,25 +55,4 @@ __all__ = [
     "sweep",
     "tuning",
     "valving",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "cross_validation",
-    "damper_comparison",
-    "damper_sheet",
-    "experiment",
-    "fit_loops",
-    "gas_and_friction",
-    "limit_check",
-    "many_fits",
-    "posterior",
-    "profile",
-    "record_sensitivity",
-    "rescore",
-    "ride_sheet",
-    "roughness_by_segment",
-    "roughness_spectrum",
-    "targets",
-    "training_history",
-    "vehicle_fit",
 ]

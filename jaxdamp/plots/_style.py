@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
 from jaxdamp.dampers import AbstractDamper, Sum
 
@@ -201,14 +202,42 @@ def label_ends(axes: "matplotlib.axes.Axes", lines: Sequence["matplotlib.lines.L
 
 
 def dress(axes: "matplotlib.axes.Axes", x: str, y: str, title: str = "") -> None:
-    """Labels, a light grid, and no frame above and to the right."""
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
+    """Labels, a light grid, and no frame above and to the right; ticks in the units and the sign that are shown.
+
+    The numbers drawn are those of the library: where the labels name a unit that is shown otherwise, the ticks are
+    round numbers of the other unit, and an axis of the other sign runs the other way.
+    """
+    axes.set_xlabel(display().text(x))
+    axes.set_ylabel(display().text(y))
+    for axis, label in ((axes.xaxis, x), (axes.yaxis, y)):
+        _rescale(axis, label)
     if title:
-        axes.set_title(title, loc="left", fontsize="medium")
+        axes.set_title(display().words(title), loc="left", fontsize="medium")
     axes.grid(True, color="0.9", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _rescale(axis: "matplotlib.axis.Axis", label: str) -> None:
+    """Ticks of an axis in the unit and the sign that are shown, by the unit in its label."""
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    found = re.search(r"\[([^\[\]]+)\]", label)
+    shown = display().of(found[1] if found else "", signed=display().text(label) != label and "+" in label)
+    if shown.factor == 1.0 or axis.get_scale() != "linear":
+        return
+
+    class Ticks(MaxNLocator):
+        def tick_values(self, vmin: float, vmax: float) -> Any:
+            ends = sorted((shown(vmin), shown(vmax)))
+            return np.sort(super().tick_values(*ends) / shown.factor)
+
+    axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 5, 10]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(shown(value), 9) + 0.0:g}".replace("-", "−")))
+    if shown.factor < 0.0:
+        axis.set_inverted(True)
+        change = f"{axis.axis_name}lim_changed"
+        axis.axes.callbacks.connect(change, lambda _: None if axis.get_inverted() else axis.set_inverted(True))
 
 
 def cross(axes: "matplotlib.axes.Axes", horizontal: bool = True, vertical: bool = True) -> None:
@@ -221,23 +250,31 @@ def cross(axes: "matplotlib.axes.Axes", horizontal: bool = True, vertical: bool 
 
 def legend_beside(
     figure: "matplotlib.figure.Figure",
-    handles: Sequence[Any],
+    handles: Sequence[object],
     title: str = "",
     place: Literal["upper", "lower"] = "upper",
 ) -> None:
     """A legend to the right of all axes, never over data."""
+    _in_words(handles)
     where = "outside right upper" if place == "upper" else "outside right lower"
     figure.legend(handles=list(handles), loc=where, frameon=False, title=title or None, alignment="left")
 
 
-def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[Any], columns: int = 3) -> None:
+def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[object], columns: int = 3) -> None:
     """A legend above all axes, for pictures that need their width."""
+    _in_words(handles)
     figure.legend(
         handles=list(handles), loc="outside upper center", frameon=False, ncols=min(columns, max(len(handles), 1))
     )
 
 
-def by_name(argument: str, given: Any, kind: type, words: str, remedy: str, alone: str = "") -> dict[str, Any]:
+def _in_words(handles: Sequence[Any]) -> None:
+    """The labels of a legend in the units that are shown."""
+    for handle in handles:
+        handle.set_label(display().words(str(handle.get_label())))
+
+
+def by_name(argument: str, given: object, kind: type, words: str, remedy: str, alone: str = "") -> dict[str, Any]:
     """One object to draw, or several by name, as a dictionary; `alone` names a single one.
 
     Arguments:
@@ -262,7 +299,11 @@ def by_name(argument: str, given: Any, kind: type, words: str, remedy: str, alon
 
 def note_below(figure: "matplotlib.figure.Figure", sentences: Sequence[str]) -> None:
     """Remarks in small print under all axes; nothing if there are none."""
-    lines = [line for sentence in sentences for line in textwrap.wrap(sentence, int(11 * figure.get_figwidth()))]
+    lines = [
+        line
+        for sentence in map(display().words, sentences)
+        for line in textwrap.wrap(sentence, int(11 * figure.get_figwidth()))
+    ]
     if lines:
         figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize="small", color="0.35")
 

@@ -124,7 +124,7 @@ def _draw_band(
     values: Float[np.ndarray, " points"],
     force: Float[np.ndarray, " points"],
     scatter: Float[np.ndarray, " points"],
-    colour: Any,
+    colour: object,
 ) -> None:
     """A band about a loop, drawn from the smallest value to the largest and back, so that it does not cover itself."""
     first, last = sorted((int(np.argmin(values)), int(np.argmax(values))))

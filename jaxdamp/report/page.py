@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jaxdamp._display import display
 from jaxdamp._tables import Table
 from jaxdamp.report.attempts import Attempts
 
@@ -112,7 +113,7 @@ class Report:
 
     def heading(self, text: str) -> None:
         """Start a section; the page begins with links to all of them. Below a sheet sections are folded."""
-        self._headings.append(text)
+        self._headings.append(display().words(text))
         self._sections.append([])
 
     def sheet(self, figure: "Callable[[], Figure]", finding: str, name: str) -> None:
@@ -149,10 +150,10 @@ class Report:
     def points(self, items: Sequence[str]) -> None:
         """A list of remarks; nothing if it is empty."""
         if items:
-            self._add(_points([self.attempts.words(item) for item in items]))
+            self._add(_points([display().words(self.attempts.words(item)) for item in items]))
 
     def _escaped(self, sentence: str) -> str:
-        return html.escape(self.attempts.words(sentence))
+        return html.escape(display().words(self.attempts.words(sentence)))
 
     def table(self, table: Table) -> None:
         """A table."""
@@ -171,8 +172,9 @@ class Report:
             name: of the file, such as "ride.png".
         """
         with self.part(f"The picture {name}"):
-            image = self._image(figure() if callable(figure) else figure, caption, name)
-            self._add(f"<figure>{image}<figcaption>{html.escape(caption)}</figcaption></figure>")
+            words = display().words(caption)
+            image = self._image(figure() if callable(figure) else figure, words, name)
+            self._add(f"<figure>{image}<figcaption>{html.escape(words)}</figcaption></figure>")
 
     def _image(self, figure: "Figure", words: str, name: str) -> str:
         """A figure as an element of the page, and as a file if the report has a folder."""

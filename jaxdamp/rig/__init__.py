@@ -3,6 +3,7 @@
 from jaxdamp.rig.constant_velocity import QuasiStatic as QuasiStatic, quasi_static
 from jaxdamp.rig.machine import Readings as Readings, Rig
 from jaxdamp.rig.marching import march as march, solve_law as solve_law
+from jaxdamp.rig.numbers import LawNumbers as LawNumbers, is_number as is_number, numbers_of as numbers_of
 from jaxdamp.rig.response import AbstractLawEngine as AbstractLawEngine, StartsInMotionWarning, respond
 from jaxdamp.rig.sensor import Sensor
 
@@ -13,12 +14,4 @@ __all__ = [
     "StartsInMotionWarning",
     "quasi_static",
     "respond",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "AbstractLawEngine",
-    "QuasiStatic",
-    "Readings",
-    "march",
-    "solve_law",
 ]

@@ -13,14 +13,12 @@ from jaxtyping import Array, Float, Int
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._tables import Table, with_unit
-from jaxdamp._types import Scalar, Signal
+from jaxdamp._types import Contents, Scalar, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import Metric
 from jaxdamp.simulation.energy import absorbed_by, energy_balance
-from jaxdamp.simulation.notes import tyres_in_tension
-from jaxdamp.simulation.range_notes import range_sentences, range_uses
-from jaxdamp.simulation.ride_metrics import Comfort, comfort, ride_metrics
-from jaxdamp.simulation.tables import comfort_table, comfort_units, metrics_table
+from jaxdamp.simulation.notes import range_sentences, range_uses, tyres_in_tension
+from jaxdamp.simulation.ride_metrics import Comfort, comfort, comfort_table, comfort_units, metrics_table, ride_metrics
 from jaxdamp.simulation.wheels import AxleTiming
 from jaxdamp.vehicles import AbstractVehicle, LinearMap, System
 
@@ -221,7 +219,7 @@ class Response(eqx.Module, AbstractResult):
         """Comfort by ISO 2631-1 of every acceleration, with units."""
         return comfort_table({"value": self})
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Metrics, comfort, energies and notes of the run, ready for JSON; numbers that are not finite are None."""
         values, comfort = self.metrics(), self.comfort()
         return {

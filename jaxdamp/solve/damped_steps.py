@@ -41,39 +41,22 @@ class Linearisation(NamedTuple):
 
 
 class State(NamedTuple):
-    """The accepted point with its linearised problem, and the point to be tried next; all with the axes of the lanes.
+    """The accepted point with its linearised problem, and the point to be tried next, with the axes of the lanes."""
 
-    Attributes:
-        trial: the point to be tried.
-        triangle: of the rows of the accepted point.
-        scale: of the damping: the largest norms of the Jacobian's columns so far (as in MINPACK).
-        conditions: slopes of the conditions, of length one.
-        least: of the conditions times a step.
-        step_size: inverse of the damping.
-        predicted: decrease of half the sum of squares at the point to be tried.
-        floor: of a decrease that counts.
-        short: whether the step is shorter than the tolerances.
-        whole: whether it is the step without damping.
-        steps: points tried.
-        converged: whether the search has ended by its tolerance.
-        stuck: whether there is no further step.
-        aux: what the residual gives beside its value at the accepted point.
-    """
-
-    trial: Any
-    triangle: Any
-    scale: Any
-    conditions: Any
-    least: Any
-    step_size: Any
-    predicted: Any
-    floor: Any
-    short: Any
-    whole: Any
-    steps: Any
-    converged: Any
-    stuck: Any
-    aux: Any
+    trial: Any  # the point to be tried
+    triangle: Any  # of the rows of the accepted point
+    scale: Any  # of the damping: the largest norms of the Jacobian's columns so far (as in MINPACK)
+    conditions: Any  # slopes of the conditions, of length one
+    least: Any  # of the conditions times a step
+    step_size: Any  # inverse of the damping
+    predicted: Any  # decrease of half the sum of squares at the point to be tried
+    floor: Any  # of a decrease that counts
+    short: Any  # whether the step is shorter than the tolerances
+    whole: Any  # whether it is the step without damping
+    steps: Any  # points tried
+    converged: Any  # whether the search has ended by its tolerance
+    stuck: Any  # whether there is no further step
+    aux: Any  # what the residual gives beside its value at the accepted point
 
 
 class _Proposal(NamedTuple):

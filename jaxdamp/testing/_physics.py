@@ -17,11 +17,12 @@ from jaxdamp.testing._probes import (
     predicted_and_advanced,
     random_motions,
     rates,
+    require,
+    require_equal,
     response_and_gradient,
     responses,
     sines,
 )
-from jaxdamp.testing._require import require, require_equal
 
 
 def check_finite(law: AbstractDamper) -> None:

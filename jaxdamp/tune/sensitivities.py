@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._jacobian import with_jacobian
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers import AbstractMemoryless
@@ -239,31 +240,23 @@ def _derivatives(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The metrics, shape (names,), and their derivatives, shape (names, numbers)."""
 
-    @eqx.filter_jit
-    def both(x: jax.Array) -> tuple[jax.Array, jax.Array]:
-        def stacked(x: jax.Array) -> tuple[jax.Array, jax.Array]:
-            results = measured(x)
-            values = jnp.stack([results[name] for name in names])
-            return values, values
+    def stacked(x: jax.Array) -> jax.Array:
+        results = measured(x)
+        return jnp.stack([results[name] for name in names])
 
-        return jax.jacfwd(stacked, has_aux=True)(x)
-
-    slopes, values = both(jnp.asarray(point))
+    values, slopes = eqx.filter_jit(with_jacobian(stacked))(jnp.asarray(point))
     return np.asarray(values, float), np.asarray(slopes, float)
 
 
 def _second(measured: Callable[[Any], Any], names: Sequence[str], point: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """Second derivatives by some of the numbers, shape (names, chosen, chosen)."""
+    start = jnp.asarray(point)
 
-    @eqx.filter_jit
-    def twice(x: jax.Array) -> jax.Array:
-        def stacked(part: jax.Array) -> jax.Array:
-            results = measured(x.at[chosen].set(part))
-            return jnp.stack([results[name] for name in names])
+    def stacked(part: jax.Array) -> jax.Array:
+        results = measured(start.at[chosen].set(part))
+        return jnp.stack([results[name] for name in names])
 
-        return jax.jacfwd(jax.jacfwd(stacked))(x[chosen])
-
-    return np.asarray(twice(jnp.asarray(point)), float)
+    return np.asarray(eqx.filter_jit(jax.jacfwd(jax.jacfwd(stacked)))(start[chosen]), float)
 
 
 def _curve_parts(
@@ -286,10 +279,6 @@ class ForceHats(AbstractMemoryless):
     """A force that is linear between velocities at equal distances, zero at standstill, constant beyond the ends.
 
     Its derivative by one of its forces is the hat function around that velocity, exactly.
-
-    Arguments:
-        spacing: of the velocities [m/s], which are ±1, ±2, ... times this.
-        forces: at these velocities, increasing [N], shape (2 k,).
     """
 
     spacing: Number = setting("m/s", "spacing of the velocities", positive)
@@ -311,14 +300,7 @@ class ForceHats(AbstractMemoryless):
 
 
 def with_hats(vehicle: V, path: str, reach: float, count: int) -> V:
-    """The vehicle with hats of zero force beside the law at a path.
-
-    Arguments:
-        vehicle: with the law.
-        path: of the law.
-        reach: largest velocity of the hats [m/s].
-        count: number of hats on each side.
-    """
+    """The vehicle with hats of zero force beside the law at a path."""
     hats = ForceHats(reach / count, np.zeros(2 * count))
     return eqx.tree_at(lambda car: get(car, path), vehicle, get(vehicle, path) + hats)
 

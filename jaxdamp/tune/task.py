@@ -1,6 +1,7 @@
-"""The task of a search over designs of a vehicle: objectives, free parameters, limits and shapes."""
+"""The task of a search over designs of a vehicle: objectives, free parameters, limits and shapes; its doubts."""
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, NamedTuple, final
 
 import numpy as np
@@ -8,20 +9,85 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp.dampers import has_fitted_range
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import stationary_notes
+from jaxdamp.simulation import (
+    DEVIATIONS,
+    CoarseStepWarning,
+    Ride,
+    far_outside,
+    over_runs,
+    range_sentences,
+    stationary_notes,
+)
 from jaxdamp.solve import Evaluation, Region
 from jaxdamp.tune.limits import Limit, LimitRange, limit_ends, limit_ranges, scaled
 from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
 from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import V
-from jaxdamp.tune.run_notes import range_notes, rides_on, step_notes
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import LEAST, RUN
 from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
+
+
+def rides_on(
+    road: Road | Scenarios, metrics: Sequence[Metric], run: Mapping[str, Any]
+) -> list[Callable[[AbstractVehicle], Ride]]:
+    """For each road a function that makes the checked ride of a vehicle on it, in no special condition."""
+    roads = [s.road for s in road.scenarios] if isinstance(road, Scenarios) else [road]
+    distinct = list({id(one): one for one in roads}.values())
+
+    def on(one: Road) -> Callable[[AbstractVehicle], Ride]:
+        return lambda vehicle: Ride(vehicle, one, metrics=metrics, **run)
+
+    return [on(one) for one in distinct]
+
+
+def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]) -> list[str]:
+    """A sentence if the step is too long or too coarse for the tuned vehicle, or if its laws need more substeps."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("ignore")
+        taken = ride_of(start).substeps
+        warnings.simplefilter("always", CoarseStepWarning)
+        try:
+            needed = ride_of(tuned).substeps
+        except ValueError as error:
+            return [f"The tuned vehicle does not bear the step. {error}"]
+    notes = [str(warning.message) for warning in caught]
+    if needed > taken:
+        notes.append(
+            f"The tuned laws need {needed} steps between two instants, and the search took {taken}: tune again from "
+            "this result."
+        )
+    return notes
+
+
+def range_notes(
+    start: AbstractVehicle, tuned: AbstractVehicle, rides: Sequence[Callable[[AbstractVehicle], Ride]]
+) -> tuple[list[str], list[str]]:
+    """A sentence for each damper used outside its fitted range, before and after the tuning; and by how much, briefly.
+
+    Arguments:
+        start: the vehicle before.
+        tuned: the vehicle after.
+        rides: the ride of a vehicle on each road; on a white road, velocities up to three standard deviations are
+            compared.
+    """
+    if not rides or not has_fitted_range((start, tuned)):
+        return [], []
+    notes, uses = [], {}
+    for when, vehicle in (("At the start", start), ("After the tuning", tuned)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", CoarseStepWarning)  # reported by the notes on the step
+            ridden = [ride_of(vehicle) for ride_of in rides]
+        white = isinstance(ridden[0].road, WhiteRoad)
+        reach = f" (velocities of {DEVIATIONS:g} standard deviations)" if white else ""
+        uses = over_runs([ride.range_use() for ride in ridden])
+        notes += [f"{when}{reach}, {sentence}" for sentence in range_sentences(uses)]
+    return notes, far_outside(uses)
 
 
 class Tolerance(NamedTuple):
@@ -38,13 +104,6 @@ DOUBLE, SINGLE = Tolerance(1e-4, 1e-6, 1e-13), Tolerance(1e-2, 1e-4, 1e-6)
 @final
 class DesignTask(Generic[V]):
     """The numbers that a search computes of a vehicle, and the ranges in which they must stay.
-
-    Arguments:
-        objectives: one or more, as the `metric` of `minimise`.
-        vehicle: to start from.
-        road: as in `minimise`.
-        argument: name of the objectives in messages.
-        settings: all of them, as in `minimise`.
 
     Attributes:
         objective: all objectives, with their metrics.
@@ -95,11 +154,7 @@ class DesignTask(Generic[V]):
         return dict(zip(self.names, map(float, values), strict=True))
 
     def limits(self, before: Mapping[str, float]) -> list[Limit]:
-        """All limits, in every scenario, their distances scaled by the numbers of the start.
-
-        Raises:
-            ValueError: a start without finite metrics; only a true peak or settling time beside a smooth one may be so.
-        """
+        """All limits, in every scenario, their distances scaled by the numbers of the start."""
         exact = {m.name for m in self.objective.beside}
         wrong = {name: x for name, x in before.items() if name not in exact and not np.isfinite(x)}
         if wrong:
@@ -141,10 +196,6 @@ class DesignTask(Generic[V]):
 @final
 class Evaluator:
     """The rows that a search follows, at points given by their coordinates: objectives, then ends of limits.
-
-    Arguments:
-        task: with the metrics and the free parameters.
-        lanes: points simulated side by side.
 
     Attributes:
         program: that computes the numbers.
@@ -218,14 +269,7 @@ def is_white(road: Any) -> bool:
 
 
 def check_call(call: str, vehicle: Any, road: Any, counts: Mapping[str, Any]) -> None:
-    """Refuse what is no vehicle or no road, and counts below their least value.
-
-    Arguments:
-        call: as it should be written, for messages.
-        vehicle: the argument of this name.
-        road: the argument of this name.
-        counts: value by argument; the others are not looked at.
-    """
+    """Refuse what is no vehicle or no road, and counts below their least value."""
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
     _checks.untraced("vehicle", vehicle, "Call it outside `jax.jit` and `jax.grad`; a `Ride` can be traced.")
     if not isinstance(road, Scenarios):

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from jaxdamp import bench, identify, plots, roads, tune, vehicles
+from jaxdamp._guesses import shared_names
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.dampers import Bilinear
 from jaxdamp.identify import Posterior, Spread, TargetFit
@@ -94,7 +95,7 @@ def test_a_tuning_on_other_roads() -> None:
 def test_every_result_with_a_table_has_a_picture() -> None:
     words = {"LimitCheck", "Table", "Report", "MetricValues"}  # drawn by the evaluation, or numbers of other results
     for package in (bench, identify, roads, tune, vehicles):
-        for name in [*package.__all__, *getattr(package, "__shared__", ())]:
+        for name in [*package.__all__, *shared_names(package)]:
             kind = getattr(package, name)
             if isinstance(kind, type) and hasattr(kind, "table") and name not in words:
                 assert hasattr(kind, "plot"), f"{name} has a table and no picture"

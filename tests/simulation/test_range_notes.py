@@ -18,7 +18,7 @@ from jaxdamp.dampers import (
     RangeUse,
     with_fitted_range,
 )
-from jaxdamp.simulation import over_runs, range_notes
+from jaxdamp.simulation import notes, over_runs
 from jaxdamp.vehicles import AbstractVehicle, presets
 
 
@@ -62,7 +62,7 @@ def test_within_the_range_and_without_one_nothing_is_said(monkeypatch):
     for law in (with_fitted_range(LAW, WIDE), LAW):
         response = simulate(*half_car(law), **TIMES)
         assert response.notes == () and bool(response.range_use()) == (law is not LAW)
-    monkeypatch.setattr(range_notes, "named_laws", None)  # it would raise if it were called
+    monkeypatch.setattr(notes, "named_laws", None)  # it would raise if it were called
     assert simulate(*half_car(LAW), **TIMES).notes == ()
 
 

@@ -10,7 +10,7 @@ import pytest
 from jaxdamp import dampers, roads, tune
 from jaxdamp.tune import Outcome, Rescore, Status, TuneResult
 from jaxdamp.tune.limits import limit_ranges
-from jaxdamp.tune.result import Change
+from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.verdict import decided, half_interval
 from jaxdamp.vehicles import presets
 
