@@ -120,8 +120,12 @@ class AbstractResult(ABC):
 
 
 def plotted(
-    kind: Any, kinds: Mapping[str, Callable[..., Any]], result: "AbstractResult", before: str = "", **options: Any
-) -> Any:
+    kind: object,
+    kinds: "Mapping[str, Callable[..., matplotlib.figure.Figure]]",
+    result: "AbstractResult",
+    before: str = "",
+    **options: object,
+) -> "matplotlib.figure.Figure":
     """The picture of a result of the kind that `result.plot(kind)` names.
 
     Arguments:
@@ -137,8 +141,9 @@ def plotted(
     if before and not isinstance(kind, str):
         warnings.warn(f"Write `plot({before}=...)`: `kind` comes first now.", DeprecationWarning, stacklevel=3)
         kind, options = next(iter(kinds)), {before: kind, **options}
-    _checks.one_of("kind", kind, kinds)
-    return kinds[kind](result, **options)
+    name = str(kind)
+    _checks.one_of("kind", name, kinds)
+    return kinds[name](result, **options)
 
 
 def worst_status(statuses: Iterable[Status]) -> Status:

@@ -183,7 +183,7 @@ class FitResult(AbstractFitted, Fit):
         """Law, errors, scores and parameters as plain data."""
         return AbstractFitted.content(self) | Fit.content(self) | {"error_shares": plain(self.error_shares._asdict())}
 
-    def plot(self, kind: str | Iterable[BenchRun] = "loops", **options: Any) -> "Figure":
+    def plot(self, kind: str | Iterable[BenchRun] = "loops", **options: object) -> "Figure":
         """Loops of force over velocity and over stroke, measured and fitted, with residuals; or the damper's sheet.
 
         Arguments:

@@ -41,7 +41,7 @@ class Rides:
     cars: tuple[AbstractVehicle, AbstractVehicle]
     responses: tuple[Response, Response] | None  # None on a white road
     road: Any
-    run: Mapping[str, Any]
+    run: Mapping[str, object]
     values: tuple[Mapping[str, float], Mapping[str, float]]
     units: Mapping[str, str]
     limits: Mapping[str, tuple[float, float]]
@@ -64,7 +64,7 @@ class Rides:
         return cls(("before", "after"), cars, responses, road, run, sides, result.units, limits, result.fresh, result)
 
     @classmethod
-    def of_responses(cls, rides: Mapping[str, Response], limits: Mapping[str, Any] | None) -> "Rides":
+    def of_responses(cls, rides: Mapping[str, Response], limits: Mapping[str, object] | None) -> "Rides":
         """Rides on one road, the first against the last."""
         first, last = next(iter(rides)), list(rides)[-1]
         pair = (rides[first], rides[last])
@@ -110,7 +110,7 @@ class Rides:
         rate = np.abs(np.asarray(self.responses[0].road_rate)[:, 0])
         return float(np.mean(rate > 1e-3 * rate.max())) < _EVENT if rate.max() > 0.0 else True
 
-    def styles(self) -> list[tuple[str, dict[str, Any], int]]:
+    def styles(self) -> list[tuple[str, _style.Look, int]]:
         """Label, look and number of what is drawn: one ride, or before and after."""
         if self.single:
             return [("", dict(_style.AFTER), 1)]

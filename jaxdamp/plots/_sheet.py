@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 A4 = (8.27, 11.69)  # inch
 SMALL = 7.5  # pt, of tables
-_TEXT: dict[str, Any] = {"va": "top", "linespacing": 1.35}
+_TEXT: _style.Look = {"va": "top", "linespacing": 1.35}
 
 
 def page() -> "matplotlib.figure.Figure":

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import matplotlib.lines
 
 
+Look = dict[str, Any]  # keywords of a line, patch or text
 # Every two of these, and black, differ for each kind of colour vision, and all stand out 3:1 from white paper.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#9933FF", "#663300", "#001A99")
 DASHES = ("-", "--", "-.", ":")
@@ -28,11 +29,11 @@ GREY = "#6B6B6B"
 SHADE = "#F5EEDF"  # behind what is extrapolated
 GOOD, DOUBT, BAD = "#00755A", "#9A5B00", "#B00020"  # of a verdict; what is beyond a limit is BAD
 # What a line means, the same in every picture, on every page and in notebooks.
-MEASURED: dict[str, Any] = {"color": GREY, "linestyle": "-"}
-BEFORE: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": 1.3, "zorder": 2.5}
-AFTER: dict[str, Any] = {"color": COLOURS[0], "linestyle": "-", "linewidth": 2.0}
-REFERENCE: dict[str, Any] = {"color": "#949494", "linestyle": "-", "linewidth": 3.5, "zorder": 1.5}
-LIMIT: dict[str, Any] = {"color": BAD, "linestyle": "--", "linewidth": 1.2}
+MEASURED: Look = {"color": GREY, "linestyle": "-"}
+BEFORE: Look = {"color": BLACK, "linestyle": "--", "linewidth": 1.3, "zorder": 2.5}
+AFTER: Look = {"color": COLOURS[0], "linestyle": "-", "linewidth": 2.0}
+REFERENCE: Look = {"color": "#949494", "linestyle": "-", "linewidth": 3.5, "zorder": 1.5}
+LIMIT: Look = {"color": BAD, "linestyle": "--", "linewidth": 1.2}
 REBOUND, COMPRESSION = COLOURS[0], COLOURS[1]  # where both are on one axis
 FRONT, REAR = "-", "-."
 
@@ -68,14 +69,12 @@ def new_figure(width: float, height: float) -> "matplotlib.figure.Figure":
     return Figure(figsize=(width, height), dpi=100, layout="constrained")
 
 
-def line_style(index: int) -> dict[str, Any]:
+def line_style(index: int) -> Look:
     """Colour and dash of the curve of that number; the dash changes once the colours are used up."""
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index // len(COLOURS) % len(DASHES)]}
 
 
-def design_styles(
-    names: Sequence[str], before: str | None = None, reference: str | None = None
-) -> dict[str, dict[str, Any]]:
+def design_styles(names: Sequence[str], before: str | None = None, reference: str | None = None) -> dict[str, Look]:
     """How to draw designs by name: the first is blue, the next have other colours; of many, other dashes too.
 
     Arguments:
@@ -89,7 +88,7 @@ def design_styles(
     return {name: dict(special[name]) if name in special else styles[name] for name in names}
 
 
-def ride_styles(names: Sequence[str], reference: str | None = None) -> dict[str, dict[str, Any]]:
+def ride_styles(names: Sequence[str], reference: str | None = None) -> dict[str, Look]:
     """`design_styles` of rides: the first of several is what the last one, the result, is compared with."""
     before = names[0] if reference is None and len(names) > 1 else None
     styles = design_styles([*names][:: -1 if before is not None else 1], before, reference)
@@ -274,7 +273,7 @@ def _in_words(handles: Sequence[Any]) -> None:
         handle.set_label(display().words(str(handle.get_label())))
 
 
-def by_name(argument: str, given: object, kind: type, words: str, remedy: str, alone: str = "") -> dict[str, Any]:
+def by_name(argument: str, given: object, kind: type, words: str, remedy: str, alone: str = "") -> Look:
     """One object to draw, or several by name, as a dictionary; `alone` names a single one.
 
     Arguments:

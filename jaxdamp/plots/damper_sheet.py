@@ -56,7 +56,7 @@ class _Damper:
         return tuple(self.evaluation.runs)
 
     @functools.cached_property
-    def colours(self) -> dict[str, Any]:
+    def colours(self) -> _style.Look:
         """The colour of each setting; a single one is measured grey."""
         names = list(self.evaluation.settings)
         return {n: _style.graded(i, len(names)) if len(names) > 1 else _style.GREY for i, n in enumerate(names)}
@@ -171,9 +171,9 @@ def _force_velocity(
         axes.legend(loc="best", frameon=False)
 
 
-def _records(axes: "matplotlib.axes.Axes", damper: _Damper) -> list[Any]:
+def _records(axes: "matplotlib.axes.Axes", damper: _Damper) -> list:
     """Loops and peak-velocity points of each setting; the lines through the points."""
-    lines: list[Any] = []
+    lines: list = []
     for setting, runs in damper.evaluation.settings.items():
         colour = damper.colours[setting]
         for run in spread(runs, _MOST_LOOPS):
@@ -260,7 +260,7 @@ def _loops(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
         part = np.append(cycle, cycle[0])  # closed
         stroke = _MM * run.stroke[part]
         force = run.force[part] - damper.static_force
-        broad: dict[str, Any] = {"linewidth": 3.0, "alpha": 0.35} if fitted else {"linewidth": 1.2}
+        broad: _style.Look = {"linewidth": 3.0, "alpha": 0.35} if fitted else {"linewidth": 1.2}
         axes.plot(stroke, force, color=colour, **broad)
         if run.name in fitted:
             expected = fitted[run.name][part] - damper.static_force

@@ -42,7 +42,7 @@ def evaluation(
     handles = []
     if baseline is not None:
         _checks.instance("baseline", baseline, Evaluation, "be an evaluation", _REMEDY)
-        style: dict[str, Any] = {"color": _style.GREY, "linestyle": "--", "linewidth": 1.0, "zorder": 1.5}
+        style: _style.Look = {"color": _style.GREY, "linestyle": "--", "linewidth": 1.0, "zorder": 1.5}
         for run in baseline.runs:
             _draw_cycle(panels, baseline.cycles[run.name], style)
         _draw_forces(panels["peaks"], baseline, dict.fromkeys(baseline.settings, style))
@@ -58,7 +58,7 @@ def evaluation(
     _draw_forces(panels["peaks"], evaluation, styles)
     handles += [Line2D([], [], color=colour, linewidth=2.0, label=label) for label, colour in labels]
     handles.append(Line2D([], [], color=_style.GREY, linewidth=7.0, alpha=0.3, label="± scatter over cycles"))
-    marks: dict[str, Any] = {"marker": "o", "markerfacecolor": "white", "color": _style.BLACK, "linestyle": ""}
+    marks: _style.Look = {"marker": "o", "markerfacecolor": "white", "color": _style.BLACK, "linestyle": ""}
     handles.append(Line2D([], [], label="at peak velocity", **marks))
     handles.append(Line2D([], [], label="at stated velocity", **{**marks, "marker": "D", "markerfacecolor": None}))
     handles += _draw_limits(panels["peaks"], limits) if limits is not None else []
@@ -82,7 +82,7 @@ def gas_and_friction(found: GasAndFriction) -> "matplotlib.figure.Figure":
     curves += (("even part: gas", found.even), ("odd part: friction and damping", found.odd))
     for number, (label, force) in enumerate(curves):
         handles += axes.plot(x, force, label=label, linewidth=1.6, **_style.line_style(number))
-    dotted: dict[str, Any] = {"color": _style.BLACK, "linestyle": ":"}
+    dotted: _style.Look = {"color": _style.BLACK, "linestyle": ":"}
     handles += axes.plot(x, found.static_force(found.stroke), label="gas force by its rate", **dotted)
     handles.append(axes.axhline(found.friction, color=_style.BLACK, linewidth=0.8, label="friction at zero velocity"))
     _style.dress(axes, _style.STROKE, _style.FORCE, f"{found.record}: force over stroke")
@@ -91,7 +91,7 @@ def gas_and_friction(found: GasAndFriction) -> "matplotlib.figure.Figure":
     return figure
 
 
-def _colours(evaluation: Evaluation) -> tuple[dict[str, Any], list[tuple[str, Any]]]:
+def _colours(evaluation: Evaluation) -> tuple[_style.Look, list[tuple[str, Any]]]:
     """The colour of each record, and the entries of the legend."""
     if len(evaluation.settings) > 1:
         names = list(evaluation.settings)
@@ -160,7 +160,7 @@ def _draw_forces(axes: "matplotlib.axes.Axes", evaluation: Evaluation, styles: M
             axes.plot(*np.array(stated).T, "D", markersize=4.5, color=styles[setting]["color"], zorder=3)
 
 
-def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list[Any]:
+def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list:
     """Bars from the least to the largest force at stated velocities; one-sided limits end at the measured value."""
     from matplotlib.lines import Line2D
 

@@ -1,7 +1,7 @@
 """The sheet of a ride: one A4 page of a vehicle before and after, its road, its dampers, and what to build."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +22,7 @@ def ride_sheet(
     *,
     sentence: str = "",
     name: str = "",
-    limits: Mapping[str, Any] | None = None,
+    limits: Mapping[str, object] | None = None,
 ) -> "matplotlib.figure.Figure":
     """One A4 page of a ride or a tuning, to print or to send: `result.plot("sheet")`.
 

@@ -65,7 +65,7 @@ pre {{ white-space: pre-wrap; }}
   @page {{ size: A4; margin: 8mm 10mm; }}
   :root {{ color-scheme: light; --ink: #222; --paper: #fff; --soft: #555; --line: #ddd; --box: #eef5fa; }}
   body {{ font-size: 9pt; max-width: none; margin: 0; padding: 0; }}
-  nav, details:not([open]) {{ display: none; }}
+  nav, details:not([open]), h1:has(+ .sheet) {{ display: none; }}
   .table {{ overflow-x: visible; }}
   table {{ font-size: 8pt; }}
   th, td {{ padding-right: 0.5em; min-width: 0; }}
@@ -198,7 +198,7 @@ class Report:
             self._section(n, text, blocks)
             for n, (text, blocks) in enumerate(zip(self._headings, self._sections, strict=True), 1)
         ]
-        head = [f"<h1>{html.escape(self.title)}</h1>", *self._blocks, *self._sheets, *contents]
+        head = [f"<h1>{html.escape(self.title)}</h1>", *self._sheets, *self._blocks, *contents]
         parts = ["<main>", *head, *sections, *troubles, "</main>", _footer(command)]
         return _PAGE.format(title=html.escape(self.title), body="\n".join(parts))
 
@@ -225,7 +225,7 @@ def _png(figure: "Figure") -> bytes:
 
     drawn, small = io.BytesIO(), io.BytesIO()
     figure.savefig(drawn, dpi=DOTS, format="png")
-    few = Image.open(drawn).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    few = Image.open(drawn).convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     few.save(small, format="png", optimize=True)
     return small.getvalue()
 

@@ -171,7 +171,7 @@ class Evaluation(AbstractResult):
         """All measurements as plain data."""
         return {"method": self.method, "notes": list(self.notes), "measurements": plain(self._list().records())}
 
-    def plot(self, kind: "str | Evaluation" = "cycles", **options: Any) -> "matplotlib.figure.Figure":
+    def plot(self, kind: "str | Evaluation" = "cycles", **options: object) -> "matplotlib.figure.Figure":
         """Mean loops over velocity, stroke, acceleration and time, and forces over velocity; or the damper's sheet.
 
         Arguments:
