@@ -9,6 +9,7 @@ from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver as Abstra
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState, settled
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
+from jaxdamp.simulation.harmonic import HarmonicResponse as HarmonicResponse, harmonic_response
 from jaxdamp.simulation.observer import MetricObserver as MetricObserver
 from jaxdamp.simulation.range_notes import named_laws as named_laws, range_sentences as range_sentences
 from jaxdamp.simulation.recorder import recorded as recorded
@@ -41,6 +42,7 @@ __all__ = [
     "comfort",
     "comfort_table",
     "energy_balance",
+    "harmonic_response",
     "metrics_table",
     "ride_metrics",
     "settled",
@@ -52,6 +54,7 @@ __shared__ = [
     "DEVIATIONS",
     "AbstractObserver",
     "AxleTiming",
+    "HarmonicResponse",
     "MetricObserver",
     "RunCheck",
     "moves_axles",

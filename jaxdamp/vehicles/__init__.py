@@ -28,7 +28,7 @@ from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
 from jaxdamp.vehicles.full_car import FullCar
 from jaxdamp.vehicles.guided import Guide, Guided
 from jaxdamp.vehicles.half_car import HalfCar
-from jaxdamp.vehicles.linear import LinearVehicle as LinearVehicle, linearise
+from jaxdamp.vehicles.linear import LinearVehicle as LinearVehicle, delays_of as delays_of, linearise
 from jaxdamp.vehicles.modes import Modes as Modes, modes
 from jaxdamp.vehicles.oscillations import Oscillations as Oscillations, oscillations
 from jaxdamp.vehicles.parts import Body, Element, Link, Place, Wheel, prefixed as prefixed
@@ -103,6 +103,7 @@ __shared__ = [
     "Ports",
     "States",
     "System",
+    "delays_of",
     "is_stationary",
     "nonlinear_variables",
     "prefixed",
