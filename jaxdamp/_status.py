@@ -13,6 +13,8 @@ class Status(enum.Enum):
     LIMIT_NOT_MET = "A limit is not met."
     STOPPED_EARLY = "The error on the held-out records fell no more."
     ALL_STEPS = "All steps were taken."
+    NOT_STEADY = "No motion that repeats with every period of the excitation was found."
+    UNSTABLE = "The motion that was found is unstable: after the smallest disturbance it goes over into another one."
     COMPUTED = "It was computed directly, without a search."
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import jaxdamp
-from jaxdamp import bench, dampers, identify, roads, tune, vehicles
+from jaxdamp import bench, dampers, identify, rig, roads, tune, vehicles
 from jaxdamp._guesses import shared_names
 from jaxdamp._results import AbstractResult, worst_status
 from jaxdamp._status import Status
@@ -94,6 +94,8 @@ def _vehicle_results() -> list[AbstractResult]:
         identify.fit_vehicle(car, record, over=["damper.rate"], dt=5e-3),
         vehicles.modes(car),
         jaxdamp.simulate(car, road, dt=5e-3),
+        jaxdamp.simulation.harmonic_response(car, [1.0, 2.0], 0.01, substeps=4),
+        rig.dynamic_stiffness(dampers.Linear(1500.0), [1.0, 2.0], [[0.01], [0.02]]),
         roads.assess_roughness(heights, 0.1),
     ]
 

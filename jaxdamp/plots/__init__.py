@@ -14,6 +14,7 @@ from jaxdamp.plots.decisions import damper_comparison as damper_comparison
 from jaxdamp.plots.errors import ladder
 from jaxdamp.plots.evaluation import evaluation, gas_and_friction as gas_and_friction, limit_check as limit_check
 from jaxdamp.plots.experiments import experiment as experiment
+from jaxdamp.plots.frequency import dynamic_stiffness as dynamic_stiffness, harmonic_response as harmonic_response
 from jaxdamp.plots.fronts import pareto
 from jaxdamp.plots.history import training_history as training_history
 from jaxdamp.plots.loops import fit_loops as fit_loops

@@ -1,6 +1,7 @@
 """The test machine: the force of a law under a prescribed stroke, and what the machine adds to it."""
 
 from jaxdamp.rig.constant_velocity import QuasiStatic as QuasiStatic, quasi_static
+from jaxdamp.rig.dynamic_stiffness import DynamicStiffness as DynamicStiffness, dynamic_stiffness
 from jaxdamp.rig.machine import Readings as Readings, Rig
 from jaxdamp.rig.marching import march as march, solve_law as solve_law
 from jaxdamp.rig.numbers import LawNumbers as LawNumbers, is_number as is_number, numbers_of as numbers_of
@@ -12,6 +13,7 @@ __all__ = [
     "Rig",
     "Sensor",
     "StartsInMotionWarning",
+    "dynamic_stiffness",
     "quasi_static",
     "respond",
 ]

@@ -9,6 +9,7 @@ from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver as Abstra
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState as StepState, settled
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
+from jaxdamp.simulation.harmonic import HarmonicResponse as HarmonicResponse, harmonic_response
 from jaxdamp.simulation.notes import (
     far_outside as far_outside,
     named_laws as named_laws,
@@ -45,6 +46,7 @@ __all__ = [
     "TracedStepWarning",
     "comfort",
     "energy_balance",
+    "harmonic_response",
     "ride_metrics",
     "settled",
     "simulate",

@@ -28,7 +28,12 @@ from jaxdamp.vehicles.equilibrium import (
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
 from jaxdamp.vehicles.guided import ForceDriven, Guide, Guided
-from jaxdamp.vehicles.linear import LinearVehicle as LinearVehicle, linearise, with_weightings as with_weightings
+from jaxdamp.vehicles.linear import (
+    LinearVehicle as LinearVehicle,
+    delays_of as delays_of,
+    linearise,
+    with_weightings as with_weightings,
+)
 from jaxdamp.vehicles.modes import Modes as Modes, Oscillations as Oscillations, modes, oscillations
 from jaxdamp.vehicles.parts import Body, Element as Element, Link, Place, Point as Point, Wheel, prefixed as prefixed
 from jaxdamp.vehicles.port_form import (

@@ -1,0 +1,81 @@
+"""Responses over frequency: of a vehicle to a sine of its road, and of a law on the test machine."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jaxdamp._steady_cycles import AbstractSteadyCycles
+from jaxdamp.plots import _style
+from jaxdamp.rig import DynamicStiffness
+from jaxdamp.simulation import HarmonicResponse
+from jaxdamp.vehicles import ChannelKind
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+
+DRAWN = (ChannelKind.ACCELERATION, ChannelKind.STROKE, ChannelKind.TYRE_LOAD)
+
+
+def harmonic_response(result: HarmonicResponse, channels: Sequence[str] | None = None) -> "matplotlib.figure.Figure":
+    """First harmonic per metre of road over frequency, one curve for each amplitude; unstable motions are circles.
+
+    Arguments:
+        result: of `simulation.harmonic_response`.
+        channels: to draw; the first acceleration, stroke and tyre load of the vehicle if left out.
+    """
+    known = result.layout.channels
+    if channels is None:
+        channels = [
+            next(c.name for c in known if c.kind is kind) for kind in DRAWN if any(c.kind is kind for c in known)
+        ]
+    gains = {channel: np.abs(np.asarray(result.gain(channel))) for channel in channels}
+    units = {c.name: (c.unit, 1.0) for c in known} | {c.name: ("N", 1e-3) for c in known if c.unit == "N"}
+    panels = []
+    for channel in channels:
+        unit, factor = units[channel]
+        label = f"[{unit} per {'m' if factor == 1.0 else 'mm'}]" if unit else "[1/m]"
+        panels.append((channel.replace("_", " "), label, factor * gains[channel]))
+    return _over_frequency(result, result.amplitude, panels, "road amplitude")
+
+
+def dynamic_stiffness(result: DynamicStiffness) -> "matplotlib.figure.Figure":
+    """Stiffness, loss angle and equivalent damping over frequency, one curve for each amplitude.
+
+    Arguments:
+        result: of `rig.dynamic_stiffness`.
+    """
+    panels = [
+        ("dynamic stiffness", "[N/mm]", 1e-3 * np.asarray(result.stiffness)),
+        ("loss angle", "[deg]", np.rad2deg(np.asarray(result.loss_angle))),
+        ("equivalent damping", "[N s/m]", np.asarray(result.damping)),
+    ]
+    return _over_frequency(result, result.amplitude, panels, "amplitude")
+
+
+def _over_frequency(
+    result: AbstractSteadyCycles, amplitude: Any, panels: Sequence[tuple[str, str, np.ndarray]], legend: str
+) -> "matplotlib.figure.Figure":
+    """A panel for each title, label and values, with a curve for each amplitude."""
+    frequency = np.asarray(result.frequency)
+    sizes = 1e3 * np.asarray(amplitude).reshape(-1, frequency.size)
+    unstable = (result.steady & ~result.stable).reshape(sizes.shape)
+    figure = _style.new_figure(8.0, 0.9 + 2.1 * len(panels))
+    columns = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
+    lines = []
+    for axes, (title, label, values) in zip(columns, panels, strict=True):
+        lines = []
+        for i, (row, size) in enumerate(zip(values.reshape(sizes.shape), sizes, strict=True)):
+            constant = np.ptp(size) <= 1e-9 * size[0]
+            name = f"{_style.short(size[0])} mm" if constant else f"{size.min():.3g} to {size.max():.3g} mm"
+            colour = _style.graded(i, len(sizes))
+            lines += axes.plot(frequency, row, color=colour, label=name, linewidth=1.4)
+            axes.plot(frequency[unstable[i]], row[unstable[i]], "o", color=colour, markerfacecolor="none")
+        _style.dress(axes, "", label, title)
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    columns[-1].set_xlabel("frequency [Hz]")
+    _style.legend_beside(figure, lines, legend)
+    _style.note_below(figure, result.warnings)
+    return figure

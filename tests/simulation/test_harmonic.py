@@ -1,0 +1,178 @@
+"""The steady response to a sine: closed forms, SciPy, long simulations, literature, derivatives, what is refused."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, root
+
+from jaxdamp import dampers, roads, simulate, vehicles
+from jaxdamp._status import Status
+from jaxdamp.dampers import CoulombFriction, Linear
+from jaxdamp.simulation import harmonic_response
+from jaxdamp.vehicles import Body, CubicSpring, Element, Frame, LumpedVehicle, QuarterCar, Wheel
+from jaxdamp.vehicles.presets import half_car_002, quarter_car_000
+
+
+FREQUENCY = np.linspace(0.6, 14.0, 7)
+MASS, RATE = 1.0, 400.0  # of an oscillator on a moving ground: 3.18 Hz
+FRICTION = quarter_car_000(Linear(1200.0) + CoulombFriction(60.0, 0.02))
+
+
+def oscillator(law: dampers.AbstractDamper, damping: float = 0.0) -> LumpedVehicle:
+    """A mass on a spring, a dashpot and a law, whose deflection is `stroke`."""
+    body = Body("mass", MASS)
+    return LumpedVehicle(Frame((body,), (), (Wheel("", body.at(), RATE, damping, elements=(Element("law", law),)),)))
+
+
+def test_linear_vehicles_have_the_frequency_response_in_closed_form() -> None:
+    """With the delay between two axles, amplitude by amplitude."""
+    for car, speed in ((quarter_car_000(), None), (half_car_002(), 12.0)):
+        result = harmonic_response(car, FREQUENCY, np.array([[0.01], [0.03]]), speed=speed, substeps=32)
+        exact = vehicles.frequency_response(car, FREQUENCY, speed=speed)
+        assert all(status is Status.CONVERGED for status in result.status)
+        for channel, gain in exact.items():
+            scale = np.abs(gain).max()
+            error = np.abs(np.asarray(result.gain(channel)) - np.asarray(gain)).max()
+            assert error < 1e-8 * scale, channel
+            assert np.nanmax(np.asarray(result.distortion(channel))) < 1e-8
+    poles = np.linalg.eigvals(np.asarray(vehicles.linearise(quarter_car_000()).state_matrix))
+    multipliers = harmonic_response(quarter_car_000(), [2.0], 0.01, substeps=32).multipliers[0]
+    largest = np.abs(np.exp(poles / 2.0)).max()
+    assert abs(multipliers[0]) == pytest.approx(largest, rel=1e-6)
+
+
+def test_the_same_by_shooting_with_scipy() -> None:
+    """Friction and a hardening spring, by an independent formula of the car."""
+    frequency, amplitude = 1.4, 0.015
+    law = Linear(1200.0) + CoulombFriction(60.0, 0.05)
+    car = QuarterCar(300.0, 40.0, 20e3, 180e3, law, extra_spring=CubicSpring(0.0, 4e6), tyre_damping=100.0)
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        phase = 2 * np.pi * frequency * t
+        road, rise = amplitude * np.sin(phase), 2 * np.pi * frequency * amplitude * np.cos(phase)
+        x, v = y[0] - y[1], y[2] - y[3]
+        force = 20e3 * x + 4e6 * x**3 + 1200.0 * v + 60.0 * np.tanh(v / 0.05)
+        tyre = 180e3 * (road - y[1]) + 100.0 * (rise - y[3])
+        return np.array([y[2], y[3], -force / 300.0, (force + tyre) / 40.0])
+
+    def carried(y: np.ndarray, **options: Any) -> Any:
+        return solve_ivp(rates, (0.0, 1.0 / frequency), y, "DOP853", rtol=1e-9, atol=1e-11, **options)
+
+    result = harmonic_response(car, [frequency], amplitude, substeps=16)
+    start = np.array([float(result[name][0, 0]) for name in ("z_sprung", "z_unsprung")] + [0.0, 0.0])
+    steady = root(lambda y: carried(y).y[:, -1] - y, start, tol=1e-9).x
+    time = np.arange(256) / 256.0 / frequency
+    motion = carried(steady, t_eval=time).y
+    np.testing.assert_allclose(result["z_sprung"][0], motion[0], atol=3e-6 * np.ptp(motion[0]))
+    np.testing.assert_allclose(result["stroke"][0], motion[0] - motion[1], atol=3e-6 * np.ptp(motion[0]))
+
+
+def test_coulomb_friction_as_in_the_solution_of_den_hartog() -> None:
+    """Amplitude of the deflection on a ground that moves with P/m ω²: motion without stops."""
+    ratio, share = np.array([0.6, 0.75, 1.25, 1.6]), 0.4  # ω/ω_n, friction over P
+    omega, force = ratio * np.sqrt(RATE / MASS), 4.0
+    result = harmonic_response(
+        oscillator(CoulombFriction(share * force, 1e-5)), omega / (2 * np.pi), force / (MASS * omega**2), substeps=64
+    )
+    gain = 1.0 / (1.0 - ratio**2)
+    stop = np.sin(np.pi / ratio) / (ratio * (1.0 + np.cos(np.pi / ratio)))
+    exact = force / RATE * np.sqrt(gain**2 - (share * stop) ** 2)
+    np.testing.assert_allclose(result.peak("stroke"), exact, rtol=2e-3)
+
+
+def test_a_hardening_spring_jumps_where_duffing_says() -> None:
+    """The sweep up climbs the backbone ω² = ω_n² + ¾ k₃ a²/m to a = P/(c ω); the sweep down stays below."""
+    damping, cubic, force = 0.8, 4e4, 0.8
+    car = oscillator(CubicSpring(0.0, cubic), damping)
+
+    def above(a: float) -> float:
+        return damping * a * np.sqrt((RATE + 0.75 * cubic * a * a) / MASS) - force
+
+    peak = brentq(above, 1e-3, 1.0)
+    jump = np.sqrt((RATE + 0.75 * cubic * peak**2) / MASS) / (2 * np.pi)
+    frequency = jump * np.linspace(0.8, 1.06, 53)
+    both = np.concatenate([frequency, frequency[::-1]])
+    result = harmonic_response(car, both, force / (MASS * (2 * np.pi * both) ** 2), substeps=1)
+    up, down = np.split(np.asarray(np.abs(result.harmonics("stroke")[:, 1])), 2)
+    assert result.stable.all()
+    assert up.max() == pytest.approx(peak, rel=0.02)
+    assert frequency[np.argmax(up)] == pytest.approx(jump, rel=0.02)
+    several = np.flatnonzero(up > 1.5 * down[::-1])  # two steady motions at one frequency
+    assert several.size >= 5
+    assert np.all(np.diff(several) == 1)
+    np.testing.assert_allclose(up[-3:], down[2::-1], rtol=1e-6)
+    assert np.asarray(result.distortion("stroke")).max() > 0.01  # superharmonics
+
+
+def test_derivatives_are_those_of_differences() -> None:
+    """Reverse, forward and second ones, by friction and amplitude."""
+    frequency = np.array([0.9, 1.0, 1.1])
+
+    def response(values: Any) -> Any:
+        car = quarter_car_000(Linear(1200.0) + CoulombFriction(values[0], 0.02))
+        return jnp.max(jnp.abs(harmonic_response(car, frequency, values[1], substeps=2).gain("z_sprung")))
+
+    at, h = jnp.array([60.0, 0.01]), np.array([1e-3, 1e-6])
+    steps = np.diag(h)
+    slopes = jax.grad(response)(at)
+    differences = [float(response(at + s) - response(at - s)) / (2 * size) for s, size in zip(steps, h, strict=True)]
+    np.testing.assert_allclose(slopes, differences, rtol=1e-5)
+    np.testing.assert_allclose(jax.jacfwd(response)(at), slopes, rtol=1e-9)
+    bend = jax.jvp(jax.grad(response), (at,), (jnp.array([1.0, 0.0]),))[1]
+    ahead, behind = (jax.grad(response)(at + sign * steps[0]) for sign in (1.0, -1.0))
+    np.testing.assert_allclose(bend, (ahead - behind) / (2 * h[0]), rtol=1e-4)
+
+
+def test_what_is_not_steady_is_not_a_number() -> None:
+    """A motion that grows is marked as unstable; arguments that mean nothing are refused."""
+    frequency = np.array([0.9, 1.2])
+    growing = harmonic_response(
+        quarter_car_000(dampers.Scaled(Linear(100.0), -1.0, allow_active=True)), frequency, 0.01
+    )
+    assert set(growing.status) == {Status.UNSTABLE}
+    assert "unstable" in growing.warnings[0]
+    away = oscillator(
+        CubicSpring(-400.0, 0.0) + dampers.Scaled(Linear(2.0), -1.0, allow_active=True)
+    )  # it leaves its well
+    lost = harmonic_response(away, [3.18], 2.0, substeps=4)
+    assert lost.status == (Status.NOT_STEADY,)
+    assert not lost.converged
+    assert np.isnan(np.asarray(lost.gain("stroke"))).all()
+    with pytest.raises(ValueError, match="amplitude"):
+        harmonic_response(FRICTION, frequency, [0.01, 0.02, 0.03])
+    with pytest.raises(ValueError, match="amplitude"):
+        harmonic_response(FRICTION, frequency, 0.0)
+    with pytest.raises(ValueError, match="speed"):
+        harmonic_response(half_car_002(), frequency, 0.01)
+    with pytest.raises(ValueError, match="substeps"):
+        jax.jit(lambda a: harmonic_response(quarter_car_000(Linear(a)), frequency, 0.01).cycles)(1000.0)
+
+
+LAWS: dict[str, Any] = {
+    "friction": FRICTION,
+    "hysteresis": quarter_car_000(dampers.BoucWen(800.0, 2000.0, 300.0, 1e-3, 0.75, 1.5)),
+    "blow-off": quarter_car_000(dampers.Besinger(14_400.0, 15_600.0, 3_600.0, 0.125, 0.7) * 0.2),
+    "bump stop": QuarterCar(
+        300.0, 40.0, 20e3, 180e3, Linear(800.0), bump_stop=dampers.BumpStop(clearance=0.03, stiffness=5e4)
+    ),
+    "series spring": quarter_car_000(dampers.SeriesSpring(Linear(1500.0), 2e5)),
+    "gas spring": QuarterCar(300.0, 40.0, 20e3, 180e3, Linear(800.0), extra_spring=dampers.GasSpring(2e6, 6e-5, 1e-4)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LAWS)
+def test_as_after_two_hundred_cycles(name: str) -> None:
+    """Of a simulation from rest, at a frequency near the resonance of the body."""
+    car, frequency, amplitude = LAWS[name], 1.25, 0.02
+    result = harmonic_response(car, [frequency], amplitude)
+    dt = 1.0 / frequency / 1024
+    road = roads.sine(amplitude, frequency=frequency)
+    response = simulate(car, road, duration=200.0 / frequency, dt=dt)
+    for channel in ("z_sprung", "sprung_acceleration", "stroke", "dynamic_tyre_load"):
+        last = np.asarray(response[channel])[-1025:-1:4]
+        np.testing.assert_allclose(result[channel][0], last, atol=0.01 * np.abs(last).max(), err_msg=channel)
