@@ -1,14 +1,26 @@
-"""Runs the examples of the README, of docs/ and of every docstring as tests.
+"""Runs the examples of the README, of docs/ and of every docstring as tests, and has all tests compile quickly.
 
 Examples that begin with `jaxdamp.configure()` run beside others in one process, which has started: there the call only
 switches on double precision. `tests/test_configuration.py` makes it in processes of its own.
 """
+
+import os
 
 import jax
 import numpy as np
 from sybil import Sybil
 from sybil.parsers.doctest import DocTestParser
 from sybil.parsers.markdown import PythonCodeBlockParser, SkipParser
+
+
+# Most of the time goes into compiling, once for each test: compile quickly instead of for speed. With the variable set,
+# even to nothing, tests run what users run.
+QUICKLY = [
+    "--xla_backend_optimization_level=0",
+    "--xla_cpu_parallel_codegen_split_count=1",  # parts of a program repeat what they share: a quarter of large ones
+    *["--xla_cpu_use_fusion_emitters=false"] * (jax.__version_info__ < (0, 11)),
+]
+os.environ.setdefault("XLA_FLAGS", " ".join(QUICKLY))
 
 
 def _prepare(namespace: dict) -> None:

@@ -1,10 +1,15 @@
 """How long a new process takes until its first result, with an empty and with a warm cache of compiled programs.
 
-    python -m benchmarks.first_result [FOLDER OF DYNO FILES]
+    python -m benchmarks.first_result [DYNO FILES]
 
-Without a folder the dyno file is a virtual one, written before the clock starts.
+The files, all of one damper and counted positive in rebound, are also fitted at the command line: the first one by the
+laws that suit it, all of them by every law. Without files there is one, of a virtual damper, written before the clock
+starts. Wall and processor time stand in seconds and in bases, of which one is a new process that imports jax and
+compiles x * x; beside them the number of XLA programs.
 """
 
+import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -33,6 +38,33 @@ runs = bench.read({file!r}, sign="rebound-positive")
 law = dampers.Besinger.guess(runs[0].velocity, runs[0].force)
 print(identify.fit(law, runs).rmse)
 """
+
+
+BASE = "import jax; jax.jit(lambda x: x * x)(1.0)"
+COUNTED = """
+import atexit, sys
+import jax.monitoring
+programs = []
+jax.monitoring.register_event_duration_secs_listener(
+    lambda name, *_, **__: programs.append(name) if name.endswith("backend_compile_duration") else None
+)
+atexit.register(lambda: print("programs:", len(programs), file=sys.stderr))
+from jaxdamp.cli import app
+sys.argv[:] = ["jaxdamp", "fit", *{files!r}, *{law!r}, "--sign", "rebound-positive", "--out", {out!r}]
+app()
+"""
+
+
+def cost(script: str, cache: str) -> tuple[float, float, str]:
+    """Wall and processor seconds of a new process, and what it says of its XLA programs."""
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    surroundings = os.environ | {"XDG_CACHE_HOME": cache}
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=surroundings)
+    if done.returncode:
+        raise RuntimeError(done.stderr)
+    wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return wall, used, done.stderr.rpartition("programs: ")[2].strip() if "programs: " in done.stderr else ""
 
 
 def seconds(script: str) -> float:
@@ -65,6 +97,27 @@ def main() -> None:
             text = script.format(cache=str(Path(folder) / "cache"), file=file)
             rows.append([name, seconds(text), min(seconds(text) for _ in range(3))])
     report("first_result", "From the start of Python to the first result, s", ["what", "first", "then"], rows)
+    report_fits([str(Path(name).resolve()) for name in sys.argv[1:]])
+
+
+def report_fits(files: list[str]) -> None:
+    """The fits of the command line with nothing cached, and again with what the first ones left."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = files or [dyno_file(folder)]
+        base = [min(each) for each in zip(*(cost(BASE, folder)[:2] for _ in range(3)), strict=True)]
+        rows: list[list[Any]] = [["base", *base, 1.0, 1.0, ""]]
+        asked = {
+            "one file, laws that suit it": (files[:1], []),
+            f"{len(files)} files, all laws": (files, ["--law", "all"]),
+        }
+        for name, (some, law) in asked.items():
+            for again in ("", ", again"):
+                out = str(Path(folder) / f"{len(rows)}")
+                script = COUNTED.format(files=some, law=law, out=out)
+                wall, used, programs = cost(script, str(Path(folder) / f"cache {name}"))
+                rows.append([f"jaxdamp fit, {name}{again}", wall, used, wall / base[0], used / base[1], programs])
+    head = ["what", "wall, s", "processor, s", "bases, wall", "bases, processor", "XLA programs"]
+    report("first_fits", "Fits of the command line", head, rows)
 
 
 if __name__ == "__main__":

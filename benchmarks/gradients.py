@@ -24,8 +24,8 @@ from benchmarks._timing import best, first_and_warm, report  # noqa: E402
 from benchmarks.peers import c, casadi_map, finite_differences, problem  # noqa: E402
 from jaxdamp import Ride, dampers, roads  # noqa: E402
 from jaxdamp.sweeps import points  # noqa: E402
+from jaxdamp.sweeps.function import trace  # noqa: E402
 from jaxdamp.sweeps.program import prepare  # noqa: E402
-from jaxdamp.sweeps.tracing import trace  # noqa: E402
 from jaxdamp.vehicles.presets import quarter_car_000  # noqa: E402
 
 

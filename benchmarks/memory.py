@@ -23,7 +23,7 @@ from benchmarks._timing import report  # noqa: E402
 from benchmarks.peers import problem  # noqa: E402
 from jaxdamp.parameters import replace  # noqa: E402
 from jaxdamp.simulation import Exponential  # noqa: E402
-from jaxdamp.simulation.recorder import recorded  # noqa: E402
+from jaxdamp.simulation.observer import recorded  # noqa: E402
 
 
 DT = 1e-3

@@ -25,7 +25,7 @@ from benchmarks.peers import problem  # noqa: E402
 from jaxdamp import Ride, dampers, roads, simulate, vehicles  # noqa: E402
 from jaxdamp.parameters import get, parameters  # noqa: E402
 from jaxdamp.simulation import Exponential  # noqa: E402
-from jaxdamp.simulation.recorder import recorded  # noqa: E402
+from jaxdamp.simulation.observer import recorded  # noqa: E402
 from jaxdamp.vehicles import presets  # noqa: E402
 
 

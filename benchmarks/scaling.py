@@ -24,8 +24,8 @@ from benchmarks import ours  # noqa: E402
 from benchmarks._timing import first_and_warm, report  # noqa: E402
 from benchmarks.peers import problem  # noqa: E402
 from jaxdamp.sweeps.axes import as_points, points  # noqa: E402
+from jaxdamp.sweeps.function import trace  # noqa: E402
 from jaxdamp.sweeps.program import prepare  # noqa: E402
-from jaxdamp.sweeps.tracing import trace  # noqa: E402
 
 
 CARS = [4**k for k in range(9)]

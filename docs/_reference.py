@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Any
 
 import jaxdamp
+from jaxdamp._guesses import shared_names
 
 
 FURTHER = "What the functions above return, and what other packages of the library use; rarely written by a user."
@@ -40,7 +41,7 @@ def _page(name: str, described: dict[int, str]) -> str:
     package = import_module(name)
     heading = [name, "=" * len(name), "", f".. automodule:: {name}", "", f".. currentmodule:: {name}", ""]
     lines = [*heading, *_members(name, package.__all__, described)]
-    if shared := getattr(package, "__shared__", ()):
+    if shared := shared_names(package):
         lines += ["Results and further parts", "-" * 25, "", FURTHER, "", *_members(name, shared, described)]
     return "\n".join(lines)
 

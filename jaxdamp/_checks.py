@@ -50,7 +50,7 @@ class Setting:
         return f"{self.argument}={_literal(self.value)}"
 
 
-def _literal(value: Any) -> str:
+def _literal(value: object) -> str:
     """A value as Python source, with double quotes."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_literal(key)}: {_literal(item)}" for key, item in value.items()) + "}"
@@ -61,7 +61,7 @@ def _literal(value: Any) -> str:
     return "..." if value is ... else repr(value)
 
 
-def refuse(argument: str, must: str, value: Any, remedy: str = "", *settings: Setting) -> NoReturn:
+def refuse(argument: str, must: str, value: object, remedy: str = "", *settings: Setting) -> NoReturn:
     """Raise the common error of all checks; `settings` are those that the remedy mentions."""
     remedy = f" {remedy}" if remedy else ""
     message = f"Argument `{argument}` must {must}, but is {summary(value)}.{remedy}"
@@ -93,7 +93,7 @@ def summary(value: Any, wrong: Any = None) -> Any:
     return f"{array.size} numbers{shape}, {count} of them wrong, the first {array[tuple(first)]:.6g} at index {index}"
 
 
-def concrete(value: Any) -> np.ndarray | None:
+def concrete(value: object) -> np.ndarray | None:
     """The value as a NumPy array, or `None` while JAX traces it.
 
     Under `jax.grad` too, so that what is computed with it keeps its derivatives; checks take `_traced.behind`.
@@ -103,7 +103,7 @@ def concrete(value: Any) -> np.ndarray | None:
     return None if isinstance(value, Tracer) else np.asarray(value)
 
 
-def _numbers(argument: str, value: Any) -> np.ndarray | None:
+def _numbers(argument: str, value: object) -> np.ndarray | None:
     """The value, also behind derivatives and batches; None inside `jax.jit`. What is no real number is refused."""
     from jaxdamp._traced import behind
 
@@ -113,21 +113,23 @@ def _numbers(argument: str, value: Any) -> np.ndarray | None:
     return array
 
 
-def finite(argument: str, value: Any, remedy: str = "Look for NaN or a division by zero where it was made.") -> None:
+def finite(argument: str, value: object, remedy: str = "Look for NaN or a division by zero where it was made.") -> None:
     """Refuse NaN and infinity."""
     array = _numbers(argument, value)
     if array is not None and not np.all(np.isfinite(array)):
         refuse(argument, "be finite", summary(array, ~np.isfinite(array)), remedy)
 
 
-def positive(argument: str, value: Any, remedy: str = "") -> None:
+def positive(argument: str, value: object, remedy: str = "") -> None:
     """Refuse anything that is not finite and greater than zero."""
     array = _numbers(argument, value)
     if array is not None and not (np.all(np.isfinite(array)) and np.all(array > 0)):
         refuse(argument, "be positive and finite", summary(array, ~(np.isfinite(array) & (array > 0))), remedy)
 
 
-def untraced(argument: str, tree: Any, remedy: str = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`.") -> None:
+def untraced(
+    argument: str, tree: object, remedy: str = "Call it outside `jax.jit`, `jax.grad` and `jax.vmap`."
+) -> None:
     """Refuse a tree with numbers that JAX traces, where numbers must be known and derivatives do not pass."""
     from jaxdamp._traced import is_traced
 
@@ -135,7 +137,7 @@ def untraced(argument: str, tree: Any, remedy: str = "Call it outside `jax.jit`,
         refuse(argument, "have numbers that are known", "traced", remedy)
 
 
-def plain_number(argument: str, value: Any, remedy: str = "Close over a plain number.") -> float:
+def plain_number(argument: str, value: object, remedy: str = "Close over a plain number.") -> float:
     """A number that must be known before a program is compiled, and takes no part in derivatives."""
     array = None if concrete(value) is None else _numbers(argument, value)
     if array is None or array.ndim:
@@ -144,7 +146,7 @@ def plain_number(argument: str, value: Any, remedy: str = "Close over a plain nu
     return float(array)
 
 
-def nonnegative(argument: str, value: Any, remedy: str = "") -> None:
+def nonnegative(argument: str, value: object, remedy: str = "") -> None:
     """Refuse anything that is not finite and at least zero."""
     array = _numbers(argument, value)
     if array is not None and not (np.all(np.isfinite(array)) and np.all(array >= 0)):
@@ -174,6 +176,13 @@ def instance(argument: str, value: Any, kinds: type | tuple[type, ...], must: st
     """Refuse an object of a wrong type, such as a road instead of a vehicle."""
     if not isinstance(value, kinds):
         refuse(argument, must, described(value), remedy)
+
+
+def counts(**values: int | None) -> None:
+    """Refuse counts below one; None stands for one that was left out."""
+    for argument, value in values.items():
+        if value is not None and value < 1:
+            refuse(argument, "be 1 or more", value)
 
 
 def one_of(argument: str, value: str, choices: Iterable[str]) -> None:

@@ -19,7 +19,7 @@ from jaxdamp._types import Scalar, Signal, State
 STEPS_PER_INSTANT = 1000  # on average: more are a law too fast for the solver, and would take for ever
 
 
-def check_solver(solver: Any, rtol: float, atol: float) -> None:
+def check_solver(solver: object, rtol: float, atol: float) -> None:
     """Refuse what is no solver of diffrax, and tolerances that are not positive."""
     if not isinstance(solver, diffrax.AbstractSolver):
         _checks.refuse("solver", "be a solver of diffrax", _checks.described(solver), "Pass `diffrax.Kvaerno5()`.")
@@ -27,7 +27,7 @@ def check_solver(solver: Any, rtol: float, atol: float) -> None:
     _checks.positive("atol", atol)
 
 
-def verdict(result: Any) -> str:
+def verdict(result: object) -> str:
     """What a solver says of its end; nothing if it is content."""
     return diffrax.RESULTS[result]
 
@@ -112,7 +112,7 @@ def hermite(now: Scalar, time: Signal, values: Signal, slopes: Signal) -> tuple[
 
 @eqx.filter_jit
 def driven_states(
-    rate: Any,
+    rate: Callable[..., PyTree],
     start: State,
     time: Signal,
     stroke: Signal,

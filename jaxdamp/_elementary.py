@@ -9,7 +9,6 @@ stores the value and loses the custom derivative, so that second derivatives are
 """
 
 import math
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -42,7 +41,9 @@ def _library_power(base: Numbers, exponent: Numbers) -> Numbers:
 
 
 @_library_power.defjvp
-def _library_power_slope(primals: tuple[Numbers, Numbers], tangents: tuple[Any, Any]) -> tuple[Numbers, Numbers]:
+def _library_power_slope(
+    primals: tuple[Numbers, Numbers], tangents: tuple[Numbers, Numbers]
+) -> tuple[Numbers, Numbers]:
     (base, exponent), (change, bend) = primals, tangents
     y = _library_power(base, exponent)
     return y, y * (exponent / base * change + jnp.log(base) * bend)  # JAX's own rule takes two more powers

@@ -49,7 +49,7 @@ def check_field_types(module: eqx.Module) -> None:
             check_module(argument, value, typing.get_args(annotation) or (annotation,))
 
 
-def check_module(argument: str, value: Any, kinds: tuple[type, ...], call: str = "") -> None:
+def check_module(argument: str, value: object, kinds: tuple[type, ...], call: str = "") -> None:
     """Refuse anything that is not one of these modules (`NoneType` among them means optional).
 
     Arguments:
@@ -81,7 +81,7 @@ def _annotations(kind: type) -> dict[str, Any]:
     return {field.name: hints[field.name] for field in dataclasses.fields(kind) if _is_checked(hints[field.name])}
 
 
-def _is_checked(annotation: Any) -> bool:
+def _is_checked(annotation: object) -> bool:
     if annotation is Number or annotation is Vector:
         return True
     origin, inside = typing.get_origin(annotation), typing.get_args(annotation)
@@ -92,5 +92,5 @@ def _is_checked(annotation: Any) -> bool:
     return _is_module(annotation)
 
 
-def _is_module(annotation: Any) -> bool:
+def _is_module(annotation: object) -> bool:
     return isinstance(annotation, type) and issubclass(annotation, eqx.Module)

@@ -13,6 +13,7 @@ from jaxdamp import _checks
 MAYBE_NOTES = (".txt", ".dat", ".asc")  # of a folder these are not read: they may be notes
 TEXT_SUFFIXES = (".csv", ".tsv", *MAYBE_NOTES)
 RECORD_SUFFIXES = (*TEXT_SUFFIXES, ".xlsx", ".xlsm", ".mat", ".tdms", ".mf4", ".mdf", ".parquet")
+LARGEST = 2**31  # bytes of a file of records
 FOLDER_SUFFIXES = frozenset(RECORD_SUFFIXES) - set(MAYBE_NOTES)  # of the files that a folder stands for
 
 
@@ -38,6 +39,19 @@ def find_files(
             must, value = "name every file once", f"naming {file}, which is there {files.count(file)} times"
             _checks.refuse("paths", must, value)
     return tuple(files)
+
+
+def check_size(file: Path, size: int, what: str = "") -> None:
+    """Refuse a file with more bytes than are read.
+
+    Arguments:
+        file: for the message.
+        size: in bytes, as it lies on the disk or inflated.
+        what: "inflated", for packed files.
+    """
+    if size > LARGEST:
+        much = f"{size / 2**20:.0f} MiB {what}".rstrip()
+        raise ValueError(f"{file} has {much}, more than {LARGEST // 2**20} MiB that are read: cut or export it again.")
 
 
 def natural_key(text: str) -> list[tuple[int, float, str]]:

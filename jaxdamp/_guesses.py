@@ -1,9 +1,12 @@
 """Wrong guesses of public names, answered with the right one."""
 
+import ast
+import inspect
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
-from typing import Any, NoReturn
+from types import ModuleType
+from typing import NoReturn
 
 
 GUESSES = {  # what people look for, and where it is
@@ -27,6 +30,12 @@ GUESSES = {  # what people look for, and where it is
     "jaxdamp.tune.optimize": "`jaxdamp.tune.minimise`",
     "jaxdamp.vehicles.load": "`jaxdamp.export.from_json(path)`",
 }
+
+
+def shared_names(package: ModuleType) -> list[str]:
+    """What a package imports as itself (`X as X`): for other packages, or only returned; a user writes `__all__`."""
+    imports = [node for node in ast.parse(inspect.getsource(package)).body if isinstance(node, ast.ImportFrom)]
+    return sorted(alias.name for node in imports for alias in node.names if alias.asname == alias.name)
 
 
 def answer(module: str, name: str, public: Sequence[str]) -> NoReturn:
@@ -60,5 +69,5 @@ class Elsewhere:
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = f"type object {owner.__name__!r} has no attribute {name!r}"
 
-    def __get__(self, instance: Any, owner: type) -> NoReturn:
+    def __get__(self, instance: object, owner: type) -> NoReturn:
         raise AttributeError(f"{self._name}; did you mean {self._remedy}?")

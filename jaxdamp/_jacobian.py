@@ -19,6 +19,16 @@ def choose_mode(inputs: int, results: int) -> Mode:
     return "forward" if inputs <= INPUTS_FOR_A_RESULT * results else "reverse"
 
 
+def with_jacobian(function: Callable[[Array], Array]) -> Callable[[Array], tuple[Array, Array]]:
+    """The same function of a vector with its Jacobian, in forward mode: value and derivatives."""
+
+    def both(x: Array) -> tuple[Array, Array]:
+        slopes, value = jax.jacfwd(lambda x: (function(x),) * 2, has_aux=True)(x)
+        return value, slopes
+
+    return both
+
+
 def value_and_jacobian(
     function: Callable[[dict[str, Array]], Mapping[str, Array]],
     point: Mapping[str, Array],

@@ -6,12 +6,12 @@ the arguments. When differentiated, their value is selected by the same comparis
 too (see `jaxdamp._elementary` on loops that lose custom derivatives).
 """
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, ArrayLike, Float
+
+from jaxdamp._types import ScalarLike
 
 
 Numbers = Float[Array, "..."]
@@ -41,15 +41,17 @@ def largest(numbers: Numbers, axis: int = 0) -> Numbers:
     return jnp.take_along_axis(numbers, first, axis).squeeze(axis)
 
 
-def _slope_of_least(primals: tuple[Any, Any], tangents: tuple[Any, Any]) -> tuple[Numbers, Numbers]:
+def _slope_of_least(primals: tuple[Numbers, Numbers], tangents: tuple[Numbers, Numbers]) -> tuple[Numbers, Numbers]:
     return _selected(primals, jnp.subtract(*primals), tangents)
 
 
-def _slope_of_most(primals: tuple[Any, Any], tangents: tuple[Any, Any]) -> tuple[Numbers, Numbers]:
+def _slope_of_most(primals: tuple[Numbers, Numbers], tangents: tuple[Numbers, Numbers]) -> tuple[Numbers, Numbers]:
     return _selected(primals, jnp.subtract(*reversed(primals)), tangents)
 
 
-def _selected(values: tuple[Any, Any], lead: Numbers, changes: tuple[Any, Any]) -> tuple[Numbers, Numbers]:
+def _selected(
+    values: tuple[Numbers, Numbers], lead: Numbers, changes: tuple[Numbers, Numbers]
+) -> tuple[Numbers, Numbers]:
     """The selected value and its change; for equal values the mean of both."""
     one, other = (jnp.asarray(value, lead.dtype) for value in values)
     ans = jnp.where(lead > 0, one, jnp.where(lead < 0, other, 0.5 * one + 0.5 * other))
@@ -72,3 +74,21 @@ def root(power: Numbers, order: int = 2) -> Numbers:
     for _ in range(order // 2):  # order 2 or 4
         positive = jnp.sqrt(positive)
     return jnp.where(zero, jnp.zeros_like(power), positive)
+
+
+def smooth_abs(v: Float[ArrayLike, "..."], width: ScalarLike) -> Float[Array, "..."]:
+    """√(v² + w²) − w: zero at zero, |v| − w far away; exactly |v| for width 0."""
+    v = jnp.asarray(v)
+    safe = jnp.where(width > 0, width, 1.0)
+    return jnp.where(width > 0, jnp.sqrt(v * v + safe * safe) - safe, jnp.abs(v))
+
+
+def ramp(v: Float[ArrayLike, "..."], width: ScalarLike) -> Float[Array, "..."]:
+    """max(v, 0), its knee rounded over `width` [unit of v]: w ln(1 + exp(v/w)); exact for width 0.
+
+    The error is largest at the knee, w ln 2.
+    """
+    v = jnp.asarray(v)
+    exact = at_least(v, 0.0)
+    safe = jnp.where(width > 0, width, 1.0)
+    return jnp.where(width > 0, safe * jax.nn.softplus(v / safe), exact)

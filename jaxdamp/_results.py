@@ -2,12 +2,14 @@
 
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jaxdamp import _checks
 from jaxdamp._status import Status
-from jaxdamp._tables import Table
+from jaxdamp._tables import Table, plain, with_unit
+from jaxdamp._types import Contents
 
 
 if TYPE_CHECKING:
@@ -28,11 +30,28 @@ class Derived:
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
-    def __get__(self, instance: Any, owner: type | None = None) -> Any:
+    def __get__(self, instance: object, owner: type | None = None) -> Any:
         """The value; a class has none."""
         if instance is None:
             raise AttributeError(f"{self.name} belongs to a result, not to its class")
         return self.function(instance)
+
+
+def drawn_by(name: str, text: str) -> "Callable[..., matplotlib.figure.Figure]":
+    """The method `plot` of a result.
+
+    Arguments:
+        name: of the function in `jaxdamp.plots`, which gets the result and all further arguments.
+        text: what it shows.
+    """
+
+    def plot(self: "AbstractResult", *values: object, **options: object) -> "matplotlib.figure.Figure":
+        from jaxdamp import plots
+
+        return getattr(plots, name)(self, *values, **options)
+
+    plot.__doc__ = f"{text} (`plots.{name}`)"
+    return plot
 
 
 class AbstractResult(ABC):
@@ -70,11 +89,16 @@ class AbstractResult(ABC):
         """All tables of the result by name, the first is `table()`."""
         return {"table": self.table()}
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """What `to_dict` holds beside status, summary and warnings: all tables, unless a class says more."""
         return {name: table.to_dict() for name, table in self.tables().items()}
 
-    def to_dict(self) -> dict[str, Any]:
+    def _data(self, *names: str, **units: str) -> Contents:
+        """Attributes as plain data, those with a unit as a value with its unit."""
+        values = {name: plain(getattr(self, name)) for name in names}
+        return values | {name: with_unit(getattr(self, name), unit) for name, unit in units.items()}
+
+    def to_dict(self) -> Contents:
         """The result as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         status = [s.name.lower() for s in self.status] if isinstance(self.status, tuple) else self.status.name.lower()
         head = {"summary": self.summary, "status": status, "converged": self.converged, "warnings": [*self.warnings]}
@@ -93,6 +117,33 @@ class AbstractResult(ABC):
 
     def __repr__(self) -> str:
         return "\n".join([self.summary, self.table().to_text(), *(f"warning: {text}" for text in self.warnings)])
+
+
+def plotted(
+    kind: object,
+    kinds: "Mapping[str, Callable[..., matplotlib.figure.Figure]]",
+    result: "AbstractResult",
+    before: str = "",
+    **options: object,
+) -> "matplotlib.figure.Figure":
+    """The picture of a result of the kind that `result.plot(kind)` names.
+
+    Arguments:
+        kind: a name among the kinds.
+        kinds: the function for each; the first is the default.
+        result: what is drawn.
+        before: the option that stood in the place of the kind in earlier releases.
+        options: of the function.
+
+    Raises:
+        ValueError: an unknown kind.
+    """
+    if before and not isinstance(kind, str):
+        warnings.warn(f"Write `plot({before}=...)`: `kind` comes first now.", DeprecationWarning, stacklevel=3)
+        kind, options = next(iter(kinds)), {before: kind, **options}
+    name = str(kind)
+    _checks.one_of("kind", name, kinds)
+    return kinds[name](result, **options)
 
 
 def worst_status(statuses: Iterable[Status]) -> Status:

@@ -1,13 +1,13 @@
 """Roots with the derivatives of the implicit function theorem: of an increasing function, and of optimistix."""
 
 from collections.abc import Callable
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Bool
+from jaxtyping import Array, Bool, PyTree
 
 from jaxdamp._matrices import solve
 from jaxdamp._sharded import varying_as
@@ -71,11 +71,11 @@ def increasing_root(
         def moved(old: Scalar, new: Scalar) -> Bool[Array, ""]:
             return jnp.abs(new - old) > close * jnp.abs(new) + near
 
-        def going(now: tuple[Any, ...]) -> Bool[Array, ""]:
+        def going(now: PyTree) -> Bool[Array, ""]:
             count, still_moving, _ = now
             return still_moving & (count < steps)
 
-        def again(now: tuple[Any, ...]) -> tuple[Any, ...]:
+        def again(now: PyTree) -> PyTree:
             count, _, (w, *others) = now
 
             def safe_step(_: Callable[[Scalar], Scalar], w: Scalar) -> tuple[Scalar, tuple[Scalar, ...]]:
@@ -104,16 +104,16 @@ class ImplicitDerivatives(optx.AbstractAdjoint):
     says why) and without the host callback by which lineax reports a singular matrix; the derivative is then NaN.
     """
 
-    def apply(self, primal_fn: Any, rewrite_fn: Any, inputs: Any, tags: frozenset[object]) -> Any:
+    def apply(self, primal_fn: PyTree, rewrite_fn: PyTree, inputs: PyTree, tags: frozenset[object]) -> PyTree:
         """The solution of the solver, with derivatives of any order, forward and reverse."""
         del tags
         return _implicit(primal_fn, rewrite_fn, (*inputs, _while_loop))
 
 
-def _while_loop(going: Any, step: Any, begin: Any, *, max_steps: int) -> Any:
+def _while_loop(going: PyTree, step: PyTree, begin: PyTree, *, max_steps: int) -> PyTree:
     """A loop of at most so many steps."""
 
-    def both(now: tuple[Array, Any]) -> tuple[Array, Any]:
+    def both(now: tuple[Array, PyTree]) -> tuple[Array, PyTree]:
         return now[0] + 1, step(now[1])
 
     start = jnp.zeros((), int), varying_as(begin)
@@ -121,18 +121,18 @@ def _while_loop(going: Any, step: Any, begin: Any, *, max_steps: int) -> Any:
 
 
 @eqx.filter_custom_jvp
-def _implicit(primal_fn: Any, rewrite_fn: Any, inputs: Any) -> Any:
+def _implicit(primal_fn: PyTree, rewrite_fn: PyTree, inputs: PyTree) -> PyTree:
     del rewrite_fn
     return jax.tree.map(jnp.asarray, primal_fn(inputs))
 
 
 @_implicit.def_jvp
-def _implicit_jvp(primals: Any, tangents: Any) -> Any:
+def _implicit_jvp(primals: PyTree, tangents: PyTree) -> PyTree:
     primal_fn, rewrite_fn, inputs = primals
     root, others = _implicit(primal_fn, rewrite_fn, inputs)
     fixed, moving = eqx.partition(inputs, jax.tree.map(lambda t: t is None, tangents[2], is_leaf=lambda t: t is None))
 
-    def missing(moving: Any) -> Array:
+    def missing(moving: PyTree) -> Array:
         return rewrite_fn(root, others, eqx.combine(moving, fixed))
 
     _, change = jax.jvp(missing, (moving,), (tangents[2],))

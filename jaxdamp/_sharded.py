@@ -3,12 +3,13 @@
 from typing import Any, TypeVar
 
 import jax
+from jaxtyping import PyTree
 
 
 Tree = TypeVar("Tree")
 
 
-def varying_as(tree: Tree, *others: Any) -> Tree:
+def varying_as(tree: Tree, *others: object) -> Tree:
     """The tree, its arrays taken for different on the devices on which any of these arrays, or its own, differ.
 
     A loop whose beginning is a constant, and whose end is not, is refused there otherwise.
@@ -17,12 +18,12 @@ def varying_as(tree: Tree, *others: Any) -> Tree:
     return jax.tree.map(lambda leaf: _cast(leaf, axes - _axes(leaf)), tree) if axes else tree
 
 
-def _axes(leaf: Any) -> frozenset[Any]:
+def _axes(leaf: object) -> frozenset[Any]:
     if not isinstance(leaf, jax.Array):
         return frozenset()
     kind: Any = jax.typeof(leaf)
     return kind.mat.varying if hasattr(kind, "mat") else kind.vma  # the latter before jax 0.10
 
 
-def _cast(leaf: Any, axes: frozenset[Any]) -> Any:
+def _cast(leaf: object, axes: frozenset[object]) -> PyTree:
     return jax.lax.pcast(leaf, tuple(axes), to="varying") if axes else leaf

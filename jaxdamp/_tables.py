@@ -1,15 +1,19 @@
 """Tables of results: columns with units, rows of words and numbers; as text, HTML, CSV and plain data."""
 
 import csv
+import dataclasses
 import html
 import io
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._display import Display, display
+from jaxdamp._types import Contents
 
 
 Cell = str | float | int | None
@@ -64,6 +68,8 @@ class Column(NamedTuple):
 class Table:
     """A table with a title, columns with units, and rows of words and numbers. Notebooks show it as HTML.
 
+    Its text, HTML and CSV have the units and the sign of `_display.display()`, its plain data those of the library.
+
     Attributes:
         title: of the table.
         columns: names, units and formats.
@@ -85,15 +91,44 @@ class Table:
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
 
+    def shown(self) -> "Table":
+        """The table in the units and the sign that are shown.
+
+        A number has the unit of its column or, where that has none, of the cell of its row in the column "unit".
+        """
+        present = display()
+        if present.plain:
+            return self
+        columns = tuple(c._replace(name=present.text(c.name), unit=_unit_shown(present, c.unit)) for c in self.columns)
+        return Table(present.text(self.title), columns, tuple(self._row_shown(present, row) for row in self.rows))
+
+    def _row_shown(self, present: Display, row: tuple[Cell, ...]) -> tuple[Cell, ...]:
+        by_name = dict(zip((column.name for column in self.columns), row, strict=True))
+        unit, quantity = str(by_name.get("unit", "")), str(by_name.get("quantity", ""))
+        cells = [
+            _cell_shown(present, column, cell, unit, quantity) for column, cell in zip(self.columns, row, strict=True)
+        ]
+        turned, signed = present.turned(tuple(by_name)), present.signed(quantity)
+        return tuple(cells[to if signed or self.columns[to].unit else at] for at, to in enumerate(turned))
+
     def texts(self) -> list[tuple[str, ...]]:
         """The rows for reading."""
-        return [tuple(c.text(cell) for c, cell in zip(self.columns, row, strict=True)) for row in self.rows]
+        shown = self.shown()
+        return [tuple(c.text(cell) for c, cell in zip(shown.columns, row, strict=True)) for row in shown.rows]
+
+    def headings(self) -> list[str]:
+        """The names of the columns with the units that are shown."""
+        return [column.heading for column in self.shown().columns]
+
+    def only(self, first_cells: Collection[str]) -> "Table":
+        """The rows whose first cell is one of these."""
+        return dataclasses.replace(self, rows=tuple(row for row in self.rows if row[0] in first_cells))
 
     def records(self) -> list[dict[str, Cell]]:
         """The rows as dictionaries by the names of the columns: a list that `pandas.DataFrame` takes as it is."""
         return [dict(zip((c.name for c in self.columns), row, strict=True)) for row in self.rows]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Contents:
         """Title, columns with units, and rows, ready for JSON; numbers that are not finite are None."""
         columns = [{"name": column.name, "unit": column.unit} for column in self.columns]
         return {"title": self.title, "columns": columns, "rows": plain(self.rows)}
@@ -104,36 +139,70 @@ class Table:
 
     def to_text(self) -> str:
         """The rows for reading, in columns of equal width."""
-        lines = [tuple(column.heading for column in self.columns), *self.texts()]
+        lines = [tuple(self.headings()), *self.texts()]
         widths = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
         sides = [">" if self.is_number(i) else "<" for i in range(len(self.columns))]
         padded = (
             "  ".join(f"{text:{side}{width}}" for text, side, width in zip(line, sides, widths, strict=True))
             for line in lines
         )
-        return "\n".join([self.title, *(line.rstrip() for line in padded)])
+        return "\n".join([display().text(self.title), *(line.rstrip() for line in padded)])
 
     def to_csv(self) -> str:
         """All digits, with headings that carry the units."""
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
-        writer.writerow(column.heading for column in self.columns)
-        writer.writerows([_plain_cell(cell) for cell in row] for row in self.rows)
+        writer.writerow(self.headings())
+        writer.writerows([_plain_cell(cell) for cell in row] for row in self.shown().rows)
         return out.getvalue()
 
     def to_html(self) -> str:
         """The rows for reading, as HTML."""
         sides = [' class="number"' if self.is_number(i) else "" for i in range(len(self.columns))]
-        head = "".join(f"<th{s}>{html.escape(c.heading)}</th>" for c, s in zip(self.columns, sides, strict=True))
+        cells = zip(self.headings(), sides, strict=True)
+        head = "".join(f'<th scope="col"{side}>{html.escape(heading)}</th>' for heading, side in cells)
         lines = [
             "<tr>" + "".join(f"<td{s}>{html.escape(text)}</td>" for text, s in zip(row, sides, strict=True)) + "</tr>"
             for row in self.texts()
         ]
-        caption = f"<caption>{html.escape(self.title)}</caption>"
-        return "\n".join([f"<table>{caption}", f"<tr>{head}</tr>", *lines, "</table>"])
+        caption = f"<caption>{html.escape(display().text(self.title))}</caption>"
+        return "\n".join([f"<table>{caption}", f"<thead><tr>{head}</tr></thead><tbody>", *lines, "</tbody></table>"])
 
     _repr_html_ = to_html
     __repr__ = to_text
+
+
+_COUNTS = ("count", "cycles", "wheels", "ratio", "times", "(value − true)/se")  # columns whose numbers have no unit
+_SPREADS = ("scatter", "uncertainty", "standard error", "change")  # and those without a sign
+
+
+def _cell_shown(present: Display, column: Column, cell: Cell, unit: str, quantity: str) -> Cell:
+    """A cell in the units and the sign that are shown, of a row with this unit and quantity, if it states them."""
+    if column.name == "unit":
+        return _unit_shown(present, str(cell))
+    if isinstance(cell, str):
+        return present.words(cell)
+    own = column.unit or ("" if column.name in _COUNTS else unit)
+    if not isinstance(cell, float) or own in ("", "–", "%"):
+        return cell
+    signed = present.signed(column.name if column.unit else quantity) and column.name not in _SPREADS
+    return _scaled(cell, present.of(own.replace("²", "^2"), signed=signed).factor)
+
+
+def _unit_shown(present: Display, unit: str) -> str:
+    return typeset_unit(present.of(unit.replace("²", "^2")).unit, "")
+
+
+def _scaled(cell: float, factor: float) -> float:
+    """A number of a table times a factor; the text of a `Shown` keeps what its digits say."""
+    value = cell * factor + 0.0
+    if factor == 1.0 or not isinstance(cell, Shown):
+        return value
+    _, sign, error = cell.text.partition(" ± ")
+    if sign:
+        return Shown(value, plus_minus(value, float(error) * abs(factor)))
+    figures = max(3, len(re.sub(r"^-?0*\.?0*|\.|e.*", "", cell.text)))
+    return Shown(value, f"{value:.{figures}g}" if np.isfinite(value) else cell.text)
 
 
 def typeset_unit(unit: str, none: str = "") -> str:
@@ -179,9 +248,11 @@ def comparison_table(
 
 
 def plain(value: Any) -> Any:
-    """Numbers, words, lists and dictionaries as JSON has them; numbers that are not finite become None."""
+    """Numbers, words, lists, records and dictionaries as JSON has them; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
+    if hasattr(value, "_asdict"):
+        return plain(value._asdict())
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     if value is None or isinstance(value, str | bool | int):
@@ -197,7 +268,7 @@ def plain(value: Any) -> Any:
     return plain(array.tolist())
 
 
-def with_unit(value: Any, unit: str) -> dict[str, Any]:
+def with_unit(value: object, unit: str) -> Contents:
     """A number or an array with its unit, as plain data."""
     return {"value": plain(value), "unit": unit}
 

@@ -118,7 +118,7 @@ def of_known_numbers(function: Function) -> Function:
     signature = inspect.signature(function)
 
     @functools.wraps(function)
-    def call(*args: Any, **kwargs: Any) -> Any:
+    def call(*args: object, **kwargs: Any) -> Any:
         if is_traced((args, kwargs)):
             from jaxdamp import _checks
 

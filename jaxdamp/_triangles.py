@@ -5,7 +5,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, PyTree
 
 
 RANK_TOLERANCE = 1e-7  # singular value, relative to the largest, below which a direction leaves the force unchanged
@@ -13,7 +13,7 @@ RANK_TOLERANCE_SINGLE = 1e-4  # the same in single precision
 _ROWS = 512  # of a block: small enough for the cache
 
 
-def triangle(tall: Any) -> Any:
+def triangle(tall: PyTree) -> PyTree:
     """R of the QR decomposition of a matrix with many rows, NumPy's or JAX's, block by block: ten times faster."""
     xp: Any = jnp if isinstance(tall, jax.Array) else np
     rows, columns = tall.shape

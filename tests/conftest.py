@@ -17,15 +17,35 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 os.environ.setdefault("MPLBACKEND", "Agg")
-# Most of the time goes into compiling, once for each test: compile quickly instead of for speed. With the variable set,
-# even to nothing, tests run what users run.
-OLD_EMITTERS = ["--xla_cpu_use_fusion_emitters=false"] * (jax.__version_info__ < (0, 11))
-os.environ.setdefault("XLA_FLAGS", " ".join(["--xla_backend_optimization_level=0", *OLD_EMITTERS]))
 
 
 MAPS = Path("/proc/self/maps")
 MOST_MAPS = 30_000  # Linux allows a process 65 530, and every compiled program takes a few
 MOST_KEPT = 2_000_000_000  # bytes of compiled programs in .pytest_cache
+
+# Programs that a plain test may have compiled: one that needs more computes number by number with `jnp`, each operation
+# a program of 15 ms, instead of with NumPy or in one `jax.jit`. Those that need more for what they show are named.
+MOST_PROGRAMS = 100
+MORE_PROGRAMS = {
+    "test_contract": 250,
+    "test_c": 300,
+    "test_the_residual_of_a_problem_gives_the_truth_within_bounds_where_a_start_at_rest_does_not": 200,
+    "test_the_slopes_of_the_pressure_drop_are_those_of_its_formula": 180,
+    "test_steps_are_divided_alike_however_a_number_is_traced": 180,
+    "test_what_is_no_argument_of_a_compiled_function_is_known_inside": 160,
+    "test_derivatives_by_parameters_and_speed_agree_with_differences": 160,
+    "test_a_spring_beside_is_a_stiffer_spring_wherever_it_stands": 160,
+    "test_hysteresis_is_told_from_a_delay_by_several_records": 140,
+    "test_a_vehicle_of_parts_and_one_with_everything_come_back": 140,
+    "test_a_delay_of_half_a_sample_is_exact_where_friction_turns_within_one": 140,
+    "test_derivatives_where_lag_and_delay_are_zero": 140,
+    "test_derivatives_are_finite_where_an_effect_starts_at_zero": 140,
+    "test_the_use_of_a_damper_is_shaded": 140,
+    "test_a_test_of_many_small_programs_fails": 3,
+}
+COMPILED = "/jax/core/compile/backend_compile_duration"
+compiled: Counter[str] = Counter()
+jax.monitoring.register_event_duration_secs_listener(lambda event, _, **__: compiled.update([event]))
 
 
 # Traced programs are millions of objects, and looking through all of them for cycles takes seconds each time.
@@ -85,6 +105,22 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
         report.outcome = "failed"
         report.longrepr = f"{item.nodeid}: {report.longrepr}. Install what is missing: .ci/run leaves out no test."
     return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, Any, Any]:
+    """A plain test that compiles more than its share fails; what its fixtures compile is shared and not counted."""
+    before = compiled[COMPILED]
+    result = yield
+    count = compiled[COMPILED] - before
+    test = pyfuncitem.originalname
+    plain = not any(pyfuncitem.get_closest_marker(kind) for kind in ("slow", "exhaustive", "notebook"))
+    if plain and count > (most := MORE_PROGRAMS.get(test, MOST_PROGRAMS)):
+        pytest.fail(
+            f"{test} compiled {count} programs, at most {most}: use NumPy for expected values, one `jax.jit` round "
+            "what is computed, a fixture of the module for what several tests need."
+        )
+    return result
 
 
 @pytest.fixture(scope="module", autouse=True)

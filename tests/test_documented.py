@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import jaxdamp
+from jaxdamp._guesses import shared_names
 from jaxdamp.dampers import AbstractDamper
 
 
@@ -26,7 +27,7 @@ def public(package: str) -> Iterator[tuple[str, Any]]:
     """The functions and classes that a package offers, to users or to other packages."""
     module = import_module(f"jaxdamp.{package}")
     assert module.__doc__
-    for name in [*module.__all__, *getattr(module, "__shared__", ())]:
+    for name in [*module.__all__, *shared_names(module)]:
         value = getattr(module, name)
         if callable(value) and value.__module__.startswith("jaxdamp"):
             yield name, value
@@ -58,9 +59,9 @@ def described(name: str, text: str) -> str:
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_name_of_a_package_is_in_one_of_its_lists(package: str) -> None:
-    """`__all__` holds what a user writes, `__shared__` what is only returned or used by other packages."""
+    """`__all__` holds what a user writes; `X as X` is only returned or used by other packages."""
     module = import_module(f"jaxdamp.{package}")
-    listed = [*module.__all__, *getattr(module, "__shared__", ())]
+    listed = [*module.__all__, *shared_names(module)]
     assert len(listed) == len(set(listed)) and all(hasattr(module, name) for name in listed)
     tree = ast.parse(inspect.getsource(module))
     imported = {alias.asname or alias.name for n in tree.body if isinstance(n, ast.ImportFrom) for alias in n.names}

@@ -13,14 +13,16 @@ import pytest
 
 import jaxdamp
 from jaxdamp import bench, dampers, identify, rig, roads, tune, vehicles
+from jaxdamp._guesses import shared_names
 from jaxdamp._results import AbstractResult, worst_status
 from jaxdamp._status import Status
 from jaxdamp._tables import Table
 from jaxdamp.parameters import free_parameters
-from jaxdamp.tune.comparison import Difference
+from jaxdamp.tune.decisions import Difference
 from jaxdamp.tune.front import FrontParameter
 from jaxdamp.tune.measuring import Measurement
-from jaxdamp.tune.result import Change, ScenarioValues
+from jaxdamp.tune.ranges import Change
+from jaxdamp.tune.result import ScenarioValues
 from jaxdamp.tune.valving_result import OutOfReach, ValveParameter
 
 
@@ -172,7 +174,7 @@ def test_a_result_writes_its_page(kind, samples, tmp_path) -> None:
 
 
 def _names(package: ModuleType) -> list[str]:
-    return [*package.__all__, *getattr(package, "__shared__", ())]
+    return [*package.__all__, *shared_names(package)]
 
 
 def test_whatever_has_a_table_is_a_result() -> None:

@@ -26,7 +26,7 @@ STOREYS = [
 TOP = len(STOREYS) - 1
 # A result draws itself: `.plot()` loads the plots when it is called.
 DRAWS_ITSELF = {(own, "plots") for own in ("metrics", "rig", "roads", "vehicles", *STOREYS[3], *STOREYS[4])}
-DRAWS_ITSELF |= {("_results", "report")}  # and writes itself: `.report(path)`
+DRAWS_ITSELF |= {("_results", "plots"), ("_results", "report")}  # and writes itself: `.report(path)`
 # Known only to someone who asks for them: importing the package loads none.
 LATE = ["matplotlib", "xarray", "pint", "typer", "rich", "pandas", "scipy.optimize", "scipy.signal", "scipy.io"]
 
@@ -58,14 +58,16 @@ def imported_modules(source: str, package: list[str]) -> Iterator[tuple[list[str
 
 
 def public_names(part: str) -> set[str] | None:
-    """What a package hands to the others, `__all__` and `__shared__` of its `__init__`; None of a single module."""
+    """What a package hands to the others, `__all__` and `X as X` of its `__init__`; None of a single module."""
     door = ROOT / part / "__init__.py"
     if not door.exists():
         return None
     names: set[str] = set()
     for node in ast.parse(door.read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) in ("__all__", "__shared__"):
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
             names |= set(ast.literal_eval(node.value))
+        if isinstance(node, ast.ImportFrom):
+            names |= {alias.name for alias in node.names if alias.asname == alias.name}
     return names
 
 

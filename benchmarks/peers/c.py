@@ -17,7 +17,7 @@ from jaxtyping import Array
 
 from benchmarks.peers import problem
 from benchmarks.peers.problem import Heights, Parameters, Results
-from jaxdamp.simulation.propagator import Propagator
+from jaxdamp.simulation.exponential import Propagator
 from jaxdamp.vehicles import AbstractVehicle, HalfCar, QuarterCar
 
 

@@ -32,7 +32,15 @@ from jaxdamp.bench.evaluation import (
     read_limits,
     separate_gas_and_friction,
 )
-from jaxdamp.bench.preflight import Finding as Finding, Preflight as Preflight, preflight, usable
+from jaxdamp.bench.force_velocity import ForceVelocityTable as ForceVelocityTable, are_tables as are_tables, read_table
+from jaxdamp.bench.preflight import (
+    Finding as Finding,
+    Preflight as Preflight,
+    clock_jitter as clock_jitter,
+    mains_lines as mains_lines,
+    preflight,
+    usable,
+)
 from jaxdamp.bench.processing import Steps, low_pass_gain
 from jaxdamp.bench.programmes import Excitation, RandomTest, SineTest
 from jaxdamp.bench.raw import RawColumn, RawTable
@@ -75,30 +83,9 @@ __all__ = [
     "read",
     "read_limits",
     "read_rides",
+    "read_table",
     "separate_gas_and_friction",
     "usable",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "OEM_VELOCITIES",
-    "Contradiction",
-    "Evaluation",
-    "Finding",
-    "FoldedCycles",
-    "GasAndFriction",
-    "LimitCheck",
-    "Measurement",
-    "PeakVelocityPoints",
-    "Preflight",
-    "VelocityLoops",
-    "as_runs",
-    "by_number",
-    "contradictions_in_words",
-    "fold_cycles",
-    "last_steady_cycle",
-    "moving_part",
-    "settings_apart",
-    "steady_cycles",
 ]
 
 answer_guesses(__name__, __all__)

@@ -26,6 +26,11 @@ class Interpretation:
     sign: str | None = None
     force_sign: str | None = None
     sampling_rate: float | int | None = None
+    drop_bad_rows: bool = False
+
+
+_LONGEST_BRIDGE = 10  # bad rows one after the other that are bridged
+_MOST_BAD = 0.05  # share of the rows of a record that may be left out
 
 
 def bench_runs(table: RawTable, name: str, how: Interpretation) -> list[BenchRun]:
@@ -35,6 +40,7 @@ def bench_runs(table: RawTable, name: str, how: Interpretation) -> list[BenchRun
         ValueError: all that is wrong with the table.
     """
     columns, doubts = find_columns(table, how.choice)
+    table = without_bad_rows(table, columns) if how.drop_bad_rows else table
     clock.check_count(len(table), table.where)
     channels, notes = _channels(table, columns, how.choice)
     notes = [_columns_note(table, columns), *table.notes, *doubts, *notes]
@@ -44,6 +50,38 @@ def bench_runs(table: RawTable, name: str, how: Interpretation) -> list[BenchRun
         return [_record(table, columns, channels, parts[0], name, how, notes)]
     names = [f"{name}_part{number}" for number in range(1, len(parts) + 1)]
     return [_record(table, columns, channels, part, n, how, notes) for part, n in zip(parts, names, strict=True)]
+
+
+def without_bad_rows(table: RawTable, columns: Mapping[str, Column]) -> RawTable:
+    """A table without rows in which a quantity is missing or no number; a note counts them.
+
+    Their places, of ten rows one after the other at most, are bridged by straight lines between the rows around them,
+    so that the time goes on.
+
+    Raises:
+        ValueError: more bad rows than can be left out, or more of them one after the other.
+    """
+    used = [column.index for column in columns.values() if column.conversion is not None]
+    bad = np.zeros(len(table), dtype=bool)
+    for index in used:
+        bad |= ~np.isfinite(np.asarray(table.columns[index].values, np.float64))
+    if not bad.any():
+        return table
+    rows, place = np.arange(len(table)), table.place(int(np.argmax(bad)))
+    good = rows[~bad]
+    longest, count = int(np.diff(good, prepend=-1, append=len(table)).max()) - 1, int(bad.sum())
+    if longest > _LONGEST_BRIDGE or bad.mean() > _MOST_BAD or bad[0] or bad[-1]:
+        limits = f"at most {_LONGEST_BRIDGE} in a row inside the record, and {100 * _MOST_BAD:g} % of all"
+        raise ValueError(
+            f"{table.where}: {count} of {len(table)} rows are bad, up to {longest} one after the other, the first is "
+            f"{place}; {limits}, can be left out. Cut the record there."
+        )
+    channels = list(table.columns)
+    for index in used:
+        values = np.interp(rows, good, np.asarray(channels[index].values, np.float64)[~bad])
+        channels[index] = replace(channels[index], values=values, faults={})
+    note = f"{count} bad row{'s' * (count > 1)} left out, straight lines instead; the first is {place}"
+    return replace(table, columns=tuple(channels), notes=(*table.notes, note))
 
 
 def _channels(table: RawTable, columns: Mapping[str, Column], choice: Choice) -> tuple[dict[str, Samples], list[str]]:

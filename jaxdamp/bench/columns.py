@@ -192,14 +192,21 @@ def is_record(table: RawTable, choice: Choice, roles: Sequence[str] = REQUIRED) 
     return any(_places(table, choice.columns.get(role)) or _candidates(table, role, choice) for role in roles)
 
 
+def find_one(table: RawTable, role: str, choice: Choice) -> int | None:
+    """The number of the column of a quantity; None where there is none or the caller leaves it out."""
+    return _index(table, role, choice)[0]
+
+
+def _index(table: RawTable, role: str, choice: Choice) -> tuple[int | None, list[str]]:
+    if role in choice.columns:
+        return _given(table, role, choice.columns[role]), []
+    return _named(table, role, choice)
+
+
 def _column(table: RawTable, role: str, choice: Choice) -> tuple[Column | None, list[str]]:
     """The column of a quantity, and a note where its unit decided between several."""
-    notes: list[str] = []
-    if role in choice.columns:
-        index = _given(table, role, choice.columns[role])
-    else:
-        index, notes = _named(table, role, choice)
-    return (None if index is None else _with_unit(table, role, index, choice)), notes
+    index, notes = _index(table, role, choice)
+    return (None if index is None else column_of(table, role, index, choice)), notes
 
 
 def _given(table: RawTable, role: str, wanted: str | int | None) -> int | None:
@@ -278,7 +285,8 @@ def _is_clock(column: RawColumn) -> bool:
     return len(texts) > 0 and all(":" in str(text) and is_stamp(str(text)) for text in texts)
 
 
-def _with_unit(table: RawTable, role: str, index: int, choice: Choice) -> Column:
+def column_of(table: RawTable, role: str, index: int, choice: Choice) -> Column:
+    """The column of this number as a quantity, with the unit that the header or the caller names."""
     column, header = table.columns[index], table.names[index]
     where = f"{table.where}, column {header!r}"
     if column.is_text:

@@ -22,6 +22,7 @@ BENCH_KEYS: Kinds = {
     "files": (list,),
     "test": (str,),
     "stroke_from_velocity": (bool,),
+    "show": (dict,),
     **dict.fromkeys(TABLES, (dict,)),
 }
 RIDE_KEYS: Kinds = {
@@ -31,6 +32,7 @@ RIDE_KEYS: Kinds = {
     "reversed_channels": (list,),
     "sampling_rate": (int, float),
     "delimiter": (str,),
+    "show": (dict,),
 }
 _KIND_NAMES = {"dict": "table", "str": "text", "bool": "true or false", "int": "whole number", "float": "number"}
 
@@ -83,7 +85,7 @@ def read_manifest(file: Path, keys: Kinds) -> dict[str, Any]:
 
 def merged(manifest: Mapping[str, Any], arguments: Mapping[str, Any]) -> dict[str, Any]:
     """The manifest with what was given in the call, which wins; columns, units and gains quantity by quantity."""
-    out = {key: value for key, value in manifest.items() if key not in ("files", "test")}
+    out = {key: value for key, value in manifest.items() if key not in ("files", "test", "show")}
     for key, value in arguments.items():
         if key in TABLES:
             out[key] = {**out.get(key, {}), **(value or {})}

@@ -22,7 +22,8 @@ from jaxdamp.bench.ride_record import RideRecord
 from jaxdamp.bench.ride_tables import RideInterpretation, ride_record
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
-from jaxdamp.bench.settings import Settings, settings_by_name
+from jaxdamp.bench.settings import Settings, settings_by_name, settings_in_names
+from jaxdamp.bench.several_tests import tests_apart
 
 
 Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
@@ -46,6 +47,7 @@ def read(
     readers: Mapping[str, Reader] | None = None,
     stroke_from_velocity: bool | None = None,
     skip_bad: bool = False,
+    drop_bad_rows: bool = False,
 ) -> BenchSet:
     r"""Read bench records from text files, workbooks, MATLAB, TDMS, MDF4 and Parquet files.
 
@@ -77,6 +79,8 @@ def read(
         stroke_from_velocity: integrate the velocity of files without a stroke, as for laws that need no place of the
             stroke; `BenchRun.stroke_is_integrated` says so.
         skip_bad: leave out files that cannot be read, instead of reading none; `BenchSet.left_out` says which and why.
+        drop_bad_rows: leave out rows with a missing value or text, at most ten one after the other and 5 % of all;
+            straight lines stand in their place, and a note counts them.
 
     Returns:
         The records, named after their files, in the order of the paths, folders and patterns in natural order. A
@@ -124,7 +128,7 @@ def read(
         _checks.positive("sampling_rate", given["sampling_rate"])
     tables = ({**(given[name] or {})} for name in ("columns", "units", "gains"))
     choice = Choice(*tables, stroke_from_velocity=bool(given["stroke_from_velocity"]))
-    how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"])
+    how = Interpretation(choice, given["sign"], given["force_sign"], given["sampling_rate"], drop_bad_rows)
     files = find_files(asked, {*FOLDER_SUFFIXES, *(readers or {})})
     runs, errors = _read_files(
         files, all_readers, given["delimiter"], lambda tables, name: _bench_runs(tables, name, how)
@@ -260,6 +264,7 @@ def _bench_runs(tables: Sequence[RawTable], name: str, how: Interpretation) -> l
 
     Tables without stroke and force are left out of a file that has others, with a note.
     """
+    tables = [part for table in tables for part in tests_apart(table, how.choice)]
     tables = on_one_clock(tables, how.choice) if len(tables) > 1 else tables
     good = [table for table in tables if is_record(table, how.choice)] or tables
     left_out = ", ".join(repr(table.record) for table in tables if table not in good)
@@ -275,8 +280,19 @@ def _bench_runs(tables: Sequence[RawTable], name: str, how: Interpretation) -> l
 def _with_settings(
     runs: list[tuple[str, BenchRun]], settings: str | Mapping[str, Settings] | None
 ) -> list[tuple[str, BenchRun]]:
-    table = settings_by_name([base for base, _ in runs], settings)
-    return [(base, replace(run, settings={**run.settings, **table[base]})) for base, run in runs]
+    names = [base for base, _ in runs]
+    table, notes = (settings_by_name(names, settings), {}) if settings is not None else settings_in_names(names)
+    return [
+        (
+            base,
+            replace(
+                run,
+                settings={**table[base], **run.settings, **({} if settings is None else table[base])},
+                notes=(*run.notes[:-1], *notes.get(base, ()), *run.notes[-1:]),
+            ),
+        )
+        for base, run in runs
+    ]
 
 
 def _commanded(runs: list[tuple[str, BenchRun]], command: Command | None) -> list[BenchRun]:

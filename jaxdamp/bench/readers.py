@@ -1,6 +1,7 @@
 """Readers of files by suffix: text, workbooks, MATLAB, TDMS, MDF4, Parquet. The libraries are the extra `io`."""
 
 import importlib
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -15,6 +16,7 @@ from jaxdamp.bench.raw import RawColumn, RawTable
 from jaxdamp.bench.text import read_text
 
 
+_LARGEST_SHEET, _LARGE, _INFLATION = 2**29, 2**26, 100  # bytes of a part of a workbook, and how often it may grow
 _MOST_COLUMNS = 64  # of a matrix in a MATLAB file that is taken for channels side by side
 
 
@@ -31,12 +33,24 @@ def _library(module: str, file: Path) -> ModuleType:
 
 def read_xlsx(file: Path) -> list[RawTable]:
     """Read a workbook: every sheet with rows of numbers is a record."""
+    _check_inflation(file)
     book = _library("openpyxl", file).load_workbook(file, read_only=True, data_only=True)
     try:
         sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
     finally:
         book.close()
     return _alone([table for name, rows in sheets.items() if (table := _sheet(file, name, rows)) is not None])
+
+
+def _check_inflation(file: Path) -> None:
+    """Refuse a workbook whose parts inflate to more than those of any record."""
+    with zipfile.ZipFile(file) as parts:
+        for part in parts.infolist():
+            swollen = part.file_size > _LARGE and part.file_size > _INFLATION * max(part.compress_size, 1)
+            if part.file_size > _LARGEST_SHEET or swollen:
+                size = f"{part.file_size / 2**20:.0f} MiB"
+                limit = f"{_LARGEST_SHEET // 2**20} MiB, and {_INFLATION} times from {_LARGE // 2**20} MiB on"
+                raise ValueError(f"{file}: {part.filename} inflates to {size}; the limit is {limit}. Export it as CSV.")
 
 
 def _sheet(file: Path, name: str, cells: list[tuple]) -> RawTable | None:

@@ -74,6 +74,50 @@ def _add(settings: dict, more: Settings, name: str) -> None:
             _checks.refuse("settings", must, f"{settings[key]!r} and {value!r}")
 
 
+_EDGE = r"(?<![A-Za-z\d.])"
+_IN_NAMES = (  # how adjusters are written in names, and what the numbers are
+    (rf"{_EDGE}(\d+(?:[.,]\d+)?) ?A(?![A-Za-z\d])", ("current",)),
+    (rf"{_EDGE}(\d+(?:[.,]\d+)?) ?V(?![A-Za-z\d])", ("voltage",)),
+    (rf"{_EDGE}(\d+) ?(?:clicks?|clks?)(?![A-Za-z])", ("clicks",)),
+    (rf"{_EDGE}(?:clicks?|clks?)[ _-]?(\d+)(?![\d.])", ("clicks",)),
+    (rf"{_EDGE}C ?(\d+)[ _,-]*R ?(\d+)(?![A-Za-z\d.])", ("compression_clicks", "rebound_clicks")),
+    (rf"{_EDGE}R ?(\d+)[ _,-]*C ?(\d+)(?![A-Za-z\d.])", ("rebound_clicks", "compression_clicks")),
+)
+
+
+def settings_in_name(name: str) -> dict[str, float]:
+    """The settings of adjusters that a name states, as workshops write them.
+
+    Arguments:
+        name: of a record, a sheet or a column.
+
+    >>> settings_in_name("run3_0.5A"), settings_in_name("C4 R6 hot"), settings_in_name("12clk"), settings_in_name("5mm")
+    ({'current': 0.5}, {'compression_clicks': 4.0, 'rebound_clicks': 6.0}, {'clicks': 12.0}, {})
+    """
+    found: dict[str, float] = {}
+    for pattern, names in _IN_NAMES:
+        match = re.search(pattern, name, re.IGNORECASE if "click" in pattern else 0)
+        values = () if match is None else (float(text.replace(",", ".")) for text in match.groups())
+        found = dict(zip(names, values, strict=False)) | found
+    return found
+
+
+def settings_in_names(names: Sequence[str]) -> tuple[dict[str, dict], dict[str, tuple[str, ...]]]:
+    """The settings of adjusters in the names of records, and a note for each record that has some.
+
+    A setting counts only if every one of several records states it, and not all the same.
+
+    Arguments:
+        names: of the records.
+    """
+    stated = {name: settings_in_name(name) for name in names}
+    keys = [k for k in stated[names[0]] if all(k in found for found in stated.values())] if len(stated) > 1 else []
+    keys = [key for key in keys if len({found[key] for found in stated.values()}) > 1]
+    settings: dict[str, dict] = {name: {key: found[key] for key in keys} for name, found in stated.items()}
+    words = {name: ", ".join(f"{key} {value:g}" for key, value in found.items()) for name, found in settings.items()}
+    return settings, {name: (f"by its name: {text}",) for name, text in words.items() if text}
+
+
 def settings_apart(runs: Sequence[BenchRun]) -> tuple[dict[str, str], str]:
     """The setting of each record where records of the same motion contradict one another again and again.
 
@@ -112,7 +156,11 @@ def _candidates(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
     stated = [(f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs}) for key in keys]
     words = {run.name: re.split(r"[_\s,;()]+|-(?=\D)", run.name) for run in runs}
     places = range(-1, -min(map(len, words.values())) - 1, -1)
-    return stated + [("a word of their names", {name: parts[i] for name, parts in words.items()}) for i in places]
+    named = [("a word of their names", {name: parts[i] for name, parts in words.items()}) for i in places]
+    read = {run.name: settings_in_name(run.name) for run in runs}  # such settings are words of the names first of all
+    own = [all(read[run.name].get(key) == run.settings[key] for run in runs) for key in keys]
+    first = [candidate for candidate, of_names in zip(stated, own, strict=True) if not of_names]
+    return [*first, *named, *(candidate for candidate, of_names in zip(stated, own, strict=True) if of_names)]
 
 
 def by_number(text: str) -> tuple[float, str]:

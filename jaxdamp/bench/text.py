@@ -1,5 +1,6 @@
 """Text files with columns of numbers: delimiter, decimal sign, preamble, header, footer."""
 
+import itertools
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -10,11 +11,23 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._checks import ArgumentError, Setting
-from jaxdamp.bench.layout import DELIMITERS, PLAIN_COMMA, Layout, columns_of, header_of, layout_of, split
+from jaxdamp._files import check_size
+from jaxdamp.bench.layout import (
+    DELIMITERS,
+    PLAIN_COMMA,
+    Header,
+    Layout,
+    columns_of,
+    header_of,
+    layout_of,
+    number,
+    split,
+)
 from jaxdamp.bench.raw import RawColumn, RawTable
 
 
 _LOOK_AT = 2000  # lines that decide on the delimiter
+_MOST_COLUMNS = 4096  # of a text file
 _CHUNK = 5_000  # lines that are divided at a time, to bound the memory
 _CONTENT = {  # how files of other formats begin
     b"PK\x03\x04": "an XLSX workbook (.xlsx)",
@@ -28,7 +41,7 @@ _CONTENT = {  # how files of other formats begin
 
 
 def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
-    """Read a text file with columns of numbers, one record a file.
+    """Read a text file with columns of numbers: one record, or one under each line that is like the header.
 
     The delimiter is the one of comma, semicolon, tab, white space and vertical bar with which most digits are those
     of numbers and time stamps. The comma is the decimal sign where it is not the delimiter and no number has a point.
@@ -45,22 +58,95 @@ def read_text(file: Path, delimiter: str | None = None) -> list[RawTable]:
     top = list(islice(((n, line) for n, line in enumerate(lines, 1) if line.strip()), _LOOK_AT))
     if not top:
         raise ValueError(f"{file} is empty: export it from the bench again.")
+    _check_width(file, top)
     layout = _choose(file, top, delimiter)
     rows = [(n, split(line, layout.delimiter)) for n, line in top]
     header = header_of(rows, layout)
     if header is None:
         raise ValueError(f"{file}: no row has a number in each of its {layout.count} columns: mend or shorten it.")
-    numbers, body, notes = _body(lines, rows[header.first][0], layout)
+    first = rows[header.first][0]
+    above = rows[header.top][0]
+    starts = _starts(lines, above, first - above, layout)
+    tables, behind = [], 0  # number of the last line of the table before
+    for start, following in zip(starts, [*starts[1:], len(lines) + 1], strict=True):
+        end = len(lines) if len(starts) == 1 else _end(lines, start + first - above, following - 1, layout)
+        preamble = tuple(line for line in lines[behind : start - 1] if line.strip())
+        table = _table(file, lines[:end], start + first - above, layout, header)
+        tables.append(replace(table, preamble=preamble, record=_title(preamble, start if behind else None, layout)))
+        behind = end
+    return _with_names_apart(tables)
+
+
+def _starts(lines: list[str], above: int, depth: int, layout: Layout) -> list[int]:
+    """The numbers of the lines with the header, where it stands over several blocks."""
+    if not depth or lines.count(lines[above - 1]) == 1:
+        return [above]
+    head = lines[above - 1].strip()
+    starts = [at for at, line in enumerate(lines, 1) if line.strip() == head]
+    return starts if _begin_again(lines, starts, depth, layout) else [above]
+
+
+def _table(file: Path, lines: list[str], first: int, layout: Layout, header: Header) -> RawTable:
+    """The table of the lines from number `first` on."""
+    numbers, body, notes = _body(lines, first, layout)
     columns = _all_at_once(body, layout)
     if columns is None:
         columns = columns_of(file, numbers, _in_chunks(body, layout.delimiter, layout.count), layout)
     columns = [replace(c, name=n, unit=u) for c, n, u in zip(columns, header.names, header.units, strict=True)]
-    preamble = tuple(line for _, line in top[: header.top])
-    return [RawTable(file, tuple(columns), lines=numbers, preamble=preamble, notes=notes)]
+    return RawTable(file, tuple(columns), lines=numbers, notes=notes)
+
+
+def _end(lines: list[str], first: int, last: int, layout: Layout) -> int:
+    """The number of the last row of numbers among these lines."""
+    while last >= first and not layout.is_row(split(lines[last - 1], layout.delimiter)):
+        last -= 1
+    return last
+
+
+def _begin_again(lines: list[str], starts: list[int], depth: int, layout: Layout) -> bool:
+    """Whether the numbers below each header begin again: a header inside one record is a fault of the file."""
+    ends = [_end(lines, start + depth, following - 1, layout) for start, following in itertools.pairwise(starts)]
+    ends.append(_end(lines, starts[-1] + depth, len(lines), layout))
+    if any(end - start - depth < 1 for start, end in zip(starts, ends, strict=True)):
+        return False
+    first = [_first_number(lines[start + depth - 1], layout) for start in starts]
+    last = [_first_number(lines[end - 1], layout) for end in ends]
+    return all(a is not None and b is not None and a > b for a, b in zip(last[:-1], first[1:], strict=True))
+
+
+def _first_number(line: str, layout: Layout) -> float | None:
+    cells = split(line, layout.delimiter)
+    return number(cells[layout.full[0]], layout.delimiter) if layout.full[0] < len(cells) else None
+
+
+def _title(preamble: tuple[str, ...], start: int | None, layout: Layout) -> str:
+    """What stands above the header of a block; the number of its line where nothing does."""
+    words = [cell for cell in split(preamble[-1], layout.delimiter) if cell] if preamble else []
+    return " ".join(words)[:60] or (f"line {start}" if start else "first")
+
+
+def _with_names_apart(tables: list[RawTable]) -> list[RawTable]:
+    """Tables of a file with names of their own; a single one needs none."""
+    names = [table.record for table in tables]
+    if len(tables) == 1:
+        return [replace(tables[0], record="")]
+    apart = [f"{name} {number}" if names.count(name) > 1 else name for number, name in enumerate(names, 1)]
+    said = f"one of {len(tables)} blocks of the file, each under a header of its own"
+    return [replace(t, record=name, notes=(*t.notes, said)) for t, name in zip(tables, apart, strict=True)]
+
+
+def _check_width(file: Path, top: list[tuple[int, str]]) -> None:
+    """Refuse lines with more columns than any record has, before they are divided."""
+    number, line = max(top, key=lambda one: len(one[1]))
+    count = 1 + max(max(line.count(mark) for mark in ",;\t|"), len(line.split()) - 1)
+    if count > _MOST_COLUMNS:
+        remedy = "export the channels of one record only"
+        raise ValueError(f"{file}, line {number}: {count} columns, more than {_MOST_COLUMNS} that are read: {remedy}.")
 
 
 def text_lines(file: Path) -> list[str]:
     """The lines of a text file in UTF-8, UTF-16 or the Western code page of Windows."""
+    check_size(file, file.stat().st_size)
     raw = file.read_bytes()
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return raw.decode("utf-16", errors="replace").splitlines()

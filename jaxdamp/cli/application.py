@@ -2,6 +2,7 @@
 
 import functools
 import inspect
+import itertools
 import shlex
 from importlib import import_module
 from typing import Annotated, Any
@@ -39,9 +40,11 @@ class Command(TyperCommand):
         """Read the words after the name of the command."""
         names = {option for parameter in self.params for option in parameter.opts}
         replaced = []
-        for word in args:
+        for word, following in itertools.zip_longest(args, args[1:], fillvalue=""):
             option, equals, value = word.partition("=")
             known = self.aliases.get(option, option) if option not in names else option
+            if option == "--units" and "--show-units" in names and "=" not in (value or following):
+                known = "--show-units"
             replaced.append(f"{known}{equals}{value}")
         return super().parse_args(ctx, replaced)
 
@@ -96,11 +99,13 @@ app = typer.Typer(
     help="""From a dyno file to a damper law, a ride and a better damper.
 
 Units: SI everywhere (m, m/s, N, s, N s/m). Files may use other units, but must name them: in their headers
-("stroke [mm]", "F_N"), or with --units.
+("stroke [mm]", "F_N"), or with --units. Results are shown in lbf and in/s with --units imperial, see --show-units.
 
 Signs: stroke and velocity are positive in rebound (extension), force is positive when it resists extension. A file
-whose bench counts compression positive is read with --sign compression-positive. Nothing is guessed silently: what was
-decided is printed.""",
+whose bench counts compression positive is read with --sign compression-positive, and results are shown so with
+--show-sign compression-positive. Nothing is guessed silently: what was decided is printed.
+
+Both can stand under [show] in jaxdamp.toml here or in ~/.config: units = "imperial", sign = "compression-positive".""",
 )
 
 
@@ -131,15 +136,17 @@ def command(name: str) -> Command:
     target = COMMANDS[name]
 
     def run(*, debug: bool = False, **given: Any) -> None:
-        from jaxdamp.cli import console, early
+        from jaxdamp.cli import console, early, showing
 
         with console.plain_errors(debug):
             early.check(name, given)
             read = options.values(target, given)
             console.prepare()
             module, _, function = target.rpartition(".")
-            screen = {("screen",): console.Screen()}
-            getattr(import_module(f"jaxdamp.{module}"), function)(**options.build(target, screen | read))
+            screen = console.Screen()
+            arguments = options.build(target, {("screen",): screen, **read})
+            with showing.chosen(given, screen):
+                getattr(import_module(f"jaxdamp.{module}"), function)(**arguments)
 
     switch = inspect.Parameter("debug", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=DEBUG)
     made = [*options.parameters(name, target), switch]

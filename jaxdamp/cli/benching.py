@@ -45,17 +45,17 @@ def bench_command(
         sound, found = reading.checked(screen, raw)
         runs = reading.processed(sound)
         remarks = decisions(runs)
-        screen.heading("What was done to the records")
         screen.points(remarks)
         by = None if group_by is None else value_of(tuple(raw), group_by)
         with screen.stage("Evaluating the records"):
             evaluation = bench.evaluate(runs, **how.arguments(by=by))
             beneath = None if baseline is None else _baseline(baseline, evaluation, reading)
         check = None if chosen is None else evaluation.check(chosen)
-        screen.points(evaluation.notes, style="yellow")
         tables = evaluation.tables()
-        for name in ("velocities", "settings", "peak_forces", "loops"):
+        for name in ("velocities", "settings"):
             screen.table(tables[name])
+        screen.details(*(tables[name] for name in ("peak_forces", "loops")))
+        screen.remarks(evaluation.notes, style="yellow")
         if check is not None:
             screen.table(check.table())
         if beneath is not None:

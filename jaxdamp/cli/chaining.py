@@ -12,12 +12,12 @@ from jaxdamp.cli.fitting import fit_laws, show, write_fits
 from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, grouped, law_names
-from jaxdamp.cli.riding import Driving, unusual
+from jaxdamp.cli.riding import Driving, headline, unusual
 from jaxdamp.cli.tuning import exit_code_of, tuned, tuning_arguments, write_tuning
 from jaxdamp.cli.vehicle_words import parse_vehicle
 from jaxdamp.identify import FitResult
 from jaxdamp.parameters import parameters
-from jaxdamp.report import chain_report, records_table, ride_tables
+from jaxdamp.report import chain_report, records_table, ride_tables, ride_verdict
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
 from jaxdamp.vehicles import AbstractVehicle
@@ -29,7 +29,7 @@ def report(
     *,
     vehicle: str = "quarter_car_000",
     road: str = "iso:C",
-    law: Sequence[str] = ("all",),
+    law: Sequence[str] = (),
     minimise: str = "comfort",
     search: Annotated[Call, "tune.minimise"],
     reading: Reading,
@@ -43,7 +43,8 @@ def report(
     change and that the records determine. Ends with exit code 1 if a limit is not met.
 
     Arguments:
-        law: names of laws to fit, see "jaxdamp laws": "linear,besinger"; or "all".
+        law: names of laws to fit, see "jaxdamp laws": "linear,besinger"; or "all"; six that suit the records if left
+            out.
         minimise: comfort, travel, grip, or the name of a ride metric.
     """
     names, make = law_names(law), parse_vehicle(vehicle)
@@ -83,8 +84,9 @@ def report(
         remarks += sentences
         rides = _rides(screen, cars, surface, run)
         tables = ride_tables(rides)
-        for table in tables.values():
-            screen.table(table)
+        screen.answer(*ride_verdict(rides))
+        screen.table(headline(screen, tables["metrics"], car))
+        screen.details(*(table for name, table in tables.items() if name != "metrics"))
         with work.saving("Tuned law, vehicle and tables") as draft:
             if result is not None:
                 write_tuning(draft, result)

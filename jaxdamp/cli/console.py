@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from jaxdamp._display import display
 from jaxdamp._tables import Column, Table
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.wording import message
@@ -22,37 +23,61 @@ from jaxdamp.cli.wording import message
 
 Advance = Callable[[str, int], None]
 _WIDTH_OF_FILES = 130  # characters a line where the output is no terminal
+_QUICK = 2.0  # s, stages that end sooner do not say how long they took
+_MOST = 3  # remarks at the terminal; the page has all
 
 
 class Screen:
-    """Where a command writes what it does, and the times that its stages took."""
+    """Where a command writes what it does, and the times that its stages took.
+
+    The terminal has the answer and the remarks that matter most; with `verbose`, all that the page has.
+    """
 
     def __init__(self) -> None:
+        self.verbose = False
         self.live = sys.stdout.isatty()  # whatever colours are forced; a notebook and a pipe keep every frame
         self.console = Console(width=None if self.live else _WIDTH_OF_FILES, highlight=False)
         self.times: dict[str, float] = {}
 
     def say(self, text: str = "", style: str = "") -> None:
         """A paragraph, taken literally."""
-        self.console.print(literal(text, style), soft_wrap=False)
+        self.console.print(literal(display().words(text), style), soft_wrap=False)
 
     def heading(self, text: str) -> None:
         """A section begins."""
         self.console.print()
-        self.console.print(literal(text, "bold"))
+        self.console.print(literal(display().words(text), "bold"))
+
+    def answer(self, *sentences: str) -> None:
+        """What the command was asked for, in words."""
+        self.console.print()
+        self.say(" ".join(filter(None, sentences)), "bold")
 
     def points(self, items: Sequence[str], style: str = "") -> None:
         """A list of remarks."""
         for item in items:
-            self.console.print(literal(f"  - {item}", style))
+            self.console.print(literal(f"  - {display().words(item)}", style))
+
+    def remarks(self, items: Sequence[str], style: str = "") -> None:
+        """The first remarks of a list that is sorted by consequence, and how many more are on the page."""
+        shown = items if self.verbose else items[:_MOST]
+        self.points(shown, style)
+        if len(shown) < len(items):
+            self.points([f"{len(items) - len(shown)} more in report.html (--verbose prints all)"])
+
+    def details(self, *tables: Table) -> None:
+        """Tables that the page has, and the terminal if it is asked to print all."""
+        for table in tables if self.verbose else ():
+            self.table(table)
 
     def table(self, table: Table, mark: str | None = None) -> None:
         """A table without its meanings, which are for the files; rows whose first cell is `mark` in bold."""
         shown = RichTable(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+        headings = table.headings()
         visible = [index for index, column in enumerate(table.columns) if column.name != "meaning"]
         for index in visible:
             side = "right" if table.is_number(index) else "left"
-            shown.add_column(literal(table.columns[index].heading), justify=side, overflow="fold", no_wrap=index == 0)
+            shown.add_column(literal(headings[index]), justify=side, overflow="fold", no_wrap=index == 0)
         for row in table.texts():
             shown.add_row(*(literal(row[index]) for index in visible), style="bold" if row[0] == mark else "")
         self.heading(table.title)
@@ -99,7 +124,8 @@ class Screen:
             yield lambda detail, done: interrupt.check()
         seconds = time.perf_counter() - started
         self.times[title] = seconds
-        self.say(f"{title}: done in {seconds:.1f} s", "green")
+        if seconds >= _QUICK:
+            self.say(f"{title}: done in {seconds:.1f} s", "green")
 
 
 def literal(text: str, style: str = "") -> Text:

@@ -32,25 +32,34 @@ def check(command: str, given: Mapping[str, Any]) -> None:
     if given.get("files"):
         find_files(given["files"], FOLDER_SUFFIXES)
     for name in ("law", "start", "baseline"):
-        path = given.get(name)
-        if not isinstance(path, Path):
-            continue
-        if command == "bench" and path.suffix != ".json":  # other records
-            find_files(path, FOLDER_SUFFIXES)
-        else:
-            either = command == "export" or (name == "baseline" and command in ("tune", "sweep"))
-            words, remedy = ("a law or a vehicle", FROM_BOTH) if either else ("a law", FROM_FIT)
-            read_json(name, path, words, remedy)
-    vehicle, road = given.get("vehicle"), given.get("road")
-    if vehicle is not None and Path(vehicle).suffix == ".json":
-        read_json("vehicle", Path(vehicle).expanduser(), "a vehicle", FROM_LIST)
-    elif vehicle is not None and Path(vehicle).suffix == ".toml":
-        read_vehicle(Path(vehicle).expanduser())
+        if isinstance(given.get(name), Path):
+            _check_law(command, name, given[name])
+    if given.get("vehicle") is not None:
+        _check_vehicle(Path(given["vehicle"]))
+    road = given.get("road")
     if isinstance(road, str) and road.partition(":")[0] not in ROADS and not Path(road).is_file():
         refuse_road(road)
     for name in ("manifest", "limits"):
         if isinstance(given.get(name), Path):
             require_file(name, given[name])
+
+
+def _check_law(command: str, name: str, path: Path) -> None:
+    """Refuse a file that is no law, or for some options no vehicle or record."""
+    if command == "bench" and path.suffix != ".json":  # other records
+        find_files(path, FOLDER_SUFFIXES)
+        return
+    either = command == "export" or (name == "baseline" and command in ("tune", "sweep"))
+    words, remedy = ("a law or a vehicle", FROM_BOTH) if either else ("a law", FROM_FIT)
+    read_json(name, path, words, remedy)
+
+
+def _check_vehicle(path: Path) -> None:
+    """Refuse a file that is no vehicle; names are looked up later."""
+    if path.suffix == ".json":
+        read_json("vehicle", path.expanduser(), "a vehicle", FROM_LIST)
+    elif path.suffix == ".toml":
+        read_vehicle(path.expanduser())
 
 
 def require_file(argument: str, path: Path, remedy: str = "") -> None:

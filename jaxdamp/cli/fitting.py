@@ -12,6 +12,7 @@ from jaxdamp.cli.interrupt import Interrupted
 from jaxdamp.cli.jobs import Job, Output, job, write_tables
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.records import Reading, decisions, grouped, law_names, split
+from jaxdamp.cli.table_fitting import Refused, fit_table, records_of, through_points
 from jaxdamp.cli.vehicle_words import read_law
 from jaxdamp.cli.wording import in_command_line
 from jaxdamp.dampers import AbstractDamper
@@ -47,7 +48,7 @@ def fit(
     screen: Screen,
     files: Sequence[Path],
     *,
-    law: Sequence[str] = ("all",),
+    law: Sequence[str] = (),
     held_out: Sequence[str] = (),
     reading: Reading,
     how: Annotated[Call, "identify.fit"],
@@ -60,36 +61,38 @@ def fit(
 ) -> None:
     """Fit damper laws to bench records, and say how good they are.
 
+    Files of velocities and forces without a time are a force-velocity table, such as a manufacturer's sheet: the laws
+    go through its points, or --law names those to be fitted to it, and a setting in it is the command of one law.
+
     Writes a report, pictures, tables, and each law as JSON; with --group-by, and where records of the same motion
     contradict one another and their names tell them apart, all of this in a folder for each value of the setting. Laws
     and tables are in the folder before the first picture is drawn.
 
     Arguments:
-        law: names of laws, see "jaxdamp laws": "linear,besinger"; or "all".
+        law: names of laws, see "jaxdamp laws": "linear,besinger"; or "all"; six that suit the records if left out.
         held_out: records to score on, not to fit: a name or a pattern, such as "30mm_*".
         rig: what the test machine adds.
         cross_validate: predict each record by the best law fitted to the others.
     """
-    names, options = law_names(law), how.arguments()
-    if isinstance(weighting := options.get("weighting", "samples"), str):
-        _checks.one_of("weighting", weighting, ("samples", "runs"))
-    options["rig"] = identify.machine_names("rig", rig)
+    table = reading.table(files)
+    kind = None if table is None else through_points(law)
+    if table is not None and kind is not None:
+        given = {"held_out": held_out, "group_by": group_by, "cross_validate": cross_validate, "baseline": baseline}
+        fit_table(screen, table, kind, output, [Refused(name, bool(value)) for name, value in given.items()])
+        return
+    names = law_names(law)
+    options = _options(how, rig)
     beside = None if baseline is None else read_law("baseline", baseline)
     if report is not None and group_by is not None:
         _checks.refuse("report", "be left out with --group-by, which writes a page for each group", str(report))
     with job(screen, "fit", output, report) as work:
         with screen.stage("Reading the records"):
-            raw = reading.raw(files)
+            raw = reading.raw(files) if table is None else records_of(screen, table)
         sound, found = reading.checked(screen, raw, refuse=True)
         runs = reading.processed(sound)
         _, held = split(runs, held_out)
         groups, divided = grouped(runs, group_by)
-        if report is not None and len(groups) > 1:
-            remedy = f"{divided} Each group has a page in its folder of --out."
-            _checks.refuse("report", "be left out where records are fitted apart", str(report), remedy)
-        for name, part in groups.items():
-            if all(run in held.runs for run in part):
-                raise ValueError(f"Option --held-out leaves no record of {name} to fit: hold out fewer.")
+        _check_groups(groups, held, None if report is None else f"{report}", divided)
         remarks = [*decisions(runs), *filter(None, [divided])]
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
@@ -97,16 +100,26 @@ def fit(
         if options["scheduled"] and cross_validate:
             remedy = "Records at each inner command are predicted without them anyway; --group-by command fits apart."
             _checks.refuse("cross_validate", "be left out where the records state several commands", "given", remedy)
-        fits = Fits(work, names, options, found, remarks, cross_validate, beside)
-        failed = []
-        for number, (name, part) in enumerate(groups.items(), 1):
-            try:
-                fits.of_group(name, part, held, later=list(groups)[number:])
-            except ValueError as error:  # no law could be fitted to this group
-                failed.append(f"{name}: {error}")
-                if len(failed) == len(groups):
-                    raise
-        work.attempts.troubles.extend(failed)
+        Fits(work, names, options, found, remarks, cross_validate, beside).of_all(groups, held)
+
+
+def _options(how: Call, rig: Sequence[str]) -> dict[str, Any]:
+    """The options of every fit, checked before anything is read."""
+    options = how.arguments()
+    if isinstance(weighting := options.get("weighting", "samples"), str):
+        _checks.one_of("weighting", weighting, ("samples", "runs"))
+    options["rig"] = identify.machine_names("rig", rig)
+    return options
+
+
+def _check_groups(groups: Mapping[str, BenchSet], held: BenchSet, page: str | None, divided: str) -> None:
+    """Refuse a page for several groups, and a group of which no record is left to fit."""
+    if page is not None and len(groups) > 1:
+        remedy = f"{divided} Each group has a page in its folder of --out."
+        _checks.refuse("report", "be left out where records are fitted apart", page, remedy)
+    for name, part in groups.items():
+        if all(run in held.runs for run in part):
+            raise ValueError(f"Option --held-out leaves no record of {name} to fit: hold out fewer.")
 
 
 class Fits(NamedTuple):
@@ -119,6 +132,18 @@ class Fits(NamedTuple):
     remarks: Sequence[str]
     cross_validate: bool
     baseline: AbstractDamper | None
+
+    def of_all(self, groups: Mapping[str, BenchSet], held_out: BenchSet) -> None:
+        """Fit every group; one of which no law could be fitted is said at the end, as long as another has a fit."""
+        failed = []
+        for number, (name, part) in enumerate(groups.items(), 1):
+            try:
+                self.of_group(name, part, held_out, later=list(groups)[number:])
+            except ValueError as error:
+                failed.append(f"{name}: {error}")
+                if len(failed) == len(groups):
+                    raise
+        self.work.attempts.troubles.extend(failed)
 
     def of_group(self, name: str, runs: BenchSet, held_out: BenchSet, later: Sequence[str]) -> None:
         """Fit one group of records and write its folder, which has the name of the group.
@@ -171,7 +196,7 @@ def fit_laws(
 
     Arguments:
         screen: the terminal.
-        names: of the laws.
+        names: of the laws; those that suit the records if there are none.
         runs: records to fit.
         held_out: records to score on.
         rig: effects of the test machine.
@@ -180,6 +205,7 @@ def fit_laws(
     Raises:
         ValueError: not one law could be fitted.
     """
+    names = names or identify.suited_laws(runs)
     title = f"Fitting {len(names)} law{'s' * (len(names) > 1)} to {len(runs)} record{'s' * (len(runs) > 1)}"
     outcomes: list[Rung | Failure] = []
     with screen.stage(title, total=len(names)) as advance:

@@ -25,10 +25,17 @@ class Output:
     Arguments:
         out: folder to write; jaxdamp- and the name of the command if left out.
         replace: write into --out although it is not empty; earlier results go to .previous in it.
+        verbose: print all tables and remarks, as the page has them.
+        show_units: units of tables, pictures and CSV: SI, metric (N, mm/s), imperial (lbf, in/s), or a force and a
+            velocity such as kgf,mm/s; --units without quantities means this too.
+        show_sign: direction in which they count positive: rebound-positive or compression-positive.
     """
 
     out: Path | None = None
     replace: bool = False
+    verbose: bool = False
+    show_units: str | None = None
+    show_sign: str | None = None
 
 
 class Job(NamedTuple):
@@ -83,7 +90,7 @@ def job(screen: Screen, command: str, output: Output, page: Path | None = None) 
         output: the folder to write.
         page: another place for the page.
     """
-    target = output.out or Path(f"jaxdamp-{command}")
+    target, screen.verbose = output.out or Path(f"jaxdamp-{command}"), output.verbose
     attempts, replace = Attempts(interrupt.check, message, in_command_line), output.replace
     with another_page(page, target, replace=replace), results_folder(target, command, replace=replace) as results:
         yield Job(screen, results, attempts)

@@ -42,7 +42,6 @@ NOT_OFFERED = {  # arguments of library functions, and why
     },
     "sweeps.sweep": {
         "gradients": "for programs",
-        "file": "--out holds the results",
         "progress": "shown at the terminal",
     },
     "export.to_explorer": {"records": "FILES"},
@@ -52,12 +51,14 @@ NAMES = {  # of options that differ from the argument, by function or for all; t
     "bounds": "bound",
     "tune.minimise limits": "limit",
     "sensors": "sensor",
+    "sweeps.sweep file": "resume",
     "low_pass": "filter",
     "reversed_channels": "reversed",
     "identify.fit_vehicle start": "initial_motion",
 }
 ALIASES = {"--force": "--replace", "--metrics": "--metric"}  # names of before, which still work
 ALIASES_OF = {"export": {"--out": "--file"}, "explore": {"--out": "--file"}}
+ALIASES_OF |= {command: {"--sign": "--show-sign"} for command in ("ride", "tune", "sweep")}  # which read no records
 SHORT = {"verbose": "-v"}
 
 
@@ -139,6 +140,7 @@ TEXTS = {  # help where the docstring speaks of Python only, by option, or by co
     "starts": "Number of searches, from several starts; the best end is the result.",
     "tie": "Parameters that take the values of others, such as front.damper.*=rear.damper.*.",
     "limit": "Hard limits by metric, in its SI unit or relative to the start; comfort, travel and grip are metrics.",
+    "resume": "File that keeps finished points, so that the same sweep, stopped or killed, goes on where it was.",
     "seed": "Of random roads, noise and further starts.",
     "priors": "What is known of parameters beforehand: mean and standard deviation.",
     "substeps": "Steps of the simulation between two instants; as many as the laws need if left out.",

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from jaxdamp import _checks, bench, identify
 from jaxdamp._checks import Setting
-from jaxdamp.bench import BenchRun, BenchSet, Preflight, by_number, settings_apart
+from jaxdamp.bench import BenchRun, BenchSet, ForceVelocityTable, Preflight, by_number, settings_apart
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.wording import in_command_line, in_options
@@ -18,6 +18,7 @@ from jaxdamp.cli.words import words
 COMMAND = "command"  # stands for what was set on the damper, unless a setting has this name
 _COMPRESSION = Setting("sign", "compression-positive")  # what the reader proposes in its notes
 _COLOURS = {"error": "red", "warning": "yellow", "note": ""}
+_OF_TABLES = ("sign", "columns", "units", "delimiter")  # what is said of a force-velocity table too
 _LINES = 5  # of findings at the terminal
 _CUT_OFF = ("rest before", "rest after")  # findings on what `process(moving=True)` cuts off
 
@@ -31,18 +32,25 @@ class Reading:
         steps: as in `bench.Steps`.
         cycles: full cycles to keep: 3 or last:3, or skip:2.
         keep_rest: keep the rest before and after the motion, which is cut off otherwise.
-        verbose: print all findings on the records.
+        side: of a force-velocity table with one direction only: rebound, compression, or symmetric for both alike.
     """
 
     read: Annotated[Call, "bench.read"]
     steps: Annotated[Call, "bench.Steps"]
     cycles: str | None = None
     keep_rest: bool = False
-    verbose: bool = False
+    side: str | None = None
 
     def raw(self, files: Sequence[Path]) -> BenchSet:
         """The records as they are in the files."""
         return bench.read(list(files), **self.read.arguments())
+
+    def table(self, files: Sequence[Path]) -> ForceVelocityTable | None:
+        """The force-velocity table that the files are; None for records."""
+        given = {name: self.read.given[name] for name in _OF_TABLES if name in self.read.given}
+        if "sampling_rate" in self.read.given or not bench.are_tables(list(files), **given):
+            return None
+        return bench.read_table(list(files), side=self.side, **given)
 
     def processing(self) -> dict[str, Any]:
         """The steps of `BenchRun.process`.
@@ -79,15 +87,7 @@ class Reading:
         """
         with screen.stage("Checking the records"):
             found = bench.preflight(runs).without(() if self.keep_rest else _CUT_OFF)
-        screen.heading(found.summary)
-        sentences = found.sentences()
-        shown = sentences if self.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
-        for sentence in shown:
-            screen.points([in_command_line(sentence)], style=_COLOURS[sentence.split(",")[0]])
-        if len(sentences) > len(shown):
-            kinds = dict.fromkeys(finding.name for finding in found.findings)
-            more = [kind for kind in kinds if not any(kind in text.split(":")[0] for text in shown)]
-            screen.points([f"also {', '.join(more)}: --verbose prints all, the page has them"])
+        self._show(screen, found)
         wrong = {name for finding in found.of("error") for name in finding.records}
         sound = BenchSet((run for run in runs if run.name not in wrong), runs.left_out)
         if not len(sound):
@@ -100,13 +100,27 @@ class Reading:
             screen.points([f"left out, with an error: {names}"], style="red")
         return sound, found
 
+    def _show(self, screen: Screen, found: Preflight) -> None:
+        """The worst findings, or all."""
+        screen.heading(found.summary)
+        sentences = found.sentences()
+        shown = sentences if screen.verbose else [text for text in sentences if not text.startswith("note")][:_LINES]
+        for sentence in shown:
+            screen.points([in_command_line(sentence)], style=_COLOURS[sentence.split(",")[0]])
+        if len(sentences) > len(shown):
+            kinds = dict.fromkeys(finding.name for finding in found.findings)
+            more = [kind for kind in kinds if not any(kind in text.split(":")[0] for text in shown)]
+            screen.points([f"also {', '.join(more)}: --verbose prints all, the page has them"])
+
 
 def law_names(asked: Sequence[str]) -> list[str]:
-    """The laws to fit: all that are not optional, or those named, each once.
+    """The laws to fit: all that are not optional, or those named, each once; none for those that suit the records.
 
     >>> law_names(["linear, besinger", "linear"])
     ['linear', 'besinger']
     """
+    if not asked:
+        return []
     asked = words("law", asked)
     if not asked:
         _checks.refuse("law", "name a law", "empty", 'See "jaxdamp laws".')

@@ -1,6 +1,6 @@
 """`jaxdamp ride`: a law in a vehicle on a road, beside a baseline; and what words mean as roads."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,10 +11,12 @@ from jaxdamp.cli.early import refuse_road
 from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
 from jaxdamp.cli.options import Call
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law
+from jaxdamp.cli.wording import in_command_line
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.report import axles_sentence, notes_of, ride_report, ride_tables
+from jaxdamp.report import Table, axles_sentence, notes_of, ride_report, ride_tables, ride_verdict
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
+from jaxdamp.vehicles import GOALS, AbstractVehicle
 
 
 USUAL = 10.0  # s, a ride on a road without an end of its own
@@ -129,10 +131,12 @@ def ride(
                     )
                 remarks += [f"{name}: {text}" for text in warned]
             tables = ride_tables(responses)
-            remarks += notes_of(responses)
-        for table in tables.values():
-            screen.table(table)
-        screen.points(remarks, style="yellow")
+            latest_first = dict(reversed(responses.items()))
+            remarks += [in_command_line(note) for note in notes_of(latest_first)]
+        screen.answer(*ride_verdict(responses))
+        screen.table(headline(screen, tables["metrics"], next(iter(responses.values())).vehicle))
+        screen.details(*(table for name, table in tables.items() if name != "metrics"))
+        screen.remarks(remarks, style="yellow")
         axles = axles_sentence(responses)
         if axles:
             screen.say(axles)
@@ -141,6 +145,15 @@ def ride(
             write_tables(draft, tables)
         title = f"{vehicle} on {road} at {driving.speed:g} m/s"
         work.page(ride_report, responses, title=title, laws=laws, remarks=remarks)
+
+
+def headline(screen: Screen, table: Table, vehicle: AbstractVehicle, more: Collection[str] = ()) -> Table:
+    """Comfort, travel and grip of a vehicle, and further metrics, out of a table of all; all if the terminal is to."""
+    names = {row[0] for row in table.rows}
+    for goal in GOALS:
+        driven, stationary = (vehicle.goal_metrics(goal, white=white) for white in (False, True))
+        more = {*more, *(driven if names & {*driven} else stationary)}
+    return table if screen.verbose else table.only(more)
 
 
 def _write(folder: Path, laws: Mapping[str, AbstractDamper], responses: Mapping[str, Response]) -> None:

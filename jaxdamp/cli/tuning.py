@@ -10,10 +10,11 @@ import numpy as np
 import typer
 
 from jaxdamp import Ride, _checks, export, sweep, tune
+from jaxdamp.cli.choosing import choose, settings_of
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.jobs import Output, job, write_tables
 from jaxdamp.cli.options import Call
-from jaxdamp.cli.riding import Driving, unusual
+from jaxdamp.cli.riding import Driving, headline, unusual
 from jaxdamp.cli.vehicle_words import parse_vehicle, read_law, read_module, with_law, write_laws
 from jaxdamp.cli.wording import in_command_line
 from jaxdamp.dampers import AbstractDamper
@@ -43,7 +44,8 @@ def tune_command(
 ) -> None:
     """Tune the dampers of a vehicle for a ride metric within limits.
 
-    Writes the law, the vehicle, tables, pictures and a page. Ends with exit code 1 if a limit is not met. Grip is
+    Dampers whose law has settings, such as that of a manufacturer's sheet, are driven at each of them. Writes the law,
+    the vehicle, tables, pictures and a page. Ends with exit code 1 if a limit is not met. Grip is
     limited to +10% of the start by itself; --limit grip=none removes that.
 
     Arguments:
@@ -55,6 +57,9 @@ def tune_command(
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     beside = None if baseline is None else _baseline(baseline, car)
     surfaces, run = _realisations(road, driving, roads)
+    if "over" not in search.given and settings_of(car):
+        _choose_setting(screen, car, minimise, surfaces, search, run, output)
+        return
     call, remarks = tuning_arguments(car, minimise, surfaces, search, driving.seed, run)
     screen.points(remarks)
     screen.points(unusual(road, driving.speed), style="yellow")
@@ -64,6 +69,30 @@ def tune_command(
             write_tuning(draft, result)
         work.page(tuning_report, result, baseline=beside)
     exit_code_of(result)
+
+
+def _choose_setting(
+    screen: Screen,
+    car: AbstractVehicle,
+    metric: str,
+    surfaces: Sequence[Any],
+    search: Call,
+    run: Mapping[str, Any],
+    output: Output,
+) -> None:
+    """Drive every setting of laws that depend on one, and write the best."""
+    white = isinstance(surfaces[0], WhiteRoad)
+    limits, remarks = _limits(car, metric, search, white=white)
+    screen.points([*remarks, "Every setting of the law is driven; --over names parameters to tune instead."])
+    with job(screen, "tune", output) as work:
+        chosen = choose(screen, car, metric, surfaces, limits, run, white=white)
+        screen.table(chosen.table)
+        screen.say(chosen.verdict, style="bold")
+        with work.saving("Law, vehicle and table") as draft:
+            chosen.write(draft)
+        work.page(chosen.page)
+    if not chosen.met:
+        raise typer.Exit(1)
 
 
 def _realisations(road: str, driving: Driving, count: int) -> tuple[list[Any], dict[str, Any]]:
@@ -79,25 +108,30 @@ def tuning_arguments(
     car: AbstractVehicle, metric: str, roads: Sequence[Any], search: Call, seed: int, run: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[str]]:
     """The arguments of `tune.minimise`, and what was chosen by default, in words."""
-    limits, white = dict(search.given.get("limits", {})), isinstance(roads[0], WhiteRoad)
-    grip, remarks = car.goal_metrics("grip", white=white), []
-    if not {"grip", *grip} & {*limits, metric}:
+    limits, remarks = _limits(car, metric, search, white=isinstance(roads[0], WhiteRoad))
+    road = roads[0] if len(roads) == 1 else tune.Scenarios(roads)
+    return search.arguments(metric=metric, vehicle=car, road=road, limits=limits, seed=seed, **run), remarks
+
+
+def _limits(car: AbstractVehicle, metric: str, search: Call, *, white: bool) -> tuple[dict[str, Any], list[str]]:
+    """The limits given, that of the grip by default, and a remark on it."""
+    limits, remarks = dict(search.given.get("limits", {})), []
+    if not {"grip", *car.goal_metrics("grip", white=white)} & {*limits, metric}:
         limits["grip"] = GRIP
         sentence = f"Limited by default: grip (RMS variation of each tyre load) to {GRIP} of the start"
         remarks = [f"{sentence}; --limit grip=none removes it."]
-    limits = {name: limit for name, limit in limits.items() if limit is not None}
-    road = roads[0] if len(roads) == 1 else tune.Scenarios(roads)
-    return search.arguments(metric=metric, vehicle=car, road=road, limits=limits, seed=seed, **run), remarks
+    return {name: limit for name, limit in limits.items() if limit is not None}, remarks
 
 
 def tuned(screen: Screen, call: Mapping[str, Any]) -> TuneResult[Any]:
     """The result of `tune.minimise` with these arguments, shown at the terminal."""
     with screen.stage("Tuning") as advance:
         result = tune.minimise(**call, progress=lambda step, value: advance(f"step {step}: {value:.5g}", step))
-    screen.say(result.summary)
-    for table in (result.parameter_table(), result.table()):
-        screen.table(table)
-    screen.points([in_command_line(warning) for warning in result.warnings], style="yellow")
+    screen.answer(result.verdict.sentence)
+    screen.say(result.summary.removeprefix(result.verdict.sentence).strip())
+    screen.table(result.parameter_table())
+    screen.table(headline(screen, result.table(), result.vehicle, {result.metric, *result.limits}))
+    screen.remarks([in_command_line(warning) for warning in result.warnings], style="yellow")
     return result
 
 
@@ -154,12 +188,7 @@ def sweep_command(
     car = parse_vehicle(vehicle)(None if start is None else read_law("start", start))
     (surface,), run = driving.over(road)
     white = isinstance(surface, WhiteRoad)
-    limits = {
-        name: span
-        for word, span in (limit or {}).items()
-        if span is not None
-        for name in _metrics_of("limit", word, car, white=white)
-    }
+    limits = _limits_by_metric(limit or {}, car, white=white)
     names = [name for word in metric for name in _metrics_of("metric", word, car, white=white)]
     names = list(dict.fromkeys([*names, *limits]))
     limit_spans(limits, names, dict.fromkeys(names, 1.0))  # refuses what is no limit before anything is driven
@@ -186,6 +215,12 @@ def sweep_command(
             "baseline": None if beside is None else dict(ride.of_vehicle(beside)()),
         }
         work.page(sweep_report, data, remarks=remarks, **marks)
+
+
+def _limits_by_metric(limit: Mapping[str, Any], car: AbstractVehicle, *, white: bool) -> dict[str, Any]:
+    """The limits by the ride metrics that their words mean."""
+    given = {word: span for word, span in limit.items() if span is not None}
+    return {name: span for word, span in given.items() for name in _metrics_of("limit", word, car, white=white)}
 
 
 def _metrics_of(option: str, word: str, car: AbstractVehicle, *, white: bool) -> list[str]:

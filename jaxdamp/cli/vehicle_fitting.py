@@ -66,7 +66,7 @@ def fit_vehicle(
         for table in (result.scores_table(), result.table()):
             screen.table(table)
         screen.points([result.patterns] * bool(result.patterns))
-        screen.points([in_command_line(warning) for warning in result.warnings], style="yellow")
+        screen.remarks([in_command_line(warning) for warning in result.warnings], style="yellow")
         with work.saving("Vehicle and tables") as draft:
             _write(draft, result)
         work.page(vehicle_fit_report, result, remarks=remarks)

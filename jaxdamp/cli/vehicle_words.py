@@ -96,13 +96,14 @@ def read_module(argument: str, path: Path, kinds: type | tuple[type, ...], words
 
 
 def _preset(word: str, document: Mapping[str, Any]) -> MakeCar:
-    extra = [key for key in document if key not in ("preset", "parameters")]
-    name, values = document.get("preset"), document.get("parameters", {})
-    if extra or not isinstance(name, str) or not isinstance(values, dict):
-        _checks.refuse("vehicle", "be a TOML file of preset and [parameters]", f"one of {', '.join(document)}", EXAMPLE)
+    extra = [key for key in document if key not in ("preset", "tyre_lifts", "parameters")]
+    name, values, lifts = document.get("preset"), document.get("parameters", {}), document.get("tyre_lifts", False)
+    if extra or not (isinstance(name, str) and isinstance(values, dict) and isinstance(lifts, bool)):
+        must = "be a TOML file of preset, tyre_lifts (true or false) and [parameters]"
+        _checks.refuse("vehicle", must, f"one of {', '.join(document)}", EXAMPLE)
     _checks.one_of(f"preset in {word}", name, presets())
     numbers = dict(_flat(values))
-    return lambda law: replace(presets()[name](damper=law), numbers)
+    return lambda law: replace(presets()[name](damper=law, tyre_lifts=lifts), numbers)
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:

@@ -41,6 +41,7 @@ CALLS = {
     r"subtract it, `process\(without=[^`]*`": "fit it beside the law, --rig gas",
     r"`bounds=\{[^`]*`": "--bound",
     r"`dt=([^`]*)`": r"`--dt \1`",
+    r"Pass `tyre_lifts=True` to the vehicle": "Write tyre_lifts = true into a vehicle file, as for --vehicle car.toml,",
     r"`process\(delay=[^)]*\)`": "fit with --rig delay",
 }
 """Calls of Python in the sentences of the library, as patterns, and what the command line says instead."""

@@ -14,10 +14,11 @@ functions are those of the language's own library. A primitive that cannot be pr
 
 from jaxdamp.codegen._languages import AbstractLanguage as AbstractLanguage, C, JavaScript, PrintedFunction
 from jaxdamp.codegen._lowering import Program as Program, Symbols as Symbols, lower, symbols
-from jaxdamp.codegen._native import compiler
+from jaxdamp.codegen._native import compiler, library as library
 from jaxdamp.codegen._printing import is_printing as is_printing, printing as printing
 from jaxdamp.codegen._program import Constant as Constant
 from jaxdamp.codegen._scan import printed_scan as printed_scan
+from jaxdamp.codegen._slopes import Signature as Signature, with_slopes as with_slopes
 
 
 __all__ = [
@@ -27,14 +28,4 @@ __all__ = [
     "compiler",
     "lower",
     "symbols",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "AbstractLanguage",
-    "Constant",
-    "Program",
-    "Symbols",
-    "is_printing",
-    "printed_scan",
-    "printing",
 ]

@@ -83,7 +83,7 @@ def _place_of_extreme(writer: Writer, equation: Equation, operands: list[Atoms])
     return [np.array(place, object)]
 
 
-def _has_batches(numbers: Any) -> bool:
+def _has_batches(numbers: object) -> bool:
     return bool(getattr(numbers, "operand_batching_dims", ()))
 
 

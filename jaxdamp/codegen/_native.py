@@ -5,9 +5,11 @@ import ctypes
 import functools
 import hashlib
 import os
+import platform
 import shutil
 import subprocess
 import tempfile
+import uuid
 from importlib import resources
 from pathlib import Path
 
@@ -18,6 +20,11 @@ import jax
 _FLAGS = (
     "-std=gnu11 -O3 -march=native -fPIC -shared -w -fopenmp-simd -fno-math-errno -fno-trapping-math -fno-signed-zeros "
     "-freciprocal-math -ffp-contract=fast"
+).split()
+# Of a fit: little time to compile, derivatives in vectors of the processor.
+_PLAIN = (
+    "-std=gnu11 -O2 -march=native -fPIC -shared -w -fopenmp-simd -ftree-vectorize -fno-math-errno -fno-trapping-math "
+    "-fno-signed-zeros -ffp-contract=fast"
 ).split()
 _WIDE = ("-mprefer-vector-width=512", "-mrecip")  # of gcc for x86
 
@@ -38,6 +45,62 @@ def compiled_by() -> str:
     if tool is None:
         raise NotImplementedError("No C compiler is at hand. Install gcc or clang, or name one in the variable CC.")
     return tool
+
+
+@functools.cache
+def library(text: str) -> ctypes.CDLL:
+    """A C text compiled and loaded; kept for other processes beside the compiled programs of JAX, where these are kept.
+
+    The file is named by its text, compiler and processor, and by what it holds, so that another one is never loaded
+    for it; the folder must be this user's and closed to others, or else the file is only that of this process.
+
+    Raises:
+        NotImplementedError: as `registered`.
+    """
+    tool = compiled_by()
+    own = hashlib.sha256("\n".join([text, tool, *_PLAIN, _processor()]).encode()).hexdigest()[:24]
+    try:
+        folder = _lasting_folder() or _folder()
+        for path in folder.glob(f"fit_{own}_*.so"):
+            if path.stem.endswith(hashlib.sha256(path.read_bytes()).hexdigest()[:24]):
+                return ctypes.CDLL(str(path))
+        draft = folder / f"{own}-{uuid.uuid4().hex}"
+        source, target = draft.with_suffix(".c"), draft.with_suffix(".tmp")
+        source.write_text(text, encoding="utf-8")
+        done = subprocess.run([tool, *_PLAIN, str(source), "-o", str(target), "-lm"], capture_output=True, text=True)
+        source.unlink()
+        if done.returncode:
+            raise NotImplementedError(f"{tool} does not compile the printed functions: {done.stderr.strip()[-2000:]}")
+        path = folder / f"fit_{own}_{hashlib.sha256(target.read_bytes()).hexdigest()[:24]}.so"
+        target.replace(path)
+        return ctypes.CDLL(str(path))
+    except OSError as error:
+        raise NotImplementedError(f"The printed functions cannot be compiled or loaded here ({error}).") from error
+
+
+def _lasting_folder() -> Path | None:
+    """Beside the compiled programs of JAX, if these are kept, in a folder that only this user can write."""
+    kept = jax.config.jax_compilation_cache_dir
+    if not kept or "://" in kept or not hasattr(os, "getuid"):
+        return None
+    folder = Path(kept) / "printed"
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        state = folder.stat()
+    except OSError:
+        return None
+    return folder if state.st_uid == os.getuid() and not state.st_mode & 0o022 and os.access(folder, os.W_OK) else None
+
+
+@functools.cache
+def _processor() -> str:
+    """What the compiler's `-march=native` means: another processor needs another file."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return " ".join(platform.uname())
+    kinds = {line for line in lines if line.startswith(("flags", "model name", "Features"))}
+    return platform.machine() + " ".join(sorted(kinds))
 
 
 @functools.cache

@@ -37,7 +37,7 @@ Atoms: TypeAlias = npt.NDArray[np.object_]  # an array of JAX: one atom for each
 COUNTER = "int32"  # the type of what counts the rounds of a loop
 
 
-def constant(value: Any, dtype: str) -> Constant:
+def constant(value: object, dtype: str) -> Constant:
     """A number of a type."""
     number = np.dtype(dtype).type(value)
     return Constant(repr(number.item()) if dtype != "float32" else str(number), dtype)

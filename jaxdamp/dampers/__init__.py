@@ -5,9 +5,6 @@ Velocity is positive in extension (rebound), force is positive when it resists e
 """
 
 from jaxdamp._guesses import answer_guesses
-from jaxdamp.dampers._commands import command_paths as command_paths
-from jaxdamp.dampers._points import drives_motion as drives_motion
-from jaxdamp.dampers._starts import Reach as Reach, from_samples as from_samples
 from jaxdamp.dampers.acceleration_surface import AccelerationSurface
 from jaxdamp.dampers.base import (
     AbstractDamper,
@@ -23,9 +20,8 @@ from jaxdamp.dampers.bouc_wen import BoucWen
 from jaxdamp.dampers.bump_stop import BumpStop
 from jaxdamp.dampers.bushing import Bushing
 from jaxdamp.dampers.command import takes_command as takes_command, with_command
-from jaxdamp.dampers.conditions import keeps_conditions as keeps_conditions, margins as margins
+from jaxdamp.dampers.contract import Reach as Reach, Traits, from_samples as from_samples
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
-from jaxdamp.dampers.coverage import coverage as coverage, require_finite_force as require_finite_force
 from jaxdamp.dampers.creeping_visco_plastic import CreepingViscoPlastic
 from jaxdamp.dampers.dahl import Dahl
 from jaxdamp.dampers.degressive import Degressive
@@ -33,6 +29,7 @@ from jaxdamp.dampers.digressive_progressive import DigressiveProgressive
 from jaxdamp.dampers.fitted_range import (
     UNITS as UNITS,
     FittedRange,
+    Motion as Motion,
     OutsideFittedRangeWarning,
     has_fitted_range as has_fitted_range,
     without_fitted_ranges as without_fitted_ranges,
@@ -43,13 +40,19 @@ from jaxdamp.dampers.gas_spring import GasSpring
 from jaxdamp.dampers.heated import Heated
 from jaxdamp.dampers.hybrid import Hybrid
 from jaxdamp.dampers.hyperbolic_tangent import HyperbolicTangent
+from jaxdamp.dampers.inside import (
+    command_paths as command_paths,
+    coverage as coverage,
+    keeps_conditions as keeps_conditions,
+    margins as margins,
+    require_finite_force as require_finite_force,
+)
 from jaxdamp.dampers.karadayi_masada import KaradayiMasada
 from jaxdamp.dampers.lag import Lag
 from jaxdamp.dampers.linear import Linear
 from jaxdamp.dampers.lugre import LuGre
 from jaxdamp.dampers.modified_bouc_wen import ModifiedBoucWen
 from jaxdamp.dampers.mono_tube import MonoTube
-from jaxdamp.dampers.motion import Motion as Motion
 from jaxdamp.dampers.motion_ratio import MotionRatio
 from jaxdamp.dampers.neural_hysteresis import NeuralHysteresis
 from jaxdamp.dampers.piecewise_linear import PiecewiseLinear
@@ -63,9 +66,9 @@ from jaxdamp.dampers.range_use import (
     range_use as range_use,
     sentence as sentence,
     warn_outside as warn_outside,
+    with_fitted_range,
 )
 from jaxdamp.dampers.saturating import Saturating
-from jaxdamp.dampers.scaled import Scaled as Scaled
 from jaxdamp.dampers.scheduled import Scheduled
 from jaxdamp.dampers.segmented_polynomial import SegmentedPolynomial
 from jaxdamp.dampers.series_spring import SeriesSpring
@@ -73,12 +76,10 @@ from jaxdamp.dampers.spline_table import SplineTable
 from jaxdamp.dampers.spring import Spring
 from jaxdamp.dampers.stribeck_friction import StribeckFriction
 from jaxdamp.dampers.stroke_dependent import StrokeDependent
-from jaxdamp.dampers.sum import Sum as Sum
-from jaxdamp.dampers.table import Table
+from jaxdamp.dampers.sum import Scaled as Scaled, Sum as Sum
+from jaxdamp.dampers.table import Table, drives_motion as drives_motion
 from jaxdamp.dampers.temperature_scaled import TemperatureScaled
-from jaxdamp.dampers.traits import Traits
 from jaxdamp.dampers.visco_plastic import ViscoPlastic
-from jaxdamp.dampers.with_range import with_fitted_range
 from jaxdamp.dampers.wrapper import AbstractWrapper
 
 
@@ -135,30 +136,6 @@ __all__ = [
     "own_states",
     "with_command",
     "with_fitted_range",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "UNITS",
-    "Motion",
-    "RangeUse",
-    "Reach",
-    "Scaled",
-    "Sum",
-    "command_paths",
-    "coverage",
-    "drives_motion",
-    "extrapolated",
-    "from_samples",
-    "has_fitted_range",
-    "keeps_conditions",
-    "laws_inside",
-    "margins",
-    "range_use",
-    "require_finite_force",
-    "sentence",
-    "takes_command",
-    "warn_outside",
-    "without_fitted_ranges",
 ]
 
 answer_guesses(__name__, __all__)

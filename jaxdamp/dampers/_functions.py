@@ -28,7 +28,7 @@ class NamedFunction:
 _PLACES = [NamedFunction("equinox.nn", "MLP", argument) for argument in ("activation", "final_activation")]
 
 
-def by_name(leaf: Any) -> Any:
+def by_name(leaf: object) -> Any:
     """A public function of JAX or a default of equinox as its name; anything else as it is."""
     if not callable(leaf):
         return leaf

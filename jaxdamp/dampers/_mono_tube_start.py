@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxdamp.dampers._knee_scan import knee_scan
+from jaxdamp.dampers._guesses import knee_scan
 
 
 NEAR_REST = 0.1  # velocity, relative to its peak, below which the force shows gas, friction and bleed

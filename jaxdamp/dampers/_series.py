@@ -10,10 +10,10 @@ from jaxdamp import _checks
 from jaxdamp._limits import within
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Scalar, ScalarLike, State
-from jaxdamp.dampers._sdirk2 import GAMMA, sdirk2
+from jaxdamp.dampers._steps import GAMMA, sdirk2
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.motion import Motion
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
+from jaxdamp.dampers.fitted_range import Motion
 from jaxdamp.dampers.wrapper import AbstractWrapper
 
 

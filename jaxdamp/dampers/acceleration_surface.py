@@ -8,8 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._types import Matrix, Number, Scalar, ScalarLike, State, Vector
-from jaxdamp.dampers._first_order import follow
-from jaxdamp.dampers._surface import (
+from jaxdamp.dampers._steps import follow
+from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.contract import Traits
+from jaxdamp.dampers.force_surface import (
     CONSENT,
     Axis,
     around_zero_range,
@@ -17,8 +19,6 @@ from jaxdamp.dampers._surface import (
     surface_force,
     surface_least_squares,
 )
-from jaxdamp.dampers.base import AbstractDamper, own_states
-from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import around_zero, nonnegative, parameter, positive, setting
 
 

@@ -15,13 +15,18 @@ import jax.numpy as jnp
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, State
-from jaxdamp.dampers._conditions import Condition, check_conditions
 from jaxdamp.dampers._functions import by_name, with_functions
-from jaxdamp.dampers._starts import Reach, from_samples, starts_of_bends
-from jaxdamp.dampers.fitted_range import FittedRange, RangeNote
-from jaxdamp.dampers.motion import Motion
-from jaxdamp.dampers.traits import Traits, combined_traits
-from jaxdamp.parameters import Module, check_parameters, readable
+from jaxdamp.dampers.contract import (
+    Condition,
+    Reach,
+    Traits,
+    check_conditions,
+    combined_traits,
+    from_samples,
+    starts_of_bends,
+)
+from jaxdamp.dampers.fitted_range import FittedRange, Motion, RangeNote
+from jaxdamp.parameters import Module, check_parameters, modules_inside, readable
 
 
 START = "Start from `law.initial_state()`."
@@ -178,7 +183,7 @@ class AbstractDamper(Module):
         _checks.refuse("law", "be a class that defines `guess`", f"the class {cls.__name__}", remedy)
 
     @classmethod
-    def from_runs(cls, runs: Sequence[Any]) -> "AbstractDamper":
+    def from_runs(cls, runs: Sequence[object]) -> "AbstractDamper":
         """A law of this class with starting values for a fit to bench records; by default `guess` of all samples."""
         return from_samples(cls.guess, runs)
 
@@ -207,11 +212,11 @@ class AbstractDamper(Module):
 
         return Sum(terms_of(self) + terms_of(other))
 
-    def __mul__(self, factor: Any) -> "AbstractDamper":
+    def __mul__(self, factor: ScalarLike | int) -> "AbstractDamper":
         """The force times a factor."""
         if isinstance(factor, AbstractDamper):
             return NotImplemented
-        from jaxdamp.dampers.scaled import Scaled
+        from jaxdamp.dampers.sum import Scaled
 
         return Scaled(self, factor)
 
@@ -309,22 +314,14 @@ def own_states(law: AbstractDamper, state: State, count: int) -> list[Scalar]:
     return list(state)
 
 
-def laws_inside(tree: Any, prefix: str = "") -> list[tuple[str, AbstractDamper]]:
+def laws_inside(tree: object, prefix: str = "") -> list[tuple[str, AbstractDamper]]:
     """All laws in a law, a vehicle or another module, each with the prefix of the paths of its parameters.
 
     Arguments:
         tree: the module.
         prefix: put before the path of each law.
     """
-    if isinstance(tree, tuple | list):
-        return [entry for i, item in enumerate(tree) for entry in laws_inside(item, f"{prefix}{i}.")]
-    if isinstance(tree, dict):
-        return [entry for key, item in tree.items() for entry in laws_inside(item, f"{prefix}{key}.")]
-    if not isinstance(tree, eqx.Module):
-        return []
-    own = [(prefix, tree)] if isinstance(tree, AbstractDamper) else []
-    inner = [laws_inside(getattr(tree, field.name), f"{prefix}{field.name}.") for field in dataclasses.fields(tree)]
-    return own + [entry for part in inner for entry in part]
+    return [(path, law) for path, law in modules_inside(tree, prefix) if isinstance(law, AbstractDamper)]
 
 
 def refuse_states(argument: str, law: AbstractDamper, remedy: str) -> None:

@@ -1,7 +1,7 @@
 """The seven-parameter law of Besinger, Cebon and Cole, as paper 001 uses it for a heavy vehicle."""
 
 import warnings
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -30,7 +30,7 @@ LEAST_COMPRESSION = 0.0067  # C_c/C_e below which the force decreases with v in 
 _STEEPEST = 0.5 * (np.sqrt(17.0) - 3.0)  # u at which the slope of C(v) v differs most from C(v)
 
 
-def least_rebound(limit_velocity: Any, transition_velocity: Any) -> Any:
+def least_rebound(limit_velocity: ScalarLike, transition_velocity: ScalarLike) -> ScalarLike:
     """C_e/C_c below which the force decreases with v between zero and v_lim; zero if α is far above v_lim.
 
     d(C v)/dv = c₂ + c₁ g(u), g = u/√(1+u²) + (1+u)/√(1+u²)³, which grows up to u = (√17 − 3)/2, where g = 1.525.

@@ -4,7 +4,7 @@ from typing import final
 
 import numpy as np
 
-from jaxdamp._smooth import smooth_abs
+from jaxdamp._limits import smooth_abs
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._guesses import secant_rate
 from jaxdamp.dampers.base import AbstractMemoryless

@@ -10,9 +10,9 @@ from jaxdamp._elementary import power, reciprocal_root
 from jaxdamp._limits import at_least, within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._guesses import sliding_fit
-from jaxdamp.dampers._hysteresis import direction
+from jaxdamp.dampers._steps import direction
 from jaxdamp.dampers.base import AbstractDamper, own_states
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import interval, nonnegative, parameter, positive, real
 
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._series import AbstractSeries, Deflections, require_feed_through
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import parameter, positive
 
 

@@ -4,9 +4,9 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._traced import is_traced
 from jaxdamp._types import ScalarLike
-from jaxdamp.dampers._commands import command_paths
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.fitted_range import Motion
+from jaxdamp.dampers.inside import command_paths
 from jaxdamp.dampers.range_use import range_use, sentence, warn_outside
 from jaxdamp.parameters import as_float, checked, with_values
 

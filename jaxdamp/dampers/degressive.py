@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike
-from jaxdamp.dampers._knee_scan import knee_scan
+from jaxdamp.dampers._guesses import knee_scan
 from jaxdamp.dampers.base import AbstractMemoryless
 from jaxdamp.parameters import nonnegative, parameter, positive
 

@@ -5,9 +5,9 @@ from typing import final
 import jax.numpy as jnp
 import numpy as np
 
-from jaxdamp._smooth import ramp
+from jaxdamp._limits import ramp
 from jaxdamp._types import Number, Scalar, ScalarLike
-from jaxdamp.dampers._knee_scan import knee_scan
+from jaxdamp.dampers._guesses import knee_scan
 from jaxdamp.dampers.base import AbstractMemoryless
 from jaxdamp.parameters import nonnegative, parameter, positive, setting
 

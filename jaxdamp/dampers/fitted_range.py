@@ -1,13 +1,16 @@
-"""The range of the records that a law was fitted to, stored in the law."""
+"""The range of the records that a law was fitted to, stored in the law, and the motion compared with it."""
 
+import dataclasses
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, TypeVar, final
+from typing import NamedTuple, TypeVar, final
 
 import jax
 import numpy as np
 from jax.extend.core import unsafe_am_i_under_a_jit_DO_NOT_USE  # pyright: ignore[reportPrivateImportUsage]
+from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._types import ScalarLike
 
 
 UNITS = {"velocity": "m/s", "stroke": "m", "frequency": "Hz", "force": "N", "temperature": "K", "command": ""}
@@ -161,7 +164,7 @@ def without_fitted_ranges(tree: Tree) -> Tree:
     return jax.tree.map(lambda leaf: RangeNote() if _is_note(leaf) else leaf, tree, is_leaf=_is_note)
 
 
-def has_fitted_range(tree: Any) -> bool:
+def has_fitted_range(tree: object) -> bool:
     """Whether any law in a tree has a fitted range.
 
     Arguments:
@@ -171,5 +174,43 @@ def has_fitted_range(tree: Any) -> bool:
     return any(note.fitted_to is not None for note in notes)
 
 
-def _is_note(node: Any) -> bool:
+def _is_note(node: object) -> bool:
     return isinstance(node, RangeNote)
+
+
+Samples = Float[np.ndarray, " samples"]
+
+
+@final
+@dataclasses.dataclass(frozen=True)
+class Motion:
+    """Stroke, velocity and force of a law at uniformly spaced times; `None` for unknown channels.
+
+    Arguments:
+        stroke: [m], positive in extension, shape (samples,).
+        velocity: [m/s], shape (samples,).
+        force: [N], positive when it resists extension, shape (samples,).
+        temperature: of the oil [K].
+    """
+
+    stroke: Samples | None = None
+    velocity: Samples | None = None
+    force: Samples | None = None
+    temperature: float | None = None
+
+    def moved(self, ratio: ScalarLike) -> "Motion":
+        """Stroke and velocity times a ratio."""
+        stroke, velocity = (None if a is None else float(ratio) * a for a in (self.stroke, self.velocity))
+        return dataclasses.replace(self, stroke=stroke, velocity=velocity)
+
+    def divided(self, factor: ScalarLike) -> "Motion":
+        """The force divided by a factor (unknown if the factor is zero)."""
+        return self.with_force(None if self.force is None or float(factor) == 0.0 else self.force / float(factor))
+
+    def with_force(self, force: Samples | None) -> "Motion":
+        """The same motion at another force [N]."""
+        return dataclasses.replace(self, force=force)
+
+    def at_temperature(self, temperature: ScalarLike) -> "Motion":
+        """The same motion at another oil temperature [K]."""
+        return dataclasses.replace(self, temperature=float(temperature))

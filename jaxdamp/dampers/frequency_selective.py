@@ -6,9 +6,9 @@ import jax.numpy as jnp
 
 from jaxdamp._limits import at_least, within
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers._first_order import follow
+from jaxdamp.dampers._steps import follow
 from jaxdamp.dampers.base import AbstractDamper, own_states, refuse_states
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import parameter, positive
 
 

@@ -8,7 +8,7 @@ from jaxdamp._elementary import power
 from jaxdamp._limits import at_least
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractStateless
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import parameter, positive, setting
 
 

@@ -6,8 +6,8 @@ import jax.numpy as jnp
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.motion import Motion
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
+from jaxdamp.dampers.fitted_range import Motion
 from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import parameter, positive, setting
 

@@ -5,9 +5,9 @@ from typing import final
 import jax.numpy as jnp
 
 from jaxdamp._types import Number, Scalar, ScalarLike, State
-from jaxdamp.dampers._first_order import follow
+from jaxdamp.dampers._steps import follow
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import parameter, positive
 

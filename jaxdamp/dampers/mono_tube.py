@@ -11,12 +11,12 @@ from jaxdamp._limits import at_least, at_most, within
 from jaxdamp._root import increasing_root
 from jaxdamp._types import Number, Scalar, ScalarLike, State
 from jaxdamp.dampers._mono_tube_start import charge_start, static_force, valve_start
-from jaxdamp.dampers._sdirk2 import GAMMA, sdirk2
+from jaxdamp.dampers._steps import GAMMA, sdirk2
 from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.coulomb_friction import CoulombFriction
 from jaxdamp.dampers.gas_spring import LEAST_SHARE, GasSpring, gas_pressure
 from jaxdamp.dampers.piston_flow import PistonFlow, flow_per_area
-from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import parameter, positive, setting
 
 

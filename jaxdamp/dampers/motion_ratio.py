@@ -4,7 +4,7 @@ from typing import final
 
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.fitted_range import Motion
 from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import parameter, positive
 

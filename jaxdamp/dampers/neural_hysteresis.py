@@ -11,7 +11,7 @@ from jaxdamp._limits import at_least
 from jaxdamp._random import normal
 from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers.base import AbstractDamper, own_states
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import parameter, positive, setting, weight
 
 

@@ -3,14 +3,28 @@
 from typing import final
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks
+from jaxdamp._limits import ramp
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers._guesses import velocity_grid
-from jaxdamp.dampers._hinges import hinges
 from jaxdamp.dampers.base import AbstractMemoryless
 from jaxdamp.parameters import increasing, nonnegative, parameter, positive, real, setting
+
+
+def hinges(v: ScalarLike, knots: Float[Array, " knots"], slopes: Float[Array, " knots+1"], width: ScalarLike) -> Scalar:
+    """s₀ v + Σ (sₖ − sₖ₋₁) max(v − vₖ, 0), shifted so that it is zero at v = 0; knees rounded over `width`."""
+    if jnp.ndim(v):
+        remedy = "For several use `jax.vmap(law.force_velocity)(velocities)`."
+        _checks.refuse("v", "be one velocity", f"of shape {jnp.shape(v)}", remedy)
+
+    def curve(v: ScalarLike) -> Scalar:
+        return slopes[0] * v + jnp.sum(jnp.diff(slopes) * ramp(v - knots, width))
+
+    return curve(v) - curve(jnp.zeros((), slopes.dtype))
 
 
 @final

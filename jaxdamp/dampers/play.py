@@ -10,7 +10,7 @@ from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers._series import AbstractSeries, Deflections, require_feed_through
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import nonnegative, parameter, positive
 
 

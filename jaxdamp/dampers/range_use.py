@@ -2,16 +2,27 @@
 
 import warnings
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jaxdamp import _checks
 from jaxdamp._traced import is_traced, of_known_numbers
-from jaxdamp.dampers._commands import commands_of
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.fitted_range import OutsideFittedRangeWarning, has_fitted_range, shown_unit, span
-from jaxdamp.dampers.motion import Motion
+from jaxdamp.dampers.fitted_range import (
+    UNITS,
+    FittedRange,
+    Limits,
+    Motion,
+    OutsideFittedRangeWarning,
+    RangeNote,
+    has_fitted_range,
+    shown_unit,
+    span,
+)
+from jaxdamp.dampers.inside import command_paths
+from jaxdamp.parameters import get
 
 
 TOLERANCE = 0.05  # of the larger limit, by which a use may leave the range without a warning
@@ -103,7 +114,8 @@ def _own_uses(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
     uses = []
     stroke = motion.stroke if law.traits().stroke_dependent else None
     channels = {"velocity": motion.velocity, "stroke": stroke, "force": motion.force}
-    channels |= {"temperature": _temperatures(law, motion), "command": np.array(commands_of(law))}
+    commands = sorted({float(get(law, path)) for path in command_paths(law)})
+    channels |= {"temperature": _temperatures(law, motion), "command": np.array(commands)}
     for name, fitted, unit in law.fitted_to.known():
         values = channels.get(name)
         if values is None or not values.size or not np.all(np.isfinite(values)):
@@ -171,3 +183,41 @@ def extrapolated(law: AbstractDamper, velocities: Float[np.ndarray, " points"]) 
         if inner.velocity is not None:
             outside |= extrapolated(part, inner.velocity)
     return outside
+
+
+L = TypeVar("L")
+
+
+def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Limits) -> L:
+    """The same law with the range of the records that it was fitted to, instead of any previous range.
+
+    `identify.fit` and `train` do this; state the range yourself for a law with parameters from another source. Laws
+    inside have their own ranges. Simulations with the law then report by how much it is used outside the range.
+
+    The range is no array of the law: a law with a range has the same structure as one without, and `jax.tree.map` of
+    several laws returns that of the first. A law that a compiled function (`jax.jit`, `jax.lax.scan`) returns has none.
+
+    Arguments:
+        law: any law.
+        fitted_to: the range; or give the limits by name.
+        limits: as `FittedRange` takes them, such as `velocity=(-0.5, 0.5)`.
+
+    Raises:
+        ValueError: something that is not a law; neither a range nor limits, or both; an unknown quantity;
+            limits out of order.
+
+    >>> from jaxdamp.dampers import Linear
+    >>> with_fitted_range(Linear(1500.0), velocity=(-0.5, 0.9)).fitted_to.words()
+    'velocity −0.5 to 0.9 m/s'
+    """
+    if not isinstance(law, AbstractDamper):
+        _checks.refuse("law", "be a damper law", f"a {type(law).__name__}", "For a vehicle, set it for its dampers.")
+    for name in limits:
+        _checks.one_of("limits", name, UNITS)
+    if (fitted_to is None) == (not limits):
+        remedy = "Write for example `with_fitted_range(law, velocity=(-0.5, 0.5))`."
+        _checks.refuse("fitted_to", "be given, or limits by name, and not both", repr(fitted_to), remedy)
+    changed = object.__new__(type(law))
+    for name, value in (vars(law) | {"range_note": RangeNote(fitted_to or FittedRange(**limits))}).items():
+        object.__setattr__(changed, name, value)
+    return changed

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._elementary import reciprocal_root
 from jaxdamp._types import Number, Scalar, ScalarLike
-from jaxdamp.dampers._knee_scan import knee_scan
+from jaxdamp.dampers._guesses import knee_scan
 from jaxdamp.dampers.base import AbstractMemoryless
 from jaxdamp.parameters import nonnegative, parameter, positive
 

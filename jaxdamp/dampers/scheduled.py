@@ -13,10 +13,9 @@ from jaxdamp._field_types import check_field_types
 from jaxdamp._limits import within
 from jaxdamp._types import Number, Vector
 from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.contract import Traits, combined_traits
 from jaxdamp.dampers.fitted_range import without_fitted_ranges
-from jaxdamp.dampers.scaled import Scaled
-from jaxdamp.dampers.sum import Sum
-from jaxdamp.dampers.traits import Traits, combined_traits
+from jaxdamp.dampers.sum import Scaled, Sum
 from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import increasing, setting
 

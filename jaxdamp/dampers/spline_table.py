@@ -10,10 +10,9 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most, within
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
-from jaxdamp.dampers._points import check_points, refuse_active
 from jaxdamp.dampers.base import AbstractMemoryless
-from jaxdamp.dampers.table import Table
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
+from jaxdamp.dampers.table import Table, check_points, refuse_active
 from jaxdamp.parameters import as_float, increasing, parameter, setting
 
 

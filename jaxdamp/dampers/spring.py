@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractStateless
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import nonnegative, parameter
 
 

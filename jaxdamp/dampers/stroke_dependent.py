@@ -13,8 +13,8 @@ from jaxdamp._field_types import check_field_types
 from jaxdamp._limits import within
 from jaxdamp._types import Scalar, ScalarLike, Vector, VectorLike
 from jaxdamp.dampers.base import AbstractDamper, AbstractStateless, refuse_states
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.table import Table
-from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import as_float, increasing, setting
 
 

@@ -7,8 +7,8 @@ import equinox as eqx
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers.base import AbstractDamper
-from jaxdamp.dampers.motion import Motion
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
+from jaxdamp.dampers.fitted_range import Motion
 from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import parameter, positive, setting
 

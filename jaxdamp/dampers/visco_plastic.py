@@ -12,10 +12,10 @@ from jaxdamp._elementary import power
 from jaxdamp._limits import within
 from jaxdamp._types import Number, Scalar, ScalarLike, State, Vector
 from jaxdamp.dampers._guesses import sliding_fit
-from jaxdamp.dampers._hysteresis import travels
+from jaxdamp.dampers._steps import travels
 from jaxdamp.dampers.base import AbstractDamper, own_states
+from jaxdamp.dampers.contract import Traits
 from jaxdamp.dampers.play import dead_zone
-from jaxdamp.dampers.traits import Traits
 from jaxdamp.parameters import interval, nonnegative, parameter, positive
 
 

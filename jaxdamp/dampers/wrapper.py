@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, State
 from jaxdamp.dampers.base import START, AbstractDamper
-from jaxdamp.dampers.traits import Traits
+from jaxdamp.dampers.contract import Traits
 
 
 class AbstractWrapper(AbstractDamper):

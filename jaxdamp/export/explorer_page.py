@@ -5,25 +5,80 @@ import importlib.metadata
 import json
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._types import Contents
 from jaxdamp._writing import write_whole
 from jaxdamp.bench import BenchRun
+from jaxdamp.codegen import JavaScript, PrintedFunction, Program, lower, symbols
 from jaxdamp.dampers import AbstractDamper, laws_inside
-from jaxdamp.export._javascript import bump_function, closed, law_functions, vehicle_functions
 from jaxdamp.export._law_program import LawNumber, LawProgram
 from jaxdamp.export._ride_program import RideProgram
 from jaxdamp.export.module_file import to_json
 from jaxdamp.parameters import weight
-from jaxdamp.roads import AbstractRoad, iso8608
+from jaxdamp.roads import AbstractRoad, cosine_bump, iso8608
 from jaxdamp.simulation import Ride
 from jaxdamp.vehicles import AbstractVehicle, presets
+
+
+_LANGUAGE = JavaScript()
+
+
+def law_functions(law: LawProgram) -> dict[str, str]:
+    """`initial(p, state)`, `force(p, x, v, state)`, `advance(p, ..., dt, state)`, `margins(p, y)`, by names."""
+    return {
+        "initial": _filled("initial(p, state)", law.initial_state, "state"),
+        "force": _returned("force(p, x, v, state)", law.force),
+        "advance": _filled("advance(p, x0, v0, x1, v1, dt, state)", law.advance, "state"),
+        "margins": _filled("margins(p, y)", law.margins, "y"),
+    }
+
+
+def vehicle_functions(vehicle: RideProgram) -> dict[str, str]:
+    """The functions of `RideProgram`, by names; results go into the arrays m, c, g and y."""
+    return {
+        "prepare": _filled("prepare(p, q, dt, m)", vehicle.prepare, "m"),
+        "start": _filled("start(m, h, r, c)", vehicle.start, "c"),
+        "begin": _filled("begin(m, c, h, r, g)", vehicle.begin, "g"),
+        "step": _filled("step(m, c, h0, r0, h1, r1)", vehicle.step, "c"),
+        "observe": _filled("observe(m, c, g, h, r)", vehicle.observe, "g"),
+        "end": _filled("end(m, g, y)", vehicle.end, "y"),
+    }
+
+
+def bump_function() -> str:
+    """`bump(t, height, length, speed)`: the height of a cosine bump that begins at 1 s."""
+
+    def bump(t: Any, height: Any, length: Any, speed: Any) -> Any:
+        return cosine_bump(height, start=1.0, length=length, speed=speed).height(t[None])[0, 0]
+
+    names = ("t", "height", "length", "speed")
+    return _returned(f"bump({', '.join(names)})", lower(bump, *map(symbols, names)))
+
+
+def closed(name: str, functions: dict[str, str]) -> str:
+    """One object of functions that see each other and nothing else."""
+    return f"const {name} = (() => {{\n{''.join(functions.values())}return {{ {', '.join(functions)} }};\n}})();\n"
+
+
+def _returned(head: str, program: Program) -> str:
+    return _function(head, program, (), program.results.item())
+
+
+def _filled(head: str, program: Program, target: str) -> str:
+    values = [atom for leaf in jax.tree.leaves(program.results) for atom in leaf.ravel()]
+    return _function(head, program, [(f"{target}[{k}]", value) for k, value in enumerate(values)], None)
+
+
+def _function(head: str, program: Program, outputs: Sequence[Any], returned: Any) -> str:
+    return _LANGUAGE.function(PrintedFunction(f"function {head}", (), program.statements, outputs, returned))
 
 
 _PARTS = Path(__file__).parent / "explorer"
@@ -121,7 +176,7 @@ def to_explorer(
     return write_whole(file, _assembled(data, programs))
 
 
-def _of_profile(road: AbstractRoad | str, ride: Ride) -> dict[str, Any]:
+def _of_profile(road: AbstractRoad | str, ride: Ride) -> Contents:
     """The heights of a road that was given."""
     if isinstance(road, str):
         return {}
@@ -137,7 +192,7 @@ def _check_vehicle(vehicle: AbstractVehicle) -> None:
         _checks.refuse("vehicle", must, f"a {type(vehicle).__name__} with {wheels}", "Take a `QuarterCar`.")
 
 
-def _of_car(car: RideProgram) -> dict[str, Any]:
+def _of_car(car: RideProgram) -> Contents:
     """The vehicle with its numbers, metrics and the channels that these need."""
     vehicle = car.vehicle
     channels = [
@@ -150,7 +205,7 @@ def _of_car(car: RideProgram) -> dict[str, Any]:
     }
 
 
-def _assembled(data: dict[str, Any], programs: str) -> str:
+def _assembled(data: Contents, programs: str) -> str:
     """The page of its parts."""
     text = {name: (_PARTS / name).read_text(encoding="utf-8") for name in ("page.html", "style.css", *_SCRIPTS)}
     parts = {
@@ -163,7 +218,7 @@ def _assembled(data: dict[str, Any], programs: str) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], text["page.html"])
 
 
-def _of_law(program: LawProgram, car: RideProgram, title: str) -> dict[str, Any]:
+def _of_law(program: LawProgram, car: RideProgram, title: str) -> Contents:
     commands = [n.name for n in program.numbers if n.kind == "command"]
     return {
         "title": title,
@@ -174,7 +229,7 @@ def _of_law(program: LawProgram, car: RideProgram, title: str) -> dict[str, Any]
     }
 
 
-def _of_number(number: LawNumber) -> dict[str, Any]:
+def _of_number(number: LawNumber) -> Contents:
     """A parameter for the page: what it is, the allowed values, and the ranges of its sliders."""
     domain, values = number.domain, number.value.ravel()
     return {
@@ -213,13 +268,13 @@ def _range(number: LawNumber, value: float, largest: float) -> tuple[float, floa
     return max(value - 2.0 * size, domain.lower), min(value + 2.0 * size, domain.upper)
 
 
-def _of_metric(metric: Any, vehicle: AbstractVehicle) -> dict[str, Any]:
+def _of_metric(metric: Any, vehicle: AbstractVehicle) -> Contents:
     title = metric.name.replace("_", " ") + (f", {metric.weighting}" if metric.weighting else "")
     unit, main = metric.unit(vehicle.units), bool(_MAIN.match(metric.name))
     return {"name": metric.name, "title": title, "unit": unit, "main": main, "signed": metric.statistic.signed}
 
 
-def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> dict[str, Any]:
+def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> Contents:
     """Amplitudes and phases of random roads of class A, of which those of all classes and speeds follow."""
     longest = max(speed, _FASTEST) * duration
     made = [iso8608("A", 1.0, seed=seed + k, length=max(1000.0, longest)) for k in range(_SEEDS)]
@@ -233,7 +288,7 @@ def _of_roads(speed: float, duration: float, seed: int, road_class: str) -> dict
     return {"class": road_class, "speed": speed, "iso": lines, "profile": None}
 
 
-def _of_record(run: BenchRun) -> dict[str, Any]:
+def _of_record(run: BenchRun) -> Contents:
     """A record for the page: every sample, or so few of them as it takes to drive the law, from the beginning."""
     per_cycle = run.sampling_rate / max(run.frequency, 1.0 / run.duration)
     stride = max(1, min(int(per_cycle / _PER_CYCLE), -(-len(run) // _SAMPLES)))
@@ -245,6 +300,6 @@ def _of_record(run: BenchRun) -> dict[str, Any]:
     return about | {key: _packed(values) for key, values in shown.items()}
 
 
-def _packed(values: Any) -> str:
+def _packed(values: object) -> str:
     """Numbers in 64 bits as text of 64 characters."""
     return base64.b64encode(np.asarray(values, "<f8").tobytes()).decode("ascii")

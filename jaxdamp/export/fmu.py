@@ -1,26 +1,168 @@
 """A law or a vehicle as functional mock-up unit (FMI 2.0)."""
 
 import hashlib
+import importlib.metadata
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import warnings
+import xml.etree.ElementTree as ET
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.export._law_program import LawProgram, identifier
-from jaxdamp.export._law_source import law_source
-from jaxdamp.export._model_description import description, variables
+from jaxdamp.export._c_text import law_source, vehicle_source
+from jaxdamp.export._law_program import LawNumber, LawProgram, identifier
 from jaxdamp.export._vehicle_program import VehicleProgram
-from jaxdamp.export._vehicle_source import vehicle_source
 from jaxdamp.simulation import substeps_needed
 from jaxdamp.vehicles import AbstractVehicle
+
+
+_NAMES, _SYMBOLS = "kilogram meter second ampere kelvin mole radian", "kg m s A K mol rad"
+_BASE_UNITS = dict(zip(_NAMES.split(), _SYMBOLS.split(), strict=True))
+_SIGNAL = {"variability": "continuous"}
+_INPUT = {"causality": "input"} | _SIGNAL
+_OUTPUT = {"causality": "output", "initial": "calculated"} | _SIGNAL
+_LOCAL = {"causality": "local", "initial": "calculated"} | _SIGNAL
+_FIXED = {"causality": "parameter", "variability": "fixed", "initial": "exact"}
+
+
+class Variable(NamedTuple):
+    """A variable of the model description; its value reference is its place in the list."""
+
+    name: str
+    unit: str
+    about: dict[str, str]
+    start: float | None = None
+    limits: tuple[float, float] = (-np.inf, np.inf)
+    derivative_of: int | None = None
+
+
+def variables(program: LawProgram | VehicleProgram, longest_step: float) -> list[Variable]:
+    """All variables, in the order of unit.c: values and rates of the inputs, outputs, numbers, states, their rates."""
+    signals = _of_law(program) if isinstance(program, LawProgram) else _of_vehicle(program)
+    said = {"description": "longest step of the model; longer communication steps are divided"}
+    listed = [*signals, Variable("longest_step", "s", _FIXED | said, longest_step, (1e-9, np.inf))]
+    listed += [variable for number in program.numbers for variable in _of_number(number)]
+    if not program.numbers:
+        listed.append(Variable("none", "", _FIXED, 0.0))
+    states = (
+        [(f"state[{k}]", "") for k in range(program.states)]
+        if isinstance(program, LawProgram)
+        else [(f"state.{name}", unit) for name, unit in program.states]
+    )
+    first = len(listed)
+    listed += [Variable(name, unit, _LOCAL) for name, unit in states]
+    rates = {"m": "m/s", "m/s": "m/s^2", "rad": "rad/s", "rad/s": "rad/s^2"}
+    listed += [
+        Variable(f"der({name})", rates.get(unit, ""), _LOCAL, derivative_of=first + k)
+        for k, (name, unit) in enumerate(states)
+    ]
+    names = [variable.name for variable in listed]
+    double = next((name for name in names if names.count(name) > 1), None)
+    if double is not None:
+        _checks.refuse("law", "have a different name for each parameter, channel and input", f"two of {double!r}")
+    return listed
+
+
+def _of_law(program: LawProgram) -> Iterator[Variable]:
+    yield Variable("x", "m", _INPUT | {"description": "stroke, positive in extension"}, 0.0)
+    yield Variable("v", "m/s", _INPUT | {"description": "velocity, positive in extension"}, 0.0)
+    yield Variable("F", "N", _OUTPUT | {"description": "force, positive when it resists extension"})
+
+
+def _of_vehicle(program: VehicleProgram) -> Iterator[Variable]:
+    for height in program.heights:
+        yield Variable(height.name, "m", _INPUT | {"description": height.description}, 0.0)
+    for height in program.heights:
+        said = f"rate of {height.name}; in co-simulation it follows from the heights as long as it is zero"
+        yield Variable(f"{height.name}_rate", "m/s", _INPUT | {"description": said}, 0.0)
+    for channel in program.channels:
+        yield Variable(channel.name, channel.unit, _OUTPUT | {"description": channel.description})
+
+
+def _of_number(number: LawNumber) -> Iterator[Variable]:
+    """One variable for each number; `terms.0.knots` becomes `terms[0].knots[1]`."""
+    name = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", number.path)
+    causes = {"parameter": _FIXED | {"variability": "tunable"}, "setting": _FIXED, "command": _INPUT}
+    about = causes[number.kind] | {"description": number.meaning}
+    for index in np.ndindex(*number.value.shape):
+        place = f"[{','.join(map(str, index))}]" if index else ""
+        yield Variable(
+            name + place, number.unit, about, float(number.value[index]), (number.domain.lower, number.domain.upper)
+        )
+
+
+def description(model: object, known: list[Variable], name: str, guid: str) -> str:
+    """The model description as XML."""
+    root = ET.Element(
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=type(model).__name__,
+        guid=f"{{{guid}}}",
+        description=repr(model),
+        generationTool=f"jaxdamp {importlib.metadata.version('jaxdamp')}",
+        variableNamingConvention="structured",
+        numberOfEventIndicators="0",
+    )
+    can = {"canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true", "canNotUseMemoryManagementFunctions": "true"}
+    steps = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
+    for kind, more in (("ModelExchange", {"providesDirectionalDerivative": "true"}), ("CoSimulation", steps)):
+        files = ET.SubElement(ET.SubElement(root, kind, {"modelIdentifier": name} | can | more), "SourceFiles")
+        ET.SubElement(files, "File", {"name": f"{name}.c"})
+    _units(ET.SubElement(root, "UnitDefinitions"), {variable.unit for variable in known} - {""})
+    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.001")
+    listed = ET.SubElement(root, "ModelVariables")
+    for place, variable in enumerate(known):
+        attributes = {"name": variable.name, "valueReference": str(place)} | variable.about
+        scalar = ET.SubElement(listed, "ScalarVariable", attributes)
+        real = ET.SubElement(scalar, "Real", {"unit": variable.unit} if variable.unit else {})
+        limits = zip(("min", "max"), variable.limits, strict=True)
+        numbers = {key: limit for key, limit in limits if np.isfinite(limit)} | {"start": variable.start}
+        numbers |= {"derivative": None if variable.derivative_of is None else variable.derivative_of + 1}
+        real.attrib |= {key: repr(value) for key, value in numbers.items() if value is not None}
+    _structure(ET.SubElement(root, "ModelStructure"), known)
+    ET.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _structure(structure: ET.Element, known: list[Variable]) -> None:
+    """Outputs, derivatives and what is computed at the start, by places counted from one."""
+    about = [variable.about for variable in known]
+    lists = {
+        "Outputs": [k for k, a in enumerate(about) if a["causality"] == "output"],
+        "Derivatives": [k for k, variable in enumerate(known) if variable.derivative_of is not None],
+        "InitialUnknowns": [k for k, a in enumerate(about) if a.get("initial") == "calculated"],
+    }
+    for name, places in lists.items():
+        if places:
+            group = ET.SubElement(structure, name)
+            for place in places:
+                ET.SubElement(group, "Unknown", index=str(place + 1))
+
+
+def _units(definitions: ET.Element, units: set[str]) -> None:
+    """Units with their powers of SI base units."""
+    import pint
+
+    registry: Any = pint.UnitRegistry()
+    for unit in sorted(units):
+        base = registry.Quantity(1.0, unit).to_base_units()
+        entry = ET.SubElement(definitions, "Unit", {"name": unit})
+        powers = dict(base.unit_items())
+        if all(float(power).is_integer() and key in _BASE_UNITS for key, power in powers.items()):
+            attributes = {_BASE_UNITS[key]: str(int(power)) for key, power in powers.items()}
+            ET.SubElement(entry, "BaseUnit", attributes | {"factor": repr(float(base.magnitude))})
 
 
 _PLATFORMS = {"linux": ("linux", "so"), "darwin": ("darwin", "dylib"), "win32": ("win", "dll")}

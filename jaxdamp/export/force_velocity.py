@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._display import display
 from jaxdamp._field_types import check_module
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import VectorLike
@@ -18,7 +19,7 @@ from jaxdamp.rig import quasi_static
 
 @of_known_numbers
 def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: VectorLike) -> Path:
-    """Write the force of a law over velocity as a table in SI units, one point per line.
+    """Write the force of a law over velocity as a table, one point per line; in SI unless a command shows other units.
 
     A table holds one force for each velocity. For a law with states that is the force at constant velocity once the
     states have settled (`jaxdamp.rig.quasi_static`); its hysteresis is not in the table, which the header states.
@@ -39,9 +40,13 @@ def to_csv(law: AbstractDamper, path: str | os.PathLike[str], velocities: Vector
             of the velocities.
     """
     table = settled_table(law, velocities, "to_csv(law, path, velocities)")
-    rows = [f"{float(v)!r},{float(f)!r}" for v, f in zip(table.velocity, table.force, strict=True)]
-    comments = [f"# {line}" for line in table.comments]
-    written = write_whole(path, "\n".join([*comments, "velocity [m/s],force [N]", *rows]) + "\n")
+    shown = display()
+    units = shown.of("m/s", signed=True), shown.of("N", signed=True)
+    points = sorted(zip(units[0](table.velocity), units[1](table.force), strict=True))
+    rows = [f"{float(v)!r},{float(f)!r}" for v, f in points]
+    comments = [f"# {shown.words(line)}" for line in table.comments]
+    heading = ",".join(f"{name} [{unit.unit}]" for name, unit in zip(("velocity", "force"), units, strict=True))
+    written = write_whole(path, "\n".join([*comments, heading, *rows]) + "\n")
     warn_of_rows(written, table)
     return written
 

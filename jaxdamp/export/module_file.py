@@ -9,16 +9,16 @@ import equinox as eqx
 
 from jaxdamp import _checks
 from jaxdamp._documents import parse_json, read_text
+from jaxdamp._types import Contents
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper, has_fitted_range
-from jaxdamp.export._plain import FITTED_TO, plain_module
-from jaxdamp.export._rebuild import rebuilt
+from jaxdamp.export._rebuild import FITTED_TO, plain_module, rebuilt
 from jaxdamp.parameters import checked
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.vehicles import AbstractVehicle
 
 
-KINDS: dict[str, Any] = {  # kinds of files, the most specific first
+KINDS: Contents = {  # kinds of files, the most specific first
     "law": AbstractDamper,
     "vehicle": AbstractVehicle,
     "road": (AbstractRoad, WhiteRoad),

@@ -25,25 +25,15 @@ MARGIN = 0.02  # of the force, by which the law between two settings may leave t
 
 
 class AtSetting(NamedTuple):
-    """A law fitted to the records of one setting alone.
+    """A law fitted to the records of one setting alone."""
 
-    Attributes:
-        law: the fitted law.
-        rig: the fitted test machine, if one was fitted.
-        runs: the records.
-        fit_percent: over all records.
-        rmse: the same [N].
-        is_only_minimum: whether no other start can lead elsewhere.
-        undetermined: the numbers of the law that these records do not determine.
-    """
-
-    law: AbstractDamper
-    rig: Rig | None
-    runs: tuple[BenchRun, ...]
-    fit_percent: float
-    rmse: float
-    is_only_minimum: bool
-    undetermined: tuple[str, ...] = ()
+    law: AbstractDamper  # the fitted law
+    rig: Rig | None  # the fitted test machine, if one was fitted
+    runs: tuple[BenchRun, ...]  # the records
+    fit_percent: float  # over all records
+    rmse: float  # the same [N]
+    is_only_minimum: bool  # whether no other start can lead elsewhere
+    undetermined: tuple[str, ...] = ()  # the numbers of the law that these records do not determine
 
     @property
     def model(self) -> Model:
@@ -64,10 +54,6 @@ def choose_blend(alone: Mapping[float, AtSetting], initial_state: str) -> Choice
     Laws of different structure have no common parameters. With three or more settings, each one between two others is
     predicted from its neighbours in both ways, and the errors decide. With two, parameters are interpolated if the
     records determine all of them and the law halfway stays within the span of its neighbours' forces.
-
-    Arguments:
-        alone: the fits by setting, in order.
-        initial_state: of laws with states at the first sample of a record, as in `fit`.
     """
     if not Scheduled.of_equal_structure([at.law for at in alone.values()]):
         return Choice("force", "The laws at the settings have different structures, so their forces are blended.")
@@ -145,11 +131,6 @@ def off_span(model: Model, runs: Sequence[BenchRun], initial_state: str) -> list
     """Sentences on settings between which a `Scheduled` law leaves the span of its neighbours' forces.
 
     Compared is the force on the motion of all records, halfway between two levels and at these levels.
-
-    Arguments:
-        model: the law, or the law on its machine, with a `Scheduled` law inside or not.
-        runs: records that state their command.
-        initial_state: as in `fit`.
     """
     inside = [law for _, law in laws_inside(law_of(model)) if isinstance(law, Scheduled) and law.blend == "parameters"]
     if not inside:

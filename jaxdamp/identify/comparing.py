@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxdamp._progress import Progress
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Table, with_unit
 from jaxdamp._traced import of_known_numbers
@@ -137,11 +137,16 @@ class Comparison(AbstractResult):
             "failed": {failure.name: failure.reason for failure in self.failed},
         }
 
-    def plot(self) -> "Figure":
-        """The errors of the laws side by side."""
-        from jaxdamp.plots import ladder
+    def plot(self, kind: str = "ladder", **options: object) -> "Figure":
+        """The errors of the laws side by side (`plots.ladder`), or the sheet of the recommended law.
 
-        return ladder(self)
+        Arguments:
+            kind: "ladder", or "sheet" for one A4 page (`plots.damper_sheet`).
+            options: of that function.
+        """
+        from jaxdamp.plots import damper_sheet, ladder
+
+        return plotted(kind, {"ladder": ladder, "sheet": damper_sheet}, self, **options)
 
     def __repr__(self) -> str:
         judged = any(rung.judged_on for rung in self.rungs)

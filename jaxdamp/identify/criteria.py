@@ -76,11 +76,7 @@ class Priors(AbstractResiduals):
 
 
 def priors_on(free: FreeParameters, priors: Mapping[str, tuple[float, float]], noise: float) -> tuple[Priors, ...]:
-    """The residuals of stated priors `{name: (mean, standard deviation)}`.
-
-    Raises:
-        ValueError: an unknown or frozen parameter; numbers that are no mean and standard deviation.
-    """
+    """The residuals of stated priors `{name: (mean, standard deviation)}`."""
     chosen: dict[str, tuple[float, float]] = {}
     for name, pair in priors.items():
         if np.shape(pair) != (2,) or not np.all(np.isfinite(pair)) or not pair[1] > 0:
@@ -104,14 +100,6 @@ def solve_by(
     spread: float | None = None,
 ) -> tuple[Problem, Solution]:
     """Minimise a loss, with priors if the problem has any: least squares again and again, with new weights.
-
-    Arguments:
-        problem: the problem with its start.
-        solve: least squares of a problem from so many starts.
-        loss: a name in `LOSSES`.
-        noise: the noise of the weighted residual at a minimum.
-        starts: largest number of starts of the first round; the others continue from its end.
-        spread: standard deviation of the residuals of sound samples; estimated by their median if left out.
 
     Returns:
         The problem of the last round, with its weights, and its solution.
@@ -167,5 +155,5 @@ def criterion_in_words(problem: Problem, loss: str, priors: Mapping[str, Sequenc
     parts = []
     if loss != "squares":
         parts.append(f"loss {loss}: {100 * problem.share_left_out:.2g} % of the samples have less than half weight")
-    known = [f"{name} {mean:.5g} ± {deviation:.2g}" for name, (mean, deviation) in priors.items()]
-    return "; ".join([*parts, *[f"priors {', '.join(known)}"] * bool(known)])
+    expected = [f"{name} {mean:.5g} ± {deviation:.2g}" for name, (mean, deviation) in priors.items()]
+    return "; ".join([*parts, *[f"priors {', '.join(expected)}"] * bool(expected)])

@@ -8,30 +8,22 @@ from jaxtyping import Float, Int
 
 from jaxdamp import _checks
 from jaxdamp._triangles import rows_of_products
-from jaxdamp.identify.lanes import Products
 from jaxdamp.parameters import Bounds, FreeParameters, match_paths, name_patterns
 from jaxdamp.solve import Linearisation
 
 
+Products = Float[np.ndarray, "_lanes _columns _columns"]
 OWN = -1  # in place of a degree: every damper has its own value
 
 
 class Dependence(NamedTuple):
-    """How the coordinates of each damper follow from one vector: its own values, then coefficients of polynomials.
+    """How the coordinates of each damper follow from one vector: its own values, then coefficients of polynomials."""
 
-    Attributes:
-        degree: of the polynomial of each coordinate in the setting, `OWN` for one that differs from damper to damper.
-        basis: Legendre polynomials of each damper's setting, scaled to −1 … 1.
-        column: of the vector, for each damper and coordinate (the first of a polynomial).
-        size: of the vector.
-        ends: lowest and highest setting.
-    """
-
-    degree: Int[np.ndarray, " free"]
-    basis: Float[np.ndarray, "dampers degrees"]
-    column: Int[np.ndarray, "dampers free"]
-    size: int
-    ends: tuple[float, float]
+    degree: Int[np.ndarray, " free"]  # of the polynomial of each coordinate in the setting, or `OWN`
+    basis: Float[np.ndarray, "dampers degrees"]  # Legendre polynomials of each damper's setting, scaled to −1 … 1
+    column: Int[np.ndarray, "dampers free"]  # of the vector, for each damper and coordinate (the first of a polynomial)
+    size: int  # of the vector
+    ends: tuple[float, float]  # lowest and highest setting
 
     def at_dampers(self, vector: Float[np.ndarray, " size"]) -> Float[np.ndarray, "dampers free"]:
         """The coordinates of every damper."""
@@ -76,21 +68,15 @@ class Dependence(NamedTuple):
         return Bounds(*sides)
 
     def gathered(self, here: Linearisation, products: Products, inside: bool) -> tuple[Linearisation, Products]:
-        """The problem of all dampers together, by the vector.
-
-        Arguments:
-            here: of each damper.
-            products: of each damper.
-            inside: whether all coordinates are within their bounds.
-        """
+        """The problem of all dampers together, by the vector."""
         together = np.zeros((self.size + 1, self.size + 1))
         slopes = np.zeros((*here.margins.shape, self.size))
-        for damper, (own, by_y) in enumerate(zip(products, here.margin_slopes, strict=True)):
+        for damper, (of_damper, by_y) in enumerate(zip(products, here.margin_slopes, strict=True)):
             columns, weights = self.rows(damper)
             slopes[damper][:, columns] = by_y @ weights
             columns, weights = np.append(columns, self.size), np.pad(weights, ((0, 1), (0, 1)))
             weights[-1, -1] = 1.0
-            together[np.ix_(columns, columns)] += weights.T @ own @ weights
+            together[np.ix_(columns, columns)] += weights.T @ of_damper @ weights
         margins = np.append(np.ravel(here.margins), 1.0 if inside else -1.0)
         by_vector = np.concatenate([slopes.reshape(-1, self.size), np.zeros((1, self.size))])
         rows, samples = rows_of_products(together[None]), np.sum(here.samples, keepdims=True)
@@ -109,21 +95,12 @@ def dependence(
     settings: Sequence[float | int] | None,
     dampers: int,
 ) -> Dependence | None:
-    """The dependence that the arguments of `fit_many` state; `None` if every damper has its own values.
-
-    Raises:
-        ValueError: an unknown parameter; a degree below zero or too high for the settings; no settings.
-    """
-    degrees = dict(shared) if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
-    if not degrees:
+    """The dependence that the arguments of `fit_many` state; `None` if every damper has its own values."""
+    if settings is not None and len(settings) != dampers:
+        _checks.refuse("settings", f"give one number for each of {dampers} dampers", f"{len(settings)} numbers")
+    degree = _degrees(free, shared)
+    if np.all(degree == OWN):
         return None
-    degree = np.full(len(free.names), OWN)
-    paths = [p.path for p in free.chosen]
-    for name, d in degrees.items():
-        if not isinstance(d, int) or d < 0:
-            _checks.refuse(f"shared[{name!r}]", "be the degree of a polynomial, 0 or more", d)
-        named = match_paths(paths, [name])
-        degree[[p.path in named for p in free.owners]] = d
     most = int(degree.max())
     if most > 0 and settings is None:
         remedy = "Give one number for each damper, such as its clicks, or share with degree 0."
@@ -137,3 +114,15 @@ def dependence(
         size += dampers if d == OWN else int(d) + 1
     ends = (float(number.min()), float(number.max()))
     return Dependence(degree, legendre(number, ends, most + 1), column, size, ends)
+
+
+def _degrees(free: FreeParameters, shared: Mapping[str, int] | Sequence[str]) -> Int[np.ndarray, " free"]:
+    """The degree of each number in the setting, `OWN` where every damper has its own."""
+    degrees = dict(shared) if isinstance(shared, Mapping) else dict.fromkeys(name_patterns("shared", shared), 0)
+    degree = np.full(len(free.names), OWN)
+    for name, d in degrees.items():
+        if not isinstance(d, int) or d < 0:
+            _checks.refuse(f"shared[{name!r}]", "be the degree of a polynomial, 0 or more", d)
+        named = match_paths([p.path for p in free.chosen], [name])
+        degree[[p.path in named for p in free.owners]] = d
+    return degree

@@ -116,19 +116,12 @@ class Goal:
 
 
 class Information(NamedTuple):
-    """What tests say of the free parameters.
+    """What tests say of the free parameters."""
 
-    Attributes:
-        free: the free parameters.
-        matrices: Fisher information of each test, in the units of the parameters.
-        force: largest |F| in each test [N].
-        power: mean F v of each test [W].
-    """
-
-    free: FreeParameters
-    matrices: Float[np.ndarray, "tests free free"]
-    force: Float[np.ndarray, " tests"]
-    power: Float[np.ndarray, " tests"]
+    free: FreeParameters  # the free parameters
+    matrices: Float[np.ndarray, "tests free free"]  # Fisher information of each test, in the units of the parameters
+    force: Float[np.ndarray, " tests"]  # largest |F| in each test [N]
+    power: Float[np.ndarray, " tests"]  # mean F v of each test [W]
 
 
 def information(
@@ -141,17 +134,7 @@ def information(
     sampling_rate: float,
     force_noise: float,
 ) -> Information:
-    """What tests would say of the free parameters of a law on a machine, by the model that a fit would use.
-
-    Arguments:
-        law: the law, with the values that are expected.
-        tests: the tests.
-        rig: as in `fit`.
-        freeze: as in `fit`.
-        tie: as in `fit`.
-        sampling_rate: of the records [Hz].
-        force_noise: standard deviation of a sample of the force [N], as white noise.
-    """
+    """What tests would say of the free parameters of a law on a machine, by the model that a fit would use."""
     runs = [_motion(test, number, sampling_rate) for number, test in enumerate(tests)]
     problem = prepare(law, runs, rig=rig, freeze=freeze, tie=tie)
     residual, jacobian = map(np.asarray, linearised(problem.free, problem.free.values, problem.residuals))
@@ -219,13 +202,7 @@ WAVEFORMS = ("sine", "triangle", "random", "multisine")
 
 
 def excitation_at(point: Point, limits: MachineLimits, duration: float) -> Any | None:
-    """The test at a point; `None` if it is outside the limits.
-
-    Arguments:
-        point: where.
-        limits: of the machine.
-        duration: of the run [s]; longer where this is less than `FEWEST_CYCLES`.
-    """
+    """The test at a point; `None` if it is outside the limits."""
     waveform, stroke, frequency = point
     low, high = limits.frequencies
     cycles = max(int(duration * frequency), FEWEST_CYCLES)

@@ -2,13 +2,13 @@
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import Excitation
@@ -16,10 +16,6 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.design_goal import WAVEFORMS, Goal, Information, MachineLimits, Point, grid, information, near
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import Rig
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 CRITERIA = ("D", "A", "c")
@@ -77,8 +73,8 @@ class ExperimentDesign(AbstractResult):
         for i, (p, value) in enumerate(zip(self.free.owners, np.asarray(self.free.values), strict=True)):
             error = self.standard_errors[self.free.names[i]]
             note = "not identifiable" if error > WEAK * abs(value) else ""
-            beside = () if others is None else (float(others[i]),)
-            rows.append((self.free.names[i], p.unit or "–", float(value), error, *beside, note))
+            of_programme = () if others is None else (float(others[i]),)
+            rows.append((self.free.names[i], p.unit or "–", float(value), error, *of_programme, note))
         return Table("Expected standard errors", tuple(columns), tuple(rows))
 
     def tables(self) -> dict[str, Table]:
@@ -97,19 +93,15 @@ class ExperimentDesign(AbstractResult):
         rows = [(t.name, *extent(t), t.highest_frequency, t.duration) for t in self.tests]
         return Table("Runs, the most useful first", columns, tuple(rows))
 
-    def plot(self) -> "Figure":
-        """The runs over stroke and velocity, and the standard errors they give."""
-        from jaxdamp.plots import experiment
-
-        return experiment(self)
+    plot = drawn_by("experiment", "The runs over stroke and velocity, and the standard errors they give.")
 
     @property
     def summary(self) -> str:
         """Number of runs, and how many are as good as the programme."""
         if self.programme_covariance is None:
             return f"{len(self.tests)} runs chosen by the criterion {self.criterion}."
-        whole, match = len(self.programme), self.runs_to_match
-        return f"{match or f'More than {whole}'} such runs are as good as the {whole} of the programme."
+        count, match = len(self.programme), self.runs_to_match
+        return f"{match or f'More than {count}'} such runs are as good as the {count} of the programme."
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -235,8 +227,7 @@ def _check(
     if limits is None and tests is None:
         remedy = "Write `limits=MachineLimits(stroke=0.05, velocity=1.0)` or `tests=[...]`."
         _checks.refuse("limits", "be given, or `tests`", "neither", remedy)
-    if runs < 1:
-        _checks.refuse("runs", "be 1 or more", runs)
+    _checks.counts(runs=runs)
     _checks.positive("force_noise", force_noise)
     _checks.one_of("criterion", criterion, CRITERIA)
     if (criterion == "c") != (function is not None):
@@ -265,11 +256,13 @@ class _Pool:
     free: FreeParameters
 
     @classmethod
-    def of(cls, candidates: Mapping[Any, Excitation], known: Information, limits: MachineLimits | None) -> "_Pool":
+    def of(
+        cls, candidates: Mapping[Any, Excitation], information: Information, limits: MachineLimits | None
+    ) -> "_Pool":
         """Those within the limits of force and heat."""
         bears = [
             limits is None or (force <= limits.force and power <= limits.power)
-            for force, power in zip(known.force, known.power, strict=True)
+            for force, power in zip(information.force, information.power, strict=True)
         ]
         if not any(bears):
             assert limits is not None
@@ -278,7 +271,9 @@ class _Pool:
                 "limits", "leave tests to choose from", value, "Allow more, or add slower and shorter tests."
             )
         items = [item for item, within in zip(candidates.items(), bears, strict=True) if within]
-        return cls([k for k, _ in items], [t for _, t in items], known.matrices[np.array(bears)], known.free)
+        return cls(
+            [k for k, _ in items], [t for _, t in items], information.matrices[np.array(bears)], information.free
+        )
 
     def joined(self, other: "_Pool") -> "_Pool":
         """Both together."""
@@ -295,11 +290,11 @@ def _compared(
     how: Mapping[str, Any],
 ) -> ExperimentDesign:
     """The design beside a programme of tests."""
-    whole = information(design.law, programme, **how).matrices.sum(axis=0)
-    aim = float(goal.value(whole))
+    of_programme = information(design.law, programme, **how).matrices.sum(axis=0)
+    aim = float(goal.value(of_programme))
     longest = goal.added(chosen, max(len(programme) - len(chosen), 0), pool.matrices)
     reached = goal.value(np.cumsum(pool.matrices[longest[: len(programme)]], axis=0)) <= aim
-    covariance = goal.covariance(whole)
+    covariance = goal.covariance(of_programme)
     return dataclasses.replace(
         design,
         programme=programme,

@@ -7,6 +7,9 @@ from jaxdamp._tables import Cell, Column, Shown, Table, rounded, with_tied
 from jaxdamp.parameters import Module, free_parameters
 
 
+WIDER = 1.5  # times a standard error, from which the error with what the law misses is shown beside it
+
+
 class Estimate(NamedTuple):
     """One fitted number.
 
@@ -24,6 +27,8 @@ class Estimate(NamedTuple):
         reason: why it is not identifiable.
         tied: the numbers that have the same value.
         bias: by the noise of stroke and velocity, in the unit; None if it was not estimated.
+        spread: standard error with what the law misses, in the unit: by how much the number changes from one part of
+            the records to another; None where the residual is noise.
     """
 
     name: str
@@ -36,6 +41,7 @@ class Estimate(NamedTuple):
     reason: str = ""  # why it is not identifiable
     tied: tuple[str, ...] = ()  # the numbers that have the same value
     bias: float | None = None  # by the noise of stroke and velocity, if this noise was stated
+    spread: float | None = None  # with what the law misses
 
     @property
     def remark(self) -> str:
@@ -71,6 +77,8 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | N
     columns = [Column("parameter"), Column("unit"), Column("value", spec=".5g"), Column("standard error", spec=".2g")]
     biased = any(e.bias is not None for e in estimates)
     columns += [Column("bias by input noise", spec="+.2g")] * biased
+    spread = any(e.spread is not None and e.spread > WIDER * e.standard_error for e in estimates)
+    columns += [Column("with what the law misses", spec=".2g")] * spread
     columns += [Column("true", spec=".5g"), Column("(value − true)/se", spec="+.1f")] * (truth is not None)
     columns += [Column("95 % from", spec=".5g"), Column("to", spec=".5g"), Column("note"), Column("meaning")]
     true_values = {} if truth is None else _numbers(truth)
@@ -78,7 +86,7 @@ def parameter_table(title: str, estimates: Sequence[Estimate], truth: Module | N
     for e in estimates:
         value, error = rounded(e.value, e.standard_error)
         row: tuple[Cell, ...] = (e.name, e.unit or "–", Shown(e.value, value), Shown(e.standard_error, error))
-        row += (e.bias,) * biased
+        row += (e.bias,) * biased + (e.spread,) * spread
         if truth is not None:
             true = true_values.get(e.name)
             row += (true, None if true is None else (e.value - true) / e.standard_error)

@@ -11,10 +11,10 @@ from jaxtyping import Bool, Float
 from jaxdamp._triangles import determined, triangle, unit_columns
 from jaxdamp.dampers import Reach, laws_inside
 from jaxdamp.identify.criteria import Priors
-from jaxdamp.identify.estimates import Estimate, Minimum
+from jaxdamp.identify.estimates import WIDER, Estimate, Minimum
 from jaxdamp.identify.identifiability import on_identifiability
 from jaxdamp.identify.model import START_PATH
-from jaxdamp.identify.noise import Noise, noise_of
+from jaxdamp.identify.noise import Noise, noise_of, spread_over_parts
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.profile import Profile, profile
 from jaxdamp.identify.search import SearchEnd
@@ -77,6 +77,9 @@ def estimate(problem: Problem, solution: Solution, noise: Noise) -> Estimates:
     undetermined = ~(moved.errors <= far) | moved.open_ended
     weak = np.where(sides != 0, at_zero | ~np.isfinite(errors), undetermined)
     estimates = _estimates(problem, found, moved.errors, weak, sides != 0, noise.dof)
+    if noise.systematic:
+        spreads = spread_over_parts(problem, found)
+        estimates = tuple(e._replace(spread=max(s, e.standard_error)) for e, s in zip(estimates, spreads, strict=True))
     directions = weak_directions(found.jacobian, float(np.sqrt(variance)), large, WEAK)
     estimates, notes = on_identifiability(problem, found, estimates, directions)
     further = on_minima(minima, estimates) + on_reach(estimates, spans)
@@ -210,14 +213,21 @@ def on_minima(minima: Sequence[Minimum], estimates: Sequence[Estimate]) -> list[
     return notes
 
 
-def on_misfit(noise: Noise) -> list[str]:
-    """A sentence on a residual that is not noise."""
+def on_misfit(noise: Noise, estimates: Sequence[Estimate] = ()) -> list[str]:
+    """A sentence on a residual that is not noise, and for what the intervals then hold."""
     if not noise.systematic:
         return []
+    factors = [
+        (e.spread / e.standard_error, e.name)
+        for e in estimates
+        if e.spread is not None and 0 < e.standard_error < np.inf and not e.note
+    ]
+    factor, name = max(factors, default=(1.0, ""))
+    wider = f"; with what the law misses, the error of {name} is {factor:.2g} times as large" * (factor > WIDER)
     return [
-        "Neighbouring residuals are alike, from cycle to cycle: the law misses something systematic. The standard"
-        " errors count that as noise with the correlation of the residual, which makes them"
-        f" {noise.inflation:.3g} times those of independent noise."
+        "The residual repeats from cycle to cycle: the law misses something systematic, or the machine is left out."
+        f" The intervals hold for this law, not for the damper{wider}. The standard errors count the residual as noise"
+        f" with its correlation, which makes them {noise.inflation:.3g} times those of independent noise."
     ]
 
 

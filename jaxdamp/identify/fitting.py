@@ -25,6 +25,7 @@ from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import rig_of
 from jaxdamp.identify.noise import noise_of
 from jaxdamp.identify.preparing import prepare, records_in_words
+from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import Problem, linearised
 from jaxdamp.identify.search import SearchEnd, Solver
 from jaxdamp.identify.several import Solution, search_from
@@ -253,9 +254,7 @@ def solve(
     Raises:
         ValueError: counts below one; a solver of another kind.
     """
-    for name, count in (("max_steps", max_steps), ("starts", starts)):
-        if count is not None and count < 1:
-            _checks.refuse(name, "be 1 or more", count)
+    _checks.counts(max_steps=max_steps, starts=starts)
     if solver is not None and not isinstance(solver, Solver):
         remedy = "For example `optimistix.Dogleg(rtol=1e-8, atol=1e-8)`."
         _checks.refuse("solver", "be a least-squares solver or minimiser of optimistix", solver, remedy)
@@ -274,7 +273,9 @@ def _solve_linear(problem: Problem) -> Solution:
     """Minimum of a linear least-squares problem within the domains."""
     free, coordinates = problem.free, problem.coordinates
     begin = np.asarray(free.values)
-    residual, jacobian = (np.asarray(a) for a in linearised(free, free.values, problem.residuals))
+    printed = evaluator(free, problem.residuals) if begin.dtype == np.float64 else None
+    pair = printed(begin) if printed else linearised(free, free.values, problem.residuals)
+    residual, jacobian = map(np.asarray, pair)
     residual, jacobian = problem.anchored(begin, residual, jacobian)
     norms = np.linalg.norm(jacobian, axis=0)
     unseen = norms <= UNSEEN * norms.max()  # no sample shows these numbers: they keep their start

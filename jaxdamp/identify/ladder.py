@@ -5,11 +5,13 @@ import functools
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, final
 
+import equinox as eqx
 import jax
 import numpy as np
 
 from jaxdamp import _checks, dampers
 from jaxdamp._tables import Column, Table
+from jaxdamp._types import Scalar
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import (
     AbstractDamper,
@@ -54,7 +56,14 @@ def _friction(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
 def _rate(law: AbstractMemoryless, velocity: np.ndarray) -> float:
     """Secant slope [N s/m] at the RMS velocity."""
     v = float(np.sqrt(np.mean(velocity**2)))
-    return float(law.force_velocity(v) - law.force_velocity(-v)) / (2 * v)
+    up, down = (float(_force(law, np.asarray(speed))) for speed in (v, -v))
+    return (up - down) / (2 * v)
+
+
+@eqx.filter_jit
+def _force(law: AbstractMemoryless, v: np.ndarray) -> Scalar:
+    """In one program: JAX would compile each operation."""
+    return law.force_velocity(v)
 
 
 _MEMORYLESS = {
@@ -110,6 +119,47 @@ NAMED_LAWS = {
 }
 
 LAWS = tuple(name for name, law in NAMED_LAWS.items() if not law.optional)
+CURVES = ("bilinear", "besinger", "piecewise_linear")  # tried on all records
+LAGGING, RUBBING = ("besinger_lag", "besinger_series_spring"), ("bouc_wen", "series_spring_dahl")
+BINS = 30  # of the velocity, in which the halves of a stroke are compared
+LOOP = 2e-3  # share of the squared force that is hysteresis, above which records show a loop
+DRY = 0.5  # share of the loop that is within `SLOW` of the largest velocity: friction that gives before it slides
+SLOW = 0.2
+
+
+def suited_laws(runs: Iterable[BenchRun]) -> tuple[str, ...]:
+    """A short ladder for these records: three curves over velocity, and three laws that a loop in them calls for.
+
+    A loop is the difference of the forces at one velocity above and below mid-stroke. Records without one get two more
+    curves and a law that a small lag would show in; a loop at all velocities gets laws with a lag, one that is widest
+    at low velocity those with friction that gives before it slides; where neither prevails, one of each kind.
+
+    Arguments:
+        runs: one record or several.
+
+    >>> from jaxdamp import bench
+    >>> suited_laws(bench.VirtualDyno(Linear(1500.0)).run([bench.SineTest(0.02, 2.0)]))
+    ('linear', 'bilinear', 'piecewise_linear', 'besinger', 'linear_friction', 'besinger_lag')
+    """
+    loop = slow = force = 0.0
+    for run in as_runs(runs, call="suited_laws(runs)"):
+        above = run.stroke > 0.5 * (run.stroke.max() + run.stroke.min())
+        edges = np.linspace(run.velocity.min(), run.velocity.max(), BINS + 1)
+        cell = np.clip(np.searchsorted(edges, run.velocity, side="right") - 1, 0, BINS - 1)
+        counts = [np.bincount(cell[half], minlength=BINS) for half in (above, ~above)]
+        sums = [np.bincount(cell[half], run.force[half], BINS) for half in (above, ~above)]
+        over, under = (total / np.maximum(count, 1) for total, count in zip(sums, counts, strict=True))
+        square = np.where(np.minimum(*counts) > 0, 0.25 * (over - under) ** 2, 0.0) * (counts[0] + counts[1])
+        middle = np.abs(0.5 * (edges[1:] + edges[:-1])) < SLOW * run.peak_velocity
+        share = float(np.sum(run.force**2))
+        loop, slow, force = loop + square.sum() / share, slow + square[middle].sum() / share, force + 1.0
+    if loop <= LOOP * force:
+        chosen = {"linear", *CURVES, "linear_friction", LAGGING[0]}
+    elif slow > DRY * loop:
+        chosen = {*CURVES, LAGGING[1], *RUBBING}
+    else:
+        chosen = {*CURVES, *LAGGING, RUBBING[1]}
+    return tuple(name for name in LAWS if name in chosen)
 
 
 def ladder_starts(names: Sequence[str] = LAWS) -> dict[str, Start]:

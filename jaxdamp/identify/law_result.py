@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Table, plain, with_unit
 from jaxdamp._types import VectorLike
@@ -183,8 +183,13 @@ class FitResult(AbstractFitted, Fit):
         """Law, errors, scores and parameters as plain data."""
         return AbstractFitted.content(self) | Fit.content(self) | {"error_shares": plain(self.error_shares._asdict())}
 
-    def plot(self, runs: Iterable[BenchRun] | None = None, **options: Any) -> "Figure":
-        """Loops of force over velocity and over stroke, measured and fitted, with residuals."""
-        from jaxdamp.plots import fit_loops
+    def plot(self, kind: str | Iterable[BenchRun] = "loops", **options: object) -> "Figure":
+        """Loops of force over velocity and over stroke, measured and fitted, with residuals; or the damper's sheet.
 
-        return fit_loops(self, runs if runs is None else tuple(runs), **options)
+        Arguments:
+            kind: "loops" (`plots.fit_loops`), or "sheet" for one A4 page (`plots.damper_sheet`).
+            options: of that function, such as `runs`, the records to show.
+        """
+        from jaxdamp.plots import damper_sheet, fit_loops
+
+        return plotted(kind, {"loops": fit_loops, "sheet": damper_sheet}, self, "runs", **options)

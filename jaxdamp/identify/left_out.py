@@ -1,67 +1,81 @@
-"""Effects that a fit left out, recognised by their traces in its residual: of a machine, a damper, a sensor.
+"""Effects that a fit on a bench left out, recognised by their patterns in its residual.
 
-A force that the model does not have leaves its own pattern in the residual: a constant for an offset, the rate of the
-force for a delay, the force times the dissipated energy for heat. The patterns are compared with the residual after
-both have been cleared of everything that the free parameters explain, the most similar first. Likewise a sensor that is
-late, shifted or scaled leaves the slope of its channel, a constant, the channel itself.
+They are of a machine, of a damper, of a sensor. A force that the model does not have leaves its own pattern in the
+residual: a constant for an offset, the rate of the force for a delay, the force times the dissipated energy for heat.
+The patterns are compared with the residual after both have been cleared of everything that the free parameters explain.
+What tells causes apart:
+
+- a delay shifts all frequencies by one time, a filter the high ones less, the memory of a damper each record and
+  direction by another;
+- the mains have a line, a clock that jitters scatters the force in proportion to its rate of change;
+- no law of the velocity has a force at rest, so that another curve with one is a constant force;
+- a fault of the machine explains all that repeats from cycle to cycle: if some of it is left, it is the law.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 
-from jaxdamp.bench import RideRecord
-from jaxdamp.identify.model import VehicleTest
-from jaxdamp.identify.noise import channel_noise, correlation_time
+from jaxdamp.bench import clock_jitter, mains_lines
+from jaxdamp.identify.noise import correlation_time
 from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.residual_patterns import (
+    LATE,
+    OF_LAW,
+    Pattern,
+    Record,
+    column,
+    hysteresis,
+    proportional,
+    records_of,
+)
 from jaxdamp.identify.search import SearchEnd
-from jaxdamp.identify.traces import Batch
-from jaxdamp.identify.vehicle_preparing import FreeScale
-from jaxdamp.identify.vehicle_residuals import RideBatch
-from jaxdamp.identify.vehicle_result import ChannelScore
-from jaxdamp.parameters import get
-from jaxdamp.rig import Sensor
 
 
-LEAST_SHARE = 0.02  # of the squared residual that an effect must explain
+LEAST_SHARE = 0.02  # of the squared residual, from which an effect is named that moves no number
 LEAST_F = 12.0  # F statistic with independent samples only, from which an effect is named
 LARGE_SHARE, LEAST_F_OF_LARGE = 0.1, 5.0  # a large share is named with less certainty
-CLEARER = 0.9  # of the largest share, from which the first effect in the order of the list is named
-FRICTION_VELOCITY = 0.005  # m/s, width of the sign change of friction
-GAPS = (0.02, 0.05, 0.1)  # clearances that are tried, relative to the half stroke
+CLEAR_F = 40.0  # from which a small share is named, of the first effect
+MOVED = 3.0  # standard errors by which such a small one must move the fitted numbers
+AS_GOOD = 12.0  # deviance above the least, within which the first effect in the order of the list is named
+PENALTY = 2.0  # deviance for each further number of an effect, in logarithms of the number of independent samples
+OF_THE_LAW = 0.01  # of what repeats from cycle to cycle, above which effects of a machine do not explain it
+SURE = 5.0  # standard errors from which something repeats
+SCATTER = 0.2  # share of the squared residual by a clock that jitters, from which it is named
+STATIC = 0.5  # force at rest, relative to its RMS, from which another curve is a constant force
+OF_ITS_OWN = 1e-5  # share of a pattern that no fitted number has, below which it cannot be shown
+REFINED = 4  # times that the size of a delay or a lag is refined
+FIRST_SIZE = 1e-6  # s, of a delay or a lag
 MOST_EFFECTS = 3
-TO_THE_MACHINE = 'add "{}" to the machine (`rig`)'
-SURE = 6.0  # standard errors from which an effect is named
-NOTICEABLE = 0.01  # sampling intervals of a delay, and tenths of a channel, below which an effect does not matter
-REVERSED = -0.3  # correlation of a channel with its prediction below which its sign is doubted
-POORLY = 30.0  # fit [%] of a channel below which the vehicle of the start is asked too
-OF_ITS_OWN = 1e-3  # share of an effect that no fitted number has, below which it cannot be shown
+MAINS_GRID = 0.05  # Hz, to which lines of the mains are rounded
+LAST_WORD = "Compare laws before anything is added to the machine."
 
 
-class _Effect(NamedTuple):
-    """A pattern in the residual and what it means."""
+class _Named(NamedTuple):
+    """An effect that was found, and what is left without it."""
 
-    name: str
-    signal: Float[np.ndarray, " samples"]  # weighted force for a unit of the effect
-    signed: bool  # whether it may have either sign
-    words: str  # with the size
-    remedy: str
+    effect: Pattern
+    sizes: np.ndarray
+    share: float  # of the squared residual
+    rest: np.ndarray
+    span: np.ndarray  # with the effect
 
+    @property
+    def words(self) -> str:
+        """Share and size.
 
-class _Motion(NamedTuple):
-    """One record as it stands in the residuals."""
-
-    time: Float[np.ndarray, " samples"]
-    stroke: Float[np.ndarray, " samples"]
-    velocity: Float[np.ndarray, " samples"]
-    force: Float[np.ndarray, " samples"]  # as predicted
-    rise: Float[np.ndarray, " samples"] | None  # measured temperature above that at the start of all records
+        Shares below one percent keep a digit.
+        """
+        share = f"{100 * self.share:.0f}" if self.share >= 0.01 else f"{100 * self.share:.1g}"
+        return f"{share} % {{}} like {self.effect.words(self.sizes)}"
 
 
 def left_out(problem: Problem, best: SearchEnd) -> list[str]:
-    """A sentence on each effect that the residual shows: offset, gas spring, mass, friction, delay, heat, clearance.
+    """A sentence on each effect that the residual shows, or one on the law where no effect of a machine explains it.
+
+    Offset, gas spring, mass, friction, delay, low-pass filter, heat, zero that drifts, gain of a record, clearance;
+    curve and memory of the damper; the mains, a clock that jitters.
 
     Arguments:
         problem: a problem on bench records that was minimised.
@@ -72,235 +86,200 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
         return []
     scale = np.linalg.norm(best.jacobian, axis=0)
     span = np.linalg.qr(best.jacobian[used] / np.where(scale > 0, scale, 1.0))[0]
-    owner = problem.owner[used]
-    residual = _cleared(span, -best.residual[used])
-    squares = float(residual @ residual)
-    open_effects = [e._replace(signal=e.signal[used]) for e in _effects(problem, best)]
-    sentences: list[str] = []
-    while open_effects and len(sentences) < MOST_EFFECTS:
-        found = _clearest(open_effects, span, residual, owner, squares)
-        if found is None:
-            break
-        effect, size, share, rest, span = found
-        open_effects = [e for e in open_effects if e.name != effect.name]
-        sentences.append(
-            f"{100 * share:.0f} % of the squared residual look like {effect.words.format(size)}, which the fit leaves"
-            f" out: {effect.remedy}."
-        )
-        residual = rest
-    return sentences
+    residual = span_free(span, -best.residual[used])
+    records = list(records_of(problem, best))
+    if not records:
+        return []
+    squares, repeated = float(residual @ residual), _repeated(residual, records)
+    of_mains, residual, span = _mains(problem, records, residual, span)
+    of_clock = _jitter(problem, records, squares)
+    named = _search(problem, records, residual, span, squares, SCATTER if of_clock else 0.0)
+    if named:
+        residual = named[-1].rest
+    left, alike = _repeated(residual, records), _alike(residual, records)
+    sure = SURE * float(residual @ residual) * np.sqrt(alike / residual.size)
+    static = [found.effect.name for found in named] == ["offset"]
+    if (named and named[-1].effect.name in OF_LAW) or (
+        not static and repeated > 0 and left > max(OF_THE_LAW * repeated, sure)
+    ):
+        return [*of_clock, _of_the_law(named, left / repeated), *of_mains]
+    return [*of_clock, *map(_of_the_machine, named), *of_mains]
 
 
-def _cleared(span: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _of_the_machine(found: _Named) -> str:
+    look = found.words.format("of the squared residual look")
+    return f"{look}, which the fit leaves out: {found.effect.remedy}."
+
+
+def _of_the_law(named: Sequence[_Named], left: float) -> str:
+    parts = [found.words.format("is") for found in named if found.effect.name not in OF_LAW]
+    alike = f" (of the squared residual {', '.join(parts)})" * bool(parts)
+    if named and named[-1].effect.name in OF_LAW:
+        effect = named[-1].effect
+        return f"By the residual, the law misses {effect.words(named[-1].sizes)}{alike}: {effect.remedy}. {LAST_WORD}"
+    return (
+        f"The residual repeats from cycle to cycle, and {100 * min(left, 1.0):.2g} % of that is like no fault of a"
+        f" machine{alike}: the law misses something of the damper. {LAST_WORD}"
+    )
+
+
+def span_free(span: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values without what an orthonormal basis has of them.
+
+    Arguments:
+        span: the basis, in columns.
+        values: one column or several.
+    """
     return values - span @ (span.T @ values)
 
 
-def _clearest(
-    effects: list[_Effect], span: np.ndarray, residual: np.ndarray, owner: np.ndarray, squares: float
-) -> tuple[_Effect, float, float, np.ndarray, np.ndarray] | None:
-    """The effect that explains most, its size, its share, the residual without it and the space with it."""
-    found = []
-    for effect in effects:
-        signal = _cleared(span, effect.signal)
-        length = float(np.linalg.norm(signal))
-        if length > 1e-6 * np.linalg.norm(effect.signal):
-            size = float(signal @ residual) / length**2
-            if size > 0 or effect.signed:
-                found.append((effect, size, (size * length) ** 2 / squares, signal / length))
-    most = max((share for _, _, share, _ in found), default=0.0)
-    if most < LEAST_SHARE:
-        return None
-    effect, size, share, direction = next(entry for entry in found if entry[2] >= CLEARER * most)
-    rest = residual - direction * (direction @ residual)
-    alike = correlation_time([rest[owner == i] for i in np.unique(owner)])
-    independent = rest.size / alike
-    least = LEAST_F_OF_LARGE if share >= LARGE_SHARE else LEAST_F
-    if share * squares < least * float(rest @ rest) / independent:
-        return None
-    return effect, size, share, rest, np.concatenate([span, direction[:, None]], axis=1)
+def _alike(residual: np.ndarray, records: Sequence[Record]) -> float:
+    """Samples for each independent one."""
+    return correlation_time([residual[record.at] for record in records])
 
 
-def _motions(problem: Problem, best: SearchEnd) -> Iterator[tuple[np.ndarray, _Motion]]:
-    """The samples of each fitted record in the residuals, and its motion there."""
-    stroke, velocity, force, weight = (_channel(problem, name) for name in ("stroke", "velocity", "force", "weight"))
-    predicted = force + np.divide(best.residual[: weight.size], weight, out=np.zeros_like(force), where=weight > 0)
-    first = [run.temperature[0] for run in problem.runs if run.temperature is not None]
-    for i, run in enumerate(problem.runs):
-        at = np.flatnonzero((problem.owner == i) & problem.used)
-        if at.size < 8:
-            continue
-        step = problem.sample_steps[i]
-        time = step * np.arange(at.size)
-        rise = None
-        if run.temperature is not None:
-            end = run.time[-1] - run.time[0]
-            rise = np.interp(time + max(end - time[-1], 0.0), run.time - run.time[0], run.temperature) - min(first)
-        yield at, _Motion(time, stroke[at], velocity[at], predicted[at], rise)
-
-
-def _channel(problem: Problem, name: str) -> Float[np.ndarray, " samples"]:
-    """One channel at all samples of the residuals of bench records."""
-    parts = [part for part in problem.residuals if isinstance(part, Batch)]
-    return np.concatenate([np.ravel(np.asarray(getattr(part, name))) for part in parts])
-
-
-def _effects(problem: Problem, best: SearchEnd) -> list[_Effect]:
-    """All effects as patterns over all samples, the likelier ones first."""
-    amplitude = problem.reach.stroke
-    gaps = [f"a clearance of about {1e3 * gap * amplitude:.2g} mm (no force after each reversal)" for gap in GAPS]
-    kinds = [
-        ("offset", True, "a constant force of {:.3g} N", 'add "gas" or "offset" to the machine (`rig`)'),
-        ("gas_stiffness", False, "a spring of {:.3g} N/m", f"{TO_THE_MACHINE}, or a `Spring` to the law"),
-        ("mass", False, "a moving mass of {:.3g} kg", TO_THE_MACHINE),
-        ("friction", False, "friction of {:.3g} N", f"{TO_THE_MACHINE}, or take a law with friction"),
-        ("delay", True, "a delay of the force by {:.2g} s", f"{TO_THE_MACHINE}, or take a law with hysteresis"),
-        ("heat", True, "damping that falls as the oil warms up", f"{TO_THE_MACHINE}, or cut the records"),
-        *(("clearance", False, gap, "look for play in the mounts, or put the law into `Play`") for gap in gaps),
-    ]
-    signals = np.zeros((len(kinds), best.residual.size))
-    weight = _channel(problem, "weight")
-    for at, motion in _motions(problem, best):
-        signals[:, at] = weight[at] * np.stack(_patterns(motion, amplitude))
-    return [
-        _Effect(name, signal, signed, words, remedy.format(name))
-        for signal, (name, signed, words, remedy) in zip(signals, kinds, strict=True)
-    ]
-
-
-def _patterns(motion: _Motion, amplitude: float) -> list[np.ndarray]:
-    """The change of the measured force for a unit of each effect, in the order of the list."""
-    time, x, v, force, rise = motion
-    energy = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] * v[1:] + force[:-1] * v[:-1]) * np.diff(time))])
-    patterns = [np.ones_like(x), x, np.gradient(v, time), np.tanh(v / FRICTION_VELOCITY), -np.gradient(force, time)]
-    since = _travel_since_reversal(x, v)
-    return [
-        *patterns,
-        -force * (energy if rise is None else rise),
-        *(-force * (since < gap * amplitude) for gap in GAPS),
-    ]
-
-
-def _travel_since_reversal(x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Distance [m] from the last reversal; infinite before the first."""
-    turns = np.flatnonzero(np.signbit(v[1:]) != np.signbit(v[:-1])) + 1
-    last = np.searchsorted(turns, np.arange(x.size), side="right") - 1
-    from_last = np.abs(x - x[turns[np.maximum(last, 0)]]) if turns.size else np.full(x.size, np.inf)
-    return np.where(last >= 0, from_last, np.inf)
-
-
-def on_signs(scores: Sequence[ChannelScore], at_start: Sequence[ChannelScore]) -> list[str]:
-    """A sentence on each channel that the vehicle predicts with the other sign.
-
-    A fit may bend the vehicle until a reversed channel runs with it a little, and explain it badly all the same: then
-    the vehicle that the fit started from tells.
-    """
-    notes = []
-    for score, first in zip(scores, at_start, strict=True):
-        which, against = "fitted vehicle", score.correlation
-        if score.fit_percent < POORLY:
-            which, against = min((which, against), ("vehicle of the start", first.correlation), key=lambda one: one[1])
-        if against < REVERSED:
-            notes.append(
-                f"{score.channel} of {score.record} runs against the {which} (correlation {against:.2f}): its sign, or"
-                " that of the other channels, is reversed. Accelerations and heights count positive up, travels in"
-                " extension; `read_rides(..., reversed_channels=[...])` and --reversed turn a channel round."
-            )
-    return notes
-
-
-def on_free_scale(scale: FreeScale, model: VehicleTest) -> list[str]:
-    """A sentence on numbers of which the records show the ratios only."""
-    if not scale.names:
-        return []
-    value = f"{float(get(model, scale.held_name)):.6g}" if scale.held_name else ""
-    held = f" {scale.held_name} was held at {value}; the standard errors are for this." if value else ""
-    return [
-        "These records hold no force, so only ratios of masses, rates and forces can be determined:"
-        f" {', '.join(scale.names)} may all be larger by one factor.{held}"
-        " Fix one mass that is known, or measure a force."
-    ]
-
-
-def on_sensors(
-    problem: Problem,
-    end: SearchEnd,
-    records: Sequence[RideRecord],
-    channels: Sequence[str],
-    sensors: Mapping[str, Sensor],
-) -> list[str]:
-    """A sentence on each sensor whose channel looks late, shifted or scaled, beside all fitted numbers.
-
-    The residual is regressed on what each sensor could add to first order (the slope of its channel, a constant, the
-    channel itself), after both are freed of what the fitted numbers can explain.
-
-    Arguments:
-        problem: the problem that was solved.
-        end: its minimum.
-        records: the records.
-        channels: all channels in the order of `problem.sigma`.
-        sensors: the fitted sensors.
-    """
-    effects, columns = [], []
-    for channel in channels:
-        given = sensors[channel].given if channel in sensors else ()
-        for effect in ("delay", "offset", "gain"):
-            if effect not in given and not (effect == "delay" and "lag" in given):
-                column = _column(problem, end, records, channel, effect)
-                if column is not None:
-                    effects.append((channel, effect))
-                    columns.append(column)
-    if not columns:
-        return []
-    whole = np.stack([*columns, end.residual], axis=1)
-    basis, _ = np.linalg.qr(end.jacobian / np.linalg.norm(end.jacobian, axis=0).clip(1e-300))
-    rest = whole - basis @ (basis.T @ whole)
-    shown = np.linalg.norm(rest[:, :-1], axis=0) > OF_ITS_OWN * np.linalg.norm(whole[:, :-1], axis=0)
-    inverse = np.linalg.pinv(rest[:, :-1][:, shown])
-    sizes = inverse @ rest[:, -1]
-    left = channel_noise(problem, rest[:, -1] - rest[:, :-1][:, shown] @ sizes, end.values.size)
-    errors = np.linalg.norm(inverse * left.sigma, axis=1)
-    chosen = [effect for effect, own in zip(effects, shown, strict=True) if own]
-    sentences = []
-    for (channel, effect), size, error in zip(chosen, map(float, sizes), errors, strict=True):
-        values = np.concatenate([record[channel] for record in records if channel in record.channels])
-        unit = {"delay": records[0].dt, "offset": 0.1 * float(np.std(values)), "gain": 0.1}[effect]
-        if abs(size) > max(SURE * error, NOTICEABLE * unit):
-            sentences.append(_sentence(channel, effect, size, problem.law.units[channel]))
-    return sentences
-
-
-def _column(
-    problem: Problem, end: SearchEnd, records: Sequence[RideRecord], channel: str, effect: str
-) -> Float[np.ndarray, " samples"] | None:
-    """Change of the weighted residual for each unit of an effect; None for a law on a bench."""
-    parts, begin, found = [], 0, False
-    for part in problem.residuals:
-        size = part.used().size
-        column = np.zeros(size)
-        if isinstance(part, RideBatch) and channel in part.channels:
-            weight = np.asarray(part.weight)
-            row, shaped, found = part.channels.index(channel), column.reshape(weight.shape), True
-            errors = end.residual[begin : begin + size].reshape(weight.shape)
-            for i, number in enumerate(np.asarray(part.number)):
-                counts = weight[i, row] > 0
-                error = np.divide(errors[i, row], weight[i, row], out=np.zeros(counts.size), where=counts)
-                expected = records[number][channel] + error
-                slope = np.gradient(expected, records[number].dt)
-                by_effect = {"delay": slope, "offset": -np.ones_like(slope), "gain": -expected}
-                shaped[i, row] = weight[i, row] * by_effect[effect]
-        parts.append(column)
-        begin += size
-    return np.concatenate(parts) if found else None
-
-
-def _sentence(channel: str, effect: str, size: float, unit: str) -> str:
-    words = {
-        "delay": f"comes {1e3 * abs(size):.3g} ms too {'late' if size > 0 else 'early'}",
-        "offset": f"has a zero error of {size:.3g} {unit}",
-        "gain": f"has a gain of {1 + size:.4g}",
-    }
-    how = {"delay": "lag or delay"}.get(effect, effect)
-    return (
-        f"By its residual, {channel} {words[effect]}, unless the vehicle misses something else:"
-        f" fit the {how} of its sensor."
+def _repeated(residual: np.ndarray, records: Sequence[Record]) -> float:
+    """The part of the sum of squares that returns one cycle later, over records of two cycles or more."""
+    return sum(
+        float(residual[at[:-cycle]] @ residual[at[cycle:]]) * at.size / (at.size - cycle)
+        for _, at, _, _, cycle in records
+        if cycle
     )
+
+
+def _search(
+    problem: Problem, records: Sequence[Record], residual: np.ndarray, span: np.ndarray, squares: float, least: float
+) -> list[_Named]:
+    """The effects that explain most, one after the other, until one is of the law."""
+    effects = [*proportional(problem, records), *_late(records, residual, span)]
+    numbers, named = span.shape[1], list[_Named]()
+    while len(named) < MOST_EFFECTS:
+        late = {found.effect.name: float(found.sizes[0]) for found in named if found.effect.name in LATE}
+        found = _clearest([*effects, hysteresis(records, late)], span, residual, records, squares, numbers)
+        if found is None or found.share < least:
+            break
+        if not named and _is_static(found):
+            constant = (_explained(e, span, residual, squares) for e in effects if e.name == "offset")
+            return [one for one in constant if one is not None]
+        named.append(found)
+        effects = [effect for effect in effects if effect.name != found.effect.name]
+        residual, span = found.rest, found.span
+        if found.effect.name in OF_LAW:
+            break
+    return named
+
+
+def _is_static(found: _Named) -> bool:
+    """Whether another curve is most of all a force at rest."""
+    if found.effect.at_rest is None:
+        return False
+    size = np.sqrt(np.mean((found.effect.signals @ found.sizes) ** 2) / np.mean(np.sum(found.effect.signals, 1) ** 2))
+    return abs(float(found.effect.at_rest @ found.sizes)) > STATIC * size
+
+
+def _late(records: Sequence[Record], residual: np.ndarray, span: np.ndarray) -> list[Pattern]:
+    """A delay and a low-pass filter of the force, with the size that explains most."""
+    words = {
+        "delay": "a delay of the force by {:.2g} s",
+        "lag": "a low-pass filter of the force with a time constant of {:.2g} s",
+    }
+    effects = []
+    for name, change in LATE.items():
+        remedy = f'add "{name}" to the machine (`rig`), or take a law with hysteresis'
+        size, effect = FIRST_SIZE, None
+        for _ in range(REFINED):
+            signals = column(records, lambda m, size=size, change=change: change(m, size) / size)
+            effect = Pattern(name, signals, name == "delay", lambda s, text=words[name]: text.format(*s), remedy)
+            found = _explained(effect, span, residual, 1.0)
+            if found is None:
+                break
+            size = float(found.sizes[0])
+        effects += [effect] if effect else []
+    return effects
+
+
+def _clearest(
+    effects: Sequence[Pattern],
+    span: np.ndarray,
+    residual: np.ndarray,
+    records: Sequence[Record],
+    squares: float,
+    numbers: int,
+) -> _Named | None:
+    """The first effect in the order of the list that explains as much as any, within the noise."""
+    found = [named for effect in effects if (named := _explained(effect, span, residual, squares)) is not None]
+    if not found:
+        return None
+    rests = np.array([max(float(one.rest @ one.rest), 1e-300) for one in found])
+    counts = np.array([one.span.shape[1] - span.shape[1] for one in found])
+    independent = residual.size / _alike(found[int(np.argmin(rests))].rest, records)
+    deviance = independent * np.log(rests) + PENALTY * np.log(max(independent, 2.0)) * counts
+    chosen = int(np.argmax(deviance <= deviance.min() + AS_GOOD))
+    one, variance = found[chosen], rests[chosen] / residual.size * _alike(found[chosen].rest, records)
+    statistic = one.share * squares / variance / counts[chosen]
+    if one.share >= LEAST_SHARE:
+        return one if statistic >= (LEAST_F_OF_LARGE if one.share >= LARGE_SHARE else LEAST_F) else None
+    if span.shape[1] > numbers:
+        return None  # beside another effect it may come from what this one is beyond first order
+    moved = float(np.linalg.norm(span[:, :numbers].T @ (one.effect.signals @ one.sizes)))
+    return one if statistic >= CLEAR_F and moved > MOVED * np.sqrt(variance) else None
+
+
+def _explained(effect: Pattern, span: np.ndarray, residual: np.ndarray, squares: float) -> _Named | None:
+    """What an effect explains of a residual; None if nothing, or if its sign is one that it cannot have."""
+    scale = np.linalg.norm(effect.signals, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    signals = span_free(span, effect.signals / scale)
+    values, directions = np.linalg.eigh(signals.T @ signals)
+    shown = values > OF_ITS_OWN**2
+    basis = signals @ directions[:, shown] / np.sqrt(values[shown])
+    inside = basis.T @ residual
+    sizes = directions[:, shown] @ (inside / np.sqrt(values[shown])) / scale
+    if not inside.size or not (effect.signed or np.all(sizes > 0)):
+        return None
+    share = float(inside @ inside) / squares
+    return _Named(effect, sizes, share, residual - basis @ inside, np.concatenate([span, basis], axis=1))
+
+
+def _mains(
+    problem: Problem, records: Sequence[Record], residual: np.ndarray, span: np.ndarray
+) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """A sentence on lines of the mains in the residual, and residual and space without them."""
+    lines: dict[float, tuple[float, float]] = {}  # size [N] and mains frequency [Hz] by line
+    for number, at, weight, _, _ in records:
+        force = residual[at] / np.where(weight > 0, weight, 1.0)
+        rate = 1.0 / problem.sample_steps[number]
+        for mains, pairs in mains_lines(force, rate, problem.runs[number].frequency).items():
+            for line, size in pairs:
+                nearest = MAINS_GRID * round(line / MAINS_GRID)
+                lines[nearest] = max(lines.get(nearest, (0.0, mains)), (size, mains))
+    if not lines:
+        return [], residual, span
+    columns = np.zeros((residual.size, 2 * len(records) * len(lines)))
+    waves = ((line, wave) for line in lines for wave in (np.cos, np.sin))
+    for k, (line, wave) in enumerate(waves):
+        for j, (_, at, weight, motion, _) in enumerate(records):
+            columns[at, k * len(records) + j] = weight * wave(2 * np.pi * line * motion.time)
+    found = _explained(Pattern("mains", columns, True, str, ""), span, residual, float(residual @ residual))
+    if found is None:
+        return [], residual, span
+    size, mains = float(np.linalg.norm([size for size, _ in lines.values()])), max(lines.values())[1]
+    sentence = (
+        f"{100 * found.share:.0f} % of the squared residual are the mains, {mains:.0f} Hz and multiples, of"
+        f" {size:.3g} N: Mend the earthing, or filter: `process(low_pass={mains / 2:g})` if the motion allows it."
+    )
+    return [sentence] * (found.share >= LEAST_SHARE), found.rest, found.span
+
+
+def _jitter(problem: Problem, records: Sequence[Record], squares: float) -> list[str]:
+    """A sentence on a clock whose jitter explains much of the residual: late samples of a force that changes."""
+    total, largest = 0.0, 0.0
+    for number, _, weight, motion, _ in records:
+        size = clock_jitter(problem.runs[number])
+        total += float(np.sum((weight * size * np.gradient(motion.force, motion.time)) ** 2))
+        largest = max(largest, size)
+    share = min(total / squares, 1.0)
+    return [
+        f"About {100 * share:.0f} % of the squared residual come from a clock that jitters by {1e3 * largest:.2g} ms:"
+        " take the clock of the hardware, not of the computer."
+    ] * (share >= SCATTER)

@@ -167,7 +167,7 @@ def constant_forces(law: AbstractDamper) -> list[str] | None:
 def free_fields(rig: Rig) -> list[str]:
     """The numbers of a machine that differ from their defaults; the others have no part in a fit."""
     pairs = zip(parameters(rig), parameters(Rig()), strict=True)
-    return [p.path for p, default in pairs if p.value != default.value]
+    return [p.path for p, default in pairs if np.asarray(p.value) != np.asarray(default.value)]
 
 
 def absent_paths(rig: Rig | None) -> list[str]:

@@ -1,7 +1,8 @@
 """`fit_many`: one law fitted to many dampers, clicks or temperatures in one call."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -18,9 +19,9 @@ from jaxdamp.dampers import AbstractDamper, Reach
 from jaxdamp.identify.criteria import FIRST_NOISE, LOSSES, Priors, priors_on
 from jaxdamp.identify.dependence import OWN, Dependence, dependence
 from jaxdamp.identify.initial_states import INITIAL_STATES
-from jaxdamp.identify.lanes import LanePriors, Lanes, Products, grouped_records
+from jaxdamp.identify.lanes import Fitted, LanePriors, Lanes, Products, by_rounds, grouped_records, noise_level
+from jaxdamp.identify.law_result import FitResult
 from jaxdamp.identify.machine import Machine, absent_paths, started_on
-from jaxdamp.identify.many_criteria import Fitted, by_rounds, noise_level
 from jaxdamp.identify.many_result import ManyFits
 from jaxdamp.identify.model import initial_state_for, on_rig, rig_of
 from jaxdamp.identify.preparing import weights
@@ -105,104 +106,87 @@ def fit_many(
     >>> round(float(many.law_at(1.5).rebound_rate), -1)
     2150.0
     """
-    names, records = _named(dampers)
-    robust = loss != "squares"
-    records = [
-        usable(runs, bad_records, robust=robust, argument=f"dampers[{name!r}]")
-        for name, runs in zip(names, records, strict=True)
-    ]
+    names, records = _named(dampers, bad_records, robust=loss != "squares")
     _checks.one_of("weighting", weighting, ["samples", "runs"])
     _checks.one_of("loss", loss, LOSSES)
     _checks.one_of("initial_state", initial_state, INITIAL_STATES)
-    for name, count in (("max_steps", max_steps), ("starts", starts)):
-        if count < 1:
-            _checks.refuse(name, "be 1 or more", count)
-    if settings is not None and len(list(settings)) != len(names):
-        _checks.refuse(
-            "settings", f"give one number for each of {len(names)} dampers", f"{len(list(settings))} numbers"
-        )
+    _checks.counts(max_steps=max_steps, starts=starts)
+    stated = None if settings is None else tuple(map(float, settings))
     some = [run for runs in records[:: -(-len(records) // STARTED_FROM)] for run in runs]
     begun, machine, held = started_on(law, some, rig, [*(bounds or ()), *(priors or ()), *(tie or ()), *shared])
-    model, absent = on_rig(begun, machine), [*absent_paths(machine), *held]
-    free = free_parameters(model, freeze=[*freeze, *absent], bounds=bounds, tie=tie)
+    model = on_rig(begun, machine)
+    free = free_parameters(model, freeze=[*freeze, *absent_paths(machine), *held], bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
-    depends = dependence(free, shared, settings, len(names))
+    depends = dependence(free, shared, stated, len(names))
     how = {"rig": rig, "freeze": freeze, "bounds": bounds, "tie": tie, "weighting": weighting, "loss": loss}
     how |= {"priors": priors, "initial_state": initial_state, "samples_per_cycle": samples_per_cycle}
     how |= {"max_steps": max_steps, "bad_records": "keep"}
-    stated = None if settings is None else tuple(float(s) for s in settings)
-    if initial_state == "estimated" and initial_state_for(model, initial_state) == initial_state:
+    many = functools.partial(ManyFits, tuple(names), tuple(records), stated, free=free, options=how)
+    initial_state = initial_state_for(model, initial_state)
+    if initial_state == "estimated":
         if depends is not None:
             remedy = "Leave out `shared`, or take another `initial_state`."
             _checks.refuse("initial_state", "be the same for dampers that share parameters", "'estimated'", remedy)
-        return _one_by_one(names, records, stated, begun, free, how | {"starts": starts})
-    coordinates = Coordinates(free, smooth="ordered")
+        return many(**_one_by_one(records, begun, free, how | {"starts": starts}))
     sigma = [weights(weighting, runs) for runs in records]
-    groups = grouped_records(model, records, sigma, samples_per_cycle, initial_state_for(model, initial_state))
-    lanes = Lanes(coordinates, groups, np.arange(len(names)))
+    groups = grouped_records(model, records, sigma, samples_per_cycle, initial_state)
+    lanes = Lanes(Coordinates(free, smooth="ordered"), groups, np.arange(len(names)))
     if priors:
         noise = FIRST_NOISE * lanes.levels() / np.sqrt(lanes.samples())
         lanes = lanes._replace(priors=LanePriors(_once(priors_on(free, priors, 1.0)[0], free, depends), noise))
+    return many(dependence=depends, **_side_by_side(lanes, records, depends, loss, starts, max_steps))
+
+
+def _side_by_side(
+    lanes: Lanes,
+    records: Sequence[Sequence[BenchRun]],
+    depends: Dependence | None,
+    loss: str,
+    starts: int,
+    max_steps: int,
+) -> dict[str, Any]:
+    """What the searches of all dampers end with: fields of the result."""
+    everyone = lanes.damper
     lanes, begin = _with_other_starts(lanes, records, starts)
     if depends is not None and starts > 1:  # each alone first, from where all together begin
         alone, best, _ = _solved(lanes, begin, None, max_steps)
-        lanes, begin = lanes._replace(damper=np.arange(len(names))), alone.y[best]
+        lanes, begin = lanes._replace(damper=everyone), alone.y[best]
     end, best, vector = _solved(lanes, begin, depends, max_steps)
-    lanes = lanes._replace(damper=np.arange(len(names)))
-    found = by_rounds(lanes, end.of(best), loss, lambda some, y: _solved(some, y, depends, max_steps)[0], depends)
-    if depends is not None and (loss != "squares" or priors):
-        vector = depends.start(found.end.y)
-    end, fitted = found.end, _physical(coordinates, found.end.y)
-    errors, percent, rmse, record_rmse, drift = _judged(found, depends, [len(runs) for runs in records])
-    return ManyFits(
-        names=tuple(names),
-        records=tuple(records),
-        settings=stated,
-        values=fitted,
-        standard_errors=errors,
-        fit_percent=percent,
-        rmse=rmse,
-        status=tuple(end.status),
-        steps=end.steps,
-        free=coordinates.free,
-        dependence=depends,
-        vector=vector,
-        record_rmse=record_rmse,
-        share_left_out=found.share_left_out,
-        drift=drift,
-        options=how,
-    )
+    lanes = lanes._replace(damper=everyone)
+    fitted = by_rounds(lanes, end.of(best), loss, lambda some, y: _solved(some, y, depends, max_steps)[0], depends)
+    if depends is not None and (loss != "squares" or lanes.priors is not None):
+        vector = depends.start(fitted.end.y)
+    return _judged(fitted, depends, [len(runs) for runs in records]) | {
+        "values": np.asarray(_both(lanes.coordinates, jnp.asarray(fitted.end.y))[0], np.float64),
+        "status": tuple(fitted.end.status),
+        "steps": fitted.end.steps,
+        "vector": vector,
+        "share_left_out": fitted.share_left_out,
+    }
 
 
 def _one_by_one(
-    names: Sequence[str],
-    records: Sequence[tuple[BenchRun, ...]],
-    settings: tuple[float, ...] | None,
-    law: AbstractDamper,
-    free: FreeParameters,
-    how: dict[str, Any],
-) -> ManyFits:
+    records: Sequence[tuple[BenchRun, ...]], law: AbstractDamper, free: FreeParameters, how: dict[str, Any]
+) -> dict[str, Any]:
     """Each damper by a fit of its own, where records have numbers of their own: states at their beginning."""
     from jaxdamp.identify.fitting import fit  # which hands many dampers to this file
 
     results = [fit(law, runs, **how) for runs in records]
     paths = free.names if rig_of(free.tree) else [f"law.{name}" for name in free.names]
-    estimates = [[result.estimate(path) for path in paths] for result in results]
-    return ManyFits(
-        names=tuple(names),
-        records=tuple(records),
-        settings=settings,
-        values=np.array([[e.value for e in row] for row in estimates]),
-        standard_errors=np.array([[e.standard_error for e in row] for row in estimates]),
-        fit_percent=np.array([result.fit_percent for result in results]),
-        rmse=np.array([result.rmse for result in results]),
-        status=tuple(result.status for result in results),
-        steps=np.array([result.steps for result in results]),
-        free=free,
-        record_rmse=tuple(np.array([score.rmse for score in result.scores]) for result in results),
-        share_left_out=np.array([result.evidence.problem.share_left_out for result in results if result.evidence]),
-        options=how,
-    )
+
+    def each(read: Callable[[FitResult], Any]) -> np.ndarray:
+        return np.array([read(result) for result in results])
+
+    return {
+        "values": each(lambda result: [result.estimate(path).value for path in paths]),
+        "standard_errors": each(lambda result: [result.estimate(path).standard_error for path in paths]),
+        "fit_percent": each(lambda result: result.fit_percent),
+        "rmse": each(lambda result: result.rmse),
+        "status": tuple(result.status for result in results),
+        "steps": each(lambda result: result.steps),
+        "record_rmse": tuple(np.array([score.rmse for score in result.scores]) for result in results),
+        "share_left_out": each(lambda result: result.evidence.problem.share_left_out if result.evidence else 0.0),
+    }
 
 
 def _once(priors: Priors, free: FreeParameters, depends: Dependence | None) -> Priors:
@@ -214,7 +198,7 @@ def _once(priors: Priors, free: FreeParameters, depends: Dependence | None) -> P
     return dataclasses.replace(priors, deviation=priors.deviation * jnp.asarray(np.sqrt(count)))
 
 
-def _named(dampers: object) -> tuple[list[str], list[tuple[BenchRun, ...]]]:
+def _named(dampers: object, bad_records: str, *, robust: bool) -> tuple[list[str], list[tuple[BenchRun, ...]]]:
     """The names of the dampers and the records of each."""
     if isinstance(dampers, Mapping):
         pairs = [(str(name), runs) for name, runs in dampers.items()]
@@ -228,7 +212,10 @@ def _named(dampers: object) -> tuple[list[str], list[tuple[BenchRun, ...]]]:
     for (name, _), runs in zip(pairs, records, strict=True):
         if not any(np.ptp(run.force) > 0 for run in runs):
             _checks.refuse(f"dampers[{name!r}]", "hold records with a force that varies", f"{len(runs)} without")
-    return [name for name, _ in pairs], records
+    named = zip(pairs, records, strict=True)
+    return [name for name, _ in pairs], [
+        usable(runs, bad_records, robust=robust, argument=f"dampers[{name!r}]") for (name, _), runs in named
+    ]
 
 
 def _with_other_starts(
@@ -240,9 +227,9 @@ def _with_other_starts(
     if starts > 1:
         reach = Reach(0.5 * max(float(np.ptp(r.stroke)) for r in together), max(r.peak_velocity for r in together))
         begin += other_starts(free, reach)[: starts - 1]
-    found = np.asarray(_from_physical(lanes.coordinates, jnp.asarray(np.array(begin))), np.float64)
+    coordinates = np.asarray(_from_physical(lanes.coordinates, jnp.asarray(np.array(begin))), np.float64)
     dampers = np.arange(len(records))
-    return lanes._replace(damper=dampers.repeat(len(begin))), np.tile(found, (len(records), 1))
+    return lanes._replace(damper=dampers.repeat(len(begin))), np.tile(coordinates, (len(records), 1))
 
 
 @eqx.filter_jit
@@ -254,10 +241,6 @@ def _from_physical(coordinates: Coordinates, values: Float[Array, "lanes free"])
 def _both(coordinates: Coordinates, y: Float[Array, "lanes free"]) -> tuple[Array, Array]:
     """Physical values and their derivatives by the coordinates."""
     return jax.vmap(coordinates.to_physical)(y), jax.vmap(jax.jacfwd(coordinates.to_physical))(y)
-
-
-def _physical(coordinates: Coordinates, y: Float[np.ndarray, "lanes free"]) -> Float[np.ndarray, "lanes free"]:
-    return np.asarray(_both(coordinates, jnp.asarray(y))[0], np.float64)
 
 
 def _solved(
@@ -288,39 +271,44 @@ def _solved(
     return together, everyone, end.y[0]
 
 
-def _judged(
-    found: Fitted, depends: Dependence | None, counts: Sequence[int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, ...], np.ndarray]:
-    """Of each damper: standard errors [dampers, free], fit percent, RMSE [N], RMSE of each of its records, drift."""
-    lanes, y, gram = found.lanes, found.end.y, found.end.aux
-    count, free = y.shape
-    errors, percent, rmse = np.full((count, free), np.inf), np.zeros(count), np.zeros(count)
-    drift = np.zeros(count)
+def _judged(fitted: Fitted, depends: Dependence | None, counts: Sequence[int]) -> dict[str, Any]:
+    """Errors of each damper and of each of its records, drift, and standard errors of its numbers."""
+    lanes, (count, free) = fitted.lanes, fitted.end.y.shape
+    percent, rmse, drift, noise = (np.zeros(count) for _ in range(4))
     first, by_record = np.cumsum([0, *counts]), tuple(np.zeros(n) for n in counts)
-    slopes = np.asarray(_both(lanes.coordinates, jnp.asarray(y))[1], np.float64)
-    inverse = [_inverse(own[:-1, :-1]) for own in (gram if depends is None else gram[:1])]
-    free_numbers = free if depends is None else depends.size / count
-    noise, levels = np.zeros(count), lanes.levels()
-    for i, records in enumerate(lanes.missed(y)):
-        errors_of = [own.residual / own.weight for own in records]
-        drift[i] = max(own.drift for own in records)
-        together, measured = np.concatenate(errors_of), np.concatenate([own.force for own in records])
+    free_numbers, levels = free if depends is None else depends.size / count, lanes.levels()
+    for i, records in enumerate(lanes.missed(fitted.end.y)):
+        errors = [record.residual / record.weight for record in records]
+        drift[i] = max(record.drift for record in records)
+        together, measured = np.concatenate(errors), np.concatenate([record.force for record in records])
         rmse[i] = np.sqrt(np.mean(together**2))
         spread = np.linalg.norm(measured - measured.mean())
         percent[i] = 100.0 * (1.0 - np.linalg.norm(together) / spread) if spread > 0 else -np.inf
-        for own, error in zip(records, errors_of, strict=True):
-            by_record[i][own.number - first[i]] = np.sqrt(np.mean(error**2))
-        level = found.factor[i] * noise_level([own.residual for own in records], free_numbers)
-        noise[i] = (level / levels[i]) ** 2
-    for i in range(count):
+        for record, error in zip(records, errors, strict=True):
+            by_record[i][record.number - first[i]] = np.sqrt(np.mean(error**2))
+        noise[i] = (fitted.factor[i] * noise_level([r.residual for r in records], free_numbers) / levels[i]) ** 2
+    errors_of_numbers = _standard_errors(fitted, depends, noise)
+    named = {"standard_errors": errors_of_numbers, "fit_percent": percent, "rmse": rmse, "record_rmse": by_record}
+    return named | {"drift": drift}
+
+
+def _standard_errors(
+    fitted: Fitted, depends: Dependence | None, noise: Float[np.ndarray, " dampers"]
+) -> Float[np.ndarray, "dampers free"]:
+    """Standard errors of the numbers of each damper, from the variance of the noise relative to its level."""
+    y, products = fitted.end.y, fitted.end.aux
+    slopes = np.asarray(_both(fitted.lanes.coordinates, jnp.asarray(y))[1], np.float64)
+    inverse = [_inverse(of_damper[:-1, :-1]) for of_damper in (products if depends is None else products[:1])]
+    errors, free = np.zeros(y.shape), y.shape[1]
+    for i in range(len(y)):
         columns, rows = (np.arange(free), np.eye(free)) if depends is None else depends.rows(i)
-        whole, lost = inverse[i if depends is None else 0]
+        variances, lost = inverse[i if depends is None else 0]
         variance = noise[i] if depends is None else float(np.mean(noise))
         to_values = slopes[i] @ rows
-        covariance = variance * to_values @ whole[np.ix_(columns, columns)] @ to_values.T
+        covariance = variance * to_values @ variances[np.ix_(columns, columns)] @ to_values.T
         undetermined = np.any(lost[columns] & (to_values != 0), axis=1)
         errors[i] = np.where(undetermined, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-    return errors, percent, rmse, by_record, drift
+    return errors
 
 
 def _inverse(products: Float[np.ndarray, "free free"]) -> tuple[np.ndarray, np.ndarray]:
@@ -329,5 +317,5 @@ def _inverse(products: Float[np.ndarray, "free free"]) -> tuple[np.ndarray, np.n
     scale = np.where(norms > 0, norms, 1.0)
     squares, directions = np.linalg.eigh(products / np.outer(scale, scale))
     seen = squares > BLIND * squares[-1]
-    whole = (directions[:, seen] / squares[seen]) @ directions[:, seen].T
-    return whole / np.outer(scale, scale), np.sum(directions[:, seen] ** 2, axis=1) < 1.0 - 1e-3
+    inverse = (directions[:, seen] / squares[seen]) @ directions[:, seen].T
+    return inverse / np.outer(scale, scale), np.sum(directions[:, seen] ** 2, axis=1) < 1.0 - 1e-3

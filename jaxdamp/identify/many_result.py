@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Shown, Table, plain, with_unit
 from jaxdamp.bench import BenchRun
@@ -25,8 +25,6 @@ from jaxdamp.rig import Rig
 
 
 if TYPE_CHECKING:
-    import matplotlib.figure
-
     from jaxdamp.identify.law_result import FitResult
 
 
@@ -141,30 +139,30 @@ class ManyFits(AbstractResult):
             _checks.one_of("blend", blend, ("parameters", "force"))
         if self.settings is None:
             _checks.refuse("settings", "be given to `fit_many` for a law between them", None)
-        known = np.array(self.settings)
-        if not known.min() <= setting <= known.max():
-            must = f"be from {known.min():g} to {known.max():g}, where there are dampers"
+        settings = np.array(self.settings)
+        if not settings.min() <= setting <= settings.max():
+            must = f"be from {settings.min():g} to {settings.max():g}, where there are dampers"
             _checks.refuse("setting", must, setting)
-        low, high = float(known[known <= setting].max()), float(known[known >= setting].min())
+        low, high = float(settings[settings <= setting].max()), float(settings[settings >= setting].min())
         if low == high or (blend or self._blend_at(low, high)) == "parameters":
             law = self._interpolated(setting)
         else:
             law = Scheduled((self._interpolated(low), self._interpolated(high)), [low, high], setting, "force")
-        return with_fitted_range(law, covered_range([run for own in self.records for run in own]))
+        return with_fitted_range(law, covered_range([run for runs in self.records for run in runs]))
 
     def _blend_at(self, low: float, high: float) -> str:
         """What lies between two settings: forces if a number that is not shared is undetermined at one of them."""
-        own = np.ones(len(self.free.names), bool) if self.dependence is None else self.dependence.degree == OWN
-        own &= np.array([not name.startswith("rig.") for name in self.free.names])
+        not_shared = np.ones(len(self.free.names), bool) if self.dependence is None else self.dependence.degree == OWN
+        not_shared &= np.array([not name.startswith("rig.") for name in self.free.names])
         at = np.isin(np.array(self.settings), (low, high))
         weak = ~(self.standard_errors[at] <= WEAK * np.abs(self.values[at]))
-        return "force" if np.any(weak[:, own]) else "parameters"
+        return "force" if np.any(weak[:, not_shared]) else "parameters"
 
     def _interpolated(self, setting: float) -> AbstractDamper:
         """The law with parameters on their polynomials, or on straight lines between the settings."""
-        known = np.array(self.settings)
-        distinct = np.unique(known)
-        means = np.stack([self.values[known == own].mean(axis=0) for own in distinct])
+        settings = np.array(self.settings)
+        distinct = np.unique(settings)
+        means = np.stack([self.values[settings == one].mean(axis=0) for one in distinct])
         values = np.array([np.interp(setting, distinct, column) for column in means.T])
         if self.dependence is not None and self.vector is not None:
             y = self.dependence.at_setting(self.vector, setting)
@@ -218,11 +216,7 @@ class ManyFits(AbstractResult):
             f"{type(law_of(self.free.tree)).__name__} fitted to {len(self)} dampers", tuple(columns), tuple(rows)
         )
 
-    def plot(self) -> "matplotlib.figure.Figure":
-        """The parameters and errors of all dampers side by side (`plots.many_fits`)."""
-        from jaxdamp import plots
-
-        return plots.many_fits(self)
+    plot = drawn_by("many_fits", "The parameters and errors of all dampers side by side.")
 
     def content(self) -> dict[str, Any]:
         """The fits as numbers with units and words, ready for JSON; numbers that are not finite are None."""

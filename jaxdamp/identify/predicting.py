@@ -15,6 +15,7 @@ from jaxdamp.dampers import require_finite_force
 from jaxdamp.identify.estimated_states import with_first_states
 from jaxdamp.identify.initial_states import DRIFT, rest_window, start_of
 from jaxdamp.identify.model import Model, blind_end, initial_state_for, is_memoryless, law_of, of_record, starts_in
+from jaxdamp.identify.printed import predicted as predicted_by_c
 from jaxdamp.identify.rows import samples_in_block, settling_time
 from jaxdamp.identify.traces import Batch, batches
 
@@ -22,8 +23,17 @@ from jaxdamp.identify.traces import Batch, batches
 PREDICTED_PER_CYCLE = 1000  # samples at which a law with states is evaluated; straight lines between them: error 5e-6
 
 
+def _predict(batch: Batch, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Forces [N], and the change of the states over the cycle before a record that starts periodically."""
+    forces = predicted_by_c(batch, model)
+    if forces is not None:
+        return forces, np.zeros(len(forces))
+    forces, change = _predicted_by_xla(batch, model)
+    return np.asarray(forces), np.asarray(change)
+
+
 @eqx.filter_jit
-def _predict(batch: Batch, model: Model) -> tuple[Array, Array]:
+def _predicted_by_xla(batch: Batch, model: Model) -> tuple[Array, Array]:
     return batch.settled_forces(model)
 
 
@@ -53,7 +63,7 @@ def predict_runs(model: Model, runs: Sequence[BenchRun], initial_state: str = "w
     memoryless = is_memoryless(model)
     per_cycle = None if memoryless else PREDICTED_PER_CYCLE
     made, ranges = batches(model, runs, [1.0] * len(runs), per_cycle, (), initial_state)
-    predicted = [tuple(map(np.asarray, _predict(batch, model))) for batch in made]
+    predicted = [_predict(batch, model) for batch in made]
     forces = []
     for run, at in zip(runs, ranges, strict=True):
         force, change = (values[at.row] for values in predicted[at.batch])

@@ -6,22 +6,18 @@ parameter that seems certain is therefore moved away in growing steps, and all o
 """
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp.dampers import keeps_conditions
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.search import SearchEnd, search
 from jaxdamp.solve import BoundedLevenbergMarquardt
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 STEPS = 15  # of each search; an incomplete search makes an error smaller, never larger
@@ -60,14 +56,6 @@ def profile(
     A parameter at a distance d from its value should increase chi-square by (d/error)². If the other parameters can
     compensate so that the increase is less than `CHI_SQUARE`, the error is at least d over the root of the increase, or
     d if there is hardly any increase.
-
-    Arguments:
-        problem: the problem that was minimised.
-        found: the minimum.
-        errors: standard errors from the Jacobian.
-        far: largest distance to try for each parameter, or three standard errors if these are more.
-        chosen: the parameters to move.
-        variance: variance of the noise of a weighted sample.
     """
     wide, open_ended, left = errors.copy(), np.zeros(errors.shape, bool), MOST_STEPS
     sides = [(int(i), side) for i in np.flatnonzero(chosen & (errors > 0)) for side in (-1.0, 1.0)]
@@ -144,24 +132,20 @@ class ProfileCurve(AbstractResult):
 
     def content(self) -> dict[str, Any]:
         """The curve and its intervals as plain data."""
-        return plain({field.name: getattr(self, field.name) for field in dataclasses.fields(self)})
+        return self._data(*(field.name for field in dataclasses.fields(self)))
 
-    def plot(self) -> "Figure":
-        """Cost over value, with the interval and the parabola of the standard error."""
-        from jaxdamp.plots import profile
-
-        return profile(self)
+    plot = drawn_by("profile", "Cost over value, with the interval and the parabola of the standard error.")
 
 
 def profile_curve(evidence: Evidence, name: str, linear: tuple[float, float]) -> ProfileCurve:
     """`FitResult.profile`."""
-    problem, found = evidence.problem, evidence.minimum
+    problem, minimum = evidence.problem, evidence.minimum
     i, level = problem.free.names.index(name), evidence.quantile**2
     error = float(np.sqrt(evidence.covariance[i, i]))
-    side = _Side(evidence, i, error if 0 < error < np.inf else 0.1 * (abs(found.values[i]) or 1.0))
+    side = _Side(evidence, i, error if 0 < error < np.inf else 0.1 * (abs(minimum.values[i]) or 1.0))
     below, lower = side.walk(-1.0, level)
     above, upper = side.walk(1.0, level)
-    points = sorted([*below, (float(found.values[i]), 0.0), *above])
+    points = sorted([*below, (float(minimum.values[i]), 0.0), *above])
     values, cost = (np.array(column) for column in zip(*points, strict=True))
     return ProfileCurve(name, problem.free.owners[i].unit, values, cost, (lower, upper), level, linear)
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -11,17 +11,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
-from jaxdamp._tables import Column, Table, plain
+from jaxdamp._jacobian import with_jacobian
+from jaxdamp._results import AbstractResult, drawn_by
+from jaxdamp._tables import Column, Table
 from jaxdamp.identify.estimating import at_ends
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.propagation import Evidence
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import FreeParameters
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 GAIN, OFFSET = 0.01, 10.0  # changes of the force that tables state: 1 %, 10 N
@@ -72,8 +69,7 @@ class RecordSensitivity(AbstractResult):
 
     def content(self) -> dict[str, Any]:
         """All derivatives as plain data, ready for JSON; numbers that are not finite are None."""
-        fields = (field.name for field in dataclasses.fields(self) if field.name != "warnings")
-        return plain({name: getattr(self, name) for name in fields})
+        return self._data(*(field.name for field in dataclasses.fields(self) if field.name != "warnings"))
 
     @property
     def summary(self) -> str:
@@ -84,11 +80,7 @@ class RecordSensitivity(AbstractResult):
             most.append(f"1 % more force in {self.records[i]} changes {name} by {GAIN * slopes[i]:+.3g}.")
         return " ".join(most)
 
-    def plot(self) -> "matplotlib.figure.Figure":
-        """See `jaxdamp.plots.record_sensitivity`."""
-        from jaxdamp import plots
-
-        return plots.record_sensitivity(self)
+    plot = drawn_by("record_sensitivity", "See `jaxdamp.plots.record_sensitivity`.")
 
     def __repr__(self) -> str:
         return "\n".join([self.table().to_text(), *(f"warning: {warning}" for warning in self.warnings)])
@@ -127,10 +119,10 @@ def sensitivity_to_records(
     by_residual = (adjoint @ minimum.jacobian.T)[:, at.used]
     by_force = by_residual * at.weight
     weighed = by_residual * minimum.residual[at.used]
-    own = [at.owner == i for i in range(len(runs))]
-    pull = np.stack([weighed[:, k].sum(axis=1) for k in own])  # adjoint times the gradient of each record
-    gain = np.stack([(by_force[:, k] * at.force[k]).sum(axis=1) for k in own])
-    offset = np.stack([by_force[:, k].sum(axis=1) for k in own])
+    of_record = [at.owner == i for i in range(len(runs))]
+    pull = np.stack([weighed[:, k].sum(axis=1) for k in of_record])  # adjoint times the gradient of each record
+    gain = np.stack([(by_force[:, k] * at.force[k]).sum(axis=1) for k in of_record])
+    offset = np.stack([by_force[:, k].sum(axis=1) for k in of_record])
     if problem.each:  # each record is divided by its own RMS force, which changes too
         squares = np.array([np.sum(run.force**2) for run in runs])
         sums = np.array([np.sum(run.force) for run in runs])
@@ -146,9 +138,9 @@ def sensitivity_to_records(
         values=dict(zip(names, values.tolist(), strict=True)),
         by_gain=dict(zip(names, gain.T, strict=True)),
         by_offset=dict(zip(names, offset.T, strict=True)),
-        by_sample={name: tuple(row[k] for k in own) for name, row in zip(names, by_force, strict=True)},
-        velocity=tuple(at.velocity[k] for k in own),
-        stroke=tuple(at.stroke[k] for k in own),
+        by_sample={name: tuple(row[k] for k in of_record) for name, row in zip(names, by_force, strict=True)},
+        velocity=tuple(at.velocity[k] for k in of_record),
+        stroke=tuple(at.stroke[k] for k in of_record),
         held=tuple(map(str, held)),
         warnings=warnings,
     )
@@ -175,8 +167,8 @@ def _refined(problem: Problem, values: np.ndarray) -> _Minimum:
 
 def _moving(problem: Problem, values: np.ndarray) -> np.ndarray:
     """Which numbers are not at a bound of their own."""
-    ends, own = at_ends(problem.coordinates, values) != 0, problem.coordinates.at_ends(values) != 0
-    shared = ends & (problem.coordinates.ordered | ~own)
+    ends, at_bounds = at_ends(problem.coordinates, values) != 0, problem.coordinates.at_ends(values) != 0
+    shared = ends & (problem.coordinates.ordered | ~at_bounds)
     if shared.any():
         names = ", ".join(np.array(problem.free.names)[shared])
         remedy = "Fit with fewer free parameters."
@@ -202,13 +194,12 @@ def _second_order(
 ) -> tuple[Array, Array, Array, Array]:
     """Gradient and second derivatives of half the sum of squares; residual and Jacobian."""
 
-    def residual(values: Array) -> tuple[Array, Array]:
+    def residual(values: Array) -> Array:
         model = free.build(values)
-        together = jnp.concatenate([part(model) for part in residuals])
-        return together, together
+        return jnp.concatenate([part(model) for part in residuals])
 
     def gradient(values: Array) -> tuple[Array, tuple[Array, Array, Array]]:
-        jacobian, together = jax.jacfwd(residual, has_aux=True)(values)
+        together, jacobian = with_jacobian(residual)(values)
         pull = jacobian.T @ together
         return pull, (pull, together, jacobian)
 
@@ -222,7 +213,7 @@ def _function(
     """Names, values and derivatives of the functions by the free numbers."""
     names: list[str] = []
 
-    def stacked(values: Array) -> tuple[Array, Array]:
+    def stacked(values: Array) -> Array:
         results = function(evidence.model(values))
         by_name = dict(results) if isinstance(results, Mapping) else {"value": results}
         for name, value in by_name.items():
@@ -230,11 +221,10 @@ def _function(
                 remedy = "Return a number, or a dictionary of numbers such as the metrics of a `Ride`."
                 _checks.refuse("function", f"give one number as {name!r}", f"of shape {jnp.shape(value)}", remedy)
         names[:] = [str(name) for name in by_name]
-        together = jnp.stack([jnp.asarray(value, float) for value in by_name.values()])
-        return together, together
+        return jnp.stack([jnp.asarray(value, float) for value in by_name.values()])
 
     centre = jnp.asarray(values, evidence.problem.free.values.dtype)
-    slopes, at = eqx.filter_jit(jax.jacfwd(stacked, has_aux=True))(centre)
+    at, slopes = eqx.filter_jit(with_jacobian(stacked))(centre)
     return names, np.asarray(at, np.float64), np.asarray(slopes, np.float64)
 
 

@@ -228,7 +228,12 @@ def verdict(choice: Recommendation, rungs: Sequence[Rung], held_out: Sequence[Be
         elif rung is not best:
             factor = rung.error / best.error
             sentences.append(f"{best.name} has a {factor:.1f} times smaller error.")
-    remaining = best.result.error_shares
+    return (*sentences, *_remaining(best, rungs))
+
+
+def _remaining(best: Rung, rungs: Sequence[Rung]) -> list[str]:
+    """Sentences on hysteresis and shape that the recommended law has not followed."""
+    sentences, remaining = list[str](), best.result.error_shares
     if not is_memoryless(best.result.law) and remaining.hysteresis >= HYSTERESIS:
         sentences.append(f"{100 * remaining.hysteresis:.0f} % of the squared error of {best.name} is still hysteresis.")
     if remaining.shape >= SHAPE:
@@ -236,7 +241,7 @@ def verdict(choice: Recommendation, rungs: Sequence[Rung], held_out: Sequence[Be
         missing = [name for name, law in CURVES.items() if not any(isinstance(r.result.law, law) for r in rungs)]
         remedy = f"try {' or '.join(missing)}, which follow any curve" if missing else "no law tried follows it better"
         sentences.append(f"{part:.0f} % of the squared error of {best.name} is shape, of the curve: {remedy}.")
-    return tuple(sentences)
+    return sentences
 
 
 def _error_of(best: Rung, rungs: Sequence[Rung], held_out: Sequence[BenchRun]) -> str:

@@ -11,8 +11,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
-from jaxdamp._results import AbstractResult
-from jaxdamp._status import Status
+from jaxdamp._results import AbstractResult, Derived
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
@@ -27,6 +26,7 @@ from jaxdamp.identify.predicting import score
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
+from jaxdamp.rig import Rig
 
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class LeftOutSetting(NamedTuple):
 
     def plot(self) -> "Figure":
         """Loops at the setting left out, measured and interpolated, with residuals."""
-        return self.result.plot(self.runs)
+        return self.result.plot(runs=self.runs)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -103,15 +103,8 @@ class ScheduledFit(AbstractResult):
         assert isinstance(self.result.law, Scheduled)
         return self.result.law
 
-    @property
-    def status(self) -> Status:
-        """How the search of the common fit ended."""
-        return self.result.status
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Doubts about the common fit."""
-        return self.result.warnings
+    status = Derived(lambda self: self.result.status)
+    warnings = Derived(lambda self: self.result.warnings)
 
     @property
     def summary(self) -> str:
@@ -132,9 +125,9 @@ class ScheduledFit(AbstractResult):
         columns += [Column("as one law", "%", ".1f"), Column("interpolated", "%", ".1f")]
         between = {left.setting: left.fit_percent for left in self.between}
         rows = []
-        for setting, own in self.alone.items():
-            percent = self.result.score(own.runs)[0]
-            rows.append((setting, len(own.runs), own.fit_percent, percent, between.get(setting)))
+        for setting, at in self.alone.items():
+            percent = self.result.score(at.runs)[0]
+            rows.append((setting, len(at.runs), at.fit_percent, percent, between.get(setting)))
         between_settings = "parameters interpolated" if self.choice.blend == "parameters" else "forces blended"
         return Table(f"Fit by setting ({between_settings} between settings)", tuple(columns), tuple(rows))
 
@@ -291,30 +284,38 @@ class Chain:
         """
         laws = [at.law for at in alone.values()]
         alike = Scheduled.of_equal_structure(laws)
-        known = [p.path for p in parameters(laws[0]) if all(p.path in paths_of(law) for law in laws)]
-        shared = match_paths(known, name_patterns("common", self.common))
+        shared = self._shared_by(laws)
         means = {path: np.mean([np.asarray(get(law, path)) for law in laws], axis=0) for path in shared}
-        rigs = [at.rig for at in alone.values() if at.rig is not None]
-        machine = jax.tree.map(lambda *leaves: sum(leaves) / len(leaves), *rigs) if rigs else None
-        place = "law.laws" if rigs else "laws"
+        machine = _mean_machine(alone)
+        place = "laws" if machine is None else "law.laws"
         tie = {f"{place}.{k}.{path}": f"{place}.0.{path}" for path in shared for k in range(1, len(laws))}
         blended = tuple(with_values(law, means) for law in laws)
         scheduled = Scheduled(blended, list(alone), min(alone), "parameters" if alike else "force")
-        members = [run for setting in alone for run in self.at(setting)]
-        constants = constant_forces(scheduled) or [] if rigs else []
-        held = [path for path in constants if float(get(scheduled, path)) == 0.0]  # the machine has the static force
+        held = [] if machine is None else _held_by_machine(scheduled)
         options: dict[str, Any] = self.options | {"starts": 1, "tie": tie, "freeze": [*self.options["freeze"], *held]}
-        result = fit(scheduled, members, rig=machine, **options)
+        result = fit(scheduled, [run for setting in alone for run in self.at(setting)], rig=machine, **options)
         return with_blended_forces(result) if alike and blend == "force" else result
+
+    def _shared_by(self, laws: Sequence[AbstractDamper]) -> list[str]:
+        """The paths of the parameters that are common to all settings."""
+        paths = [[p.path for p in parameters(law)] for law in laws]
+        in_all = [path for path in paths[0] if all(path in of_law for of_law in paths)]
+        return match_paths(in_all, name_patterns("common", self.common))
 
     def without(self, setting: float, blend: str, shown: Callable[[str], None]) -> LeftOutSetting:
         """The score at a setting of the law interpolated from all others; its records have no part in any start."""
         alone = self.alone([other for other in self.settings if other != setting], shown)
         shown(f"all but {setting:g} as one law")
-        result, runs, own = self.together(alone, blend), tuple(self.at(setting)), self.own[setting]
-        return LeftOutSetting(setting, runs, result, *result.score(runs)[:2], own.fit_percent, own.rmse)
+        result, runs, there = self.together(alone, blend), tuple(self.at(setting)), self.own[setting]
+        return LeftOutSetting(setting, runs, result, *result.score(runs)[:2], there.fit_percent, there.rmse)
 
 
-def paths_of(law: AbstractDamper) -> list[str]:
-    """The paths of the parameters of a law."""
-    return [p.path for p in parameters(law)]
+def _mean_machine(alone: Alone) -> Rig | None:
+    """The mean of the machines that were fitted."""
+    rigs = [at.rig for at in alone.values() if at.rig is not None]
+    return jax.tree.map(lambda *leaves: sum(leaves) / len(leaves), *rigs) if rigs else None
+
+
+def _held_by_machine(law: AbstractDamper) -> list[str]:
+    """The constant forces of a law that stay zero, since the machine has the static force."""
+    return [path for path in constant_forces(law) or [] if float(get(law, path)) == 0.0]

@@ -17,6 +17,7 @@ from jaxtyping import Array, Float
 from jaxdamp._status import Status
 from jaxdamp._triangles import triangle
 from jaxdamp.dampers import laws_inside, margins
+from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import AbstractResiduals, Problem, linearised
 from jaxdamp.parameters import Coordinates
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_squares_on_host
@@ -85,19 +86,37 @@ def search(
     kind = problem.free.values.dtype
     bounded = dataclasses.replace(solver, lower=lower, upper=upper, precision=float(jnp.finfo(kind).eps))
 
+    printed = evaluator(problem.free, problem.residuals) if kind == np.float64 else None
+    to_values = coordinates.on_host() if printed else None
+
     def at(y: Float[np.ndarray, "1 free"], _: Any) -> tuple[Linearisation, _Point]:
-        return _linearised(problem, coordinates, jnp.asarray(y[0], kind))
+        if printed is None or to_values is None:
+            return _linearised(problem, *_by_xla(problem, coordinates, jnp.asarray(y[0], kind)))
+        values, units = to_values(y[0])
+        of_law, slopes = printed.margins(values)
+        return _linearised(problem, values, *printed(values), units, of_law, slopes @ units)
 
     end = least_squares_on_host(at, bounded, start[None], max_steps)
     point: _Point = end.aux
     return SearchEnd(point.values[0], point.residual[0], point.jacobian[0], end.status[0], int(end.steps[0]))
 
 
+def _by_xla(problem: Problem, coordinates: Coordinates, y: Array) -> list[np.ndarray]:
+    """What `_linearised` takes, by the one compiled program."""
+    return [np.asarray(a, np.float64) for a in _evaluated(coordinates, y, problem.residuals)]
+
+
 @np.errstate(over="ignore", invalid="ignore")
-def _linearised(problem: Problem, coordinates: Coordinates, y: Float[Array, " free"]) -> tuple[Linearisation, _Point]:
-    """The problem at coordinates, by the one compiled program."""
-    arrays = [np.asarray(a, np.float64) for a in _evaluated(coordinates, y, problem.residuals)]
-    values, residual, jacobian, units, of_law, slopes = arrays
+def _linearised(
+    problem: Problem,
+    values: np.ndarray,
+    residual: np.ndarray,
+    jacobian: np.ndarray,
+    units: np.ndarray,
+    of_law: np.ndarray,
+    slopes: np.ndarray,
+) -> tuple[Linearisation, _Point]:
+    """The problem at a point, from what `_evaluated` gives."""
     residual, jacobian = problem.anchored(values, residual, jacobian)
     rows = triangle(np.concatenate([jacobian, residual[:, None]], axis=1))
     rows = np.concatenate([rows[:, :-1] @ units, rows[:, -1:]], axis=1) / problem.level
@@ -139,7 +158,7 @@ def _search_unbounded(problem: Problem, max_steps: int, solver: Solver) -> Searc
     solution = optx.least_squares(residual, solver, start, max_steps=max_steps, throw=False)
     bounded = problem.coordinates
     y = bounded.from_physical(coordinates.to_physical(solution.value))
-    _, point = _linearised(problem, bounded, y)
+    _, point = _linearised(problem, *_by_xla(problem, bounded, y))
     if solution.result == optx.RESULTS.successful:
         status = Status.CONVERGED
     elif solution.result == optx.RESULTS.nonlinear_max_steps_reached:

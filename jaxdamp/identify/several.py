@@ -45,19 +45,18 @@ def other_starts(free: FreeParameters, reach: Reach) -> list[Float[np.ndarray, "
     Proposals for frozen parameters and those that violate a condition between parameters are left out; those outside
     the limits are moved inside.
     """
-    own, (lower, upper) = np.asarray(free.values), free.limits()
+    start, (lower, upper) = np.asarray(free.values), free.limits()
     width = np.where(np.isfinite(upper - lower), upper - lower, 0.0)
     starts = []
     for path, part in laws_inside(free.tree):
         for proposal in part.other_starts(reach):
-            values = own.copy()
+            values = start.copy()
             for i, name in enumerate(free.names):
                 field = name.removeprefix(path)
                 if name.startswith(path) and field in proposal:
                     low, high = lower[i] + INSIDE * width[i], upper[i] - INSIDE * width[i]
                     values[i] = np.clip(proposal[field], low, high)
-            known = any(np.array_equal(values, other) for other in (own, *starts))
-            if not known and keeps_conditions(free.started_at(values).tree):
+            if _not_among([start, *starts], [values]) and keeps_conditions(free.started_at(values).tree):
                 starts.append(values)
     return starts
 
@@ -67,33 +66,30 @@ def search_from(problem: Problem, *, starts: int | None, max_steps: int, solver:
 
     If another start leads to a better end, new proposals are made from there, so that more than one parameter can be
     wrong at the start.
-
-    Arguments:
-        problem: the problem with its start.
-        starts: largest number of starts; all proposed ones if `None`.
-        max_steps: largest number of steps of each search.
-        solver: as in `search`.
     """
     best = search(problem, max_steps, solver=solver)
     ends, tried = [best], [np.asarray(problem.free.values)]
     for _ in range(ROUNDS):
         if best.finite and problem.is_rounding(best.squares):
             break
-        others = [
-            v for v in other_starts(problem.free, problem.reach) if not any(np.array_equal(v, known) for known in tried)
-        ]
+        others = _not_among(tried, other_starts(problem.free, problem.reach))
         others = others[: None if starts is None else starts - len(tried)]
         tried, ends = [*tried, *others], [*ends, *_follow(problem, others, best, max_steps, solver)]
-        before, known = best.squares, best.finite
+        before = best
         best = min(
             (end for end in ends if end.finite),
-            key=lambda end: (1.0 + BETTER * (end is not best)) * end.squares,
-            default=best,
+            key=lambda end: (1.0 + BETTER * (end is not before)) * end.squares,
+            default=before,
         )
-        if known and best.squares >= (1.0 - WORTH_A_ROUND) * before:
+        if before.finite and best.squares >= (1.0 - WORTH_A_ROUND) * before.squares:
             break
         problem = problem.started_at(best.values)
     return Solution(best, tuple(end for end in ends if end.finite and (end.converged or end is best)), len(tried))
+
+
+def _not_among(tried: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Those starts that are not among others."""
+    return [values for values in others if not any(np.array_equal(values, one) for one in tried)]
 
 
 def scattered_starts(free: FreeParameters, count: int, seed: int) -> list[Float[np.ndarray, " free"]]:
@@ -108,18 +104,12 @@ def scattered_starts(free: FreeParameters, count: int, seed: int) -> list[Float[
     return starts
 
 
-def search_each(
-    problem: Problem, starts: Sequence[Float[np.ndarray, " free"]], max_steps: int, solver: Solver | None = None
+def search_scattered(
+    problem: Problem, starts: int | None, *, seed: int, max_steps: int, solver: Solver | None = None
 ) -> Solution:
-    """Search from every start to its end; the first of those that count as equally good is the best.
-
-    Arguments:
-        problem: in residuals of unit noise: channels in their noise, targets in their tolerance.
-        starts: values of the free numbers.
-        max_steps: largest number of steps of each search.
-        solver: as in `search`.
-    """
-    allowed = [v for i, v in enumerate(starts) if i == 0 or keeps_conditions(problem.free.started_at(v).tree)]
+    """Search from scattered starts to their ends; the first of those that count as equally good is the best."""
+    tried = scattered_starts(problem.free, starts or 1, seed)
+    allowed = [v for i, v in enumerate(tried) if i == 0 or keeps_conditions(problem.free.started_at(v).tree)]
     ends = [search(problem.started_at(values), max_steps, solver=solver) for values in allowed]
     squares = np.array([end.squares if end.finite else np.inf for end in ends])
     best = ends[int(np.argmax(squares <= squares.min() + equally_good(squares.min())))]
@@ -136,14 +126,14 @@ def _follow(
 ) -> list[SearchEnd]:
     """The ends of a few steps from each of several starts, and of the whole search from the most promising."""
     looks = [search(problem.started_at(values), min(FIRST_LOOK, max_steps), solver=solver) for values in others]
-    most = PROMISING * min([found.squares for found in (best, *looks) if found.finite], default=np.inf)
-    open_ended = (found for found in looks if not found.converged and found.finite and found.squares < most)
+    most = PROMISING * min([end.squares for end in (best, *looks) if end.finite], default=np.inf)
+    open_ended = (end for end in looks if not end.converged and end.finite and end.squares < most)
     promising = sorted(open_ended, key=lambda end: end.squares)
-    ends = [found for found in looks if found.converged]
-    for found in promising[:FOLLOWED]:
-        left = min(max_steps - found.steps, FOLLOWED_STEPS)
-        on = search(problem.started_at(found.values), left, solver=solver) if left else found._replace(steps=0)
-        ends.append(on._replace(steps=found.steps + on.steps))
+    ends = [end for end in looks if end.converged]
+    for look in promising[:FOLLOWED]:
+        left = min(max_steps - look.steps, FOLLOWED_STEPS)
+        on = search(problem.started_at(look.values), left, solver=solver) if left else look._replace(steps=0)
+        ends.append(on._replace(steps=look.steps + on.steps))
     return ends
 
 
@@ -152,11 +142,6 @@ def minima_of(solution: Solution, names: Sequence[str], variance: float) -> tupl
 
     Two ends are the same minimum if their sums of squares differ by less than the noise, and if by the Jacobian of the
     better one their parameters give almost the same force.
-
-    Arguments:
-        solution: the ends of the searches.
-        names: names of the free numbers.
-        variance: variance of the noise of a weighted sample.
     """
     best = solution.best
     groups: list[tuple[SearchEnd, int]] = []

@@ -1,8 +1,9 @@
 """`fit_targets`: parameters that meet a table of numbers, such as frequencies, damping ratios and ride metrics."""
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, final
+from typing import Any, NamedTuple, TypeAlias, final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -11,6 +12,7 @@ from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
+from jaxdamp._results import drawn_by
 from jaxdamp._tables import Column, Table, plain, plus_minus
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import Reach, without_fitted_ranges
@@ -21,13 +23,9 @@ from jaxdamp.identify.noise import Noise, independent
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.result import Fit
 from jaxdamp.identify.search import SearchEnd, Solver
-from jaxdamp.identify.several import Solution, equally_good, scattered_starts, search_each
+from jaxdamp.identify.several import Solution, equally_good, search_scattered
 from jaxdamp.parameters import FreeParameters, Parameter, free_parameters, interval, match_paths, name_patterns, real
 from jaxdamp.simulation import Ride
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 APART = 0.01  # relative difference of a parameter between them that is named
@@ -81,11 +79,7 @@ class TargetFit(Fit):
         ]
         return Table("Targets", tuple(columns), tuple(rows))
 
-    def plot(self) -> "matplotlib.figure.Figure":
-        """The distance of each value from its target (`plots.targets`)."""
-        from jaxdamp import plots
-
-        return plots.targets(self)
+    plot = drawn_by("targets", "The distance of each value from its target.")
 
     @property
     def summary(self) -> str:
@@ -98,7 +92,7 @@ class TargetFit(Fit):
 
     def content(self) -> dict[str, Any]:
         """Parameters and targets as plain data."""
-        return super().content() | {"targets": [plain({**t._asdict(), "met": t.met}) for t in self.targets]}
+        return super().content() | {"targets": [plain(t) | {"met": t.met} for t in self.targets]}
 
     def __repr__(self) -> str:
         return "\n".join(map(str, (*reversed(self.tables().values()), *(f"warning: {w}" for w in self.warnings))))
@@ -192,9 +186,7 @@ def fit_targets(
     """
     goals = _goals(targets, tolerance)
     _checks.one_of("loss", loss, LOSSES)
-    for name, count in (("starts", starts), ("max_steps", max_steps)):
-        if count < 1:
-            _checks.refuse(name, "be 1 or more", count)
+    _checks.counts(starts=starts, max_steps=max_steps)
     free = _free(start, over, freeze, bounds, tie)
     expected = priors_on(free, priors or {}, 1.0)
     padding = max(free.values.size + 1 - len(goals), 0)
@@ -205,10 +197,7 @@ def fit_targets(
     owner = np.zeros(len(goals) + padding + sum(part.size for part in expected), int)
     everywhere, parts = Reach(np.inf, np.inf), (residuals, *expected)
     problem = Problem(free, parts, level, (), (1.0,), owner, everywhere, free.tree, (), False)
-
-    def by_squares(problem: Problem, count: int | None) -> Solution:
-        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps, solver)
-
+    by_squares = functools.partial(search_scattered, seed=seed, max_steps=max_steps, solver=solver)
     problem, solution = solve_by(problem, by_squares, loss=loss, noise=_tolerances, starts=starts, spread=1.0)
     if not solution.best.finite:
         remedy = "Start nearer to the targets, or give `bounds`."
@@ -269,10 +258,10 @@ def _goals(targets: Mapping[str, Goal], tolerance: float) -> dict[str, tuple[flo
         _checks.refuse("targets", "be numbers by name", _checks.described(targets), "Write {'frequency': 1.2}.")
     goals = {}
     for name, goal in targets.items():
-        value, own = goal if isinstance(goal, tuple) else (goal, tolerance * abs(goal))
+        value, allowed = goal if isinstance(goal, tuple) else (goal, tolerance * abs(goal))
         _checks.finite(f"targets[{name!r}]", value)
-        _checks.positive(f"tolerance of targets[{name!r}]", own, "Write `(value, tolerance)`.")
-        goals[name] = float(value), float(own)
+        _checks.positive(f"tolerance of targets[{name!r}]", allowed, "Write `(value, tolerance)`.")
+        goals[name] = float(value), float(allowed)
     return goals
 
 
@@ -286,17 +275,26 @@ def _free(
     """The free numbers of a module or a mapping."""
     if not isinstance(start, Mapping):
         return free_parameters(without_fitted_ranges(start), over=over, freeze=freeze, bounds=bounds, tie=tie)
-    known = [*start]
-    for name in known:
-        if "." in name:
-            _checks.refuse("start", "have names without a point", repr(name))
     if tie:
         _checks.refuse("tie", "be left out for a mapping of numbers", tie, "Use one name in `numbers` twice.")
-    limits = {name: pair for key, pair in (bounds or {}).items() for name in match_paths(known, [key])}
-    chosen = match_paths(known, name_patterns("over", over)) if over is not None else known
-    held = match_paths(known, name_patterns("freeze", freeze))
+    return _free_numbers(start, over, freeze, bounds or {})
+
+
+def _free_numbers(
+    start: Mapping[str, Any],
+    over: Sequence[str] | None,
+    freeze: Sequence[str],
+    bounds: Mapping[str, tuple[float, float]],
+) -> FreeParameters:
+    """The free numbers of a mapping."""
+    names = [*start]
+    if with_point := [name for name in names if "." in name]:
+        _checks.refuse("start", "have names without a point", repr(with_point[0]))
+    limits = {name: pair for key, pair in bounds.items() for name in match_paths(names, [key])}
+    chosen = names if over is None else match_paths(names, name_patterns("over", over))
+    held = match_paths(names, name_patterns("freeze", freeze))
     tree = {name: jnp.asarray(value, float) for name, value in start.items()}
-    domains = {name: interval(*map(float, limits[name])) if name in limits else real for name in known}
+    domains = {name: interval(*map(float, limits[name])) if name in limits else real for name in names}
     free = tuple(Parameter(n, tree[n], "", n, domains[n], False) for n in chosen if n not in held)
     for p in free:
         if not p.domain.contains(np.asarray(p.value)):

@@ -93,7 +93,8 @@ class Batch(AbstractResiduals):
 
     def reweighted(self, factor: Float[np.ndarray, " samples"]) -> "Batch":
         """The same with every weight times a factor."""
-        return dataclasses.replace(self, weight=self.weight * jnp.asarray(factor.reshape(self.weight.shape)))
+        weight = np.asarray(self.weight)
+        return dataclasses.replace(self, weight=on_device(weight * factor.reshape(weight.shape)))
 
     def measurements(self) -> Float[Array, " samples"]:
         """The measured forces [N] of all samples, padding too."""
@@ -221,7 +222,9 @@ def _refuse_some(what: str, runs: Sequence[BenchRun], remedy: str) -> None:
 def _channels(model: Model, runs: Sequence[BenchRun]) -> list[str]:
     """The channels that a model is compared with, the temperature among them if it says something of the force."""
     channels, rig = ["stroke", "velocity", "force"], rig_of(model)
-    of_rig = rig is not None and (np.any(rig.temperature_slope) or np.any(rig.gas_temperature_slope))
+    of_rig = rig is not None and (
+        np.any(np.asarray(rig.temperature_slope)) or np.any(np.asarray(rig.gas_temperature_slope))
+    )
     if not (of_rig or law_of(model).traits().temperature_dependent):
         return channels
     if all(run.temperature is None for run in runs):

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -14,8 +14,9 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
+from jaxdamp._results import drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._tables import Column, Table, with_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.judging import notes_on
@@ -28,10 +29,6 @@ from jaxdamp.identify.problem import AbstractResiduals
 from jaxdamp.identify.starting import Start
 from jaxdamp.identify.traces import batches
 from jaxdamp.parameters import Coordinates
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 CHUNK = 25  # steps in one compiled call, after which the held-out records are evaluated
@@ -77,19 +74,10 @@ class Training(AbstractFitted):
         return super().content() | {
             "held_out": [run.name for run in self.held_out],
             "held_out_fit": with_unit(self.held_out_fit_percent, "%"),
-            "held_out_rmse": with_unit(self.held_out_rmse, "N"),
-            "steps": plain(self.steps),
-            "history": with_unit(self.history, "N"),
-            "held_out_history": with_unit(self.held_out_history, "N"),
-            "best_step": self.best_step,
-            "stopped": self.stopped,
+            **self._data("steps", "best_step", "stopped", held_out_rmse="N", history="N", held_out_history="N"),
         }
 
-    def plot(self, **options: Any) -> "Figure":
-        """The errors over the steps of the training."""
-        from jaxdamp.plots import training_history
-
-        return training_history(self, **options)
+    plot = drawn_by("training_history", "The errors over the steps of the training.")
 
     @property
     def summary(self) -> str:
@@ -222,9 +210,7 @@ def _check(runs: Sequence[BenchRun], held_out: Sequence[BenchRun], steps: int, p
     both = [run.name for run in held_out if any(run is other for other in runs)]
     if both:
         _checks.refuse("held_out", "hold records that are not trained on", ", ".join(both))
-    for name, count in (("steps", steps), ("patience", patience)):
-        if count < 1:
-            _checks.refuse(name, "be 1 or more", count)
+    _checks.counts(steps=steps, patience=patience)
 
 
 @functools.lru_cache
@@ -239,16 +225,16 @@ def _model(coordinates: Coordinates, raw: Array) -> Model:
     return coordinates.free.build(coordinates.to_physical(raw))
 
 
-def _mean_square(coordinates: Coordinates, raw: Array, made: Sequence[AbstractResiduals]) -> Array:
+def _mean_square(coordinates: Coordinates, raw: Array, residuals: Sequence[AbstractResiduals]) -> Array:
     """Mean squared error [N²] of the law over the samples that count, each as often as it was measured."""
     model = _model(coordinates, raw)
-    squares = jnp.stack([jnp.sum(jnp.square(part(model))) for part in made])
-    return jnp.sum(squares) / jnp.sum(jnp.stack([part.total_weight() for part in made]))
+    squares = jnp.stack([jnp.sum(jnp.square(part(model))) for part in residuals])
+    return jnp.sum(squares) / jnp.sum(jnp.stack([part.total_weight() for part in residuals]))
 
 
 @eqx.filter_jit
-def _error(coordinates: Coordinates, raw: Array, made: Sequence[AbstractResiduals]) -> Array:
-    return jnp.sqrt(_mean_square(coordinates, raw, made))
+def _error(coordinates: Coordinates, raw: Array, residuals: Sequence[AbstractResiduals]) -> Array:
+    return jnp.sqrt(_mean_square(coordinates, raw, residuals))
 
 
 @eqx.filter_jit
@@ -256,7 +242,7 @@ def _descend(
     coordinates: Coordinates,
     raw: Array,
     state: Any,
-    made: Sequence[AbstractResiduals],
+    residuals: Sequence[AbstractResiduals],
     rule: optax.GradientTransformation,
     level: float,
     count: Array,
@@ -265,7 +251,7 @@ def _descend(
 
     def step(_: Any, now: tuple[Array, Any]) -> tuple[Array, Any]:
         raw, state = now
-        slope = jax.grad(lambda raw: _mean_square(coordinates, raw, made) / level**2)(raw)
+        slope = jax.grad(lambda raw: _mean_square(coordinates, raw, residuals) / level**2)(raw)
         with jax.numpy_dtype_promotion("standard"):  # optax mixes its integer count with floats
             change, state = rule.update(slope, state, raw)
         return optax.apply_updates(raw, change), state  # type: ignore[return-value]

@@ -1,6 +1,7 @@
 """`fit_vehicle`: masses, rates, friction and damper laws of a vehicle from its records."""
 
 import dataclasses
+import functools
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -14,15 +15,16 @@ from jaxdamp._field_types import check_module
 from jaxdamp._one_thread import one_thread
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, RideRecord
-from jaxdamp.identify.criteria import LOSSES, Priors, criterion_in_words, priors_on, solve_by
+from jaxdamp.identify.criteria import LOSSES, criterion_in_words, priors_on, solve_by
 from jaxdamp.identify.estimating import estimate
 from jaxdamp.identify.judging import MOST_WARNINGS, fields_of_fit, on_status
-from jaxdamp.identify.left_out import on_free_scale, on_sensors, on_signs
 from jaxdamp.identify.machine import Machine, started_machine
+from jaxdamp.identify.model import VehicleTest
 from jaxdamp.identify.noise import Noise, channel_noise
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd, Solver, search
-from jaxdamp.identify.several import Solution, scattered_starts, search_each
+from jaxdamp.identify.several import Solution, search_scattered
+from jaxdamp.identify.vehicle_left_out import on_free_scale, on_sensors, on_signs
 from jaxdamp.identify.vehicle_preparing import (
     FreeScale,
     VehicleData,
@@ -33,7 +35,6 @@ from jaxdamp.identify.vehicle_preparing import (
     free_scale,
     frozen_paths,
     in_units,
-    known_noise,
     mean_over_records,
     per_record_paths,
     vehicle_test,
@@ -129,9 +130,7 @@ def fit_vehicle(
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "fit_vehicle(vehicle, records)")
     rides = checked_records(vehicle, records)
-    for name, count in (("max_steps", max_steps), ("starts", starts)):
-        if count < 1:
-            _checks.refuse(name, "be 1 or more", count)
+    _checks.counts(max_steps=max_steps, starts=starts)
     _checks.one_of("loss", loss, LOSSES)
     _checks.nonnegative("settling", settling)
     if settling > 0.5 * min(len(ride) * ride.dt for ride in rides):
@@ -139,63 +138,56 @@ def fit_vehicle(
     benches = checked_benches(vehicle, bench or {}, rig)
     machine = started_machine(rig, [run for runs in benches.values() for run in runs])
     model = vehicle_test(vehicle, rides, sensors or {}, start, machine)
-    own, frozen = per_record_paths(model, per_record, len(rides)), frozen_paths(model, over, freeze)
-    spread = with_values(model, {path: jnp.full(len(rides), get(model, path)) for path in own})
-    data = VehicleData(model, rides, drives_of(vehicle, rides, dt), benches, float(settling), own, samples_per_cycle)
-    known = known_noise(data, noise or {})
-
-    free = free_parameters(spread, freeze=frozen, bounds=bounds, tie=tie)
+    varied = per_record_paths(model, per_record, len(rides))
+    spread = with_values(model, {path: jnp.full(len(rides), get(model, path)) for path in varied})
+    free = free_parameters(spread, freeze=frozen_paths(model, over, freeze), bounds=bounds, tie=tie)
     _checks.finite("vehicle", free.values)
-    expected = priors_on(free, priors or {}, 1.0)
-    free, sigma = in_units(free, vehicle.units), {**data.first_noise(), **known}
-    problem = data.problem(free, sigma, expected)
+    expected, drives = priors_on(free, priors or {}, 1.0), drives_of(vehicle, rides, dt)
+    data = VehicleData(model, rides, drives, benches, float(settling), varied, samples_per_cycle, dt, expected)
+    data = data.with_known_noise(noise or {})
+    free = in_units(free, vehicle.units)
+    problem = data.problem(free, data.first_noise())
     first = search(problem, 1)
     scale, at_start = free_scale(problem, first), channel_scores(problem, first.residual, rides)
     problem = problem._replace(free=without(free, scale.held))
     how = {"loss": loss, "starts": starts, "max_steps": max_steps, "seed": seed, "solver": solver}
     begin = np.asarray(problem.free.values)
-    problem, solution = _solved(data, problem, known, expected, **how)
-    problem, solution, refused = _accepted(data, problem, solution, begin, known, expected, dt, how | {"starts": 1})
-    paths = [p.path for p in parameters(model)]
-    named = matched_in_words([path for path in paths if path.startswith("vehicle.")], over=over or ())
-    others = matched_in_words(paths, freeze=freeze, bounds=bounds or {}, per_record=per_record)
+    problem, solution = _solved(data, problem, **how)
+    problem, solution, refused = _accepted(data, problem, solution, begin, how | {"starts": 1})
     result = _judged(data, problem, solution, scale, at_start, refused)
     criterion = criterion_in_words(problem, loss, priors or {})
-    return dataclasses.replace(result, patterns="; ".join(filter(None, (named, others))), criterion=criterion)
+    words = _patterns(model, over=over or (), freeze=freeze, bounds=bounds or {}, per_record=per_record)
+    return dataclasses.replace(result, patterns=words, criterion=criterion)
+
+
+def _patterns(model: VehicleTest, over: Sequence[str], **names: Iterable[str]) -> str:
+    """What each pattern in the call stood for, in words."""
+    paths = [p.path for p in parameters(model)]
+    of_vehicle = matched_in_words([path for path in paths if path.startswith("vehicle.")], over=over)
+    return "; ".join(filter(None, (of_vehicle, matched_in_words(paths, **names))))
 
 
 def _solved(
-    data: VehicleData,
-    problem: Problem,
-    known: Mapping[str, float],
-    expected: Sequence[Priors],
-    *,
-    loss: str,
-    starts: int,
-    max_steps: int,
-    seed: int,
-    solver: Solver | None,
+    data: VehicleData, problem: Problem, *, loss: str, starts: int, max_steps: int, seed: int, solver: Solver | None
 ) -> tuple[Problem, Solution]:
     """The minimum with each channel weighted by its noise, which is estimated until it is consistent."""
     sigma = dict(zip(data.channels, problem.sigma, strict=True))
     rounds = 0
     while True:
         end, rounds = search(problem, max_steps, solver=solver), rounds + 1
-        before, sigma = sigma, {**data.noise_in(end, problem, sigma, loss), **known}
+        before, sigma = sigma, data.noise_in(end, problem, sigma, loss)
         consistent = all(abs(np.log(sigma[name] / before[name])) < ALIKE for name in sigma)
         if not end.finite or consistent or rounds == MOST_ROUNDS:
             break
-        problem = data.problem(problem.free.started_at(end.values), sigma, expected)
-    if not end.finite or (loss == "squares" and starts == 1 and not expected):
+        problem = data.problem(problem.free.started_at(end.values), sigma)
+    if not end.finite or (loss == "squares" and starts == 1 and not data.priors):
         return problem, Solution(end, (end,), 1)
+    by_squares = functools.partial(search_scattered, seed=seed, max_steps=max_steps, solver=solver)
+    return solve_by(problem.started_at(end.values), by_squares, loss=loss, noise=_noise, starts=starts)
 
-    def by_squares(problem: Problem, count: int | None) -> Solution:
-        return search_each(problem, scattered_starts(problem.free, count or 1, seed), max_steps, solver)
 
-    def noise(problem: Problem, end: SearchEnd) -> Noise:
-        return channel_noise(problem, end.residual, end.values.size)
-
-    return solve_by(problem.started_at(end.values), by_squares, loss=loss, noise=noise, starts=starts)
+def _noise(problem: Problem, end: SearchEnd) -> Noise:
+    return channel_noise(problem, end.residual, end.values.size)
 
 
 def _accepted(
@@ -203,9 +195,6 @@ def _accepted(
     problem: Problem,
     solution: Solution,
     start: Float[np.ndarray, " free"],
-    known: Mapping[str, float],
-    expected: Sequence[Priors],
-    dt: float | None,
     how: Mapping[str, Any],
 ) -> tuple[Problem, Solution, list[str]]:
     """The minimum among the vehicles that `simulate` accepts, as it does the start, with the substeps they need."""
@@ -217,7 +206,7 @@ def _accepted(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             try:
-                return drives_of(vehicle, data.rides, dt)
+                return drives_of(vehicle, data.rides, data.dt)
             except ValueError:
                 return None
 
@@ -241,7 +230,7 @@ def _accepted(
             )
         sigma = dict(zip(data.channels, problem.sigma, strict=True))
         begin = problem.free if drives is None else problem.free.started_at(end.values)
-        problem, solution = _solved(data, data.problem(begin, sigma, expected), known, expected, **how)
+        problem, solution = _solved(data, data.problem(begin, sigma), **how)
     return problem, solution, notes
 
 
@@ -260,7 +249,7 @@ def _judged(
         _checks.refuse("vehicle", "give finite channels and derivatives over the records", "one that does not", remedy)
     problem = problem.started_at(end.values)
     model, held = problem.free.tree, (scale.held_name,) if scale.held_name else ()
-    noise = channel_noise(problem, end.residual, end.values.size)
+    noise = _noise(problem, end)
     estimates = estimate(problem, solution, noise)
     model = mean_over_records(model, data.per_record)
     scores = channel_scores(problem, end.residual, data.rides)

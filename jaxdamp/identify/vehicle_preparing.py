@@ -46,15 +46,25 @@ class VehicleData(NamedTuple):
     settling: float
     per_record: tuple[str, ...]
     samples_per_cycle: int | None
+    dt: float | None = None  # longest step of the simulation, s
+    priors: tuple[Priors, ...] = ()
+    known: Mapping[str, float] = {}  # noise of channels, where it is given
 
     @property
     def channels(self) -> list[str]:
         """All measured channels, then the paths of the laws on a bench: the owners of residuals."""
         return [*dict.fromkeys(name for ride in self.rides for name in ride.channels), *self.benches]
 
+    def with_known_noise(self, noise: Mapping[str, float]) -> "VehicleData":
+        """The same with the noise that is given, checked."""
+        for name, value in noise.items():
+            _checks.one_of("noise", name, self.channels)
+            _checks.positive(f"noise[{name!r}]", value)
+        return self._replace(known={name: float(value) for name, value in noise.items()})
+
     def first_noise(self) -> dict[str, float]:
-        """A share of the standard deviation of each channel."""
-        return {name: FIRST_GUESS * level for name, level in self.levels().items()}
+        """A share of the standard deviation of each channel, where its noise is not given."""
+        return {name: FIRST_GUESS * level for name, level in self.levels().items()} | dict(self.known)
 
     def levels(self) -> dict[str, float]:
         """The standard deviation of each channel over all records."""
@@ -66,19 +76,22 @@ class VehicleData(NamedTuple):
         forces = {path: np.concatenate([run.force for run in runs]) for path, runs in self.benches.items()}
         return {name: float(np.std(values)) for name, values in (rides | forces).items()}
 
-    def problem(self, free: FreeParameters, sigma: Mapping[str, float], priors: Sequence[Priors] = ()) -> Problem:
+    def problem(self, free: FreeParameters, sigma: Mapping[str, float]) -> Problem:
         """The least squares with residuals divided by the noise of each channel."""
         rides = ride_batches(self.rides, self.drives, sigma, self.settling, self.per_record)
         number = {name: i for i, name in enumerate(self.channels)}
-        owner = [np.broadcast_to(_column([number[c] for c in b.channels]), b.weight.shape).ravel() for b in rides]
+        owner = [
+            np.broadcast_to(np.array([number[c] for c in b.channels])[None, :, None], b.weight.shape).ravel()
+            for b in rides
+        ]
         forces, paths = bench_parts(self.model, self.benches, sigma, self.samples_per_cycle)
         owner += [len(self.channels) - len(self.benches) + numbers for numbers in paths]
         weighted = [np.ravel(b.measured * b.weight) for b in rides]
         weighted += [np.ravel(part.batch.force * part.batch.weight) for part in forces]
         level = float(np.sqrt(sum(np.sum(np.square(values)) for values in weighted)))
         ordered = tuple(sigma[name] for name in self.channels)
-        owner += [np.zeros(part.size, int) for part in priors]
-        parts, owners = (*rides, *forces, *priors), np.concatenate(owner)
+        owner += [np.zeros(part.size, int) for part in self.priors]
+        parts, owners = (*rides, *forces, *self.priors), np.concatenate(owner)
         return Problem(
             free, parts, level, self.rides, ordered, owners, EVERYWHERE, self.model.vehicle, self.per_record, True
         )
@@ -87,14 +100,10 @@ class VehicleData(NamedTuple):
         """RMS of the residual of each channel, in its unit; with a robust loss that of most samples, by the median."""
         used, levels, noise = problem.used, self.levels(), {}
         for i, name in enumerate(self.channels):
-            own = end.residual[used & (problem.owner == i)]
-            size = np.sqrt(np.mean(own**2)) if loss == "squares" else MEDIAN * np.median(np.abs(own))
+            residual = end.residual[used & (problem.owner == i)]
+            size = np.sqrt(np.mean(residual**2)) if loss == "squares" else MEDIAN * np.median(np.abs(residual))
             noise[name] = max(sigma[name] * float(size), LEAST_NOISE * levels[name])
-        return noise
-
-
-def _column(numbers: Sequence[int]) -> np.ndarray:
-    return np.array(numbers)[None, :, None]
+        return noise | dict(self.known)
 
 
 def checked_records(vehicle: AbstractVehicle, records: Any) -> tuple[RideRecord, ...]:
@@ -156,11 +165,11 @@ def vehicle_test(
 
 def frozen_paths(model: VehicleTest, over: Sequence[str] | None, freeze: Sequence[str]) -> list[str]:
     """Paths that are held: those asked for, what `over` leaves out, what sensors and test machine do not have."""
-    known, held = [p.path for p in parameters(model)], not_chosen(model, over, "sensors.", "starts.", "rig.")
+    paths, held = [p.path for p in parameters(model)], not_chosen(model, over, "sensors.", "starts.", "rig.")
     for name, sensor in model.sensors.items():
         held += [f"sensors.{name}.{p.path}" for p in parameters(sensor) if p.path not in sensor.given]
     held += absent_paths(model.rig)
-    return [*held, *match_paths(known, name_patterns("freeze", freeze))]
+    return [*held, *match_paths(paths, name_patterns("freeze", freeze))]
 
 
 def per_record_paths(model: VehicleTest, names: Sequence[str], count: int) -> tuple[str, ...]:
@@ -206,12 +215,6 @@ def first_refused(
 ) -> tuple[int, float, FreeParameters] | None:
     """The number by which the end of a search is refused; None if no single number makes the difference.
 
-    Arguments:
-        free: the free parameters.
-        start: values that are accepted.
-        end: values that are not.
-        accepted: whether `simulate` takes a vehicle with these values.
-
     Returns:
         Its index, its last accepted value, and the free parameters with this value as limit.
     """
@@ -233,37 +236,23 @@ def first_refused(
     return None
 
 
-def known_noise(data: VehicleData, noise: Mapping[str, float]) -> dict[str, float]:
-    """The noise that is given, checked."""
-    for name, value in noise.items():
-        _checks.one_of("noise", name, data.channels)
-        _checks.positive(f"noise[{name!r}]", value)
-    return {name: float(value) for name, value in noise.items()}
-
-
 def in_units(free: FreeParameters, units: Mapping[str, str]) -> FreeParameters:
     """The same with the units of the channels for the offsets of their sensors."""
     changed = []
     for p in free.chosen:
-        kind, _, rest = p.path.partition(".")
-        channel, _, field = rest.partition(".")
+        kind, _, name = p.path.partition(".")
+        channel, _, field = name.partition(".")
         unit = units[channel] if kind == "sensors" and field == "offset" else p.unit
         changed.append(dataclasses.replace(p, unit=unit))
     return FreeParameters(free.tree, tuple(changed), free.ties)
 
 
 class FreeScale(NamedTuple):
-    """Numbers that may all grow by one factor without any change of the channels, and the one that is held.
+    """Numbers that may all grow by one factor without any change of the channels, and the one that is held."""
 
-    Attributes:
-        names: of the numbers; empty if the records show the scale.
-        held: index of the number held, the first mass if there is one; None if none can be.
-        held_name: its name.
-    """
-
-    names: tuple[str, ...] = ()
-    held: int | None = None
-    held_name: str = ""
+    names: tuple[str, ...] = ()  # of the numbers; empty if the records show the scale
+    held: int | None = None  # index of the number held, the first mass if there is one; None if none can be
+    held_name: str = ""  # its name
 
 
 def force_powers(free: FreeParameters) -> Float[np.ndarray, " free"]:

@@ -46,16 +46,16 @@ class RideBatch(AbstractResiduals):
         """What the sensors show, in SI."""
 
         def one(heights: Array, number: Array) -> Array:
-            own = with_values(model, {path: get(model, path)[number] for path in self.per_record})
-            system, dt = driven(own.vehicle, self.by_forces).system(), jnp.asarray(self.dt, heights.dtype)
+            of_record = with_values(model, {path: get(model, path)[number] for path in self.per_record})
+            system, dt = driven(of_record.vehicle, self.by_forces).system(), jnp.asarray(self.dt, heights.dtype)
             start = settled(system, heights[0])
-            if own.starts:
-                motions = [jnp.concatenate([begin.position, begin.rate]) for begin in own.starts]
+            if of_record.starts:
+                motions = [jnp.concatenate([begin.position, begin.rate]) for begin in of_record.starts]
                 start = start + jnp.stack(motions)[number]
             saved, _ = recorded(self.engine, system, heights, dt, start)
             rows = system.channels(self.channels)
             values = jax.vmap(rows)(saved.motion, saved.port_force, saved.road, saved.road_rate).T
-            sensors = [own.sensors.get(name) for name in self.channels]
+            sensors = [of_record.sensors.get(name) for name in self.channels]
             shown = [v if sensor is None else sensor(v, dt) for sensor, v in zip(sensors, values, strict=True)]
             return jnp.stack(shown)[:, :: self.finer]
 
@@ -141,22 +141,14 @@ def ride_batches(
     settling: float = 0.0,
     per_record: tuple[str, ...] = (),
 ) -> list[RideBatch]:
-    """Records in groups that are driven together, in the order of their first members.
-
-    Arguments:
-        records: the records.
-        drives: how each is simulated.
-        sigma: standard deviation of each channel, by which its residuals are divided.
-        settling: time at the beginning of each record that is not compared [s].
-        per_record: paths where the model has a value for each record.
-    """
+    """Records in groups that are driven together, in the order of their first members."""
     groups: dict[tuple, list[int]] = {}
     for i, (record, drive) in enumerate(zip(records, drives, strict=True)):
         forces = record.driven_by == "forces"
         steps = drive.finer, drive.engine.step_count
         alike = len(record), round(record.dt, 12), tuple(record.channels), forces, *steps
         groups.setdefault(alike, []).append(i)
-    made = []
+    batched = []
     for (length, dt, channels, forces, finer, _), members in groups.items():
         one = drives[members[0]]
         weight = np.zeros((len(members), len(channels), length))
@@ -165,8 +157,8 @@ def ride_batches(
         measured = np.stack([np.stack(list(records[i].channels.values())) for i in members])
         road, channel, weights = (jnp.asarray(a, float) for a in (heights, measured, weight))
         numbers, how = jnp.asarray(members, int), (dt / finer, finer, channels, per_record, forces)
-        made.append(RideBatch(road, channel, weights, numbers, one.engine, *how))
-    return made
+        batched.append(RideBatch(road, channel, weights, numbers, one.engine, *how))
+    return batched
 
 
 def bench_parts(
@@ -176,9 +168,9 @@ def bench_parts(
     parts, numbers = [], []
     for number, (path, runs) in enumerate(benches.items()):
         law = on_rig(get(model.vehicle, path), model.rig)
-        made, ranges = batches(law, runs, [sigma[path]] * len(runs), per_cycle)
-        parts += [DamperOnBench(batch, path) for batch in made]
-        numbers.append(np.full(owners(made, ranges).size, number))
+        of_path, ranges = batches(law, runs, [sigma[path]] * len(runs), per_cycle)
+        parts += [DamperOnBench(batch, path) for batch in of_path]
+        numbers.append(np.full(owners(of_path, ranges).size, number))
     return parts, numbers
 
 

@@ -3,12 +3,13 @@
 import dataclasses
 import warnings
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
+from jaxdamp._results import Derived, drawn_by
 from jaxdamp._tables import Column, Table, with_unit
 from jaxdamp.bench import BenchRun, RideRecord
 from jaxdamp.identify.estimates import parameter_table
@@ -20,10 +21,6 @@ from jaxdamp.identify.vehicle_preparing import checked_records, drives_of
 from jaxdamp.identify.vehicle_residuals import DamperOnBench, RideBatch, ride_batches
 from jaxdamp.rig import Rig, Sensor
 from jaxdamp.vehicles import AbstractVehicle
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class ChannelScore(NamedTuple):
@@ -83,10 +80,7 @@ class VehicleFit(Fit):
         least = min(self.scores, key=lambda score: score.fit_percent)
         return f"the least fit is {least.fit_percent:.1f} %, of {least.channel} in {least.record}"
 
-    @property
-    def model(self) -> AbstractVehicle:
-        """`vehicle`."""
-        return self.vehicle
+    model = Derived(lambda self: self.vehicle)
 
     @property
     def problem(self) -> Problem:
@@ -196,11 +190,7 @@ class VehicleFit(Fit):
             ],
         }
 
-    def plot(self, record: str | None = None) -> "Figure":
-        """Measured and fitted channels of a record over time, with residuals (`plots.vehicle_fit`)."""
-        from jaxdamp.plots import vehicle_fit
-
-        return vehicle_fit(self, record)
+    plot = drawn_by("vehicle_fit", "Measured and fitted channels of a record over time, with residuals.")
 
 
 @eqx.filter_jit
@@ -211,13 +201,7 @@ def _predict(batch: RideBatch, model: VehicleTest) -> Array:
 def channel_scores(
     problem: Problem, residual: Float[np.ndarray, " samples"], records: Sequence[RideRecord]
 ) -> tuple[ChannelScore, ...]:
-    """Errors of each channel of each record over the samples that are compared.
-
-    Arguments:
-        problem: the least squares.
-        residual: at the minimum, weighted.
-        records: the records.
-    """
+    """Errors of each channel of each record over the samples that are compared."""
     scores, end, units = {}, 0, problem.law.units
     forces: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for part in problem.residuals:

@@ -39,26 +39,44 @@ Array([0.707107, 1.414214, 2.828427], dtype=float64)
 from typing import Any
 
 from jaxdamp.metrics._linear_system import StateSpace as StateSpace
-from jaxdamp.metrics.aggregate_force import aggregate_force, aggregate_force_percentile
-from jaxdamp.metrics.amplitude import crest_factor, peak, rms, smooth_peak
-from jaxdamp.metrics.comfort import AXES, comfort_reaction, total_vibration, vibration_total_value
+from jaxdamp.metrics.amplitude import (
+    crest_factor,
+    gaussian_exceedance,
+    peak,
+    rms,
+    smooth_peak,
+    working_space_exceedance,
+    working_space_mean,
+    working_space_peak_to_peak,
+    working_space_rms,
+)
+from jaxdamp.metrics.comfort import (
+    AXES as AXES,
+    Evaluation as Evaluation,
+    ShockRatios as ShockRatios,
+    comfort_reaction,
+    evaluation_method,
+    shock_ratios,
+    total_vibration,
+    vibration_total_value,
+)
 from jaxdamp.metrics.decay import damping_ratio, logarithmic_decrement, settling_time, smooth_settling_time
-from jaxdamp.metrics.dissipation import dissipated_energy, dissipated_power, equivalent_damping
+from jaxdamp.metrics.dissipation import (
+    damper_temperature,
+    dissipated_energy,
+    dissipated_power,
+    dissipation_histogram,
+    equivalent_damping,
+    temperature_rise,
+    velocity_histogram,
+)
 from jaxdamp.metrics.dose import (
     estimated_vibration_dose_value,
     motion_sickness_dose,
     motion_sickness_percentage,
     vibration_dose_value,
 )
-from jaxdamp.metrics.evaluation import (
-    Evaluation as Evaluation,
-    ShockRatios as ShockRatios,
-    evaluation_method,
-    shock_ratios,
-)
-from jaxdamp.metrics.fatigue import spectral_damage, spectral_moments
-from jaxdamp.metrics.heat import damper_temperature, temperature_rise
-from jaxdamp.metrics.histogram import dissipation_histogram, velocity_histogram
+from jaxdamp.metrics.fatigue import rainflow_cycles, spectral_damage, spectral_moments
 from jaxdamp.metrics.metric import Metric
 from jaxdamp.metrics.names import (
     RENAMED,
@@ -66,35 +84,32 @@ from jaxdamp.metrics.names import (
     current_name as current_name,
     current_names as current_names,
 )
-from jaxdamp.metrics.rainflow import rainflow_cycles
 from jaxdamp.metrics.roughness_index import (
     RoughnessBySegment as RoughnessBySegment,
     international_roughness_by_segment,
     international_roughness_index,
 )
 from jaxdamp.metrics.running import max_transient_value, running_rms
-from jaxdamp.metrics.spectrum import power_spectral_density
+from jaxdamp.metrics.spectrum import coherence, power_spectral_density, transmissibility
 from jaxdamp.metrics.statistics import STATISTICS, Gathered as Gathered, Reduction, Statistic, Term, percentile
-from jaxdamp.metrics.transfer import coherence, transmissibility
-from jaxdamp.metrics.tyre_load import dynamic_load_coefficient, lift_off_fraction, road_stress_factor
-from jaxdamp.metrics.weighted import weighted_rms, weighted_signal
-from jaxdamp.metrics.weighting import (
-    discrete_weighting as discrete_weighting,
-    weighting_factor,
-    weighting_response,
-    weighting_state_space as weighting_state_space,
+from jaxdamp.metrics.tyre_load import (
+    aggregate_force,
+    aggregate_force_percentile,
+    dynamic_load_coefficient,
+    lift_off_fraction,
+    road_stress_factor,
 )
-from jaxdamp.metrics.working_space import (
-    gaussian_exceedance,
-    working_space_exceedance,
-    working_space_mean,
-    working_space_peak_to_peak,
-    working_space_rms,
+from jaxdamp.metrics.weighted import (
+    discrete_weighting as discrete_weighting,
+    weighted_rms,
+    weighted_signal,
+    weighting_factor,
+    weighting_response as weighting_response,
+    weighting_state_space as weighting_state_space,
 )
 
 
 __all__ = [
-    "AXES",
     "STATISTICS",
     "Metric",
     "Reduction",
@@ -144,24 +159,10 @@ __all__ = [
     "weighted_rms",
     "weighted_signal",
     "weighting_factor",
-    "weighting_response",
     "working_space_exceedance",
     "working_space_mean",
     "working_space_peak_to_peak",
     "working_space_rms",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "Evaluation",
-    "Gathered",
-    "MetricValues",
-    "RoughnessBySegment",
-    "ShockRatios",
-    "StateSpace",
-    "current_name",
-    "current_names",
-    "discrete_weighting",
-    "weighting_state_space",
 ]
 
 

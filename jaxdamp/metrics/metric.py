@@ -6,7 +6,7 @@ from typing import final
 
 from jaxdamp import _checks
 from jaxdamp.metrics.statistics import STATISTICS, Statistic
-from jaxdamp.metrics.weighting import check_weighting
+from jaxdamp.metrics.weighted import check_weighting
 
 
 @final

@@ -10,6 +10,7 @@ import jax
 
 from jaxdamp import _checks
 from jaxdamp._tables import Compared, Table, comparison_table, with_unit
+from jaxdamp._types import Contents
 
 
 # Old name: new name, of the functions here and of ride metrics, alone or after the name of a corner ("front_…"). Remove
@@ -41,7 +42,7 @@ def _warn(text: str) -> None:
     warnings.warn(text, FutureWarning, stacklevel=level)
 
 
-def _new_name(name: Any, known: Collection[str]) -> str | None:
+def _new_name(name: object, known: Collection[str]) -> str | None:
     if isinstance(name, str) and name not in known:
         for old, new in RENAMED.items():
             corner = name.removesuffix(old)
@@ -89,7 +90,7 @@ class MetricValues(dict):
     units: Mapping[str, str] = MappingProxyType({})
 
     @classmethod
-    def with_units(cls, values: Mapping[str, Any], units: Mapping[str, str]) -> "MetricValues":
+    def with_units(cls, values: Mapping[str, object], units: Mapping[str, str]) -> "MetricValues":
         """These values and their units."""
         result = cls(values)
         result.units = {name: units[name] for name in result if name in units}
@@ -100,7 +101,7 @@ class MetricValues(dict):
         rows = [Compared(name, self.units.get(name, ""), (float(value),), None) for name, value in self.items()]
         return comparison_table("Ride metrics", "metric", ("value",), rows)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Contents:
         """The values with units, ready for JSON; numbers that are not finite are None."""
         return {name: with_unit(value, self.units.get(name, "")) for name, value in self.items()}
 
@@ -116,7 +117,7 @@ class MetricValues(dict):
     def __contains__(self, name: object) -> bool:
         return super().__contains__(name) or _new_name(name, self.keys()) is not None
 
-    def get(self, name: Any, default: Any = None) -> Any:
+    def get(self, name: object, default: object = None) -> Any:
         """The value of a metric, or the default if there is no metric of this name."""
         return self[name] if name in self else default
 
@@ -128,7 +129,7 @@ class MetricValues(dict):
         )
 
     @classmethod
-    def tree_unflatten(cls, names: tuple[tuple[str, str | None], ...], values: Sequence[Any]) -> "MetricValues":
+    def tree_unflatten(cls, names: tuple[tuple[str, str | None], ...], values: Sequence[object]) -> "MetricValues":
         """The values with these names and units."""
         units = {name: unit for name, unit in names if unit is not None}
         return cls.with_units(dict(zip((name for name, _ in names), values, strict=True)), units)

@@ -1,7 +1,7 @@
 """The international roughness index of a road profile, for the whole profile and by segment."""
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._tables import Column, Table
-from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
+from jaxdamp._types import Contents, Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.metrics._signals import as_signal
 
 
@@ -116,7 +116,7 @@ class RoughnessBySegment(NamedTuple):
         rows = tuple((float(start), float(end), 1e3 * float(value), note) for start, end, value, note in cells)
         return Table("International roughness index", columns, rows)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Contents:
         """The rows of the table with units, ready for JSON."""
         return self.table().to_dict()
 

@@ -1,10 +1,8 @@
 """The running root mean square and its maximum."""
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Int
+from jaxtyping import Array, Int, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._limits import largest, root
@@ -80,7 +78,7 @@ def _moving_sum(values: Signal, count: Int[Array, ""]) -> Signal:
     precision.
     """
 
-    def double(_: Any, sums: tuple[Signal, Int[Array, ""], Signal, Int[Array, ""]]) -> tuple[Any, ...]:
+    def double(_: object, sums: tuple[Signal, Int[Array, ""], Signal, Int[Array, ""]]) -> PyTree:
         total, taken, block, length = sums
         has = (count & length) != 0
         total = jnp.where(has, total + _delayed(block, taken), total)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias, final
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, at_most, largest, root
@@ -62,7 +62,7 @@ class Reduction(enum.Enum):
                 return values[-1]
 
 
-def _sample(y: Samples, first: Any) -> Samples:
+def _sample(y: Samples, first: object) -> Samples:
     del first
     return y
 
@@ -83,7 +83,7 @@ class Term(NamedTuple):
     """
 
     reduction: Reduction
-    value: Callable[[Samples, Any], Samples] = _sample
+    value: Callable[[Samples, PyTree], Samples] = _sample
 
 
 @final

@@ -8,11 +8,12 @@ parameter inside a composition. Freezing, ties and extra bounds are arguments of
 """
 
 from jaxdamp.parameters._checking import check_parameters as check_parameters, checked as checked
-from jaxdamp.parameters._coordinates import Bounds as Bounds, Coordinates
+from jaxdamp.parameters._coordinates import Bounds as Bounds, Coordinates as Coordinates
 from jaxdamp.parameters._declaration import (
     Module as Module,
     Parameter as Parameter,
     as_float as as_float,
+    declared_inside as declared_inside,
     domain_of as domain_of,
     modules_inside as modules_inside,
     parameter,
@@ -22,16 +23,16 @@ from jaxdamp.parameters._declaration import (
 )
 from jaxdamp.parameters._domains import (
     Domain as Domain,
-    around_zero,
-    ends,
+    around_zero as around_zero,
+    ends as ends,
     increasing,
-    increasing_negative,
+    increasing_negative as increasing_negative,
     interval,
     nonnegative,
-    ordered_interval,
+    ordered_interval as ordered_interval,
     positive,
     real,
-    weight,
+    weight as weight,
 )
 from jaxdamp.parameters._free import FreeParameters as FreeParameters, free_parameters
 from jaxdamp.parameters._paths import (
@@ -41,45 +42,20 @@ from jaxdamp.parameters._paths import (
     matching as matching,
     name_patterns as name_patterns,
     replace,
-    with_values,
+    with_values as with_values,
 )
 
 
 __all__ = [
-    "Coordinates",
-    "around_zero",
-    "ends",
     "free_parameters",
     "get",
     "increasing",
-    "increasing_negative",
     "interval",
     "nonnegative",
-    "ordered_interval",
     "parameter",
     "parameters",
     "positive",
     "real",
     "replace",
     "setting",
-    "weight",
-    "with_values",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "Bounds",
-    "Domain",
-    "FreeParameters",
-    "Module",
-    "Parameter",
-    "as_float",
-    "check_parameters",
-    "checked",
-    "domain_of",
-    "match_paths",
-    "matched_in_words",
-    "matching",
-    "modules_inside",
-    "name_patterns",
-    "readable",
 ]

@@ -7,9 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PyTree
 
 from jaxdamp.parameters._declaration import Parameter
+from jaxdamp.parameters._domains import Domain
 from jaxdamp.parameters._free import FreeParameters
 
 
@@ -54,7 +55,7 @@ class Coordinates(eqx.Module):
     smooth: Literal["none", "ordered", "all"] = eqx.field(static=True)
 
     @property
-    def units(self) -> list[Any]:
+    def units(self) -> list[PyTree]:
         """The unit of each parameter: its value where a coordinate without a smooth map is one."""
         return [
             np.full(p.value.shape, p.domain.upper - p.domain.lower, p.value.dtype)
@@ -67,13 +68,27 @@ class Coordinates(eqx.Module):
         """Physical values of coordinates; NumPy arrays for NumPy arrays."""
         parts = zip(self.free.chosen, self.units, self.free.split(y), strict=True)
         maps = ((p.domain.from_raw, p, u, a) for p, u, a in parts)
-        return _joined([of(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a * u for of, p, u, a in maps])
+        return _joined([of(_plain(p, a), _scale(p)) if self._is_smooth(p) else a * u for of, p, u, a in maps])
+
+    def on_host(self) -> "HostMap | None":
+        """The map to physical values with its derivatives, by NumPy alone; None if a domain has not written them."""
+        slopes, ends = np.zeros((self.free.values.size,) * 2), np.cumsum([p.value.size for p in self.free.chosen])
+        smooth = []
+        for p, unit, end in zip(self.free.chosen, self.units, ends, strict=True):
+            own = slice(int(end) - p.value.size, int(end))
+            if not self._is_smooth(p):
+                slopes[own, own] = np.diag(np.ravel(np.asarray(unit)))
+            elif p.domain.slopes is None:
+                return None
+            else:
+                smooth.append((own, p.domain, np.asarray(_scale(p))))
+        return HostMap(np.diag(slopes).copy(), slopes, tuple(smooth))
 
     def from_physical(self, values: Vector) -> Vector:
         """Coordinates of physical values; NumPy arrays for NumPy arrays."""
         parts = zip(self.free.chosen, self.units, self.free.split(values), strict=True)
         maps = ((p.domain.to_raw, p, u, a) for p, u, a in parts)
-        return _joined([of(jnp.asarray(a), _scale(p)) if self._is_smooth(p) else a / u for of, p, u, a in maps])
+        return _joined([of(_plain(p, a), _scale(p)) if self._is_smooth(p) else a / u for of, p, u, a in maps])
 
     @property
     def start(self) -> Float[np.ndarray, " free"]:
@@ -128,12 +143,35 @@ class Coordinates(eqx.Module):
         return self.smooth == "all" or (self.smooth == "ordered" and p.domain.ordered)
 
 
+class HostMap(NamedTuple):
+    """Physical values of coordinates, and their derivatives.
+
+    Attributes:
+        units: of the numbers without a smooth map, zero for the others.
+        slopes: the same on the diagonal of a matrix.
+        smooth: ordered vectors: their place, domain and scale.
+    """
+
+    units: Float[np.ndarray, " free"]
+    slopes: Float[np.ndarray, "free free"]
+    smooth: tuple[tuple[slice, Domain, Float[np.ndarray, " _"]], ...]
+
+    def __call__(
+        self, y: Float[np.ndarray, " free"]
+    ) -> tuple[Float[np.ndarray, " free"], Float[np.ndarray, "free free"]]:
+        """Values and derivatives at coordinates."""
+        values, slopes = y * self.units, self.slopes.copy() if self.smooth else self.slopes
+        for own, domain, scale in self.smooth:
+            values[own], slopes[own, own] = domain.from_raw(y[own], scale), domain.slopes(y[own], scale)
+        return values, slopes
+
+
 def _has_range(p: Parameter) -> bool:
     """Whether both ends of the range are finite."""
     return not p.domain.ordered and bool(np.isfinite(p.domain.upper - p.domain.lower))
 
 
-def _magnitude(value: Any) -> Any:
+def _magnitude(value: PyTree) -> PyTree:
     """Typical magnitude of each number, never zero; numbers much smaller than the largest are increased.
 
     Numbers that JAX does not trace are computed by NumPy, because JAX would compile each operation separately.
@@ -146,13 +184,18 @@ def _magnitude(value: Any) -> Any:
     return xp.where(magnitude > floor, magnitude, xp.where(largest == 0, 1.0, largest)).astype(value.dtype)
 
 
-def _scale(p: Parameter) -> Array:
+def _plain(p: Parameter, values: Array | np.ndarray) -> Array | np.ndarray:
+    """As a map takes them: those of ordered vectors compute NumPy arrays by NumPy."""
+    return values if p.domain.ordered and isinstance(values, np.ndarray) else jnp.asarray(values)
+
+
+def _scale(p: Parameter) -> Array | np.ndarray:
     """The scale of the smooth map of a domain: the magnitude of the start, or of the steps of an ordered vector."""
-    scale = _magnitude(p.value if p.domain.steps is None else p.domain.steps(p.value))
-    return jnp.asarray(scale, scale.dtype)
+    value = p.value if isinstance(p.value, Tracer) else np.asarray(p.value)
+    return _magnitude(value if p.domain.steps is None else p.domain.steps(value))
 
 
-def _joined(pieces: list[Any]) -> Any:
+def _joined(pieces: list[PyTree]) -> PyTree:
     xp: Any = np if all(isinstance(piece, np.ndarray | np.generic) for piece in pieces) else jnp
     return xp.concatenate([xp.ravel(piece) for piece in pieces])
 

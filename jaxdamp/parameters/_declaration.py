@@ -1,7 +1,7 @@
 """Declaring parameters and settings beside the fields of a class, and listing them."""
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, dataclass_transform
 
 import equinox as eqx
@@ -16,7 +16,7 @@ from jaxdamp._traced import is_traced
 from jaxdamp.parameters._domains import Domain, real
 
 
-def as_float(value: Any, name: str = "value") -> Array:
+def as_float(value: object, name: str = "value") -> Array:
     """A JAX array of the default float type; arrays that are floating already keep their type.
 
     Arguments:
@@ -88,7 +88,7 @@ def setting(unit: str, meaning: str, domain: Domain = real, *, command: bool = F
 def _number(kind: str, declared: dict[str, Any], options: dict[str, Any]) -> Any:
     """A field that converts numbers to arrays, with an error that names the field."""
 
-    def convert(value: Any) -> Array:
+    def convert(value: object) -> Array:
         return as_float(value, field.name)
 
     field = eqx.field(converter=convert, metadata={kind: declared}, **options)
@@ -130,23 +130,42 @@ class Parameter(eqx.Module):
     adjustable: bool = eqx.field(static=True, default=True)
 
 
-def modules_inside(tree: Any, prefix: str = "") -> Iterator[tuple[str, eqx.Module]]:
+def _children(tree: object) -> Iterable[tuple[object, Any]]:
+    """What a container or a module holds, with index, key or name of the field."""
+    if isinstance(tree, tuple | list):
+        return enumerate(tree)
+    if isinstance(tree, dict):
+        return tree.items()
+    return [(f.name, getattr(tree, f.name)) for f in dataclasses.fields(tree)] if isinstance(tree, eqx.Module) else ()
+
+
+def modules_inside(tree: object, prefix: str = "") -> Iterator[tuple[str, eqx.Module]]:
     """All modules in a tree, each with the prefix of the paths of its fields, before those inside it.
 
     Arguments:
         tree: the tree.
         prefix: put before each path.
     """
-    if isinstance(tree, tuple | list):
-        for index, item in enumerate(tree):
-            yield from modules_inside(item, f"{prefix}{index}.")
-    elif isinstance(tree, dict):
-        for key, item in tree.items():
-            yield from modules_inside(item, f"{prefix}{key}.")
-    elif isinstance(tree, eqx.Module):
+    if isinstance(tree, eqx.Module):
         yield prefix, tree
-        for field in dataclasses.fields(tree):
-            yield from modules_inside(getattr(tree, field.name), f"{prefix}{field.name}.")
+    for name, child in _children(tree):
+        yield from modules_inside(child, f"{prefix}{name}.")
+
+
+def declared_inside(tree: object, prefix: str = "") -> Iterator[tuple[str, eqx.Module, Mapping[str, Any]]]:
+    """The declared fields of all modules in a tree, depth first: path, module and metadata of the field.
+
+    Arguments:
+        tree: the tree.
+        prefix: put before each path.
+    """
+    fields = {f.name: f.metadata for f in dataclasses.fields(tree)} if isinstance(tree, eqx.Module) else {}
+    for name, child in _children(tree):
+        metadata = fields.get(str(name), {})
+        if isinstance(tree, eqx.Module) and ("parameter" in metadata or "setting" in metadata):
+            yield f"{prefix}{name}", tree, metadata
+        else:
+            yield from declared_inside(child, f"{prefix}{name}.")
 
 
 def domain_of(declared: dict[str, Any], module: eqx.Module) -> Domain:
@@ -160,7 +179,7 @@ def domain_of(declared: dict[str, Any], module: eqx.Module) -> Domain:
     return domain if isinstance(domain, Domain) else domain(module)
 
 
-def parameters(tree: Any, prefix: str = "") -> list[Parameter]:
+def parameters(tree: object, prefix: str = "") -> list[Parameter]:
     """All parameters of a law, vehicle or any other module, depth first in the order of their fields.
 
     Arguments:
@@ -171,24 +190,13 @@ def parameters(tree: Any, prefix: str = "") -> list[Parameter]:
     >>> [(p.path, p.unit, float(p.value)) for p in parameters(Lag(Linear(1500.0), lag_time=0.004))]
     [('law.rate', 'N s/m', 1500.0), ('lag_time', 's', 0.004)]
     """
-    found = []
-    if isinstance(tree, tuple | list):
-        for index, item in enumerate(tree):
-            found += parameters(item, f"{prefix}{index}.")
-    elif isinstance(tree, dict):
-        for key, item in tree.items():
-            found += parameters(item, f"{prefix}{key}.")
-    elif isinstance(tree, eqx.Module):
-        for field in dataclasses.fields(tree):
-            value = getattr(tree, field.name)
-            declared = field.metadata.get("parameter")
-            if declared is None:
-                found += parameters(value, f"{prefix}{field.name}.")
-            else:
-                words = declared["unit"], declared["meaning"]
-                traits = domain_of(declared, tree), declared["linear"], declared["adjustable"]
-                found.append(Parameter(prefix + field.name, value, *words, *traits))
-    return found
+    listed = []
+    for path, module, metadata in declared_inside(tree, prefix):
+        if declared := metadata.get("parameter"):
+            words = declared["unit"], declared["meaning"]
+            traits = domain_of(declared, module), declared["linear"], declared["adjustable"]
+            listed.append(Parameter(path, getattr(module, path.rsplit(".", 1)[-1]), *words, *traits))
+    return listed
 
 
 def readable(module: eqx.Module) -> str:
@@ -198,7 +206,7 @@ def readable(module: eqx.Module) -> str:
         module: the module.
     """
 
-    def text(value: Any) -> str:
+    def text(value: object) -> str:
         if isinstance(value, tuple | list):
             return f"({', '.join(map(text, value))}{',' if len(value) == 1 else ''})"
         if isinstance(value, jax.Array | np.ndarray):

@@ -3,12 +3,13 @@
 import dataclasses
 import functools
 from collections.abc import Callable
-from typing import Any
+from types import ModuleType
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, PyTree
 
 from jaxdamp._traced import of_known_numbers
 
@@ -19,7 +20,8 @@ class Domain:
 
     `from_raw(raw, scale)` and `to_raw(value, scale)` are inverse to each other; `scale` is a typical magnitude, so
     that a raw step of one is a step of about the size of the parameter. `steps` is for ordered vectors: the steps from
-    one number to the next, which are scaled in place of the numbers.
+    one number to the next, which are scaled in place of the numbers. Their maps compute NumPy arrays by NumPy, since
+    JAX would compile each operation, and `slopes(raw, scale)` is the derivative of `from_raw`, of NumPy arrays.
 
     Attributes:
         name: in words, such as "positive".
@@ -36,6 +38,7 @@ class Domain:
     lower: float = -np.inf
     upper: float = np.inf
     steps: Callable[[Array], Array] | None = None
+    slopes: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
     remade: tuple[Callable[..., "Domain"], tuple[float, ...]] | None = dataclasses.field(default=None, repr=False)
 
     def __reduce_ex__(self, protocol: Any) -> str | tuple[Any, ...]:
@@ -49,29 +52,60 @@ class Domain:
         return self.steps is not None
 
 
-def _inverse_softplus(y: Array) -> Array:
-    return jnp.where(y > 30.0, y, jnp.log(jnp.expm1(jnp.minimum(y, 30.0))))
+Numbers: TypeAlias = PyTree  # arrays of JAX or NumPy, as the arguments are
+
+
+def _library(array: object) -> ModuleType:
+    return np if isinstance(array, np.ndarray | np.generic) else jnp
+
+
+def _softplus(raw: Numbers) -> Numbers:
+    return _library(raw).logaddexp(raw, 0.0)
+
+
+def _sigmoid(raw: np.ndarray) -> np.ndarray:
+    return 0.5 * (1.0 + np.tanh(0.5 * raw))
+
+
+def _inverse_softplus(y: Numbers) -> Numbers:
+    xp = _library(y)
+    return xp.where(y > 30.0, y, xp.log(xp.expm1(xp.minimum(y, 30.0))))
 
 
 def _positive_to_raw(value: Array, scale: Array) -> Array:
     return _inverse_softplus(jnp.maximum(value / scale, 1e-12))
 
 
-def _increasing_from_raw(raw: Array, scale: Array) -> Array:
-    steps = jnp.concatenate([scale[:1] * raw[:1], scale[1:] * jax.nn.softplus(raw[1:])])
-    return jnp.cumsum(steps)
+def _steps_up(value: Numbers) -> Numbers:
+    xp = _library(value)
+    return xp.diff(value, prepend=xp.zeros(1, value.dtype))
 
 
-def _increasing_to_raw(value: Array, scale: Array) -> Array:
-    return jnp.concatenate([value[:1] / scale[:1], _inverse_softplus(jnp.diff(value) / scale[1:])])
+def _steps_to_zero(value: Numbers) -> Numbers:
+    xp = _library(value)
+    return xp.diff(value, append=xp.zeros(1, value.dtype))
 
 
-def _increasing_from_raw_positive(raw: Array, scale: Array) -> Array:
-    return jnp.cumsum(scale * jax.nn.softplus(raw))
+def _increasing_from_raw(raw: Numbers, scale: Numbers) -> Numbers:
+    xp = _library(raw)
+    return xp.cumsum(xp.concatenate([scale[:1] * raw[:1], scale[1:] * _softplus(raw[1:])]))
 
 
-def _increasing_to_raw_positive(value: Array, scale: Array) -> Array:
-    return _inverse_softplus(jnp.diff(value, prepend=jnp.zeros(1, value.dtype)) / scale)
+def _increasing_slopes(raw: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    return np.tril(np.ones((raw.size, raw.size))) * np.append(scale[:1], scale[1:] * _sigmoid(raw[1:]))
+
+
+def _increasing_to_raw(value: Numbers, scale: Numbers) -> Numbers:
+    xp = _library(value)
+    return xp.concatenate([value[:1] / scale[:1], _inverse_softplus(xp.diff(value) / scale[1:])])
+
+
+def _increasing_from_raw_positive(raw: Numbers, scale: Numbers) -> Numbers:
+    return _library(raw).cumsum(scale * _softplus(raw))
+
+
+def _increasing_to_raw_positive(value: Numbers, scale: Numbers) -> Numbers:
+    return _inverse_softplus(_steps_up(value) / scale)
 
 
 real = Domain("real", lambda a: True, lambda raw, scale: scale * raw, lambda value, scale: value / scale)
@@ -98,7 +132,8 @@ increasing = Domain(
     lambda a: bool(np.all(np.diff(a) > 0)),
     _increasing_from_raw,
     _increasing_to_raw,
-    steps=lambda value: jnp.diff(value, prepend=jnp.zeros(1, value.dtype)),
+    steps=_steps_up,
+    slopes=_increasing_slopes,
 )
 increasing_negative = Domain(
     "strictly increasing and negative",
@@ -106,7 +141,8 @@ increasing_negative = Domain(
     lambda raw, scale: -_increasing_from_raw_positive(raw[::-1], scale[::-1])[::-1],
     lambda value, scale: _increasing_to_raw_positive(-value[::-1], scale[::-1])[::-1],
     upper=0.0,
-    steps=lambda value: jnp.diff(value, append=jnp.zeros(1, value.dtype)),
+    steps=_steps_to_zero,
+    slopes=lambda raw, scale: -np.triu(np.ones((raw.size, raw.size))) * (scale * _sigmoid(raw)),
 )
 # For settings that are the two ends of a range.
 ends = dataclasses.replace(
@@ -129,6 +165,7 @@ def _bounded(
     raw_of: Callable[[Array], Array],
     remade: Callable[[float, float], Domain],
     steps: Callable[[Array], Array] | None = None,
+    slopes: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Domain:
     """A domain between two finite numbers, from the map of raw numbers to shares of the range (0 to 1) and back."""
     if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
@@ -146,6 +183,7 @@ def _bounded(
         lower,
         upper,
         steps,
+        None if slopes is None else lambda raw, scale: width * slopes(raw),
         (remade, (lower, upper)),
     )
 
@@ -155,14 +193,28 @@ def _logit(share: Array) -> Array:
     return jnp.log(share / (1 - share))
 
 
-def _ordered_shares(raw: Array) -> Array:
-    return jnp.cumsum(jax.nn.softmax(jnp.concatenate([raw, jnp.zeros(1, raw.dtype)])))[:-1]
+def _gap_shares(raw: Numbers) -> Numbers:
+    """The shares that the gaps have of the range, a softmax."""
+    xp = _library(raw)
+    raw = xp.concatenate([raw, xp.zeros(1, raw.dtype)])
+    size = xp.exp(raw - jax.lax.stop_gradient(raw).max() if xp is jnp else raw - raw.max())
+    return size / size.sum()
 
 
-def _raw_of_ordered_shares(shares: Array) -> Array:
-    zero, one = jnp.zeros(1, shares.dtype), jnp.ones(1, shares.dtype)
-    gaps = jnp.maximum(jnp.diff(shares, prepend=zero, append=one), 1e-12)
-    return jnp.log(gaps[:-1] / gaps[-1])
+def _ordered_shares(raw: Numbers) -> Numbers:
+    return _library(raw).cumsum(_gap_shares(raw))[:-1]
+
+
+def _slopes_of_ordered_shares(raw: np.ndarray) -> np.ndarray:
+    gaps = _gap_shares(raw)[:-1]
+    return (np.tril(np.ones((raw.size, raw.size))) - np.cumsum(gaps)[:, None]) * gaps
+
+
+def _raw_of_ordered_shares(shares: Numbers) -> Numbers:
+    xp = _library(shares)
+    zero, one = xp.zeros(1, shares.dtype), xp.ones(1, shares.dtype)
+    gaps = xp.maximum(xp.diff(shares, prepend=zero, append=one), 1e-12)
+    return xp.log(gaps[:-1] / gaps[-1])
 
 
 @of_known_numbers
@@ -187,4 +239,4 @@ def ordered_interval(lower: float, upper: float) -> Domain:
         upper: upper end.
     """
     maps = _ordered_shares, _raw_of_ordered_shares, ordered_interval
-    return _bounded("strictly increasing ", lower, upper, *maps, steps=increasing.steps)
+    return _bounded("strictly increasing ", lower, upper, *maps, increasing.steps, _slopes_of_ordered_shares)

@@ -15,7 +15,7 @@ from jaxdamp.parameters._declaration import as_float, parameters
 Tree = TypeVar("Tree")
 
 
-def get(tree: Any, path: str) -> Any:
+def get(tree: object, path: str) -> Any:
     """The value at a path such as `"damper.terms.0.rate"`.
 
     Arguments:
@@ -30,7 +30,7 @@ def get(tree: Any, path: str) -> Any:
     return tree
 
 
-def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
+def with_values(tree: Tree, values: Mapping[str, object]) -> Tree:
     """The same tree with other values at exact paths, unchecked: for searches, which respect bounds themselves.
 
     Arguments:
@@ -45,7 +45,7 @@ def with_values(tree: Tree, values: Mapping[str, Any]) -> Tree:
     return eqx.tree_at(lambda t: [get(t, path) for path in paths], tree, list(values.values())) if paths else tree
 
 
-def replace(tree: Tree, values: Mapping[str, Any]) -> Tree:
+def replace(tree: Tree, values: Mapping[str, object]) -> Tree:
     """The same tree with other values at the given paths (last parts and patterns as in `free_parameters`).
 
     Values outside their domain are refused, and so are all values that a constructor refuses: violated conditions
@@ -151,7 +151,7 @@ def matched_in_words(known: Sequence[str], **patterns: Iterable[str]) -> str:
     )
 
 
-def name_patterns(argument: str, names: Any) -> list[str]:
+def name_patterns(argument: str, names: object) -> list[str]:
     """Names or patterns of parameters as a list.
 
     Arguments:

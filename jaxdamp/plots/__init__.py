@@ -6,7 +6,9 @@ touches pyplot or its global state, and matplotlib is loaded by the first call o
 
 from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
+from jaxdamp.plots.curve_family import force_velocity_family as force_velocity_family
 from jaxdamp.plots.curves import force_velocity
+from jaxdamp.plots.damper_sheet import damper_sheet as damper_sheet
 from jaxdamp.plots.damper_use import damper_use
 from jaxdamp.plots.decisions import damper_comparison as damper_comparison
 from jaxdamp.plots.errors import ladder
@@ -26,6 +28,7 @@ from jaxdamp.plots.modes import modes
 from jaxdamp.plots.preflight import preflight
 from jaxdamp.plots.profiles import profile as profile
 from jaxdamp.plots.records import records
+from jaxdamp.plots.ride_sheet import ride_sheet as ride_sheet
 from jaxdamp.plots.rides import ride
 from jaxdamp.plots.roughness import (
     roughness_by_segment as roughness_by_segment,
@@ -53,25 +56,4 @@ __all__ = [
     "sweep",
     "tuning",
     "valving",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "cross_validation",
-    "damper_comparison",
-    "dynamic_stiffness",
-    "experiment",
-    "fit_loops",
-    "gas_and_friction",
-    "harmonic_response",
-    "limit_check",
-    "many_fits",
-    "posterior",
-    "profile",
-    "record_sensitivity",
-    "rescore",
-    "roughness_by_segment",
-    "roughness_spectrum",
-    "targets",
-    "training_history",
-    "vehicle_fit",
 ]

@@ -1,41 +1,65 @@
-"""Common style of all pictures: figure, colours, labels with unit and sign, legends."""
+"""House style of all pictures: what each colour means, names and digits for people, axes, legends, titles."""
 
+import re
 import textwrap
-import zlib
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from jaxdamp import _checks, dampers
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._display import display
+from jaxdamp._tables import typeset_unit
 from jaxdamp.dampers import AbstractDamper, Sum
 
 
 if TYPE_CHECKING:
     import matplotlib.axes
+    import matplotlib.axis
     import matplotlib.figure
+    import matplotlib.lines
 
 
-# Okabe and Ito: distinguishable with every kind of colour vision; without the pale yellow; black is for baselines.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+Look = dict[str, Any]  # keywords of a line, patch or text
+# Every two of these, and black, differ for each kind of colour vision, and all stand out 3:1 from white paper.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#9933FF", "#663300", "#001A99")
 DASHES = ("-", "--", "-.", ":")
-FAMILIES = (  # of laws, by the number of their colour
-    (dampers.Linear, dampers.Bilinear, dampers.PiecewiseLinear),  # straight pieces
-    (dampers.Besinger, dampers.Degressive, dampers.DigressiveProgressive, dampers.Saturating),  # valves that open
-    (dampers.PowerLaw, dampers.Polynomial, dampers.SegmentedPolynomial),  # powers of the velocity
-    (dampers.BoucWen, dampers.ModifiedBoucWen, dampers.Dahl, dampers.LuGre, dampers.ViscoPlastic,
-     dampers.CreepingViscoPlastic, dampers.Play, dampers.CoulombFriction, dampers.StribeckFriction,
-     dampers.HyperbolicTangent, dampers.KaradayiMasada),  # friction
-    (dampers.Table, dampers.SplineTable, dampers.ForceSurface, dampers.AccelerationSurface, dampers.NeuralHysteresis,
-     dampers.Hybrid),  # numbers without a formula
-    (dampers.MonoTube, dampers.PistonFlow, dampers.FrequencySelective),  # hydraulics
-)  # fmt: skip
 BLACK = "#222222"
-GREY = "#7F7F7F"
+GREY = "#6B6B6B"
 SHADE = "#F5EEDF"  # behind what is extrapolated
+GOOD, DOUBT, BAD = "#00755A", "#9A5B00", "#B00020"  # of a verdict; what is beyond a limit is BAD
+# What a line means, the same in every picture, on every page and in notebooks.
+MEASURED: Look = {"color": GREY, "linestyle": "-"}
+BEFORE: Look = {"color": BLACK, "linestyle": "--", "linewidth": 1.3, "zorder": 2.5}
+AFTER: Look = {"color": COLOURS[0], "linestyle": "-", "linewidth": 2.0}
+REFERENCE: Look = {"color": "#949494", "linestyle": "-", "linewidth": 3.5, "zorder": 1.5}
+LIMIT: Look = {"color": BAD, "linestyle": "--", "linewidth": 1.2}
+REBOUND, COMPRESSION = COLOURS[0], COLOURS[1]  # where both are on one axis
+FRONT, REAR = "-", "-."
 
 VELOCITY = "velocity [m/s]   (+ rebound, − compression)"
 STROKE = "stroke [mm]   (+ rebound, − compression)"
 FORCE = "force [N]   (+ resists extension)"
 SIMULATE = "Take what `jaxdamp.simulate(vehicle, road)` gives, or several by name: {'before': ..., 'after': ...}."
+
+_PEOPLE = {
+    "besinger": "Besinger", "bouc wen": "Bouc–Wen", "dahl": "Dahl", "lu gre": "LuGre", "lugre": "LuGre",
+    "karadayi masada": "Karadayi–Masada", "stribeck": "Stribeck", "coulomb": "Coulomb",
+}  # fmt: skip
+_BESIDE = ("series spring", "lag", "series spring dahl")  # at the end of the name of a law: what stands beside the law
+_METRICS = (  # patterns in the names of ride metrics, and how people say them
+    (r"^weighted_rms_(.*)", r"\1, weighted RMS"),
+    (r"^vibration_dose_value_(.*)", r"\1, vibration dose value"),
+    (r"^(rms|peak)_(.*)", r"\2, \1"),
+    (r"(.*)_(peak_to_peak|rms|mean)$", r"\1, \2"),
+    (r"\bsprung_|_sprung_", "body_"),
+    (r"working_space", "suspension travel"),
+    (r"dynamic_tyre_load", "tyre load variation"),
+    (r"_", " "),
+    (r"\brms\b", "RMS"),
+    (r"peak to peak", "peak–peak"),
+)
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def new_figure(width: float, height: float) -> "matplotlib.figure.Figure":
@@ -45,60 +69,174 @@ def new_figure(width: float, height: float) -> "matplotlib.figure.Figure":
     return Figure(figsize=(width, height), dpi=100, layout="constrained")
 
 
-def line_style(index: int) -> dict[str, Any]:
+def line_style(index: int) -> Look:
     """Colour and dash of the curve of that number; the dash changes once the colours are used up."""
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index // len(COLOURS) % len(DASHES)]}
 
 
-def law_styles(laws: Mapping[str, AbstractDamper]) -> dict[str, dict[str, Any]]:
-    """Colour and dash of laws by name: a law has the colour of its family, solid, in every figure.
+def design_styles(names: Sequence[str], before: str | None = None, reference: str | None = None) -> dict[str, Look]:
+    """How to draw designs by name: the first is blue, the next have other colours; of many, other dashes too.
 
-    Of several laws of one family in a figure, all but the first are dashed, in colours that no family there has as long
-    as there are any.
+    Arguments:
+        names: of the designs, the most important first.
+        before: name of the one that the others are compared with: black and dashed.
+        reference: name of the truth or of a measurement: broad and grey beneath the others.
     """
-    families = {name: _family(law) for name, law in laws.items()}
-    spare = [colour for colour in range(len(COLOURS)) if colour not in families.values()]
-    more = [(colour, dash) for dash in range(1, len(DASHES)) for colour in (*spare, *sorted(set(families.values())))]
-    chosen: dict[str, tuple[int, int]] = {}
-    for name, family in families.items():
-        unused = [place for place in ((family, 0), *more) if place not in chosen.values()]
-        chosen[name] = unused[0] if unused else (family, 0)
-    return {name: {"color": COLOURS[colour], "linestyle": DASHES[dash]} for name, (colour, dash) in chosen.items()}
+    others = [name for name in names if name not in (before, reference)]
+    styles = {name: {"linewidth": 1.4, **line_style(i), **(AFTER if i == 0 else {})} for i, name in enumerate(others)}
+    special = {before: BEFORE, reference: REFERENCE}
+    return {name: dict(special[name]) if name in special else styles[name] for name in names}
 
 
-def _family(law: AbstractDamper) -> int:
-    """The number of the colour of a law: that of its family, or of the first law inside a sum or a wrapper.
-
-    Laws of your own have one by their name.
-    """
-    families = [number for number, family in enumerate(FAMILIES) if isinstance(law, family)]
-    inside = law.inner_laws()
-    if families or not inside:
-        return families[0] if families else zlib.crc32(type(law).__name__.encode()) % len(COLOURS)
-    return _family(inside[0])
+def ride_styles(names: Sequence[str], reference: str | None = None) -> dict[str, Look]:
+    """`design_styles` of rides: the first of several is what the last one, the result, is compared with."""
+    before = names[0] if reference is None and len(names) > 1 else None
+    styles = design_styles([*names][:: -1 if before is not None else 1], before, reference)
+    return {name: styles[name] for name in names}
 
 
-def graded(index: int, count: int) -> tuple[float, float, float, float]:
+def graded(index: float, count: int = 2) -> tuple[float, float, float, float]:
     """One of so many colours in order, dark to light, for curves that have an order themselves."""
     from matplotlib import colormaps
 
-    return colormaps["viridis"](0.88 * index / max(count - 1, 1))
+    return colormaps["viridis"](0.66 * index / max(count - 1, 1))
 
 
 def short(value: float) -> str:
-    """Three figures, but no power of ten for thousands."""
-    return (f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}").replace("-", "−")
+    """Three figures, no power of ten from 0.001 to 99 999, a true minus, and none before zero.
+
+    >>> short(-1032.4), short(0.0123456), short(8.818e-05), short(-0.0)
+    ('−1032', '0.0123', '8.82·10⁻⁵', '0')
+    """
+    if not np.isfinite(value):
+        return "–" if np.isnan(value) else f"{'−' * (value < 0)}∞"
+    if value and not 1e-3 <= abs(value) < 1e5:
+        digits, power = f"{value:.2e}".split("e")
+        text = f"{float(digits):g}·10{str(int(power)).translate(_RAISED)}"
+    else:
+        text = f"{value:.0f}" if abs(value) >= 1e3 else f"{value:.3g}"
+    return "0" if value == 0.0 else text.replace("-", "−")
+
+
+def quantity(value: float, unit: str) -> str:
+    """A number with its unit for people: strokes in mm.
+
+    >>> quantity(0.0745, "m"), quantity(1.25, "m/s^2"), quantity(3.0, "")
+    ('74.5 mm', '1.25 m/s²', '3')
+    """
+    value, unit = (1e3 * value, "mm") if unit == "m" else (value, typeset_unit(unit))
+    return f"{short(value)} {unit}".rstrip()
+
+
+def percent(value: float, digits: int = 0) -> str:
+    """A change with its sign: "−14 %"; zero has none."""
+    text = f"{value:+.{digits}f}"
+    return f"{text if float(text) else text[1:]} %".replace("-", "−")
+
+
+def typeset(text: str) -> str:
+    """A sentence as it is printed: true minus, arrow, raised powers; names of metrics and laws in words."""
+    text = re.sub(r"\b\w+(?:_\w+)+\b", lambda match: metric_words(match[0]), text)
+    text = text.replace("->", "→").replace("^2", "²").replace("**", "·").replace("`", "")
+    return re.sub(r"(?<![\w])-(?=\d)", "−", text)
+
+
+def in_words(name: str) -> str:
+    """The name of a law, parameter or setting as people say it.
+
+    >>> in_words("besinger_lag"), in_words("front.damper.rebound_rate")
+    ('Besinger + lag', 'front damper rebound rate')
+    """
+    text = name.replace(".", " ").replace("_", " ").strip()
+    for part in _BESIDE:
+        lead = text.removesuffix(f" {part}")
+        text = f"{lead} + {part.replace(' dahl', ' + dahl')}" if lead != text and lead in _PEOPLE else text
+    for plain, said in _PEOPLE.items():
+        text = re.sub(rf"\b{plain}\b", said, text)
+    return text
+
+
+def metric_words(name: str) -> str:
+    """The name of a ride metric as people say it; of anything else, its words.
+
+    >>> metric_words("weighted_rms_sprung_acceleration"), metric_words("front_working_space_peak_to_peak")
+    ('body acceleration, weighted RMS', 'front suspension travel, peak–peak')
+    """
+    said = name
+    for pattern, words in _METRICS:
+        said = re.sub(pattern, words, said)
+    return in_words(said)
+
+
+def frequency_axis(axis: "matplotlib.axis.Axis") -> None:
+    """A logarithmic axis with ticks at 1, 2 and 5 of each decade, in plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=30))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: short(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def label_ends(axes: "matplotlib.axes.Axes", lines: Sequence["matplotlib.lines.Line2D"], gap: float = 0.05) -> None:
+    """The label of each line at its right end, in its colour, moved apart where labels would meet: no legend.
+
+    Arguments:
+        axes: with its limits set.
+        lines: whose labels to write.
+        gap: smallest distance of two labels, as a share of the height of the axes.
+    """
+    ends = []
+    for line in lines:
+        x, y = (np.asarray(values, dtype=float) for values in line.get_data())
+        if np.isfinite(y).any():
+            last = np.flatnonzero(np.isfinite(y))[np.argmax(x[np.isfinite(y)])]
+            share = axes.transAxes.inverted().transform(axes.transData.transform((x[last], y[last])))
+            ends.append((*share, line))
+    place = -np.inf
+    for x, y, line in sorted(ends, key=lambda end: end[1]):
+        place = max(min(y, 1.0), place + gap)
+        look = {"color": line.get_color(), "fontsize": "small", "va": "center", "annotation_clip": False}
+        to = (min(x, 1.0) + 0.015, place)
+        axes.annotate(str(line.get_label()), to, xycoords="axes fraction", **look)
 
 
 def dress(axes: "matplotlib.axes.Axes", x: str, y: str, title: str = "") -> None:
-    """Labels, a light grid, and no frame above and to the right."""
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
+    """Labels, a light grid, and no frame above and to the right; ticks in the units and the sign that are shown.
+
+    The numbers drawn are those of the library: where the labels name a unit that is shown otherwise, the ticks are
+    round numbers of the other unit, and an axis of the other sign runs the other way.
+    """
+    axes.set_xlabel(display().text(x))
+    axes.set_ylabel(display().text(y))
+    for axis, label in ((axes.xaxis, x), (axes.yaxis, y)):
+        _rescale(axis, label)
     if title:
-        axes.set_title(title, loc="left", fontsize="medium")
+        axes.set_title(display().words(title), loc="left", fontsize="medium")
     axes.grid(True, color="0.9", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _rescale(axis: "matplotlib.axis.Axis", label: str) -> None:
+    """Ticks of an axis in the unit and the sign that are shown, by the unit in its label."""
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    found = re.search(r"\[([^\[\]]+)\]", label)
+    shown = display().of(found[1] if found else "", signed=display().text(label) != label and "+" in label)
+    if shown.factor == 1.0 or axis.get_scale() != "linear":
+        return
+
+    class Ticks(MaxNLocator):
+        def tick_values(self, vmin: float, vmax: float) -> Any:
+            ends = sorted((shown(vmin), shown(vmax)))
+            return np.sort(super().tick_values(*ends) / shown.factor)
+
+    axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 5, 10]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(shown(value), 9) + 0.0:g}".replace("-", "−")))
+    if shown.factor < 0.0:
+        axis.set_inverted(True)
+        change = f"{axis.axis_name}lim_changed"
+        axis.axes.callbacks.connect(change, lambda _: None if axis.get_inverted() else axis.set_inverted(True))
 
 
 def cross(axes: "matplotlib.axes.Axes", horizontal: bool = True, vertical: bool = True) -> None:
@@ -111,23 +249,31 @@ def cross(axes: "matplotlib.axes.Axes", horizontal: bool = True, vertical: bool 
 
 def legend_beside(
     figure: "matplotlib.figure.Figure",
-    handles: Sequence[Any],
+    handles: Sequence[object],
     title: str = "",
     place: Literal["upper", "lower"] = "upper",
 ) -> None:
     """A legend to the right of all axes, never over data."""
+    _in_words(handles)
     where = "outside right upper" if place == "upper" else "outside right lower"
     figure.legend(handles=list(handles), loc=where, frameon=False, title=title or None, alignment="left")
 
 
-def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[Any], columns: int = 3) -> None:
+def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[object], columns: int = 3) -> None:
     """A legend above all axes, for pictures that need their width."""
+    _in_words(handles)
     figure.legend(
         handles=list(handles), loc="outside upper center", frameon=False, ncols=min(columns, max(len(handles), 1))
     )
 
 
-def by_name(argument: str, given: Any, kind: type, words: str, remedy: str, alone: str = "") -> dict[str, Any]:
+def _in_words(handles: Sequence[Any]) -> None:
+    """The labels of a legend in the units that are shown."""
+    for handle in handles:
+        handle.set_label(display().words(str(handle.get_label())))
+
+
+def by_name(argument: str, given: object, kind: type, words: str, remedy: str, alone: str = "") -> Look:
     """One object to draw, or several by name, as a dictionary; `alone` names a single one.
 
     Arguments:
@@ -152,14 +298,23 @@ def by_name(argument: str, given: Any, kind: type, words: str, remedy: str, alon
 
 def note_below(figure: "matplotlib.figure.Figure", sentences: Sequence[str]) -> None:
     """Remarks in small print under all axes; nothing if there are none."""
-    lines = [line for sentence in sentences for line in textwrap.wrap(sentence, int(11 * figure.get_figwidth()))]
+    lines = [
+        line
+        for sentence in map(display().words, sentences)
+        for line in textwrap.wrap(sentence, int(11 * figure.get_figwidth()))
+    ]
     if lines:
         figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize="small", color="0.35")
 
 
 def law_name(law: AbstractDamper) -> str:
-    """The classes of a law in words: "SeriesSpring of Besinger", "Linear + CoulombFriction"."""
+    """The classes of a law in words: "Besinger + series spring", "linear + Coulomb friction"."""
     if isinstance(law, Sum):
         return " + ".join(law_name(term) for term in law.terms)
-    name, inside = type(law).__name__, law.inner_laws()
-    return f"{name} of {law_name(inside[0])}" if len(inside) == 1 else name
+    words, inside = class_words(law), law.inner_laws()
+    return f"{law_name(inside[0])} + {words}" if len(inside) == 1 else words
+
+
+def class_words(part: Any) -> str:
+    """The name of a class in words: "digressive progressive" of a DigressiveProgressive, "half car" of a HalfCar."""
+    return in_words(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(part).__name__).lower())

@@ -49,8 +49,8 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
             _spectrum(figure.add_subplot(below[place]), channel, result.start.units[channel], pair)
     gaps = _laws(curves, pairs, np.asarray(velocities, dtype=float))
     verdict = result.verdict
-    colour = _style.COLOURS[2 if verdict.better else 1]
-    lines = [verdict.outcome.value, *textwrap.wrap(verdict.sentence, 130)]
+    colour = _style.GOOD if verdict.better else _style.BAD
+    lines = [verdict.outcome.value, *textwrap.wrap(_style.typeset(verdict.sentence), 130)]
     figure.suptitle("\n".join(lines), fontsize="medium", color=colour)
     _bars(bars, result)
     _search(search, result)
@@ -63,9 +63,8 @@ def _laws(
 ) -> list[str]:
     """The laws before and after over the velocity; a sentence for each that has no settled force somewhere."""
     gaps = []
-    styles = _style.law_styles({name: after for name, (_, after) in pairs.items()})
-    for name, pair in pairs.items():
-        colour = styles[name]["color"]
+    for number, (name, pair) in enumerate(pairs.items()):
+        colour = _style.COLOURS[number % len(_style.COLOURS)]
         settled = [quasi_static(law, points) for law in pair]
         old, new = (np.asarray(curve.force) for curve in settled)
         gaps += [f"{name}{when}: {c.note}" for when, c in zip(("before", "after"), settled, strict=True) if c.note]
@@ -75,7 +74,7 @@ def _laws(
     fitted_range.shade(curves, [law for pair in pairs.values() for law in pair], points)
     _style.dress(curves, _style.VELOCITY, _style.FORCE, "Damper law")
     _style.cross(curves)
-    curves.legend(loc="upper left", facecolor="white", edgecolor="none")
+    curves.legend(loc="best", frameon=False)
     return gaps
 
 
@@ -114,7 +113,7 @@ def _bars(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
     reached = {n: " (limit reached)" if n in result.active_limits else " (limited)" for n in result.limits}
     reached |= dict.fromkeys(result.violated, " (LIMIT VIOLATED)")
     marks = [" (minimised)" if n == result.metric else reached.get(n, "") for n in names]
-    axes.set_yticks(rows, [n.replace("_", " ") + mark for n, mark in zip(names, marks, strict=True)])
+    axes.set_yticks(rows, [_style.metric_words(n) + mark for n, mark in zip(names, marks, strict=True)])
     axes.invert_yaxis()
     lower, upper = min(*change, 0.0), max(*change, 0.0)
     spread = max(upper - lower, 1.0)
@@ -126,11 +125,11 @@ def _bars(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
 
 def _spectrum(axes: "matplotlib.axes.Axes", channel: str, unit: str, pair: tuple[Any, Any]) -> None:
     """The power spectral density of a channel before and after."""
-    styles = ({"linestyle": "--", "color": _style.BLACK}, {"color": _style.COLOURS[0], "linewidth": 1.8})
-    for spectrum, style, label in zip(pair, styles, ("before", "after"), strict=True):
+    for spectrum, style, label in zip(pair, (_style.BEFORE, _style.AFTER), ("before", "after"), strict=True):
         axes.loglog(spectrum.frequency, spectrum.density, label=label, **style)
-    title = f"Spectrum of the {channel.replace('_', ' ')}"
+    title = f"Spectrum of the {_style.metric_words(channel)}"
     _style.dress(axes, "frequency [Hz]", f"[({typeset_unit(unit)})²/Hz]", title)
+    _style.frequency_axis(axes.xaxis)
     axes.set_xlim(pair[0].frequency[0], pair[0].frequency[-1])
     axes.legend(frameon=False)
 
@@ -142,5 +141,5 @@ def _search(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
     axes.plot(np.arange(len(history)), history, "o-", color=_style.COLOURS[0], markersize=3.5, linewidth=1.3)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     unit = typeset_unit(result.units[result.metric], "–")
-    title = f"Search of {result.metric.replace('_', ' ')}"
+    title = f"Search: {_style.metric_words(result.metric)}"
     _style.dress(axes, "step of the search", f"metric [{unit}]", title)

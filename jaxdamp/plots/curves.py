@@ -37,7 +37,7 @@ def force_velocity(
 ) -> "matplotlib.figure.Figure":
     """Force over velocity of one law or several, over the samples and the peak-velocity points of records.
 
-    A law has the same colour in every figure, that of its family.
+    The first law is blue, others have other colours, the baseline is black and dashed.
 
     A law with states is drawn at constant velocity with settled states: the curve in the middle of its loops. Where it
     has no settled or no finite force the curve has a gap, and a remark under the picture gives the reason. Outside the
@@ -104,17 +104,16 @@ def draw_laws(
 ) -> tuple[list, list[str]]:
     """One curve for each law; the handles for the legend, and remarks on gaps in the curves."""
     handles, gaps = [], []
-    styles = _style.law_styles({name: law for name, law in laws.items() if name != baseline})
-    styles |= {baseline: {"color": _style.BLACK, "linestyle": "--", "zorder": 2.5}} if baseline else {}
+    styles = _style.design_styles(list(laws), baseline)
     for name, law in laws.items():
         curve = quasi_static(law, velocities)
         gaps += [f"{name}: {curve.note}"] if curve.note else []
-        label = f"{name} (settled)" if law.initial_state().size else name
+        label = _style.in_words(name) + " (settled)" * bool(law.initial_state().size)
         style = styles[name]
         force = np.asarray(curve.force)
-        handles += fitted_range.curve(axes, law, velocities, force, linewidth=1.8, label=label, **style)
+        handles += fitted_range.curve(axes, law, velocities, force, label=label, **style)
         if name in bands:
-            band, label = bands[name], f"{name}, 95 %"
+            band, label = bands[name], f"{_style.in_words(name)}, 95 %"
             shade = {"color": style["color"], "alpha": 0.25, "linewidth": 0.0, "zorder": 2.0, "label": label}
             handles.append(axes.fill_between(band.velocity, band.lower, band.upper, **shade))
     return handles, gaps
@@ -133,7 +132,7 @@ def _measured(axes: "matplotlib.axes.Axes", runs: Sequence[BenchRun]) -> list:
         return []
     cycles = [np.stack([run.velocity, run.force])[:, last_steady_cycle(run)] for run in runs]
     velocity, force = np.concatenate([cycle[:, :: max(cycle.shape[1] // 400, 1)] for cycle in cycles], axis=1)
-    cloud = axes.plot(velocity, force, ".", color="0.78", markersize=2.0, label="measured, last cycles", zorder=0)
+    cloud = axes.plot(velocity, force, ".", color="0.58", markersize=2.0, label="measured, last cycles", zorder=0)
     peaks = peak_velocity_points(runs)
     rings = axes.plot(
         peaks.velocity.ravel(),

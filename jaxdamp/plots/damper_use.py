@@ -48,7 +48,7 @@ def damper_use(
     edges = np.linspace(-reach, reach, _BINS + 1)
     middles, handles, gaps = 0.5 * (edges[1:] + edges[:-1]), [], []
     laws = {name: response.vehicle.frame().element(damper).law for name, response in responses.items()}
-    styles = _style.law_styles(laws)
+    styles = _style.ride_styles(list(laws))
     for name, (velocity, force) in records.items():
         style, law = styles[name], laws[name]
         held = np.linspace(velocity.min(), velocity.max(), _POINTS)
@@ -56,14 +56,14 @@ def damper_use(
         curve = quasi_static(law, held)
         gaps += [f"{name or 'law'}: {curve.note}"] if curve.note else []
         force_held = np.asarray(curve.force)
-        handles += fitted_range.curve(trace, law, held, force_held, linewidth=1.8, label=name or "law", **style)
+        handles += fitted_range.curve(trace, law, held, force_held, label=_style.in_words(name) or "law", **style)
         shares = metrics.velocity_histogram(velocity, edges), metrics.dissipation_histogram(force, velocity, edges)
         for axes, share in zip((time_share, energy_share), shares, strict=True):
-            axes.step(middles, 100.0 * np.asarray(share), where="mid", linewidth=1.4, **style)
+            axes.step(middles, 100.0 * np.asarray(share), where="mid", **style)
     reached = np.linspace(-reach, reach, _SHADE_POINTS)
     shaded = [fitted_range.shade(axes, laws.values(), reached) for axes in (trace, time_share, energy_share)]
     handles += shaded[0]
-    words = f"{damper.replace('_', ' ')}: ride (thin), constant velocity (thick)"
+    words = f"{damper.replace('_', ' ').capitalize()}: law (thick) and its forces in the ride (thin)"
     _style.dress(trace, _style.VELOCITY, _style.FORCE, words)
     _style.cross(trace)
     _style.dress(time_share, "velocity [m/s]", "share of time [%]", f"Time, {reach / _BINS * 2:.2g} m/s a step")

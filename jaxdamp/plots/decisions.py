@@ -41,7 +41,7 @@ def damper_comparison(comparison: DamperComparison) -> "matplotlib.figure.Figure
         axes.errorbar(change, rows, xerr=_finite(from_parameters), fmt="none", **thick)
         axes.scatter(change, rows, 40.0, faces, edgecolors=colour, zorder=3)
         handles.append(axes.scatter([], [], 40.0, colour, label=f"{name} relative to {first}"))
-    axes.set_yticks(range(len(metrics)), [metric.replace("_", " ") for metric in metrics])
+    axes.set_yticks(range(len(metrics)), [_style.metric_words(metric) for metric in metrics])
     axes.invert_yaxis()
     roads = len(next(iter(comparison.values[first].values())))
     where = f"on the same {roads} roads" if roads > 1 else "on a white road"
@@ -50,7 +50,7 @@ def damper_comparison(comparison: DamperComparison) -> "matplotlib.figure.Figure
     _style.cross(axes, horizontal=False)
     _style.legend_above(figure, handles)
     legend = "With 95 % intervals; hollow where there may be no difference; thick: standard error from the parameters."
-    _style.note_below(figure, [legend, *comparison.warnings])
+    _style.note_below(figure, [legend, *map(_style.typeset, comparison.warnings)])
     return figure
 
 

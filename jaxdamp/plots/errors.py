@@ -18,7 +18,7 @@ def ladder(comparison: Comparison) -> "matplotlib.figure.Figure":
     Arguments:
         comparison: of `identify.compare`.
     """
-    rungs = comparison.rungs
+    rungs = sorted(comparison.rungs, key=lambda rung: rung.error)
     held = any(rung.held_out_rmse is not None for rung in rungs)
     rows = np.arange(len(rungs), dtype=float)
     thickness = 0.38 if held else 0.6
@@ -40,10 +40,16 @@ def ladder(comparison: Comparison) -> "matplotlib.figure.Figure":
         bars = axes.barh(rows + shift, values, thickness, color=colour, label=label)
         axes.bar_label(bars, fmt=_style.short, padding=3, fontsize="small")
         handles.append(bars)
-    words = "Errors of the laws (free parameters in brackets, the recommended law in bold)"
-    _style.dress(axes, "root of the mean squared force error [N]", "", words)
+    largest, best = max(float(np.abs(run.force).max()) for run in comparison.best.result.runs), comparison.best
+    share = f"{_style.short(best.error)} N = {_style.short(100.0 * best.error / largest)} % of the largest force"
+    title = f"{_style.in_words(best.name)}: {share}"
+    _style.dress(axes, "RMS of the force error [N]   (free parameters in brackets)", "", title)
+    factor = 100.0 / largest
+    to_percent, back = (lambda x: np.multiply(x, factor)), (lambda x: np.divide(x, factor))
+    shares = axes.secondary_xaxis("top", functions=(to_percent, back))
+    shares.set_xlabel("% of the largest force")
     axes.grid(False, axis="y")
-    axes.set_yticks(rows, [f"{r.name} ({r.parameters})" for r in rungs])
+    axes.set_yticks(rows, [f"{_style.in_words(r.name)} ({r.parameters})" for r in rungs])
     axes.get_yticklabels()[[r.name for r in rungs].index(comparison.best.name)].set_fontweight("bold")
     axes.invert_yaxis()
     axes.margins(x=0.1)

@@ -42,7 +42,7 @@ def evaluation(
     handles = []
     if baseline is not None:
         _checks.instance("baseline", baseline, Evaluation, "be an evaluation", _REMEDY)
-        style: dict[str, Any] = {"color": _style.GREY, "linestyle": "--", "linewidth": 1.0, "zorder": 1.5}
+        style: _style.Look = {"color": _style.GREY, "linestyle": "--", "linewidth": 1.0, "zorder": 1.5}
         for run in baseline.runs:
             _draw_cycle(panels, baseline.cycles[run.name], style)
         _draw_forces(panels["peaks"], baseline, dict.fromkeys(baseline.settings, style))
@@ -58,7 +58,7 @@ def evaluation(
     _draw_forces(panels["peaks"], evaluation, styles)
     handles += [Line2D([], [], color=colour, linewidth=2.0, label=label) for label, colour in labels]
     handles.append(Line2D([], [], color=_style.GREY, linewidth=7.0, alpha=0.3, label="± scatter over cycles"))
-    marks: dict[str, Any] = {"marker": "o", "markerfacecolor": "white", "color": _style.BLACK, "linestyle": ""}
+    marks: _style.Look = {"marker": "o", "markerfacecolor": "white", "color": _style.BLACK, "linestyle": ""}
     handles.append(Line2D([], [], label="at peak velocity", **marks))
     handles.append(Line2D([], [], label="at stated velocity", **{**marks, "marker": "D", "markerfacecolor": None}))
     handles += _draw_limits(panels["peaks"], limits) if limits is not None else []
@@ -82,7 +82,7 @@ def gas_and_friction(found: GasAndFriction) -> "matplotlib.figure.Figure":
     curves += (("even part: gas", found.even), ("odd part: friction and damping", found.odd))
     for number, (label, force) in enumerate(curves):
         handles += axes.plot(x, force, label=label, linewidth=1.6, **_style.line_style(number))
-    dotted: dict[str, Any] = {"color": _style.BLACK, "linestyle": ":"}
+    dotted: _style.Look = {"color": _style.BLACK, "linestyle": ":"}
     handles += axes.plot(x, found.static_force(found.stroke), label="gas force by its rate", **dotted)
     handles.append(axes.axhline(found.friction, color=_style.BLACK, linewidth=0.8, label="friction at zero velocity"))
     _style.dress(axes, _style.STROKE, _style.FORCE, f"{found.record}: force over stroke")
@@ -91,7 +91,7 @@ def gas_and_friction(found: GasAndFriction) -> "matplotlib.figure.Figure":
     return figure
 
 
-def _colours(evaluation: Evaluation) -> tuple[dict[str, Any], list[tuple[str, Any]]]:
+def _colours(evaluation: Evaluation) -> tuple[_style.Look, list[tuple[str, Any]]]:
     """The colour of each record, and the entries of the legend."""
     if len(evaluation.settings) > 1:
         names = list(evaluation.settings)
@@ -124,7 +124,7 @@ def _draw_band(
     values: Float[np.ndarray, " points"],
     force: Float[np.ndarray, " points"],
     scatter: Float[np.ndarray, " points"],
-    colour: Any,
+    colour: object,
 ) -> None:
     """A band about a loop, drawn from the smallest value to the largest and back, so that it does not cover itself."""
     first, last = sorted((int(np.argmin(values)), int(np.argmax(values))))
@@ -160,11 +160,11 @@ def _draw_forces(axes: "matplotlib.axes.Axes", evaluation: Evaluation, styles: M
             axes.plot(*np.array(stated).T, "D", markersize=4.5, color=styles[setting]["color"], zorder=3)
 
 
-def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list[Any]:
+def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list:
     """Bars from the least to the largest force at stated velocities; one-sided limits end at the measured value."""
     from matplotlib.lines import Line2D
 
-    colours = {True: _style.COLOURS[2], False: _style.COLOURS[1]}
+    colours = {True: _style.GOOD, False: _style.BAD}
     seen = set()
     for limit, measured in limits.results:
         if limit.velocity is None or measured is None or measured.unit != "N":
@@ -182,8 +182,10 @@ def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list[Any]:
 
 
 def _dress(panels: Mapping[str, "matplotlib.axes.Axes"]) -> None:
-    _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Mean cycles: force over velocity")
-    _style.dress(panels["peaks"], _style.VELOCITY, _style.FORCE, "Forces at peak and at stated velocities")
+    _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Continuous plot (CVP): mean cycles")
+    _style.dress(
+        panels["peaks"], _style.VELOCITY, _style.FORCE, "Peak-velocity plot (PVP), and forces at stated velocities"
+    )
     _style.dress(panels["x"], _style.STROKE, _style.FORCE, "Force over stroke")
     _style.dress(panels["a"], "acceleration [m/s²]   (+ rebound)", _style.FORCE, "Force over acceleration")
     _style.dress(panels["t"], "time in the cycle, over its period [–]", _style.FORCE, "Force over time")
@@ -207,7 +209,7 @@ def limit_check(check: LimitCheck) -> "matplotlib.figure.Figure":
         size = np.nanmax(np.abs([*ends, value])) or 1.0
         low, high = (-1.2 if np.isnan(ends[0]) else ends[0] / size), (1.2 if np.isnan(ends[1]) else ends[1] / size)
         axes.barh(row, high - low, left=low, height=0.5, color="0.85")
-        colour = _style.COLOURS[2] if measured is not None and limit.kept_by(value) else _style.COLOURS[1]
+        colour = _style.GOOD if measured is not None and limit.kept_by(value) else _style.BAD
         axes.plot(value / size, row, "o", color=colour)
         where = limit.setting if measured is None else measured.record or measured.setting
         shown = "not measured" if measured is None else f"{_style.short(value)} {measured.unit}".strip()

@@ -58,7 +58,7 @@ def pareto(
         plot.set_axis_off()
     by_label = {handle.get_label(): handle for handles in drawn for handle in handles}
     _style.legend_above(figure, list(by_label.values()), 3)
-    _style.note_below(figure, [front.summary])
+    _style.note_below(figure, [_style.typeset(front.summary)])
     return figure
 
 
@@ -69,7 +69,7 @@ def _points(
     across, up, shades = front.values[x], front.values[y], front.shares[:, 0]
     if len(front.names) == 2:
         axes.plot(across, up, color="0.6", linewidth=1.0, zorder=1)
-    points = axes.scatter(across, up, 26.0, 0.88 * shades, cmap="viridis", vmin=0.0, vmax=1.0, label="front", zorder=3)
+    points = axes.scatter(across, up, 26.0, 0.66 * shades, cmap="viridis", vmin=0.0, vmax=1.0, label="front", zorder=3)
     knee = axes.scatter(
         across[front.knee], up[front.knee], 150.0, facecolors="none", edgecolors=_style.COLOURS[1], linewidths=1.8,
         label=f"knee, point {front.knee}", zorder=4,
@@ -86,12 +86,14 @@ def _points(
 
 def _limits(axes: "matplotlib.axes.Axes", front: ParetoFront, x: str, y: str) -> list[Any]:
     """Dashed lines at the limits of the two objectives, and marks at points where another metric is at its limit."""
-    colour, handles = _style.COLOURS[3], []
+    colour, handles = _style.BAD, []
     for name, (lower, upper) in limit_spans(front.limits, list(front.values)).items():
         for end in (lower, upper):
             if not np.isfinite(end):
                 continue
-            words = f"limit of {name.replace('_', ' ')}, {_style.short(end)} {typeset_unit(front.units[name])}".rstrip()
+            words = (
+                f"limit of {_style.metric_words(name)}, {_style.short(end)} {typeset_unit(front.units[name])}".rstrip()
+            )
             if name in (x, y):
                 line = axes.axvline if name == x else axes.axhline
                 handles.append(line(end, color=colour, linestyle="--", linewidth=1.2, label=words))
@@ -102,7 +104,7 @@ def _limits(axes: "matplotlib.axes.Axes", front: ParetoFront, x: str, y: str) ->
 
 
 def _label(front: ParetoFront, name: str) -> str:
-    words, unit = name.replace("_", " "), typeset_unit(front.units[name])
+    words, unit = _style.metric_words(name), typeset_unit(front.units[name])
     return f"{words} [{unit}]" if unit else words
 
 
@@ -132,8 +134,6 @@ def _curves(
     velocities: VectorLike | None,
 ) -> None:
     """Force over velocity of the laws at some points of the front, the knee among them."""
-    from matplotlib import colormaps
-
     if velocities is None:
         peaks = front.values.get("peak_damper_velocity", np.zeros(1))
         reach = 1.1 * float(np.max(peaks)) or 1.0
@@ -144,7 +144,7 @@ def _curves(
     for i in sorted(shown):
         force = np.asarray(quasi_static(laws[i], points).force)
         knee = i == front.knee
-        colour = _style.COLOURS[1] if knee else colormaps["viridis"](0.88 * shades[i])
+        colour = _style.COLOURS[1] if knee else _style.graded(float(shades[i]))
         axes.plot(points, force, color=colour, linewidth=2.2 if knee else 1.1, zorder=3 if knee else 2)
     _style.dress(axes, _style.VELOCITY, _style.FORCE, f"{title}, in the colours of the front")
     _style.cross(axes)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 
-_SHADES = {"error": "#D55E00", "warning": "#E69F00", "note": "#56B4E9"}
+_SHADES = {"error": _style.BAD, "warning": _style.COLOURS[1], "note": _style.COLOURS[0]}
 
 
 def preflight(found: Preflight) -> "matplotlib.figure.Figure":
@@ -36,8 +36,9 @@ def preflight(found: Preflight) -> "matplotlib.figure.Figure":
             cells.setdefault((names.index(finding.name), found.records.index(record)), []).append(finding)
     for (x, y), findings in cells.items():
         worst = max(findings, key=lambda finding: abs(finding.size or 0.0))
-        axes.add_patch(Rectangle((x - 0.46, y - 0.44), 0.92, 0.88, color=_SHADES[worst.severity], alpha=0.55))
-        text = "" if worst.size is None else f"{_style.short(worst.size)} {worst.unit}"
+        alpha = 0.25 + 0.2 * (worst.severity == "error")
+        axes.add_patch(Rectangle((x - 0.46, y - 0.44), 0.92, 0.88, color=_SHADES[worst.severity], alpha=alpha))
+        text = "" if worst.size is None else _size(worst)
         axes.text(x, y, text + f" ({len(findings)})" * (len(findings) > 1), ha="center", va="center", fontsize="small")
     axes.set_xticks(range(len(names)), names, rotation=30, ha="left")
     axes.set_yticks(range(len(found.records)), found.records)
@@ -49,6 +50,17 @@ def preflight(found: Preflight) -> "matplotlib.figure.Figure":
     axes.grid(True, which="minor", color="0.9", linewidth=0.8)
     axes.tick_params(which="both", length=0)
     axes.spines[:].set_visible(False)
-    figure.suptitle(found.summary)
-    _style.legend_beside(figure, [Patch(color=colour, alpha=0.55, label=word) for word, colour in _SHADES.items()])
+    figure.suptitle(_style.typeset(found.summary))
+    _style.legend_beside(figure, [Patch(color=colour, alpha=0.35, label=word) for word, colour in _SHADES.items()])
     return figure
+
+
+def _size(finding: Finding) -> str:
+    """The size of a finding in units for people, after E, W or i: not everyone can tell the colours."""
+    sign = {"error": "E", "warning": "W"}.get(finding.severity, "i")
+    size, unit = finding.size or 0.0, finding.unit
+    if unit in ("", "–") and abs(size) < 1.0:
+        size, unit = 100.0 * size, "%"
+    for large, small in (("s", "ms"), ("m", "mm")):
+        size, unit = (1e3 * size, small) if unit == large and abs(size) < 0.1 else (size, unit)
+    return f"{sign}  {_style.short(size)} {unit}"

@@ -1,7 +1,7 @@
 """Rides: time histories and the spectrum of the body acceleration."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -69,7 +69,7 @@ def ride(
     rows += [figure.add_subplot(grid[i, 0], sharex=rows[0]) for i in range(1, len(channels))]
     spectrum = figure.add_subplot(grid[:, 1])
     handles, unit = [], _unit(first, channels[0])
-    styles = _ride_styles(responses, reference)
+    styles = _style.ride_styles(list(responses), reference)
     for name, response in responses.items():
         style = styles[name]
         time, all_channels = np.asarray(response.time), response.channels
@@ -79,7 +79,7 @@ def ride(
         for axes, channel in zip(rows, channels, strict=True):
             axes.plot(time[seen], _factor(first, channel) * np.asarray(all_channels[channel])[seen], **style)
         values = np.asarray(all_channels[channels[0]])
-        label = f"{name + ': ' if name else ''}RMS {_style.short(float(metrics.rms(values)))} {unit}"
+        label = f"{_style.in_words(name) + ': ' if name else ''}RMS {_style.short(float(metrics.rms(values)))} {unit}"
         frequency, density = _spectrum(values, time, frequencies)
         if weighting is not None:
             dt = float(time[1] - time[0])
@@ -99,7 +99,7 @@ def ride(
     name = _label(first, channels[0]).split(" [")[0]
     words = f"Spectrum of the {name}" + (f", dotted: weighted by {weighting}" if weighting else "")
     _style.dress(spectrum, "frequency [Hz]", f"power spectral density [({unit})²/Hz]", words)
-    spectrum.grid(True, which="minor", color="0.95", linewidth=0.5)
+    _style.frequency_axis(spectrum.xaxis)
     spectrum.set_xlim(*frequencies)
     _style.legend_above(figure, handles)
     title = title or f"{type(first.vehicle).__name__}, ride of {float(first.time[-1] - first.time[0]):g} s"
@@ -117,16 +117,6 @@ def _chosen_channels(response: Response, channels: Sequence[str] | None) -> Sequ
     for channel in channels:
         _checks.one_of("channels", channel, response.units)
     return channels
-
-
-def _ride_styles(responses: Mapping[str, Response], reference: str | None) -> dict[str, dict[str, Any]]:
-    """How to draw each response: in the colour of its first damper's law, the reference broad beneath all."""
-    others = [name for name in responses if name != reference]
-    laws = {name: r.vehicle.frame().element(r.dampers[0]).law for name, r in responses.items() if r.dampers}
-    are_laws = all(name in laws for name in others)
-    styles = _style.law_styles({name: laws[name] for name in others}) if are_laws else {}
-    styles = {n: (styles[n] if are_laws else _style.line_style(i)) | {"linewidth": 1.2} for i, n in enumerate(others)}
-    return styles if reference is None else {reference: {"color": "0.7", "linewidth": 3.5}} | styles
 
 
 def ride_channels(response: Response) -> tuple[str, ...]:

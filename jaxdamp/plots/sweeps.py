@@ -29,7 +29,7 @@ def sweep(
     metric: str,
     over: Sequence[str] | None = None,
     *,
-    limits: Mapping[str, Any] | None = None,
+    limits: Mapping[str, object] | None = None,
 ) -> "matplotlib.figure.Figure":
     """A result of a sweep over a grid: a curve for one axis, a map for two; failed points are marked.
 
@@ -190,7 +190,7 @@ class _End(NamedTuple):
         return values > self.value if self.above else values < self.value
 
 
-def _ends(data: Any, spans: Mapping[str, tuple[float, float]]) -> list[_End]:
+def _ends(data: object, spans: Mapping[str, tuple[float, float]]) -> list[_End]:
     """The finite ends of limits, in words."""
     ends = []
     for name, span in spans.items():

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from jaxdamp import _checks
+from jaxdamp._tables import typeset_unit
 from jaxdamp.identify import VehicleFit
 from jaxdamp.plots import _style
 
@@ -35,8 +36,8 @@ def vehicle_fit(result: VehicleFit, record: str | None = None) -> "matplotlib.fi
         over.plot(shown.time, shown[channel], color=_style.GREY, linewidth=2.5, alpha=0.5, label="measured")
         over.plot(shown.time, fitted[channel], color=_style.COLOURS[0], linewidth=0.9, label="fitted")
         spectrum.plot(shown.time, fitted[channel] - shown[channel], color=_style.COLOURS[1], linewidth=0.6)
-        _style.dress(over, "", f"[{unit}]", channel)
-        _style.dress(spectrum, "", f"[{unit}]", "fitted − measured")
+        _style.dress(over, "", f"[{typeset_unit(unit)}]", _style.metric_words(channel))
+        _style.dress(spectrum, "", f"[{typeset_unit(unit)}]", "fitted − measured")
     for axes in rows[-1]:
         axes.set_xlabel("time [s]")
     _style.legend_above(figure, rows[0, 0].get_lines())

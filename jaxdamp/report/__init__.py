@@ -27,6 +27,7 @@ from jaxdamp.report.fits import (
     fitted_velocities as fitted_velocities,
     parameters_of as parameters_of,
 )
+from jaxdamp.report.force_velocity import table_report as table_report
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import fitted_range_table as fitted_range_table, range_use_table as range_use_table
 from jaxdamp.report.records import add_records as add_records, records_table as records_table
@@ -56,30 +57,6 @@ __all__ = [
     "sweep_report",
     "tuning_report",
     "vehicle_fit_report",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "Attempts",
-    "Column",
-    "add_evaluation",
-    "add_other_fits",
-    "add_records",
-    "add_rides",
-    "add_tuning",
-    "axles_sentence",
-    "baseline_table",
-    "failure_sentences",
-    "fit_verdict",
-    "fitted_range_table",
-    "fitted_velocities",
-    "law_evaluation",
-    "notes_of",
-    "parameters_of",
-    "range_use_table",
-    "records_table",
-    "ride_records_table",
-    "ride_tables",
-    "ride_verdict",
 ]
 
 answer_guesses(__name__, __all__)

@@ -46,7 +46,9 @@ def bench_report(
     report = Report(title, folder, attempts)
     if isinstance(baseline, AbstractDamper):
         baseline = law_evaluation(baseline, evaluation)
-    report.verdict(*bench_verdict(evaluation, preflight, limits))
+    sentences = bench_verdict(evaluation, preflight, limits)
+    report.verdict(*sentences)
+    add_bench_sheet(report, evaluation, sentences[0] if sentences else "", preflight, limits)
     add_records(report, evaluation.runs, (), remarks, preflight)
     if preflight is not None and preflight.findings:
         report.table(preflight.table())
@@ -55,6 +57,23 @@ def bench_report(
         report.table(limits.table())
     add_evaluation(report, evaluation, baseline, limits)
     return report
+
+
+def add_bench_sheet(
+    report: Report, evaluation: Evaluation, sentence: str, preflight: Preflight | None, limits: LimitCheck | None = None
+) -> None:
+    """The sheet of records without a law, with what the preflight says.
+
+    Arguments:
+        report: the page.
+        evaluation: of `bench.evaluate`.
+        sentence: at the top.
+        preflight: of `bench.preflight`.
+        limits: of `evaluation.check`.
+    """
+    doubts = evaluation.notes if preflight is None else [*preflight.sentences(), *evaluation.notes]
+    more = {"sentence": sentence, "warnings": doubts, "limits": limits}
+    report.sheet(lambda: evaluation.plot("sheet", **more), sentence, "damper_sheet")
 
 
 def add_evaluation(
@@ -70,7 +89,11 @@ def add_evaluation(
     """
     report.heading("Evaluation")
     report.points(evaluation.notes)
-    report.picture(lambda: evaluation.plot(baseline, limits), "Mean cycles and forces over velocity", "evaluation.png")
+    report.picture(
+        lambda: evaluation.plot(baseline=baseline, limits=limits),
+        "Mean cycles and forces over velocity",
+        "evaluation.png",
+    )
     for name, table in evaluation.tables().items():
         if name != "measurements":
             report.table(table)

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from jaxdamp import plots
 from jaxdamp.bench import BenchRun, Evaluation, Preflight
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Comparison
@@ -60,11 +61,17 @@ def chain_report(
     """
     report = Report(title, folder, attempts)
     report.verdict(
-        *(bench_verdict(evaluation, preflight) if evaluation else []),
+        *([tuned.summary] if tuned else []),
         *fit_verdict(report, comparison, baseline),
         *(f"{road}: {sentence}" for road, ride in rides.items() for sentence in ride_verdict(ride)),
-        *([tuned.summary] if tuned else []),
+        *(bench_verdict(evaluation, preflight) if evaluation else []),
     )
+    report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
+    if tuned is not None:
+        report.sheet(lambda: tuned.plot("sheet"), tuned.verdict.sentence, "ride_sheet")
+    elif rides:
+        road, ride = next(iter(rides.items()))
+        report.sheet(lambda: plots.ride_sheet(ride, name=road), ride_verdict(ride)[-1], "ride_sheet")
     records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
     add_records(report, records, comparison.held_out, remarks, preflight)
     if evaluation is not None:

@@ -60,6 +60,7 @@ def fit_report(
     """
     report = Report(title, folder, attempts)
     report.verdict(*fit_verdict(report, comparison, baseline), f"{preflight.summary}." if preflight else "")
+    report.sheet(lambda: comparison.plot("sheet", baseline=baseline), comparison.verdict[0], "damper_sheet")
     records = (*comparison.best.result.runs, *comparison.held_out) if runs is None else tuple(runs)
     add_records(report, records, comparison.held_out, remarks, preflight)
     add_fits(report, comparison, failures, baseline)
@@ -179,7 +180,7 @@ def fitted_velocities(comparison: Comparison) -> np.ndarray:
 def _add_curves(report: Report, comparison: Comparison, baseline: AbstractDamper | None) -> None:
     """Force over velocity of the best laws; a law without a curve is left out of the picture and named.
 
-    The baseline is dashed and black; without one, the best of several laws is.
+    The best law is blue, the baseline dashed and black.
     """
     best = comparison.best
     order = sorted(comparison.rungs, key=lambda rung: (rung is not best, rung.error))
@@ -194,10 +195,8 @@ def _add_curves(report: Report, comparison: Comparison, baseline: AbstractDamper
         others = ", ".join(list(laws)[MOST_CURVES:])
         count = len(laws) - len(drawn)
         note = f"Drawn are {best.name} and the laws with the smallest errors. The other {count}: {others}."
-    dashed = best.name if len(drawn) > 1 and best.name in drawn else None
     if baseline is not None:
         drawn |= _with_curves(report, {BASELINE: baseline}, points)
-        dashed = BASELINE if BASELINE in drawn else dashed
     machine, runs = best.result.rig, best.result.runs
     static = 0.0 if machine is None else float(machine.force_offset) + float(machine.gas_force)
     without_force = None if machine is None else dataclasses.replace(machine, force_offset=0.0, gas_force=0.0)
@@ -205,7 +204,7 @@ def _add_curves(report: Report, comparison: Comparison, baseline: AbstractDamper
         lambda: plots.force_velocity(
             drawn,
             runs=without_machine(without_force, runs),
-            baseline=dashed,
+            baseline=BASELINE if BASELINE in drawn else None,
             note=note,
             bands=bands,
             static_force=static,

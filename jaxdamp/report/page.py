@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jaxdamp._display import display
 from jaxdamp._tables import Table
 from jaxdamp.report.attempts import Attempts
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 
 PIXELS = 86  # of a page for an inch of a picture: the widest ones fill the page
+COLOURS = 64  # of a picture: nobody sees the difference, and the file has a quarter of the size
+DOTS = 130  # of a picture in an inch
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -27,44 +30,61 @@ _PAGE = """<!DOCTYPE html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title>
 <style>
-:root {{ color-scheme: light; }}
-body {{ font: 15px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-width: 72em; margin: 2em auto;
-  padding: 0 1em; overflow-wrap: break-word; }}
+:root {{ color-scheme: light dark; --ink: #222; --paper: #fff; --soft: #555; --line: #ddd; --mark: #0072b2;
+  --box: #eef5fa; }}
+@media (prefers-color-scheme: dark) {{
+  :root {{ --ink: #e6e6e6; --paper: #16181b; --soft: #a9a9a9; --line: #3a3d42; --mark: #56a8dc; --box: #1f2a33; }}
+}}
+body {{ font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 72em;
+  margin: 2em auto; padding: 0 1em; overflow-wrap: anywhere; }}
 h1 {{ line-height: 1.2; }}
-h2 {{ margin-top: 2em; border-bottom: 2px solid #0072b2; }}
-nav {{ color: #555; margin-bottom: 1em; }}
-.verdict {{ border-left: 5px solid #0072b2; background: #eef5fa; padding: 0.3em 1em; font-size: 1.07em; }}
+h2 {{ font-size: 1.25em; margin: 1.6em 0 0.6em; border-bottom: 2px solid var(--mark); }}
+summary h2 {{ display: inline-block; border: 0; margin: 0; }}
+details {{ border-bottom: 1px solid var(--line); padding: 0.5em 0; }}
+summary {{ cursor: pointer; }}
+a {{ color: var(--mark); }}
+nav {{ color: var(--soft); margin: 1em 0; }}
+.verdict {{ border-left: 5px solid var(--mark); background: var(--box); padding: 0.3em 1em; font-size: 1.07em; }}
 .table {{ overflow-x: auto; margin: 1em 0; }}
-table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; }}
-caption {{ text-align: left; font-weight: 600; padding-bottom: 0.3em; white-space: nowrap; }}
-th, td {{ text-align: left; vertical-align: top; padding: 0.15em 0.8em 0.15em 0; border-bottom: 1px solid #ddd; }}
+table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; overflow-wrap: normal; }}
+caption {{ text-align: left; font-weight: 600; padding-bottom: 0.3em; }}
+th, td {{ text-align: left; vertical-align: top; padding: 0.15em 0.8em 0.15em 0;
+  border-bottom: 1px solid var(--line); }}
 th {{ vertical-align: bottom; }}
 td {{ min-width: 4em; max-width: 28em; }}
 .number {{ text-align: right; white-space: nowrap; }}
 th.number {{ white-space: normal; }}
-img {{ max-width: 100%; height: auto; }}
+img {{ max-width: 100%; height: auto; background: #fff; }}
 figure {{ margin: 1.5em 0; }}
-figcaption, footer {{ color: #555; }}
-footer {{ margin-top: 3em; border-top: 1px solid #ddd; font-size: 0.9em; }}
+.sheet img {{ width: 54em; border: 1px solid var(--line); }}
+figcaption, footer {{ color: var(--soft); }}
+footer {{ margin-top: 3em; border-top: 1px solid var(--line); font-size: 0.9em; }}
 pre {{ white-space: pre-wrap; }}
-@media (max-width: 40em) {{
-  body {{ margin: 1em auto; font-size: 14px; }}
-  caption {{ white-space: normal; }}
-  figure {{ overflow-x: auto; }}
-  img {{ max-width: none; width: max(100%, 640px); }}
-}}
+@media (max-width: 40em) {{ body {{ margin: 1em auto; font-size: 14px; }} }}
 @media print {{
-  @page {{ margin: 14mm; }}
-  body {{ font-size: 9.5pt; max-width: none; margin: 0; padding: 0; }}
-  nav {{ display: none; }}
+  @page {{ size: A4; margin: 8mm 10mm; }}
+  :root {{ color-scheme: light; --ink: #222; --paper: #fff; --soft: #555; --line: #ddd; --box: #eef5fa; }}
+  body {{ font-size: 9pt; max-width: none; margin: 0; padding: 0; }}
+  nav, details:not([open]), h1:has(+ .sheet) {{ display: none; }}
   .table {{ overflow-x: visible; }}
   table {{ font-size: 8pt; }}
   th, td {{ padding-right: 0.5em; min-width: 0; }}
   h2, h3, caption {{ break-after: avoid; }}
   figure, tr, .verdict {{ break-inside: avoid; }}
   img {{ max-height: 230mm; }}
+  .sheet {{ margin: 0; text-align: center; break-after: page; }}
+  .sheet img {{ width: auto; height: 270mm; max-height: none; border: 0; }}
+  .sheet figcaption {{ display: none; }}
 }}
 </style>
+<script>
+function show() {{
+  const part = document.getElementById(location.hash.slice(1))?.closest("details");
+  if (part) {{ part.open = true; part.scrollIntoView(); }}
+}}
+addEventListener("hashchange", show);
+addEventListener("load", show);
+</script>
 </head>
 <body>
 {body}
@@ -87,35 +107,57 @@ class Report:
         self.attempts = Attempts() if attempts is None else attempts
         self._folder = folder
         self._headings: list[str] = []
+        self._sheets: list[str] = []
         self._blocks: list[str] = []
+        self._sections: list[list[str]] = []
 
     def heading(self, text: str) -> None:
-        """Start a section; the page begins with links to all of them."""
-        self._headings.append(text)
-        self._blocks.append(f'<h2 id="{len(self._headings)}">{html.escape(text)}</h2>')
+        """Start a section; the page begins with links to all of them. Below a sheet sections are folded."""
+        self._headings.append(display().words(text))
+        self._sections.append([])
+
+    def sheet(self, figure: "Callable[[], Figure]", finding: str, name: str) -> None:
+        """A sheet of one A4 page, which the page begins with; as PNG and PDF too if the report has a folder.
+
+        Arguments:
+            figure: draws it.
+            finding: what it says, for those who cannot see it.
+            name: of its files, such as "damper_sheet".
+        """
+        with self.part(f"The sheet {name}.png"):
+            drawn = figure()
+            image = self._image(drawn, finding, f"{name}.png")
+            also = ""
+            if self._folder is not None:
+                drawn.savefig(self._folder / f"{name}.pdf")
+                also = f'<figcaption>To print or to send: <a href="{name}.pdf">{name}.pdf</a></figcaption>'
+            self._sheets.append(f'<figure class="sheet">{image}{also}</figure>')
+
+    def _add(self, block: str) -> None:
+        (self._sections[-1] if self._sections else self._blocks).append(block)
 
     def verdict(self, *sentences: str) -> None:
         """The result in words, each sentence on a line, in a box; nothing if there are no words."""
         lines = "".join(f"<p>{self._escaped(sentence)}</p>" for sentence in sentences if sentence)
         if lines:
-            self._blocks.append(f'<div class="verdict">{lines}</div>')
+            self._add(f'<div class="verdict">{lines}</div>')
 
     def text(self, *sentences: str) -> None:
         """A paragraph; nothing if there are no words."""
         if any(sentences):
-            self._blocks.append(f"<p>{self._escaped(' '.join(sentences))}</p>")
+            self._add(f"<p>{self._escaped(' '.join(sentences))}</p>")
 
     def points(self, items: Sequence[str]) -> None:
         """A list of remarks; nothing if it is empty."""
         if items:
-            self._blocks.append(_points([self.attempts.words(item) for item in items]))
+            self._add(_points([display().words(self.attempts.words(item)) for item in items]))
 
     def _escaped(self, sentence: str) -> str:
-        return html.escape(self.attempts.words(sentence))
+        return html.escape(display().words(self.attempts.words(sentence)))
 
     def table(self, table: Table) -> None:
         """A table."""
-        self._blocks.append(f'<div class="table">{table.to_html()}</div>')
+        self._add(f'<div class="table">{table.to_html()}</div>')
 
     def part(self, what: str) -> AbstractContextManager[None]:
         """A part that may fail; the page then reports that `what` could not be made."""
@@ -130,14 +172,18 @@ class Report:
             name: of the file, such as "ride.png".
         """
         with self.part(f"The picture {name}"):
-            drawn, shown = io.BytesIO(), figure() if callable(figure) else figure
-            shown.savefig(drawn, dpi=150, format="png")
-            if self._folder is not None:
-                (self._folder / name).write_bytes(drawn.getvalue())
-            data, words = base64.b64encode(drawn.getvalue()).decode("ascii"), html.escape(caption)
-            width = round(PIXELS * shown.get_figwidth())
-            image = f'<img alt="{words}" width="{width}" src="data:image/png;base64,{data}">'
-            self._blocks.append(f"<figure>{image}<figcaption>{words}</figcaption></figure>")
+            words = display().words(caption)
+            image = self._image(figure() if callable(figure) else figure, words, name)
+            self._add(f"<figure>{image}<figcaption>{html.escape(words)}</figcaption></figure>")
+
+    def _image(self, figure: "Figure", words: str, name: str) -> str:
+        """A figure as an element of the page, and as a file if the report has a folder."""
+        data = _png(figure)
+        if self._folder is not None:
+            (self._folder / name).write_bytes(data)
+        source = f"data:image/png;base64,{base64.b64encode(data).decode('ascii')}"
+        alternative = html.escape(_finding(figure) or words)
+        return f'<img alt="{alternative}" width="{round(PIXELS * figure.get_figwidth())}" src="{source}">'
 
     def to_html(self, command: str = "") -> str:
         """The page.
@@ -145,11 +191,21 @@ class Report:
         Arguments:
             command: the command that writes this page, for its last lines, which have date and versions.
         """
-        links = [f'<a href="#{n}">{html.escape(text)}</a>' for n, text in enumerate(self._headings, 1)]
+        links = [f'<a href="#part-{n}">{html.escape(text)}</a>' for n, text in enumerate(self._headings, 1)]
         contents = [f"<nav>{' · '.join(links)}</nav>"] * (len(links) > 1)
         troubles = [_points(self.attempts.troubles)] if self.attempts.troubles else []
-        parts = [f"<h1>{html.escape(self.title)}</h1>", *contents, *self._blocks, *troubles, _footer(command)]
+        sections = [
+            self._section(n, text, blocks)
+            for n, (text, blocks) in enumerate(zip(self._headings, self._sections, strict=True), 1)
+        ]
+        head = [f"<h1>{html.escape(self.title)}</h1>", *self._sheets, *self._blocks, *contents]
+        parts = ["<main>", *head, *sections, *troubles, "</main>", _footer(command)]
         return _PAGE.format(title=html.escape(self.title), body="\n".join(parts))
+
+    def _section(self, number: int, title: str, blocks: Sequence[str]) -> str:
+        """A section with its heading, folded below a sheet."""
+        heading, body = f'<h2 id="part-{number}">{html.escape(title)}</h2>', "\n".join(blocks)
+        return f"<details><summary>{heading}</summary>{body}</details>" if self._sheets else f"{heading}\n{body}"
 
     def write(self, path: str | os.PathLike[str], command: str = "") -> Path:
         """Write the page.
@@ -161,6 +217,23 @@ class Report:
         path = Path(path)
         path.write_text(self.to_html(command), encoding="utf-8")
         return path
+
+
+def _png(figure: "Figure") -> bytes:
+    """A figure as a small PNG file."""
+    from PIL import Image
+
+    drawn, small = io.BytesIO(), io.BytesIO()
+    figure.savefig(drawn, dpi=DOTS, format="png")
+    few = Image.open(drawn).convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    few.save(small, format="png", optimize=True)
+    return small.getvalue()
+
+
+def _finding(figure: "Figure") -> str:
+    """What the title of a figure says, or the titles of its panels."""
+    titles = [figure.get_suptitle(), *(axes.get_title(loc="left") for axes in figure.axes)]
+    return ". ".join(" ".join(title.split()) for title in titles if title)
 
 
 def _points(items: Sequence[str]) -> str:

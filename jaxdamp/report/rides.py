@@ -10,12 +10,12 @@ from jaxdamp.metrics import comfort_reaction
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
 from jaxdamp.report.ranges import range_use_table
-from jaxdamp.simulation import Response, comfort_table, metrics_table
+from jaxdamp.simulation import Response, comfort_table, far_outside, metrics_table
 
 
 WORDS = {
     "comfort": "weighted RMS of the body acceleration",
-    "travel": "suspension travel, peak to peak,",
+    "travel": "peak-to-peak suspension travel",
     "grip": "RMS of the dynamic tyre load",
 }
 
@@ -47,7 +47,10 @@ def ride_report(
     """
     rides = {"ride": responses} if isinstance(responses, Response) else dict(responses)
     report = Report(title, folder, attempts)
-    report.verdict(*ride_verdict(rides))
+    sentences = ride_verdict(rides)
+    report.verdict(*sentences)
+    report.sheet(lambda: plots.ride_sheet(rides, name=title), sentences[-1], "ride_sheet")
+    report.heading("The ride")
     report.text(axles_sentence(rides))
     report.points(notes_of(rides) if remarks is None else remarks)
     for name, law in (laws or {}).items():
@@ -87,15 +90,21 @@ def ride_verdict(responses: Mapping[str, Response]) -> list[str]:
         return [
             f"{name} against {first}: "
             + ", ".join(f"{WORDS[g]} {percent_change(values[first][g], values[name][g]) or 0.0:+.1f} %" for g in goals)
-            + "."
-            for name, _ in others
+            + _trust(response)
+            for name, response in others
         ]
     units = baseline.metric_units()
     said = [f"{WORDS[g]} {values[first][g]:.3g} {typeset_unit(units[names[0]])}" for g, names in goals.items()]
     feel = ""
     if "comfort" in goals and typeset_unit(units[goals["comfort"][0]]) == "m/s²":
         feel = f" ISO 2631-1 calls such an acceleration {' or '.join(comfort_reaction(values[first]['comfort']))}."
-    return [f"{', '.join(said)}.{feel}" if said else ""]
+    return [f"{', '.join(said)}{_trust(baseline)}{feel}" if said else ""]
+
+
+def _trust(response: Response) -> str:
+    """The end of a sentence: where the laws were used outside their records, that it rests on extrapolation."""
+    far = far_outside(response.range_use())
+    return f"; not certain, as the law is extrapolated: {'; '.join(far)}." if far else "."
 
 
 def _means(response: Response, goals: Mapping[str, Sequence[str]]) -> dict[str, float]:

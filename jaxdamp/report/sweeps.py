@@ -24,8 +24,8 @@ def sweep_report(
     *,
     title: str = "Sweep",
     remarks: Sequence[str] = (),
-    limits: Mapping[str, Any] | None = None,
-    baseline: Mapping[str, Any] | None = None,
+    limits: Mapping[str, object] | None = None,
+    baseline: Mapping[str, object] | None = None,
     folder: Path | None = None,
     attempts: Attempts | None = None,
 ) -> Report:
@@ -61,7 +61,7 @@ def sweep_report(
 
 
 def best_points(
-    data: "xarray.Dataset", limits: Mapping[str, Any] | None = None, baseline: Mapping[str, Any] | None = None
+    data: "xarray.Dataset", limits: Mapping[str, object] | None = None, baseline: Mapping[str, object] | None = None
 ) -> list[str]:
     """The smallest value of each result in a sentence, where it is, within the limits, and beside a baseline.
 

@@ -46,6 +46,7 @@ def tuning_report(
     """
     report = Report(title, folder, attempts)
     report.verdict(result.summary)
+    report.sheet(lambda: result.plot("sheet"), result.verdict.sentence, "ride_sheet")
     report.heading(result.verdict.outcome.value)
     add_tuning(report, result, rescored)
     if baseline is not None:

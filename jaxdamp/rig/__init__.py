@@ -4,6 +4,7 @@ from jaxdamp.rig.constant_velocity import QuasiStatic as QuasiStatic, quasi_stat
 from jaxdamp.rig.dynamic_stiffness import DynamicStiffness as DynamicStiffness, dynamic_stiffness
 from jaxdamp.rig.machine import Readings as Readings, Rig
 from jaxdamp.rig.marching import march as march, solve_law as solve_law
+from jaxdamp.rig.numbers import LawNumbers as LawNumbers, is_number as is_number, numbers_of as numbers_of
 from jaxdamp.rig.response import AbstractLawEngine as AbstractLawEngine, StartsInMotionWarning, respond
 from jaxdamp.rig.sensor import Sensor
 
@@ -15,13 +16,4 @@ __all__ = [
     "dynamic_stiffness",
     "quasi_static",
     "respond",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "AbstractLawEngine",
-    "DynamicStiffness",
-    "QuasiStatic",
-    "Readings",
-    "march",
-    "solve_law",
 ]

@@ -1,18 +1,24 @@
 """The force of a law at constant velocity: the curve without hysteresis."""
 
+import ctypes
+import functools
+import math
+from collections.abc import Callable, Hashable
 from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._traced import of_known_numbers
+from jaxdamp.codegen import C, PrintedFunction, Symbols, library, lower, symbols
 from jaxdamp.dampers import AbstractDamper, coverage
 from jaxdamp.parameters import as_float
+from jaxdamp.rig.numbers import is_number, numbers_of
 
 
 class QuasiStatic(NamedTuple):
@@ -33,6 +39,7 @@ class QuasiStatic(NamedTuple):
     states: Float[Array, "points states"]
 
 
+MOST_REMEMBERED = 64  # curves, and C functions
 LONGEST_HOLD = 64  # s at constant velocity
 STEADY = 1e-4  # change of a force while the time held doubles, relative to the scale of the forces: settled
 STILL = {"float64": 1e-9, "float32": 1e-3}  # the same, at which no longer hold can improve the curve
@@ -66,9 +73,35 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     if velocities.ndim != 1 or velocities.size == 0:
         _checks.refuse("velocities", "be one or more in one dimension", f"of shape {velocities.shape}")
     _checks.finite("velocities", velocities)
-    states = jnp.broadcast_to(law.initial_state(), (velocities.size, law.initial_state().size))
+    numbers = numbers_of(law)
+    kinds = sorted({str(leaf.dtype) for leaf in jax.tree.leaves(law) if is_number(leaf)})
+    key = numbers.key, numbers.flat.tobytes(), np.asarray(velocities).tobytes(), *kinds, coverage(law)
+    return _settled(_Keyed(key, law, velocities))
+
+
+class _Keyed:
+    """What is remembered by a key, and with what it is computed."""
+
+    content: tuple[PyTree, ...]
+
+    def __init__(self, key: Hashable, *content: object) -> None:
+        self.key, self.content = key, content
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Keyed) and self.key == other.key
+
+
+@functools.lru_cache(maxsize=MOST_REMEMBERED)
+def _settled(question: _Keyed) -> QuasiStatic:
+    """The curve, which a table, a picture and a page ask for one after the other."""
+    law, velocities = question.content
+    begin = np.asarray(law.initial_state())
+    states = on_device(np.broadcast_to(begin, (velocities.size, begin.size)).copy())
     states, force = _hold(law, velocities, states, jnp.asarray(0))
-    if law.initial_state().size == 0:
+    if begin.size == 0:
         settled = np.isfinite(force)
         note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
         return QuasiStatic(velocities, force, settled, note, states)
@@ -84,7 +117,7 @@ def quasi_static(law: AbstractDamper, velocities: Float[Array, " points"] | np.n
     alone = change <= limit * size
     settled = np.isfinite(size) & (alone | (change <= limit * np.max(size, where=alone, initial=0.0)))
     note = _gaps(law, np.asarray(velocities), np.asarray(force), settled)
-    return QuasiStatic(velocities, jnp.where(settled, force, jnp.nan), settled, note, states)
+    return QuasiStatic(velocities, on_device(np.where(settled, force, np.nan)), settled, note, states)
 
 
 def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled: np.ndarray) -> str:
@@ -103,8 +136,26 @@ def _gaps(law: AbstractDamper, velocity: np.ndarray, force: np.ndarray, settled:
     return " ".join(notes)
 
 
+def _hold(law: AbstractDamper, velocities: Array, states: Array, count: Array) -> tuple[Array, Array]:
+    """States and forces after so many more milliseconds at constant velocities."""
+    if velocities.dtype == np.float64 and states.size:
+        numbers = numbers_of(law)
+        printed = _printed_hold(_Keyed(numbers.key, numbers))
+        if printed is not None:
+            p, v = numbers.flat, np.ascontiguousarray(velocities, np.float64)
+            s, force = np.array(states, np.float64), np.empty(v.size)
+            printed(p.ctypes.data, v.size, v.ctypes.data, int(count), s.ctypes.data, force.ctypes.data)
+            return on_device(s), on_device(force)
+    return _held_by_xla(law, velocities, states, count)
+
+
+def on_device(array: np.ndarray) -> Array:
+    """With a type stated, an array is copied; without one JAX compiles a program for that."""
+    return jnp.asarray(array, array.dtype)
+
+
 @eqx.filter_jit
-def _hold(law: AbstractDamper, velocities: Array, states: Array, count: Int[Array, ""]) -> tuple[Array, Array]:
+def _held_by_xla(law: AbstractDamper, velocities: Array, states: Array, count: Int[Array, ""]) -> tuple[Array, Array]:
     """States and forces after so many more milliseconds at constant velocities."""
     zero, dt = jnp.zeros((), velocities.dtype), jnp.asarray(1e-3, velocities.dtype)
 
@@ -113,3 +164,59 @@ def _hold(law: AbstractDamper, velocities: Array, states: Array, count: Int[Arra
         return state, law.force(zero, v, state)
 
     return jax.vmap(one)(velocities, states)
+
+
+_HEADS = {"void advance": "double", "double force": "const double"}
+_C_HOLD = """
+void hold(const double *p, int64_t points, const double *v, int64_t count, double *states, double *forces)
+{
+    for (int64_t i = 0; i < points; i++) {
+        double *s = states + i * STATES, before[STATES];
+        for (int64_t step = 0, moves = 1; moves && step < count; step++) {
+            moves = 0;
+            memcpy(before, s, sizeof before);
+            advance(p, v[i], s);
+            for (int m = 0; m < STATES; m++) moves |= !(fabs(s[m] - before[m]) <= 4e-16 * fabs(s[m]));
+        }
+        forces[i] = force(p, v[i], s);
+    }
+}
+"""
+
+
+@functools.lru_cache(maxsize=MOST_REMEMBERED)
+def _printed_hold(structure: _Keyed) -> Callable[..., None] | None:
+    """`_hold` as a C function, which ends where the states stand still; None where XLA computes it."""
+    (numbers,) = structure.content
+    count, shapes = int(numbers.built(numbers.arrays).initial_state().size), [a.shape for a in numbers.arrays]
+    ends, names = np.cumsum([math.prod(shape) for shape in shapes]), symbols("p", (numbers.flat.size,)).names
+    cut = zip(ends, shapes, strict=True)
+    arrays = [Symbols(names[end - math.prod(shape) : end].reshape(shape)) for end, shape in cut]
+
+    def advance(arrays: list[Array], v: Array, s: Array) -> Array:
+        return numbers.built(arrays).advance(jnp.zeros(()), v, jnp.zeros(()), v, s, jnp.asarray(1e-3))
+
+    def force(arrays: list[Array], v: Array, s: Array) -> Array:
+        return numbers.built(arrays).force(jnp.zeros(()), v, s)
+
+    try:
+        given = (arrays, symbols("v"), symbols("s", (count,)))
+        step, end = lower(advance, *given), lower(force, *given)
+        outputs = [(f"s[{i}]", atom) for i, atom in enumerate(np.ravel(step.results))]
+        value = np.ravel(np.asarray(end.results, object))[0]
+        heads = [f"static {kind}(const double *p, double v, {s} *s)" for kind, s in _HEADS.items()]
+        text = "".join(
+            [
+                "".join(f"#include <{name}.h>\n" for name in ("math", "stdint", "stdbool", "string")),
+                f"enum {{ STATES = {count} }};\n",
+                C().function(PrintedFunction(heads[0], ["p", "v", "s"], step.statements, outputs)),
+                C().function(PrintedFunction(heads[1], ["p", "v", "s"], end.statements, (), value)),
+                _C_HOLD,
+            ]
+        )
+        hold = library(text).hold
+    except NotImplementedError:
+        return None
+    pointer, whole = ctypes.c_void_p, ctypes.c_int64
+    hold.argtypes, hold.restype = [pointer, whole, pointer, whole, pointer, pointer], None
+    return hold

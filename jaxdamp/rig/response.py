@@ -2,7 +2,7 @@
 
 import warnings
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, Literal, TypedDict, Unpack, overload
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -189,7 +189,7 @@ def _check_record(instants: np.ndarray | None, time: Signal, stroke: Signal, vel
             _checks.refuse("time", "increase in equal steps", value, "Resample the record to a uniform rate.")
 
 
-def _refuse_beside_engine(temperature: Any, substeps: int, state: Any, return_state: bool) -> None:
+def _refuse_beside_engine(temperature: object, substeps: int, state: object, return_state: bool) -> None:
     """Refuse what only the steps of the laws have."""
     if substeps != 1:
         must = "be left out beside an engine, which has its own or chooses them"
@@ -200,7 +200,7 @@ def _refuse_beside_engine(temperature: Any, substeps: int, state: Any, return_st
             _checks.refuse(name, "be left out beside an engine", value, "Leave out `engine`.")
 
 
-def _checked_state(law: AbstractDamper, state: Any, temperature: Signal | None) -> State:
+def _checked_state(law: AbstractDamper, state: object, temperature: Signal | None) -> State:
     """The states, as many as the law has."""
     warm_law = law if temperature is None else law.at_temperature(temperature[0])
     begin, shape = as_float(state), warm_law.initial_state().shape

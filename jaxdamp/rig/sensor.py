@@ -1,6 +1,6 @@
 """A sensor of a vehicle: what it makes of a channel before that stands in a record."""
 
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -51,11 +51,11 @@ class Sensor(Module):
     def __init__(
         self,
         *,
-        gain: Any = None,
-        offset: Any = None,
-        lag: Any = None,
-        delay: Any = None,
-        high_pass: Any = None,
+        gain: ScalarLike | int | None = None,
+        offset: ScalarLike | int | None = None,
+        lag: ScalarLike | int | None = None,
+        delay: ScalarLike | int | None = None,
+        high_pass: ScalarLike | int | None = None,
     ) -> None:
         if high_pass is not None:
             _checks.positive("high_pass", high_pass, "Leave it out for a sensor that shows slow motions too.")

@@ -35,35 +35,26 @@ A speed hump, then a rough surface, at 10 m/s:
 """
 
 from jaxdamp._guesses import answer_guesses
+from jaxdamp.roads._composed import joined, superposed
 from jaxdamp.roads.assessment import RoughnessAssessment as RoughnessAssessment, assess_roughness
 from jaxdamp.roads.axles import delayed, in_phase
 from jaxdamp.roads.base import AbstractRoad, Columns as Columns
-from jaxdamp.roads.bump import cosine_bump
-from jaxdamp.roads.coherency import coherency
+from jaxdamp.roads.bump import cosine_bump, pothole, step
 from jaxdamp.roads.contact import contact_patch, rolling_disc
 from jaxdamp.roads.cornered_bump import half_sine_bump, trapezoid_bump, triangular_bump
 from jaxdamp.roads.crg import read_crg
-from jaxdamp.roads.edge import step
-from jaxdamp.roads.filtered_noise import iso8608_filtered
-from jaxdamp.roads.harmonic import sine, wave_course
-from jaxdamp.roads.iso_classes import class_limits, road_class
+from jaxdamp.roads.harmonic import sine, sweep_sine, wave_course
+from jaxdamp.roads.iso_classes import class_limits as class_limits, road_class
 from jaxdamp.roads.iso_roughness import iso8608
-from jaxdamp.roads.pothole import pothole
-from jaxdamp.roads.profile import from_profile
-from jaxdamp.roads.profile_file import read_profile
-from jaxdamp.roads.random_band import band_limited
-from jaxdamp.roads.sequence import joined
-from jaxdamp.roads.superposition import superposed
-from jaxdamp.roads.sweep import sweep_sine
-from jaxdamp.roads.tracks import two_track
-from jaxdamp.roads.white import WhiteRoad as WhiteRoad, white
+from jaxdamp.roads.profile import from_profile, read_profile
+from jaxdamp.roads.random_roads import WhiteRoad as WhiteRoad, band_limited, iso8608_filtered, white
+from jaxdamp.roads.tracks import coherency, two_track
 
 
 __all__ = [
     "AbstractRoad",
     "assess_roughness",
     "band_limited",
-    "class_limits",
     "coherency",
     "contact_patch",
     "cosine_bump",
@@ -88,12 +79,6 @@ __all__ = [
     "two_track",
     "wave_course",
     "white",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "Columns",
-    "RoughnessAssessment",
-    "WhiteRoad",
 ]
 
 answer_guesses(__name__, __all__)

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, Signal, SignalLike
-from jaxdamp.roads._fade import fade_in
+from jaxdamp.roads._events import fade_in
 from jaxdamp.roads.base import AbstractRoad, Columns
 
 

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
@@ -11,6 +11,7 @@ from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Contents
 from jaxdamp.roads.iso_classes import (
     HIGHEST_SPATIAL_FREQUENCY,
     LOWEST_SPATIAL_FREQUENCY,
@@ -121,7 +122,7 @@ class RoughnessAssessment(AbstractResult):
         numbers = self.spatial_frequency, 1.0 / self.spatial_frequency, self.displacement_psd, self.lines
         return Table("Road roughness", columns, tuple(zip(*map(plain, numbers), self.band_classes, strict=True)))
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Class, fitted spectrum, bands and verdict with units, ready for JSON."""
         return {
             "road_class": self.road_class,

@@ -50,7 +50,7 @@ else:
         def __init__(self, method: Callable[..., Any]) -> None:
             self.method = method
 
-        def __get__(self, road: Any, owner: type | None = None) -> Callable[..., Any]:
+        def __get__(self, road: object, owner: type | None = None) -> Callable[..., Any]:
             return self.method if road is None else Partial(self.method, road)
 
 

@@ -1,5 +1,8 @@
 """Measured roads."""
 
+import csv
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
@@ -7,6 +10,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
+from jaxdamp._documents import read_text
 from jaxdamp._types import ScalarLike
 from jaxdamp.roads._sampled import SampledRoad
 
@@ -110,3 +114,101 @@ def _refuse_gaps(argument: str, values: Any) -> None:
             f"NaN or infinite at {int(bad.sum())} samples, first at sample {int(np.argmax(bad))}",
             "Cut or fill the gaps first, for example with numpy.interp over the good samples.",
         )
+
+
+_LENGTHS = {"m": 1.0, "km": 1000.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
+_TIMES = {"s": 1.0, "ms": 0.001}
+Column = str | int
+
+
+def read_profile(
+    path: str | Path,
+    speed: ScalarLike | int | None = None,
+    *,
+    position: Column = 0,
+    height: Column | Sequence[Column] = 1,
+    position_unit: str | None = None,
+    height_unit: str = "m",
+    periodic: bool = False,
+    ramp: float | int = 0.0,
+) -> SampledRoad:
+    r"""A road from a text file with one column of positions (or times) and one or several of heights.
+
+    Columns are separated by commas, semicolons, tabs or blanks. Lines that begin with # or %, and empty ones, are left
+    out. Names of columns may stand in the first remaining line. Everything else is as for `from_profile`.
+
+    Arguments:
+        path: the file.
+        speed: the speed of the vehicle [m/s] if the positions are distances along the road; left out if they are times.
+        position: the column of positions, by name or by number from 0.
+        height: the column of heights, or one column for each track, by name or by number from 0.
+        position_unit: "m" (which is assumed with a speed), "km", "cm", "mm", "ft" or "in"; without a speed "s" (which
+            is then assumed) or "ms".
+        height_unit: "m", "km", "cm", "mm", "ft" or "in".
+        periodic: repeat the profile for ever, as for `from_profile`.
+        ramp: the time [s] over which the road fades in, as for `from_profile`.
+
+    Raises:
+        ValueError: if the file holds no numbers, if lines differ in length or a field is not a number, if a column or
+            unit is unknown, or if `from_profile` refuses the values.
+        FileNotFoundError: if there is no such file.
+
+    >>> import tempfile, pathlib
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "lane.csv"
+    >>> _ = file.write_text("distance,left,right\n0.0,0,1\n0.1,5,2\n0.2,0,3\n")
+    >>> road = read_profile(file, speed=10.0, height=["left", "right"], height_unit="mm")
+    >>> road.height(np.array([0.01, 0.02]))
+    Array([[0.005, 0.002],
+           [0.   , 0.003]], dtype=float64)
+    """
+    units = _TIMES if speed is None else _LENGTHS
+    unit = position_unit or next(iter(units))
+    _checks.one_of("position_unit", unit, units)
+    _checks.one_of("height_unit", height_unit, _LENGTHS)
+    names, table = _table(Path(path))
+    columns = [height] if isinstance(height, str | int) else list(height)
+    heights = np.stack([table[:, _column("height", column, names)] for column in columns], axis=1)
+    positions = table[:, _column("position", position, names)] * units[unit]
+    return from_profile(positions, heights * _LENGTHS[height_unit], speed, periodic=periodic, ramp=ramp)
+
+
+def _table(path: Path) -> tuple[list[str], np.ndarray]:
+    """The names of the columns (their numbers where there are none) and the numbers of a file."""
+    lines = _lines(path)
+    separator = next((mark for mark in ";\t," if mark in lines[0]), None)
+    split = [line.split() for line in lines] if separator is None else list(csv.reader(lines, delimiter=separator))
+    rows = [[field.strip() for field in row] for row in split]
+    has_names = not all(map(_is_number, rows[0]))
+    names = rows.pop(0) if has_names else [str(number) for number in range(len(rows[0]))]
+    wrong = [i for i, row in enumerate(rows, has_names) if len(row) != len(names) or not all(map(_is_number, row))]
+    if wrong:
+        remedy = "Remarks begin with # or %; decimals have a point."
+        must = f"name a file with {len(names)} numbers in each line"
+        _checks.refuse("path", must, f"{path} with {lines[wrong[0]]!r}", remedy)
+    return names, np.array(rows, float).reshape(len(rows), len(names))
+
+
+def _lines(path: Path) -> list[str]:
+    """The lines of a file but remarks."""
+    stripped = map(str.strip, read_text(path, "text").splitlines())
+    lines = [line for line in stripped if line and line[0] not in "#%"]
+    if not lines:
+        _checks.refuse("path", "name a file with numbers", f"{path}, which is empty")
+    return lines
+
+
+def _is_number(field: str) -> bool:
+    try:
+        float(field)
+    except ValueError:
+        return False
+    return True
+
+
+def _column(argument: str, column: Column, names: list[str]) -> int:
+    if isinstance(column, str):
+        _checks.one_of(argument, column, names)
+        return names.index(column)
+    if not 0 <= column < len(names):
+        _checks.refuse(argument, f"be a column from 0 to {len(names) - 1}", column, f"The file has {names}.")
+    return column

@@ -8,7 +8,7 @@ and Ostermann, Exponential integrators, Acta Numerica 2010).
 """
 
 import dataclasses
-from typing import Any, Literal, NamedTuple, final
+from typing import Literal, NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -18,6 +18,7 @@ from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode
+from jaxdamp._matrices import phi_functions
 from jaxdamp._types import Scalar, Signal
 from jaxdamp._vectors import (
     Matrix,
@@ -35,9 +36,41 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.rig import march
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState
 from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
-from jaxdamp.simulation.propagator import Propagator
 from jaxdamp.simulation.step_size import RunCheck
-from jaxdamp.vehicles import Earlier
+from jaxdamp.vehicles import Earlier, LinearMap
+
+
+@final
+class Propagator(eqx.Module):
+    """x₁ = Φ x₀ + H₀ f₀ + H₁ (f₁ − f₀) + H₂ (f₁ − 2 f₀ + f₋₁) + R₀ z₀ + R₁ (z₁ − z₀).
+
+    Exact for element forces f [N] that run over the step on the parabola through f₋₁, one step earlier, f₀ and f₁, and
+    for heights z [m] that run straight. Motion x = (q, q̇).
+    """
+
+    phi: Float[Array, "n n"]
+    force_held: Float[Array, "n ports"]
+    force_ramp: Float[Array, "n ports"]
+    force_bend: Float[Array, "n ports"]
+    road_held: Float[Array, "n wheels"]
+    road_ramp: Float[Array, "n wheels"]
+
+    @classmethod
+    def over(cls, rate: LinearMap, dt: Scalar) -> "Propagator":
+        """The matrices of a step of dt [s] of ẋ = A x + B f + R z + S ż.
+
+        Φ = φ₀(A dt), H₀ = φ₁ B dt, H₁ = φ₂ B dt, H₂ = (φ₃ − φ₂/2) B dt.
+        """
+        phi, held, ramp, bend = phi_functions(rate.motion * dt)
+        forces, heights = rate.force * dt, rate.road * dt
+        return cls(
+            phi,
+            held @ forces,
+            ramp @ forces,
+            (bend - 0.5 * ramp) @ forces,
+            held @ heights,
+            ramp @ heights + held @ rate.road_rate,
+        )
 
 
 FEW_STATES = 4  # up to which one car is best written number by number, if loops are fused
@@ -106,7 +139,7 @@ class ExponentialStepper(AbstractStepper):
         """
         again = self.equations.at(now.motion, now.states, road)
 
-        def before(old: Any, then: Any, present: Any) -> Any:
+        def before(old: object, then: object, present: object) -> PyTree:
             return jax.tree.map(lambda old, then, present: present + ratio * (old - then), old, then, present)
 
         held = [None if old is None else state for old, state in zip(now.memory.states[0], now.states, strict=True)]

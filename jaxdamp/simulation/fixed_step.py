@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PyTree
+from jaxtyping import Array, ArrayLike, Float, PyTree
 
 from jaxdamp._jacobian import Mode
 from jaxdamp._sharded import varying_as
@@ -168,11 +168,11 @@ def _over(stepper: AbstractStepper, now: StepState, begin: RoadInput, end: RoadI
     if substeps == 1:
         return stepper(now, begin, end)
 
-    def at(share: Any) -> RoadInput:
+    def at(share: ScalarLike) -> RoadInput:
         rate = None if begin.rate is None or end.rate is None else between(begin.rate, end.rate, share)
         return RoadInput(between(begin.height, end.height, share), rate)
 
-    def step(i: Any, now: StepState) -> StepState:
+    def step(i: ArrayLike, now: StepState) -> StepState:
         done = jnp.asarray(i, stepper.dt.dtype)
         return stepper(now, at(done / substeps), at((done + 1.0) / substeps))
 

@@ -1,12 +1,93 @@
-"""What a response says of itself in words: one function for each kind of note, a sentence for each thing to know."""
+"""Notes on a response: laws beyond the range of their fit, tyres in tension."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
+import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float, PyTree
 
+from jaxdamp import _checks
 from jaxdamp._types import Signal
-from jaxdamp.vehicles import ChannelKind, System
+from jaxdamp.dampers import AbstractDamper, Motion, RangeUse, has_fitted_range, range_use, sentence
+from jaxdamp.vehicles import AbstractVehicle, ChannelKind, PortForm, System
+
+
+FAR = 0.01  # share of the time outside the fitted range from which a verdict cannot be trusted
+
+
+def range_uses(
+    vehicle: AbstractVehicle,
+    form: PortForm,
+    motion: Float[Array, "time n"],
+    road: Float[Array, "time wheels"],
+    road_rate: Float[Array, "time wheels"],
+    port_force: Float[Array, "time ports"],
+) -> dict[str, list[RangeUse]]:
+    """What each damper did beside what its law was fitted to, by the name of the damper.
+
+    Arguments:
+        vehicle: with its laws.
+        form: its matrices.
+        motion: coordinates and their rates [m, m/s] at each instant.
+        road: heights [m].
+        road_rate: their rates [m/s].
+        port_force: force of each element [N].
+
+    Returns:
+        The dampers whose law has a range; empty if none has one, or while JAX traces the run.
+    """
+    tree: PyTree = (vehicle, motion)
+    if not has_fitted_range(vehicle) or any(_checks.concrete(leaf) is None for leaf in jax.tree.leaves(tree)):
+        return {}
+    position, rate = jnp.split(motion, 2, axis=1)
+    strokes, velocities = (np.asarray(form.at_ports(*at), dtype=float) for at in ((position, road), (rate, road_rate)))
+    forces = np.asarray(port_force, dtype=float)
+    uses_of = {}
+    for i, (name, law) in enumerate(named_laws(vehicle).items()):
+        uses = range_use(law, Motion(strokes[:, i], velocities[:, i], forces[:, i]))
+        if uses:
+            uses_of[name] = uses
+    return uses_of
+
+
+def named_laws(vehicle: AbstractVehicle) -> dict[str, AbstractDamper]:
+    """The law at each port by the name of its element, such as "front_damper".
+
+    Arguments:
+        vehicle: the vehicle.
+    """
+    return dict(zip(vehicle.layout.ports, vehicle.elements(), strict=True))
+
+
+def over_runs(runs: Sequence[Mapping[str, Sequence[RangeUse]]]) -> dict[str, list[RangeUse]]:
+    """The uses of each damper in several runs of one length as one: the extremes, and the mean share of the time.
+
+    Arguments:
+        runs: uses by the name of the damper, of one vehicle on several roads.
+    """
+    together: dict[str, dict[tuple[str, str], list[RangeUse]]] = {}
+    for uses in runs:
+        for name, of_damper in uses.items():
+            for use in of_damper:
+                together.setdefault(name, {}).setdefault((use.law, use.quantity), []).append(use)
+    return {name: [_over_runs(same) for same in groups.values()] for name, groups in together.items()}
+
+
+def _over_runs(uses: Sequence[RangeUse]) -> RangeUse:
+    used = min(use.used[0] for use in uses), max(use.used[1] for use in uses)
+    shares = [use.share for use in uses if use.share is not None]
+    return uses[0]._replace(used=used, share=sum(shares) / len(uses) if shares else None)
+
+
+def range_sentences(uses: Mapping[str, Sequence[RangeUse]]) -> tuple[str, ...]:
+    """A sentence for each damper that leaves its range.
+
+    Arguments:
+        uses: by the name of the damper.
+    """
+    texts = (sentence(name.replace("_", " "), of_damper) for name, of_damper in uses.items())
+    return tuple(text for text in texts if text)
 
 
 LEAST = 1e-3  # of the static load, by which a load must be below zero
@@ -31,3 +112,23 @@ def tyres_in_tension(
         return ()
     remedy = "Pass `tyre_lifts=True` to the vehicle if its wheels can leave the road."
     return (f"Wheel loads fell below zero, as linear tyres pull on the road: {'; '.join(pulled)}. {remedy}",)
+
+
+def far_outside(uses: Mapping[str, Sequence[RangeUse]]) -> list[str]:
+    """By how much each damper leaves the range of its law, where it does so for 1 % of the time or more.
+
+    As in "front damper at 5.6 times the velocity and 1.8 times the stroke of its records, 46 % of the time".
+
+    Arguments:
+        uses: by the name of the damper.
+    """
+    texts = []
+    for name, of_damper in uses.items():
+        far = [use for use in of_damper if use.outside and use.times is not None and (use.share or 0.0) >= FAR]
+        fast = any(use.quantity == "velocity" for use in far)
+        far = [use for use in far if use.quantity != "force" or not fast]  # a force follows from the velocity
+        if far:
+            times = " and ".join(f"{use.times:.2g} times the {use.quantity}" for use in far)
+            share = 100.0 * max(use.share or 0.0 for use in far)
+            texts.append(f"{name.replace('_', ' ')} at {times} of its records, {share:.0f} % of the time")
+    return texts

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import equinox as eqx
 import jax
@@ -11,16 +11,14 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._tables import Table, with_unit
-from jaxdamp._types import Scalar, Signal
+from jaxdamp._types import Contents, Scalar, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import Metric
 from jaxdamp.simulation.energy import absorbed_by, energy_balance
-from jaxdamp.simulation.notes import tyres_in_tension
-from jaxdamp.simulation.range_notes import range_sentences, range_uses
-from jaxdamp.simulation.ride_metrics import Comfort, comfort, ride_metrics
-from jaxdamp.simulation.tables import comfort_table, comfort_units, metrics_table
+from jaxdamp.simulation.notes import range_sentences, range_uses, tyres_in_tension
+from jaxdamp.simulation.ride_metrics import Comfort, comfort, comfort_table, comfort_units, metrics_table, ride_metrics
 from jaxdamp.simulation.wheels import AxleTiming
 from jaxdamp.vehicles import AbstractVehicle, LinearMap, System
 
@@ -221,7 +219,7 @@ class Response(eqx.Module, AbstractResult):
         """Comfort by ISO 2631-1 of every acceleration, with units."""
         return comfort_table({"value": self})
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Metrics, comfort, energies and notes of the run, ready for JSON; numbers that are not finite are None."""
         values, comfort = self.metrics(), self.comfort()
         return {
@@ -241,11 +239,16 @@ class Response(eqx.Module, AbstractResult):
             "energy_balance": {name: with_unit(value, "J") for name, value in self.energy_balance().items()},
         }
 
-    def plot(self, **options: Any) -> "Figure":
-        """Channels over time and the spectrum of the first (`plots.ride`)."""
-        from jaxdamp.plots import ride
+    def plot(self, kind: str = "ride", **options: object) -> "Figure":
+        """Channels over time and the spectrum of the first, or the sheet of the ride.
 
-        return ride(self, **options)
+        Arguments:
+            kind: "ride" (`plots.ride`), or "sheet" for one A4 page (`plots.ride_sheet`).
+            options: of that function.
+        """
+        from jaxdamp.plots import ride, ride_sheet
+
+        return plotted(kind, {"ride": ride, "sheet": ride_sheet}, self, **options)
 
     def to_xarray(self) -> "xarray.Dataset":
         """All channels as an `xarray.Dataset` over time, with units."""

@@ -27,9 +27,8 @@ from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation.engine import AbstractEngine, chosen_engine
 from jaxdamp.simulation.equations import Equations, settled
 from jaxdamp.simulation.exponential import Exponential
-from jaxdamp.simulation.observer import MetricObserver
-from jaxdamp.simulation.range_notes import range_uses
-from jaxdamp.simulation.recorder import recorded
+from jaxdamp.simulation.notes import range_uses
+from jaxdamp.simulation.observer import MetricObserver, recorded
 from jaxdamp.simulation.run import refuse_stacked, run_check, sampled
 from jaxdamp.simulation.stationary import in_motion, stationary_dampers, stationary_metrics, stationary_range_use
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
@@ -192,7 +191,7 @@ class Ride(eqx.Module):
             return None
         return eqx.tree_at(lambda ride: ride.engine, self, engine).side_by_side()
 
-    def range_use(self, point: Mapping[str, Any] | None = None) -> dict[str, list[RangeUse]]:
+    def range_use(self, point: Mapping[str, object] | None = None) -> dict[str, list[RangeUse]]:
         """What each damper does at a point beside the range that its law was fitted to; only of laws that have one.
 
         It drives the run once more and keeps it: ask it of the few points that matter, not of a whole sweep. On a white
@@ -211,7 +210,7 @@ class Ride(eqx.Module):
         saved, _ = recorded(self.engine, system, heights, step)
         return range_uses(vehicle, system.form, saved.motion, saved.road, saved.road_rate, saved.port_force)
 
-    def equivalent_dampers(self, point: Mapping[str, Any] | None = None) -> dict[str, EquivalentDamper]:
+    def equivalent_dampers(self, point: Mapping[str, object] | None = None) -> dict[str, EquivalentDamper]:
         """On a white road, the linear damper that stands for each law at a point; empty on other roads.
 
         `EquivalentDamper.words` says it as in "Gaussian, equivalent slope 2006 N s/m at 0.21 m/s RMS".
@@ -273,7 +272,7 @@ def _drive(ride: Ride, point: dict[str, Any]) -> dict[str, Scalar]:
     return observer.end(outcome.gathered, outcome.records)
 
 
-def _refuse_run(argument: str, value: Any) -> None:
+def _refuse_run(argument: str, value: object) -> None:
     """Refuse what only a run in time has."""
     if value is not None:
         remedy = "Leave it out: the answer is that of the stationary motion, without a run."

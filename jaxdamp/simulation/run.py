@@ -21,8 +21,8 @@ from jaxdamp.simulation.adaptive import Adaptive
 from jaxdamp.simulation.engine import AbstractEngine, RunState, chosen_engine
 from jaxdamp.simulation.equations import RoadEdges
 from jaxdamp.simulation.exponential import Exponential
-from jaxdamp.simulation.range_notes import range_sentences
-from jaxdamp.simulation.recorder import recorded
+from jaxdamp.simulation.notes import range_sentences
+from jaxdamp.simulation.observer import recorded
 from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.stability import known_system, rounded_down
 from jaxdamp.simulation.step_size import RunCheck

@@ -9,7 +9,7 @@ from jaxdamp._types import Scalar
 from jaxdamp.dampers import Motion, RangeUse, range_use
 from jaxdamp.metrics import Metric
 from jaxdamp.roads import WhiteRoad
-from jaxdamp.simulation.range_notes import named_laws
+from jaxdamp.simulation.notes import named_laws
 from jaxdamp.vehicles import (
     AbstractVehicle,
     EquivalentDamper,

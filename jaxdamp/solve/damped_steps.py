@@ -41,39 +41,22 @@ class Linearisation(NamedTuple):
 
 
 class State(NamedTuple):
-    """The accepted point with its linearised problem, and the point to be tried next; all with the axes of the lanes.
+    """The accepted point with its linearised problem, and the point to be tried next, with the axes of the lanes."""
 
-    Attributes:
-        trial: the point to be tried.
-        triangle: of the rows of the accepted point.
-        scale: of the damping: the largest norms of the Jacobian's columns so far (as in MINPACK).
-        conditions: slopes of the conditions, of length one.
-        least: of the conditions times a step.
-        step_size: inverse of the damping.
-        predicted: decrease of half the sum of squares at the point to be tried.
-        floor: of a decrease that counts.
-        short: whether the step is shorter than the tolerances.
-        whole: whether it is the step without damping.
-        steps: points tried.
-        converged: whether the search has ended by its tolerance.
-        stuck: whether there is no further step.
-        aux: what the residual gives beside its value at the accepted point.
-    """
-
-    trial: Any
-    triangle: Any
-    scale: Any
-    conditions: Any
-    least: Any
-    step_size: Any
-    predicted: Any
-    floor: Any
-    short: Any
-    whole: Any
-    steps: Any
-    converged: Any
-    stuck: Any
-    aux: Any
+    trial: Any  # the point to be tried
+    triangle: Any  # of the rows of the accepted point
+    scale: Any  # of the damping: the largest norms of the Jacobian's columns so far (as in MINPACK)
+    conditions: Any  # slopes of the conditions, of length one
+    least: Any  # of the conditions times a step
+    step_size: Any  # inverse of the damping
+    predicted: Any  # decrease of half the sum of squares at the point to be tried
+    floor: Any  # of a decrease that counts
+    short: Any  # whether the step is shorter than the tolerances
+    whole: Any  # whether it is the step without damping
+    steps: Any  # points tried
+    converged: Any  # whether the search has ended by its tolerance
+    stuck: Any  # whether there is no further step
+    aux: Any  # what the residual gives beside its value at the accepted point
 
 
 class _Proposal(NamedTuple):
@@ -226,17 +209,17 @@ def _damped_step(xp: Any, state: State, step_size: Any, lower: Any, upper: Any) 
     high = xp.concatenate([xp.broadcast_to(upper, scale.shape), xp.full_like(state.least, np.inf)], axis=-1)
 
     def solved(held: Any, at: Any) -> Any:
-        own, rows, values = held[..., :n], held[..., n:], xp.where(held[..., :n], at[..., :n], 0.0)
+        coordinates, rows, values = held[..., :n], held[..., n:], xp.where(held[..., :n], at[..., :n], 0.0)
         firmly = xp.where(rows, firm, 0.0)
         blocks = [
-            xp.where(own[..., None, :], 0.0, r),
-            xp.eye(n, dtype=r.dtype) * xp.where(own, 1.0, damping)[..., None],
+            xp.where(coordinates[..., None, :], 0.0, r),
+            xp.eye(n, dtype=r.dtype) * xp.where(coordinates, 1.0, damping)[..., None],
         ]
-        blocks += [xp.where(own[..., None, :], 0.0, firmly[..., None] * conditions)]
+        blocks += [xp.where(coordinates[..., None, :], 0.0, firmly[..., None] * conditions)]
         aims = [-q - _times(r, values), values, firmly * (at[..., n:] - _times(conditions, values))]
         matrix, target = xp.concatenate(blocks, axis=-2), xp.concatenate(aims, axis=-1)
-        whole = xp.linalg.qr(xp.concatenate([matrix, target[..., None]], axis=-1), mode="r")
-        return _back_substituted(xp, whole[..., :n, :n], whole[..., :n, n])
+        reduced = xp.linalg.qr(xp.concatenate([matrix, target[..., None]], axis=-1), mode="r")
+        return _back_substituted(xp, reduced[..., :n, :n], reduced[..., :n, n])
 
     def body(carry: tuple[Any, ...]) -> tuple[Any, ...]:
         held, at, _, _ = carry

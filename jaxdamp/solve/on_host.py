@@ -78,7 +78,7 @@ def least_squares_on_host(
     return SearchLanes(y, aux, list(status), state.steps)
 
 
-def _put(lanes: Int[np.ndarray, " some"], some: Any, whole: Any) -> Any:
+def _put(lanes: Int[np.ndarray, " some"], some: Any, tree: Any) -> Any:
     """A tree with the leaves of some lanes replaced."""
 
     def replaced(part: np.ndarray, leaf: np.ndarray) -> np.ndarray:
@@ -86,7 +86,7 @@ def _put(lanes: Int[np.ndarray, " some"], some: Any, whole: Any) -> Any:
         leaf[lanes] = part
         return leaf
 
-    return jtu.tree_map(replaced, some, whole)
+    return jtu.tree_map(replaced, some, tree)
 
 
 def _status(converged: bool | np.bool_, stuck: bool | np.bool_) -> Status:

@@ -1,7 +1,7 @@
 """One function over many points: `jaxdamp.sweep`, and samples to sweep over: `points`, `random`, `sobol`."""
 
+from jaxdamp.sweeps.accessor import without_effect as without_effect
 from jaxdamp.sweeps.axes import points, random, sobol
-from jaxdamp.sweeps.effects import without_effect as without_effect
 from jaxdamp.sweeps.function import SweepFunction as SweepFunction
 from jaxdamp.sweeps.running import sweep
 
@@ -11,9 +11,4 @@ __all__ = [
     "random",
     "sobol",
     "sweep",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "SweepFunction",
-    "without_effect",
 ]

@@ -1,13 +1,50 @@
 """What a sweep's `xarray.Dataset` can do: `data.jaxdamp.table()`, `.to_dict()`, `.plot(metric)`."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 import xarray
 
 from jaxdamp._tables import Column, Table, plain, typeset_unit
-from jaxdamp.sweeps.effects import without_effect
+from jaxdamp._types import Contents
+
+
+if TYPE_CHECKING:
+    import xarray
+
+
+_ROUNDING = 1e-12  # of the largest value, by which a result may change along an axis without effect
+
+
+def without_effect(data: "xarray.Dataset") -> dict[str, list[str]]:
+    """The axes of a grid along which a result does not change anywhere, but for rounding, by the name of the result.
+
+    No value of such a parameter is better than another. Axes of one value, and points that are no grid, say nothing.
+
+    Arguments:
+        data: of `jaxdamp.sweep`.
+
+    >>> import jaxdamp
+    >>> data = jaxdamp.sweep(lambda p: {"area": 2.0 * p["a"] + 0.0 * p["b"]}, {"a": [1.0, 2.0], "b": [3.0, 4.0]})
+    >>> without_effect(data)
+    {'area': ['b']}
+    """
+    idle = {}
+    dims = [str(name) for name in data["failed"].dims if data.sizes[name] > 1 and name in data.coords]
+    for name, result in data.data_vars.items():
+        if result.dims != data["failed"].dims:
+            continue
+        size = _ROUNDING * float(np.abs(result).max())
+        pairs = {over: result.count(over) > 1 for over in dims}
+        flat = [
+            over
+            for over, compared in pairs.items()
+            if compared.any() and bool(((result.max(over) - result.min(over)).where(compared, 0.0) <= size).all())
+        ]
+        if flat:
+            idle[str(name)] = flat
+    return idle
 
 
 if TYPE_CHECKING:
@@ -50,7 +87,7 @@ class SweepResults:
         flat = [f"; no effect of {', '.join(over)} on {name}" for name, over in without_effect(data).items()]
         return Table(f"Sweep over {', '.join(map(str, axes))}{''.join(flat)}", tuple(columns), rows)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Contents:
         """As `Dataset.to_dict`, ready for JSON: numbers that are not finite are None."""
         return plain(self._data.to_dict())
 
@@ -61,7 +98,7 @@ class SweepResults:
         return sweep(self._data, metric, over)
 
 
-def _is_in(axis: xarray.DataArray, dims: tuple[Any, ...]) -> bool:
+def _is_in(axis: xarray.DataArray, dims: tuple[object, ...]) -> bool:
     """Whether a coordinate belongs to the points, not to an axis of a result."""
     return bool(axis.dims) and set(axis.dims) <= set(dims)
 

@@ -92,7 +92,7 @@ class Points(AbstractPoints):
         return {name: (POINT, values) for name, values in self.values.items()}
 
 
-def points(values: Mapping[str, Any]) -> Points:
+def points(values: Mapping[str, object]) -> Points:
     """A list of points.
 
     Arguments:
@@ -159,7 +159,7 @@ def as_points(over: object) -> AbstractPoints:
     return Grid(_columns("over", over))
 
 
-def _columns(argument: str, values: Mapping[str, Any]) -> Columns:
+def _columns(argument: str, values: Mapping[str, object]) -> Columns:
     """The numbers of each axis as float64, checked."""
     if not values:
         _checks.refuse(argument, "have at least one axis", values)

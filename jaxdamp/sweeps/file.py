@@ -14,7 +14,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._writing import whole
-from jaxdamp.sweeps import processes
+from jaxdamp.sweeps.devices import is_first, largest, of_first, text_of_first
 from jaxdamp.sweeps.table import Table
 
 
@@ -51,16 +51,16 @@ class SweepFile:
         import xarray  # noqa: F401 so that no interrupt can hit it while it loads
 
         refusal: Exception | None = None
-        if processes.is_first() and self.path.exists():
+        if is_first() and self.path.exists():
             try:
                 self._load()
             except Exception as error:
                 refusal = error
-        if processes.largest(refusal is not None)[0]:
+        if largest(refusal is not None)[0]:
             raise refusal or ValueError(f"The first process refuses the file {self.path}: see its message.")
         table = self._table
-        table.values, table.done, table.reason = processes.of_first((table.values, table.done, table.reason))
-        table.reasons = json.loads(processes.text_of_first(json.dumps(table.reasons)))
+        table.values, table.done, table.reason = of_first((table.values, table.done, table.reason))
+        table.reasons = json.loads(text_of_first(json.dumps(table.reasons)))
 
     def _load(self) -> None:
         import xarray
@@ -127,7 +127,7 @@ class SweepFile:
     def save(self, *, now: bool = False) -> None:
         """Write what is done if it is time, whole or not at all; what cannot be written stops no sweep."""
         start = time.monotonic()
-        if not processes.is_first() or (start < self._next and not now):
+        if not is_first() or (start < self._next and not now):
             return
         try:
             self._write()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from jaxdamp.sweeps.axes import PARAMETER, AbstractPoints, Columns
-from jaxdamp.sweeps.tracing import Traced
+from jaxdamp.sweeps.function import Traced
 
 
 if TYPE_CHECKING:

@@ -6,16 +6,14 @@
 They need neither pytest nor a test runner: each check raises an `AssertionError` that says what is wrong.
 """
 
-from jaxdamp.testing.law_checks import CHECKS as CHECKS, check_law
-from jaxdamp.testing.places import check_alike_ports, check_inside_wrappers
+from jaxdamp.testing.law_checks import (
+    CHECKS as CHECKS,
+    check_alike_ports as check_alike_ports,
+    check_inside_wrappers as check_inside_wrappers,
+    check_law,
+)
 
 
 __all__ = [
-    "check_alike_ports",
-    "check_inside_wrappers",
     "check_law",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "CHECKS",
 ]

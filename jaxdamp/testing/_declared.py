@@ -9,8 +9,7 @@ import numpy as np
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.export import from_json, to_json
 from jaxdamp.parameters import free_parameters, get, parameters, replace
-from jaxdamp.testing._probes import motion, points, responses
-from jaxdamp.testing._require import require, require_equal, require_refusal
+from jaxdamp.testing._probes import motion, points, require, require_equal, require_refusal, responses
 
 
 REFUSALS = (ValueError, TypeError, jaxtyping.TypeCheckError)

@@ -3,6 +3,9 @@
 Laws of equal structure are thus compiled once; points and motions are in groups of equal size.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -12,6 +15,35 @@ from jaxtyping import Array
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import FreeParameters, parameters
 from jaxdamp.rig import march
+
+
+def require(condition: object, message: str) -> None:
+    """Raise an `AssertionError` with the message unless the condition holds."""
+    if not condition:
+        raise AssertionError(message)
+
+
+def require_equal(found: object, expected: object, message: str, *, rtol: float = 0.0, atol: float = 0.0) -> None:
+    """Raise an `AssertionError` with the message and the largest difference unless two arrays agree."""
+    found, expected = np.asarray(found), np.asarray(expected)
+    require(found.shape == expected.shape, f"{message} Their shapes are {found.shape} and {expected.shape}.")
+    excess = np.abs(found - expected) - rtol * np.abs(expected)
+    if found.size and not np.all(excess <= atol):
+        worst = np.unravel_index(int(np.argmax(np.nan_to_num(excess, nan=np.inf))), found.shape)
+        raise AssertionError(f"{message} The largest difference is {found[worst]!r} against {expected[worst]!r}.")
+
+
+def require_refusal(
+    call: Callable[[], Any], words: tuple[str, ...], kinds: tuple[type[Exception], ...], message: str
+) -> None:
+    """Raise an `AssertionError` with the message unless a call raises one of these errors and names what is wrong."""
+    try:
+        call()
+    except kinds as error:
+        text = str(error)
+        require(any(word in text for word in words), f"{message} The error does not name it: {text}")
+    else:
+        raise AssertionError(f"{message} It is accepted.")
 
 
 LANES = 8

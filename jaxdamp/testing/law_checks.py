@@ -1,16 +1,158 @@
 """The contract of damper laws: each check takes a law and raises an `AssertionError` if it is violated."""
 
 from collections.abc import Callable, Collection
+from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
-from jaxdamp import _checks
+from jaxdamp import _checks, roads
 from jaxdamp._field_types import check_module
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import (
+    AbstractDamper,
+    Bushing,
+    FrequencySelective,
+    Heated,
+    Lag,
+    Linear,
+    MotionRatio,
+    Play,
+    Scheduled,
+    SeriesSpring,
+    Spring,
+    StrokeDependent,
+    Sum,
+    TemperatureScaled,
+)
+from jaxdamp.parameters import free_parameters
+from jaxdamp.rig import march
+from jaxdamp.simulation import Ride
 from jaxdamp.testing import _declared, _physics
-from jaxdamp.testing.places import check_alike_ports, check_inside_wrappers
+from jaxdamp.testing._probes import require, require_equal
+from jaxdamp.vehicles import Corner, HalfCar
+
+
+Wrap = Callable[[AbstractDamper], AbstractDamper]
+Laws = dict[str, Any]  # by slot
+
+WRAPPERS: dict[str, Wrap] = {
+    "0.7 * law": lambda law: 0.7 * law,
+    "law + Spring(...) + law": lambda law: Sum((law, Spring(1e3), law)),
+    "MotionRatio(law, ...)": lambda law: MotionRatio(law, 0.8),
+    "TemperatureScaled(law, ...)": lambda law: TemperatureScaled(law, 313.15),
+    "Scheduled((law, law), ...)": lambda law: Scheduled((law, law), [0.0, 1.0], 0.4),
+    "Heated(law, ...)": lambda law: Heated(law, 0.01, 1.0, heat_capacity=10.0),
+    "Lag(law, ...)": lambda law: Lag(law, 0.004),
+}
+IN_SERIES: dict[str, Wrap] = {
+    "SeriesSpring(law, ...)": lambda law: SeriesSpring(law, 5e5),
+    "Bushing(law, ...)": lambda law: Bushing(law, 2e6, 6e5, 800.0),
+    "Play(law, ...)": lambda law: Play(law, 5e5, 2e-4),
+}
+WITHOUT_STATES: dict[str, Wrap] = {
+    "StrokeDependent((law, law), ...)": lambda law: StrokeDependent((law, law), [-0.01, 0.01]),
+    "FrequencySelective(law, ...)": lambda law: FrequencySelective(law, Linear(500.0), 0.03, 0.003),
+}
+SLOTS = ("damper", "extra_spring", "bump_stop", "friction")  # of a corner: four laws can share a car
+METRICS = ("rms_sprung_acceleration", "rms_front_dynamic_tyre_load", "rms_rear_dynamic_tyre_load")
+
+
+def expected_forces(force: np.ndarray, stroke: np.ndarray) -> dict[str, np.ndarray]:
+    """Forces [N] of the wrappers that follow at every instant from that of the law, in the same motion."""
+    return {
+        "0.7 * law": 0.7 * force,
+        "law + Spring(...) + law": 2.0 * force + 1e3 * stroke,
+        "TemperatureScaled(law, ...)": (1.0 - 0.002 * 20.0) * force,
+        "Scheduled((law, law), ...)": force,
+    }
+
+
+@eqx.filter_jit
+def _forces(laws: tuple[AbstractDamper, ...]) -> tuple[Array, Array]:
+    """A short motion's strokes [m], and the force [N] of each law in it, shape (laws, time)."""
+    t = 1e-3 * jnp.arange(25.0)
+    x, v = 0.006 * jnp.sin(60.0 * t), 0.36 * jnp.cos(60.0 * t)
+    return x, jnp.stack([march(law, jnp.asarray(1e-3), x, v, 1) for law in laws])
+
+
+def _resists_more_the_faster(law: AbstractDamper) -> bool:
+    """Whether the force at rest grows with the velocity, as a law in series with a spring must."""
+    state, zero = law.initial_state(), jnp.zeros(())
+    force = [float(law.force(zero, jnp.asarray(v), state)) for v in (-2.0, -0.5, -0.1, 0.0, 0.1, 0.5, 2.0)]
+    return bool(np.all(np.diff(force) > 0.0))
+
+
+def check_inside_wrappers(law: AbstractDamper) -> None:
+    """Every wrapper takes the law, or refuses it as its traits say, and gives finite forces with it.
+
+    Arguments:
+        law: the damper law.
+    """
+    stateless, feed_through = law.initial_state().size == 0, law.traits().has_feed_through
+    wrapped = {name: wrap(law) for name, wrap in WRAPPERS.items()}
+    for name, wrap in (IN_SERIES | WITHOUT_STATES).items():
+        fits, why = (feed_through, "feed-through") if name in IN_SERIES else (stateless, "states")
+        if fits and (name not in IN_SERIES or _resists_more_the_faster(law)):
+            wrapped[name] = wrap(law)
+        elif not fits:
+            try:
+                wrap(law)
+            except ValueError:
+                continue
+            raise AssertionError(f"`{name}` takes the law, which it must refuse for its {why}.")
+    stroke, forces = (np.asarray(a) for a in _forces((law, *wrapped.values())))
+    own, found = forces[0], dict(zip(wrapped, forces[1:], strict=True))
+    for name, force in found.items():
+        require(np.all(np.isfinite(force)), f"`{name}` has forces that are not finite: {force}.")
+    for name, expected in expected_forces(own, stroke).items():
+        atol = 1e-9 * float(np.max(np.abs(expected)))
+        require_equal(found[name], expected, f"`{name}` must follow from the law's own force.", atol=atol)
+
+
+def half_car(front: Laws, rear: Laws) -> HalfCar:
+    """A car that is symmetric but for its laws, given by the slot of a corner."""
+    ahead, behind = (Corner(40.0, 23.5e3, 190e3, **laws) for laws in (front, rear))
+    return HalfCar(580.0, 1100.0, 1.2, 1.2, ahead, behind)
+
+
+def two_bumps() -> tuple[np.ndarray, np.ndarray]:
+    """Time [s] and heights [m] of two short bumps, one under each axle, the rear one later."""
+    time = 1e-3 * np.arange(51)
+    share = np.clip((time[:, None] - np.array([0.002, 0.012])) / 0.03, 0.0, 1.0)
+    return time, 0.01 * (1.0 - np.cos(2 * np.pi * share))
+
+
+def _ride(front: Laws, rear: Laws, heights: np.ndarray) -> np.ndarray:
+    """The metrics of a ride, at a step that steep laws bear."""
+    road = roads.from_profile(two_bumps()[0], heights)
+    metrics = Ride(half_car(front, rear), road, metrics=list(METRICS), substeps=64)()
+    return np.array([float(metrics[name]) for name in METRICS])
+
+
+def check_alike_ports(*laws: AbstractDamper, rtol: float = 1e-9) -> None:
+    """Two of each law with different numbers at the ends of a half car, stacked and computed as one batch.
+
+    If front and rear of car and road are exchanged, the results must be exchanged too: no end may use the parameters of
+    the other.
+
+    Arguments:
+        laws: up to four laws, which share the car.
+        rtol: relative difference of the two rides that is allowed.
+    """
+    _, heights = two_bumps()
+    one: Laws = dict(zip(SLOTS, laws, strict=False))
+    free = {slot: free_parameters(law) for slot, law in one.items()}
+    other: Laws = {slot: f.build(f.values * 1.02) for slot, f in free.items()}
+    there, back, same = _ride(one, other, heights), _ride(other, one, heights[:, ::-1]), _ride(one, one, heights)
+    require(np.all(np.isfinite(there)), f"In a half car {METRICS} are {there}.")
+    difference = np.abs(there / back[[0, 2, 1]] - 1.0)
+    message = f"{METRICS} change by {difference} of themselves when front and rear are exchanged."
+    require(np.all(difference <= rtol), f"Several laws of one kind must act as each alone, but {message}")
+    effect = abs(there[2] / same[2] - 1.0)
+    require(effect > 5 * rtol, f"Numbers 2 % larger at the rear change the rear tyre's load by {effect:.1g} only.")
 
 
 CHECKS: dict[str, Callable[[AbstractDamper], None]] = {

@@ -15,25 +15,23 @@
 
 from jaxdamp._deprecated import answer_old_names
 from jaxdamp._status import Status
-from jaxdamp.tune.comparison import DamperComparison
-from jaxdamp.tune.decisions import compare_dampers
-from jaxdamp.tune.front import ParetoFront, hypervolume
-from jaxdamp.tune.limits import limit_spans
+from jaxdamp.tune.decisions import DamperComparison as DamperComparison, compare_dampers
+from jaxdamp.tune.front import ParetoFront as ParetoFront, hypervolume as hypervolume
+from jaxdamp.tune.limits import limit_spans as limit_spans
 from jaxdamp.tune.minimising import minimise
-from jaxdamp.tune.objective import Targets
+from jaxdamp.tune.objective import Targets, smooth_peak, smooth_settling
 from jaxdamp.tune.pareto_search import pareto
 from jaxdamp.tune.ranges import Choice
-from jaxdamp.tune.rescoring import Rescore, rescore
-from jaxdamp.tune.result import TuneResult
+from jaxdamp.tune.rescoring import Rescore as Rescore, rescore
+from jaxdamp.tune.result import TuneResult as TuneResult
 from jaxdamp.tune.robust_tuning import robust, tolerance_effects
 from jaxdamp.tune.scenario_ride import CVaR
 from jaxdamp.tune.scenarios import Condition, Scenarios, samples, tolerances
 from jaxdamp.tune.sensitivities import sensitivity
-from jaxdamp.tune.sensitivity_result import Sensitivity
+from jaxdamp.tune.sensitivity_result import Sensitivity as Sensitivity
 from jaxdamp.tune.settings import Design, Run, Search
-from jaxdamp.tune.shape import damper_paths, knee, monotone, ratio, slope
-from jaxdamp.tune.smooth import smooth_peak, smooth_settling
-from jaxdamp.tune.valving_result import ValvingResult
+from jaxdamp.tune.shape import damper_paths as damper_paths, knee, monotone, ratio, slope
+from jaxdamp.tune.valving_result import ValvingResult as ValvingResult
 from jaxdamp.tune.valving_search import valving
 from jaxdamp.tune.verdict import Outcome
 
@@ -42,24 +40,15 @@ __all__ = [
     "CVaR",
     "Choice",
     "Condition",
-    "DamperComparison",
     "Design",
     "Outcome",
-    "ParetoFront",
-    "Rescore",
     "Run",
     "Scenarios",
     "Search",
-    "Sensitivity",
     "Status",
     "Targets",
-    "TuneResult",
-    "ValvingResult",
     "compare_dampers",
-    "damper_paths",
-    "hypervolume",
     "knee",
-    "limit_spans",
     "minimise",
     "monotone",
     "pareto",
@@ -81,16 +70,16 @@ answer_old_names(
     __all__,
     {
         "Attempt": "result",
-        "Change": "result",
+        "Change": "ranges",
         "CurveSensitivity": "sensitivity_result",
-        "Difference": "comparison",
+        "Difference": "decisions",
         "FittedLaw": "decisions",
         "OutOfReach": "valving_result",
         "Scenario": "scenarios",
         "ScenarioRide": "scenario_ride",
         "ScenarioValues": "result",
         "Shape": "shape",
-        "Spectrum": "spectra",
+        "Spectrum": "rescoring",
         "ToleranceEffect": "result",
         "ValveParameter": "valving_result",
     },

@@ -1,30 +1,32 @@
 """`compare_dampers`: the difference between dampers in ride metrics, with its uncertainty."""
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, Unpack, runtime_checkable
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._jacobian import value_and_jacobian
+from jaxdamp._jacobian import with_jacobian
 from jaxdamp._progress import Progress
+from jaxdamp._results import AbstractResult, drawn_by
+from jaxdamp._tables import Column, Table, plain, plus_minus, typeset_unit
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.simulation import Ride
-from jaxdamp.tune.comparison import DamperComparison, Difference
+from jaxdamp.tune.scenario_ride import ScenarioRide
+from jaxdamp.tune.scenarios import Scenarios
 from jaxdamp.tune.settings import RUN, Run, completed
 from jaxdamp.vehicles import AbstractVehicle
 
 
-CONFIDENCE = 0.95
 NO_EFFECT = 1e-6  # change of a metric per 100 % of a parameter, relative to its size, that counts as none
 
 
@@ -50,6 +52,86 @@ class FittedLaw(Protocol):
     def covariance(self) -> Float[np.ndarray, "free free"]:
         """Of the estimates."""
         ...
+
+
+class Difference(NamedTuple):
+    """The change of a metric from the first damper to another one, relative to the first."""
+
+    damper: str  # name of the other damper
+    metric: str  # name of the metric
+    change: float  # mean over the roads [%]
+    from_parameters: float  # standard error due to the fitted parameters [%]
+    from_roads: float  # standard error due to the choice of roads, the same for both dampers [%]
+    margin: float  # half the width of the 95 % interval from both sources [%]
+
+    @property
+    def significant(self) -> bool:
+        """Whether the interval excludes zero."""
+        return abs(self.change) > self.margin
+
+    @property
+    def sentence(self) -> str:
+        """The difference in words."""
+        parts = f"± {self.from_parameters:.2g} % from the fitted parameters, ± {self.from_roads:.2g} % from the roads"
+        less = "less" if self.change < 0 else "more"
+        size = f"{plus_minus(abs(self.change), self.margin)} % {less} {self.metric}"
+        verdict = "" if self.significant else ", which may be none"
+        return f"{self.damper} has {size}{verdict} (95 %; standard errors {parts})."
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class DamperComparison(AbstractResult):
+    """Ride metrics of several dampers on the same roads, with their uncertainties.
+
+    Attributes:
+        values: each metric of each damper on each road, by damper and metric.
+        parameter_errors: standard error of the mean of each metric due to the fitted parameters, likewise.
+        road_errors: standard error of the mean of each metric due to the choice of roads, likewise.
+        differences: from the first damper to each other one.
+        units: of the metrics.
+        warnings: parameters that no record determines but that matter here.
+    """
+
+    values: dict[str, dict[str, Float[np.ndarray, " roads"]]]
+    parameter_errors: dict[str, dict[str, float]]
+    road_errors: dict[str, dict[str, float]]
+    differences: tuple[Difference, ...]
+    units: dict[str, str]
+    warnings: tuple[str, ...]
+
+    @property
+    def summary(self) -> str:
+        """The differences of the first metric in words."""
+        first = next(iter(self.units))
+        return " ".join(d.sentence for d in self.differences if d.metric == first)
+
+    def difference(self, metric: str, damper: str | None = None) -> Difference:
+        """The difference in a metric; of the second damper, if none is named."""
+        _checks.one_of("metric", metric, self.units)
+        damper = list(self.values)[1] if damper is None else damper
+        _checks.one_of("damper", damper, list(self.values)[1:])
+        return next(d for d in self.differences if (d.metric, d.damper) == (metric, damper))
+
+    def table(self) -> Table:
+        """Each metric of each damper with both standard errors, and the change from the first one."""
+        names = ["metric", "unit", "damper", "mean", "from parameters", "from roads"]
+        columns = [*map(Column, names), Column("change", "%", "+.2f"), Column("95 %", "%", ".2f"), Column("note")]
+        changes = {(d.damper, d.metric): d for d in self.differences}
+        rows = []
+        for metric, unit in self.units.items():
+            for damper, values in self.values.items():
+                errors = self.parameter_errors[damper][metric], self.road_errors[damper][metric]
+                d = changes.get((damper, metric))
+                more = (None, None, "") if d is None else (d.change, d.margin, "" if d.significant else "may be none")
+                rows.append((metric, typeset_unit(unit, "–"), damper, float(values[metric].mean()), *errors, *more))
+        return Table("Ride metrics with standard errors", tuple(columns), tuple(rows))
+
+    def content(self) -> dict[str, Any]:
+        """All numbers with units and words, ready for JSON; numbers that are not finite are None."""
+        differences = [plain(d) | {"significant": bool(d.significant)} for d in self.differences]
+        return self._data("units", "values", "parameter_errors", "road_errors") | {"differences": differences}
+
+    plot = drawn_by("damper_comparison", "The change of each metric with its interval, and the share of each source.")
 
 
 class _DamperMetrics(NamedTuple):
@@ -97,20 +179,18 @@ def compare_dampers(
     driven = completed("compare_dampers", run, RUN)
     _check(dampers, vehicle, roads)
     listed: list[Any] = [roads] if isinstance(roads, WhiteRoad) else list(roads)
-    by_damper, warnings, units = {}, [], {}
-    heights = None
+    by_damper, warnings, units, first = {}, [], {}, None
     with Progress("Comparing dampers") as shown:
         for number, (name, damper) in enumerate(dampers.items()):
             shown(f"{name}, {number + 1} of {len(dampers)}")
-            law = damper if isinstance(damper, AbstractDamper) else damper.law
-            car = vehicle(law)
+            car = vehicle(damper if isinstance(damper, AbstractDamper) else damper.law)
             check_module("vehicle", car, (AbstractVehicle,), "compare_dampers(dampers, vehicle, roads)")
-            ride = Ride(car, listed[0], metrics=_chosen(car, listed, metrics), **driven)
-            if ride.heights is not None and heights is None:  # the same roads for all dampers
-                rides = (ride, *(Ride(car, road, metrics=ride.metrics, **driven) for road in listed[1:]))
-                heights = jnp.stack([each.heights for each in rides if each.heights is not None])
+            sampled = listed if first is None else listed[:1]  # the same roads for all dampers
+            ride = Scenarios(sampled).ride(car, metrics=_chosen(car, listed, metrics), **driven)
+            first = ride if first is None else first
+            ride = eqx.tree_at(lambda one: one.roads, ride, first.roads)
             units = {m.name: m.unit(car.units) for m in ride.metrics}
-            by_damper[name], notes = _metrics_of(damper, vehicle, ride, heights)
+            by_damper[name], notes = _metrics_of(damper, vehicle, ride)
             warnings += [f"{name}: {note}" for note in notes]
     return _comparison(by_damper, units, warnings, len(listed))
 
@@ -166,15 +246,14 @@ def _chosen(car: AbstractVehicle, roads: Sequence[Any], metrics: Sequence[str | 
     """The metrics to compare: those asked for, or all that have a derivative and one sign."""
     if metrics is not None:
         return list(metrics)
-    known = Ride(car, roads[0]).metrics if isinstance(roads[0], WhiteRoad) else car.ride_metrics
-    return [m for m in known if m.statistic.differentiable and not m.statistic.signed]
+    available = Ride(car, roads[0]).metrics if isinstance(roads[0], WhiteRoad) else car.ride_metrics
+    return [m for m in available if m.statistic.differentiable and not m.statistic.signed]
 
 
 def _metrics_of(
     damper: AbstractDamper | FittedLaw,
     vehicle: Callable[[AbstractDamper], AbstractVehicle],
-    ride: Ride,
-    heights: Array | None,
+    ride: ScenarioRide,
 ) -> tuple[_DamperMetrics, list[str]]:
     """The metrics of a damper on all roads side by side, with exact derivatives by its estimates."""
     law = damper if isinstance(damper, AbstractDamper) else damper.law
@@ -182,7 +261,7 @@ def _metrics_of(
     estimates, names = ([], free.names) if isinstance(damper, AbstractDamper) else (damper.parameters, free.names)
     effects = _effects(estimates, names)
     order = [m.name for m in ride.metrics]
-    values, slopes = _metrics_on_roads(ride.side_by_side(), vehicle, free, heights, jnp.asarray(effects), order)
+    values, slopes = _metrics_on_roads(ride, vehicle, free, jnp.asarray(effects), order)
     values, slopes = np.asarray(values, np.float64), np.asarray(slopes, np.float64).mean(axis=0)
     if isinstance(damper, AbstractDamper):
         return _DamperMetrics(values, np.zeros(len(order))), []
@@ -203,7 +282,9 @@ def _metrics_of(
 
 def _effects(estimates: Sequence[Any], names: Sequence[str]) -> Float[np.ndarray, "numbers free"]:
     """Change of each number of a law per change of each estimate: one, or a share where the law has a mean."""
-    plain_names = [str(e.name).removeprefix("law.") for e in estimates]
+    of_wrapper = all(name in names or name.rpartition("[")[0] in names for name in (str(e.name) for e in estimates))
+    prefix = "" if of_wrapper else "law."  # of a law on a machine, beside which `Lag(law, ...)` has such paths too
+    plain_names = [str(e.name).removeprefix(prefix) for e in estimates]
     effects = np.zeros((len(names), len(estimates)))
     for i, (estimate, name) in enumerate(zip(estimates, plain_names, strict=True)):
         owner = name.rpartition("[")[0]
@@ -214,7 +295,7 @@ def _effects(estimates: Sequence[Any], names: Sequence[str]) -> Float[np.ndarray
             effects[names.index(name), i] = 1.0
         elif not name.startswith("rig."):  # a test machine takes no part in a ride
             _checks.refuse("dampers", f"have estimates among {', '.join(names)}", repr(estimate.name))
-        for tied in (str(other).removeprefix("law.") for other in estimate.tied):
+        for tied in (str(other).removeprefix(prefix) for other in estimate.tied):
             if tied in names:
                 effects[names.index(tied), i] = 1.0
     return effects
@@ -222,34 +303,22 @@ def _effects(estimates: Sequence[Any], names: Sequence[str]) -> Float[np.ndarray
 
 @eqx.filter_jit
 def _metrics_on_roads(
-    ride: Ride,
+    ride: ScenarioRide,
     vehicle: Callable[[AbstractDamper], AbstractVehicle],
     free: FreeParameters,
-    heights: Array | None,
     effects: Array,
     order: list[str],
 ) -> tuple[Array, Array]:
     """The metrics on each road (roads, metrics), and their derivatives by the estimates (roads, metrics, estimates)."""
-    count = 1 if heights is None else len(heights)
-    columns = [str(i) for i in range(effects.shape[1])]
 
-    def one(heights: Array | None, moved: dict[str, Array]) -> dict[str, Array]:
-        step = jnp.stack([moved[name] for name in columns]) if columns else jnp.zeros(0)
-        car = vehicle(free.build(free.values + effects @ step))
-        on_road = ride.of_vehicle(car)
-        return dict(on_road() if heights is None else eqx.tree_at(lambda r: r.heights, on_road, heights)())
+    def metrics(step: Array) -> Array:
+        each = ride.of_vehicle(vehicle(free.build(free.values + effects @ step))).each()
+        return jnp.stack([each[name] for name in order], axis=-1)
 
-    def on_roads(moved: dict[str, Array]) -> dict[str, Array]:
-        return jax.vmap(one, in_axes=(None if heights is None else 0, 0), axis_size=count)(heights, moved)
-
-    still = {name: jnp.zeros(count, free.values.dtype) for name in columns}
-    if not columns:
-        metrics = on_roads(still)
-        values = jnp.stack([metrics[name] for name in order], axis=-1)
+    if not effects.shape[1]:
+        values = metrics(jnp.zeros(0))
         return values, jnp.zeros((*values.shape, 0))
-    metrics, slopes = value_and_jacobian(on_roads, still, of=order)
-    rows = [jnp.stack([slopes[name][column] for column in columns], axis=-1) for name in order]
-    return jnp.stack([metrics[name] for name in order], axis=-1), jnp.stack(rows, axis=1)
+    return with_jacobian(metrics)(jnp.zeros(effects.shape[1], free.values.dtype))
 
 
 def _standard_error(values: Float[np.ndarray, " roads"]) -> float:
@@ -267,9 +336,8 @@ def _difference(name: str, metric: str, first: _DamperMetrics, other: _DamperMet
     from_roads = share * _standard_error(new - ratio * base)
     from_parameters = share * float(np.sqrt(other.variance[i] + ratio**2 * first.variance[i]))
     total = float(np.hypot(from_roads, from_parameters))
-    tail = 0.5 + CONFIDENCE / 2.0
     # degrees of freedom after Welch and Satterthwaite: only the error from the roads is estimated from a few values
     freedom = (roads - 1) * (total / from_roads) ** 4 if from_roads > 0.0 else np.inf
-    factor = float(stdtrit(freedom, tail)) if np.isfinite(freedom) else float(ndtri(tail))
+    factor = float(stdtrit(freedom, 0.975)) if np.isfinite(freedom) else float(ndtri(0.975))
     numbers = 100.0 * (ratio - 1.0), from_parameters, from_roads, factor * total
     return Difference(name, metric, *map(float, numbers))

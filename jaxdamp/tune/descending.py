@@ -17,31 +17,18 @@ RESTARTS = 2  # with a new estimate of the curvature, if the search ends before 
 
 
 class Ended(NamedTuple):
-    """Where and how a search ended.
+    """Where and how a search ended."""
 
-    Attributes:
-        values: of the free parameters.
-        evaluation: numbers and derivatives there.
-        history: the metric after each step.
-        out_of_steps: whether it had used all its steps.
-        slope_left: length of the projected scaled gradient, relative to the metric.
-    """
-
-    values: Float[np.ndarray, " free"]
-    evaluation: Evaluation
-    history: tuple[float, ...]
-    out_of_steps: bool
-    slope_left: float
+    values: Float[np.ndarray, " free"]  # of the free parameters
+    evaluation: Evaluation  # numbers and derivatives there
+    history: tuple[float, ...]  # the metric after each step
+    out_of_steps: bool  # whether it had used all its steps
+    slope_left: float  # length of the projected scaled gradient, relative to the metric
 
 
 @final
 class Descent:
     """Searches for the smallest value of one objective, side by side.
-
-    Arguments:
-        evaluator: of rows and derivatives.
-        max_steps: of each search.
-        progress: called with the number of steps and the smallest present value of the objective.
 
     Attributes:
         task: of the evaluator.
@@ -57,21 +44,11 @@ class Descent:
 
         If one ends before an optimum, its estimate of the curvature is wrong or a kink has stopped it: it is started
         again.
-
-        Arguments:
-            starts: coordinates.
-            evaluations: of the starts.
-            limits: that must hold at the end.
         """
         return self._search(starts, evaluations, limits, None)
 
     def choose(self, ended: Ended, limits: Sequence[Limit]) -> list[Ended]:
-        """Searches with each combination of the choices next to where a search ended, over what else is free.
-
-        Arguments:
-            ended: of numbers between the choices.
-            limits: that must hold at the end.
-        """
+        """Searches with each combination of the choices next to where a search ended, over what else is free."""
         space = self.task.space
         pairs = zip(space.choices, ended.values, strict=True)
         sides = [[value] if choice is None else choice.around(value) for choice, value in pairs]

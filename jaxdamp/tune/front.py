@@ -1,15 +1,14 @@
 """A front: the designs of which none is better in one objective without being worse in another."""
 
 import dataclasses
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple
+from typing import Any, Generic, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, typeset_unit, with_unit
 from jaxdamp._traced import of_known_numbers
@@ -17,10 +16,6 @@ from jaxdamp.metrics import MetricValues
 from jaxdamp.parameters import FreeParameters
 from jaxdamp.tune.measuring import Measurement
 from jaxdamp.tune.result import V
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def non_dominated(values: Float[np.ndarray, "points objectives"]) -> Bool[np.ndarray, " points"]:
@@ -148,11 +143,7 @@ class ParetoFront(AbstractResult, Generic[V]):
         values = self.measured(vehicle)
         return MetricValues.with_units({name: float(values[name]) for name in self.units}, self.units)
 
-    def plot(self, baselines: Mapping[str, Any] | None = None, **options: Any) -> "Figure":
-        """The front with its knee, the start and other vehicles, and the damper laws along the front."""
-        from jaxdamp.plots import pareto
-
-        return pareto(self, baselines, **options)
+    plot = drawn_by("pareto", "The front with its knee, the start and other vehicles, and the laws along it.")
 
     @property
     def summary(self) -> str:
@@ -188,22 +179,15 @@ class ParetoFront(AbstractResult, Generic[V]):
 
     def content(self) -> dict[str, Any]:
         """The front as numbers with units and words, ready for JSON; numbers that are not finite are None."""
-        return {
+        return self._data("knee", "hypervolume", "fresh", "evaluations", "interpolated", "dropped") | {
             "objectives": list(self.names),
             "metrics": {
                 name: {"points": plain(values), "start": plain(self.before[name]), "unit": self.units[name]}
                 for name, values in self.values.items()
             },
             "parameters": [
-                plain(p._asdict()) | {"points": plain(column)}
-                for p, column in zip(self.parameters, self.designs.T, strict=True)
+                plain(p) | {"points": plain(column)} for p, column in zip(self.parameters, self.designs.T, strict=True)
             ],
-            "knee": self.knee,
-            "hypervolume": plain(self.hypervolume),
             "reference": {name: with_unit(value, self.units[name]) for name, value in self.reference.items()},
-            "fresh": {name: plain(values) for name, values in self.fresh.items()},
             "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
-            "evaluations": self.evaluations,
-            "interpolated": self.interpolated,
-            "dropped": self.dropped,
         }

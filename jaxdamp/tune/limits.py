@@ -19,17 +19,11 @@ Span = tuple[float, float]  # smallest and largest allowed value, infinite witho
 
 
 class LimitRange(NamedTuple):
-    """The allowed range of a metric as it is written: ends in its unit, or relative to the start.
+    """The allowed range of a metric as it is written: ends in its unit, or relative to the start."""
 
-    Attributes:
-        lower: smallest allowed value, or its relative distance from the start; −∞ without one.
-        upper: the largest one, likewise; ∞ without one.
-        relative: whether the two ends are relative to the start.
-    """
-
-    lower: float
-    upper: float
-    relative: tuple[bool, bool] = (False, False)
+    lower: float  # smallest allowed value, or its relative distance from the start; −∞ without one
+    upper: float  # the largest one, likewise; ∞ without one
+    relative: tuple[bool, bool] = (False, False)  # whether the two ends are relative to the start
 
     def at(self, start: float) -> Span:
         """Smallest and largest allowed value where the start has this value; shares of a negative one by its size."""
@@ -37,36 +31,17 @@ class LimitRange(NamedTuple):
         lower, upper = (start + end * abs(start) if relative else end for end, relative in ends)
         return lower, upper
 
-    def nearer(self, value: float, start: float, unit: str) -> str:
-        """The nearer end in words: "<= 0.1 m", "<= start +10 %"."""
-        lower, upper = self.at(start)
-        is_upper = upper - value <= value - lower
-        sign, end = ("<=", upper) if is_upper else (">=", lower)
-        if self.relative[is_upper]:
-            return f"{sign} start {100 * (self.upper if is_upper else self.lower):+.4g} %"
-        return f"{sign} {end:.4g} {typeset_unit(unit)}".rstrip()
-
 
 class Limit(NamedTuple):
-    """The allowed range of one number.
+    """The allowed range of one number."""
 
-    Attributes:
-        name: of the number among those that the search computes.
-        of: name of the metric or of the shape constraint that it belongs to.
-        lower: smallest allowed value, −∞ without one.
-        upper: largest allowed value, ∞ without one.
-        scale: of distances to the limit.
-        unit: of the number.
-        is_shape: whether it belongs to the shape of a curve, not to a metric.
-    """
-
-    name: str
-    of: str
-    lower: float
-    upper: float
-    scale: float
-    unit: str = ""
-    is_shape: bool = False
+    name: str  # of the number among those that the search computes
+    of: str  # name of the metric or of the shape constraint that it belongs to
+    lower: float  # smallest allowed value, −∞ without one
+    upper: float  # largest allowed value, ∞ without one
+    scale: float  # of distances to the limit
+    unit: str = ""  # of the number
+    is_shape: bool = False  # whether it belongs to the shape of a curve, not to a metric
 
     def margin(self, value: float) -> float:
         """Relative distance to the nearer end, negative beyond it."""
@@ -109,15 +84,7 @@ def limit_spans(
 
 
 def limit_ranges(limits: Mapping[Any, Any] | None, known: Sequence[str]) -> dict[str, LimitRange]:
-    """The allowed ranges of metrics by their current names, as they are written.
-
-    Arguments:
-        limits: as in `limit_spans`.
-        known: names of metrics, for those that were renamed.
-
-    Raises:
-        ValueError: limits that are neither a largest value nor a smallest and a largest one.
-    """
+    """The allowed ranges of metrics by their current names, as they are written."""
     if not isinstance(limits, Mapping | None):
         _checks.refuse("limits", "be a mapping of metrics to limits", _checks.described(limits), EXAMPLE)
     return {
@@ -190,8 +157,3 @@ def limit_ends(limits: Iterable[Limit]) -> list[LimitEnd]:
 def margins(ends: Iterable[LimitEnd], values: Mapping[str, Any]) -> np.ndarray:
     """Relative distances to ends of limits, negative beyond them."""
     return np.array([end.sign * (end.value - values[end.name]) / end.scale for end in ends])
-
-
-def margin_slopes(ends: Iterable[LimitEnd], slopes: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The derivatives of `margins`."""
-    return np.array([-end.sign * slopes[end.name] / end.scale for end in ends])

@@ -40,15 +40,6 @@ class Measurement(eqx.Module):
     """The metrics of a vehicle and the value of the objective, as functions of the vehicle.
 
     A pytree: programs of equal measurements, but for their numbers, are compiled once.
-
-    Arguments:
-        vehicle: with which the checks of a ride are done.
-        road: one road, or scenarios.
-        objective: with all metrics.
-        free: parameters that change.
-        each: names of metrics whose value in every scenario is given too, as "name in 'scenario'".
-        curves: numbers of force-velocity curves, which are given too.
-        run: as in `simulate`.
     """
 
     ride: Ride | ScenarioRide
@@ -119,7 +110,7 @@ class Measurement(eqx.Module):
 
     def by(self, ride: Ride | ScenarioRide) -> "Measurement":
         """The same by another ride of the vehicle."""
-        return eqx.tree_at(lambda whole: whole.ride, self, ride)
+        return eqx.tree_at(lambda measured: measured.ride, self, ride)
 
 
 @eqx.filter_jit
@@ -160,11 +151,6 @@ class Computed(NamedTuple):
 @final
 class BatchProgram:
     """Numbers of many points, simulated a fixed number side by side, so that one program is enough.
-
-    Arguments:
-        measured: the metrics of a vehicle.
-        free: the free parameters.
-        lanes: points side by side; one alone is compiled without a batch.
 
     Attributes:
         differentiated: names of the numbers with derivatives: objectives and what is limited.

@@ -21,13 +21,12 @@ from jaxdamp.tune.scenario_ride import ScenarioRide, exact
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import DEFAULTS, Settings, completed
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call, is_white
-from jaxdamp.tune.verdict import lost_limits
-from jaxdamp.tune.wording import (
+from jaxdamp.tune.verdict import (
     active_words,
     bound_notes,
-    changes_of,
     early_end,
     effect_notes,
+    lost_limits,
     missed_notes,
     start_notes,
     tightened_notes,
@@ -194,7 +193,7 @@ def _result(
     idle = without_effect(space, (start, ended.evaluation), ended.values)
     short = missed(limits[0], after, task.tolerance)
     held = reached(limits[1], after, task.tolerance)
-    status, changes = _status(task, ended, short), changes_of(space, ended.values)
+    status, changes = _status(task, ended, short), space.changes(ended.values)
     notes = missed_notes(short, after, changes) + true_value_notes(objective, after, before, task.allowed)
     notes += tightened_notes(*limits) + workshop_notes(space) + effect_notes(idle, objective.name)
     notes += bound_notes(space, changes) + start_notes(attempts, objective.name)

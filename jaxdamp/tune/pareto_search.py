@@ -17,16 +17,15 @@ from jaxdamp.tune.descending import missed
 from jaxdamp.tune.front import FrontParameter, ParetoFront, non_dominated, shares_of
 from jaxdamp.tune.limits import Limit, limit_ends, margins
 from jaxdamp.tune.measuring import LANES, ride_on
-from jaxdamp.tune.objective import Function, check_objective
+from jaxdamp.tune.objective import Function, check_objective, exact_counterpart
 from jaxdamp.tune.ranges import SearchRange, start_points
 from jaxdamp.tune.rescoring import other_roads
 from jaxdamp.tune.result import V
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import DEFAULTS, Settings, completed
-from jaxdamp.tune.smooth import exact_counterpart
 from jaxdamp.tune.task import DesignTask, Evaluator, check_call
 from jaxdamp.tune.tracing import NO_CONFLICT, FrontProblem, lattice, range_of, trace_front
-from jaxdamp.tune.wording import changes_of, missed_notes
+from jaxdamp.tune.verdict import missed_notes
 
 
 BEYOND = 0.1  # distance of the default reference point beyond the worst values, relative to their range
@@ -137,8 +136,7 @@ def pareto(
 
 def _parameters(space: SearchRange) -> tuple[FrontParameter, ...]:
     """The free numbers with their bounds."""
-    free = zip(space.free.names, space.free.owners, space.start, space.lower, space.upper, strict=True)
-    return tuple(FrontParameter(n, p.unit, float(a), float(b), float(c)) for n, p, a, b, c in free)
+    return tuple(FrontParameter(c.name, c.unit, c.before, c.lower, c.upper) for c in space.changes(space.start))
 
 
 def _check(objectives: Any, vehicle: Any, road: Any, points: int, counts: Mapping[str, Any]) -> None:
@@ -214,7 +212,7 @@ def _nearest(
     beyond = [max(-limit.margin(v[limit.name]) for limit in s) for s, v in zip(short, values, strict=True)]
     i, space = int(np.argmin(beyond)), task.space
     design = np.clip(states[i].y * space.unit, space.lower, space.upper)
-    return [states[i]], Status.LIMIT_NOT_MET, missed_notes(short[i], values[i], changes_of(space, design))
+    return [states[i]], Status.LIMIT_NOT_MET, missed_notes(short[i], values[i], space.changes(design))
 
 
 def _at_bounds(best: Sequence[SearchState], task: DesignTask[Any]) -> list[str]:
@@ -231,11 +229,6 @@ def _notes_on_points(front: ParetoFront, task: DesignTask[Any], start_on_fresh: 
     """Limits that the points do not keep by their true values or on fresh roads; doubts about step and fitted ranges.
 
     The step and the ranges are looked at at the ends and the knee of the front.
-
-    Arguments:
-        front: the front.
-        task: its task.
-        start_on_fresh: the metrics of the start on the fresh roads, for relative limits.
     """
     notes = []
     exact = {m.name: other for m in task.objective.metrics if (other := exact_counterpart(m))}
@@ -269,15 +262,7 @@ def _with_designs_between(
     limits: Sequence[Limit],
     count: int,
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """The designs of a front with others between them, as far as no other one beats them and they keep all limits.
-
-    Arguments:
-        evaluator: simulates the designs.
-        designs: of the front, more than objectives.
-        numbers: of these designs, by name.
-        limits: of numbers.
-        count: number of designs to interpolate.
-    """
+    """The designs of a front with others between them, as far as no other one beats them and they keep all limits."""
     from scipy.interpolate import RBFInterpolator
 
     space, names = evaluator.task.space, evaluator.task.objective.names

@@ -3,12 +3,13 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
+from jaxdamp._tables import with_tied
 from jaxdamp.parameters import (
     Coordinates,
     FreeParameters,
@@ -27,6 +28,7 @@ INSIDE = 1e-6  # distance from the open ends of a domain, relative to the unit o
 DAMPERS = ("**damper.**",)  # what is tuned by default, as far as it is adjustable
 MOST_CHOICES = 6  # numbers of which all combinations of two neighbours are tried
 NO_BOUND = (-math.inf, math.inf)
+_ROUNDING = 1e-12  # of its unit, below which the end of a parameter is zero
 
 
 @final
@@ -59,28 +61,36 @@ class Choice:
         return list(dict.fromkeys([self.values[max(place - 1, 0)], self.values[min(place, len(self.values) - 1)]]))
 
 
+class Change(NamedTuple):
+    """One parameter before and after."""
+
+    name: str  # path of the parameter
+    before: float  # value of the start, in the unit
+    after: float  # tuned value, in the unit
+    unit: str  # in SI
+    note: str  # "", "at its lower bound" or "at its upper bound"
+    lower: float  # lower bound of the search
+    upper: float  # upper bound of the search
+    tied: tuple[str, ...] = ()  # the numbers that have the same value
+
+    @property
+    def remark(self) -> str:
+        """The note, and the names of the numbers tied to this one."""
+        return with_tied(self.note, self.tied)
+
+
 @final
 @dataclasses.dataclass(frozen=True)
 class SearchRange:
-    """Free numbers with the closed range of each, in physical units and double precision.
+    """Free numbers with the closed range of each, in physical units and double precision."""
 
-    Attributes:
-        coordinates: those of the search, whose free parameters are the vehicle's.
-        start: the value of each number to start from.
-        unit: the value of each number where its coordinate is one.
-        lower: the smallest allowed value of each number.
-        upper: the largest allowed value of each number.
-        origin: where the two bounds of each number come from: `"default"`, `"given"` or `"domain"`.
-        choices: the values that each number may take at the end; None for all between its bounds.
-    """
-
-    coordinates: Coordinates
-    start: np.ndarray
-    unit: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    origin: tuple[tuple[str, str], ...]
-    choices: tuple[Choice | None, ...]
+    coordinates: Coordinates  # those of the search, whose free parameters are the vehicle's
+    start: np.ndarray  # the value of each number to start from
+    unit: np.ndarray  # the value of each number where its coordinate is one
+    lower: np.ndarray  # the smallest allowed value of each number
+    upper: np.ndarray  # the largest allowed value of each number
+    origin: tuple[tuple[str, str], ...]  # of the two bounds of each number: "default", "given" or "domain"
+    choices: tuple[Choice | None, ...]  # the values allowed at the end; None for all between the bounds
 
     @property
     def is_choice(self) -> Bool[np.ndarray, " free"]:
@@ -98,6 +108,17 @@ class SearchRange:
         low, high = values <= self.lower + slack, values >= self.upper - slack
         return ["lower" if at_low else "upper" if at_high else "" for at_low, at_high in zip(low, high, strict=True)]
 
+    def changes(self, values: np.ndarray) -> tuple[Change, ...]:
+        """Every free number before and after, with its bounds."""
+        free = self.free
+        notes = [f"at its {side} bound" if side else "" for side in self.side(values)]
+        ended = np.where(np.abs(values) < _ROUNDING * np.abs(self.unit), 0.0, values)
+        columns = (free.names, self.start, ended, free.owners, notes, self.lower, self.upper, free.followers)
+        return tuple(
+            Change(name, float(before), float(after), p.unit, note, float(lower), float(upper), followers)
+            for name, before, after, p, note, lower, upper, followers in zip(*columns, strict=True)
+        )
+
 
 def search_range(
     vehicle: Any,
@@ -106,12 +127,7 @@ def search_range(
     bounds: Mapping[str, Any] | None,
     tie: Mapping[str, str] | None = None,
 ) -> SearchRange:
-    """The free parameters and their ranges: of all dampers what a workshop can change, if `over` is None.
-
-    Raises:
-        ValueError: names that fit no parameter, or no free one; bounds of a wrong shape, given twice, or without the
-            start between them; dampers of which nothing can be changed.
-    """
+    """The free parameters and their ranges: of all dampers what a workshop can change, if `over` is None."""
     over = _adjustable(vehicle) if over is None else over
     in_over, names = (over, list(over)) if isinstance(over, Mapping) else ({}, over)
     free = free_parameters(vehicle, over=name_patterns("over", names), freeze=freeze, tie=tie)
@@ -161,9 +177,9 @@ def start_points(space: SearchRange, count: int, seed: int) -> np.ndarray:
 
 def _adjustable(vehicle: Any) -> list[str]:
     """The parameters of the dampers that a workshop can change."""
-    known = {p.path: p for p in parameters(vehicle)}
-    inside = match_paths(list(known), DAMPERS)
-    adjustable = [path for path in inside if known[path].adjustable]
+    by_path = {p.path: p for p in parameters(vehicle)}
+    inside = match_paths(list(by_path), DAMPERS)
+    adjustable = [path for path in inside if by_path[path].adjustable]
     if not adjustable:
         remedy = "Name parameters in `over` to move them nevertheless."
         must = "be given where no workshop can change a parameter of the dampers"
@@ -176,10 +192,10 @@ def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> di
     if not isinstance(bounds, Mapping):
         remedy = "Write `{'damper.rate': (1000.0, 5000.0)}`."
         _checks.refuse(argument, "be a mapping of parameters to bounds", _checks.described(bounds), remedy)
-    known, leaders, by_path = [p.path for p in parameters(free.tree)], dict(free.ties), {}
+    every, leaders, by_path = [p.path for p in parameters(free.tree)], dict(free.ties), {}
     paths = [p.path for p in free.chosen]
     for name, bound in bounds.items():
-        named = [leaders.get(path, path) for path in match_paths(known, [name])]
+        named = [leaders.get(path, path) for path in match_paths(every, [name])]
         chosen = [path for path in named if path in paths]
         if not chosen:
             remedy = f"The free parameters are {', '.join(paths)}: add it to `over`, or leave its bounds out."

@@ -2,33 +2,74 @@
 
 import dataclasses
 import itertools
+import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Unpack, final
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, final
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Compared, Table, comparison_table, plain
 from jaxdamp._types import Scalar
-from jaxdamp.metrics import Metric
+from jaxdamp.metrics import Metric, power_spectral_density
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import Ride
+from jaxdamp.simulation import Ride, simulate
 from jaxdamp.tune.limits import LimitRange
 from jaxdamp.tune.objective import Objective
 from jaxdamp.tune.scenario_ride import exact
 from jaxdamp.tune.scenarios import Scenarios
 from jaxdamp.tune.settings import RUN, Run, completed
 from jaxdamp.tune.verdict import decided, half_interval
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.vehicles import AbstractVehicle, frequency_response, linearise
 
 
 if TYPE_CHECKING:
-    import matplotlib.figure
-
     from jaxdamp.tune.result import TuneResult
+
+
+LOWEST, HIGHEST = 0.3, 30.0  # Hz
+
+
+class Spectrum(NamedTuple):
+    """A one-sided power spectral density."""
+
+    frequency: Float[np.ndarray, " lines"]  # [Hz]
+    density: Float[np.ndarray, " lines"]  # [unit²/Hz]
+
+
+def spectra(
+    vehicle: AbstractVehicle,
+    road: AbstractRoad | WhiteRoad,
+    channels: Sequence[str],
+    run: Mapping[str, Any],
+) -> dict[str, Spectrum]:
+    """The spectrum of each channel between 0.3 and 30 Hz.
+
+    On a white road it is that of the vehicle with equivalent linear laws; otherwise Welch's estimate with
+    segments of 4 s, or of the whole run if that is shorter.
+    """
+    if isinstance(road, WhiteRoad):
+        frequency = np.geomspace(LOWEST, HIGHEST, 400)
+        linear = linearise(vehicle, velocity_psd=road.velocity_psd, speed=road.speed)
+        gains = frequency_response(linear, frequency, speed=road.speed)
+        height = 2.0 * float(road.velocity_psd) / (2.0 * np.pi * frequency) ** 2
+        return {name: Spectrum(frequency, np.abs(np.asarray(gains[name])) ** 2 * height) for name in channels}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the notes of the tuning say it
+        response = simulate(vehicle, road, **run)
+    dt = float(response.time[1] - response.time[0])
+    by_channel = {}
+    for name in channels:
+        values = np.asarray(response[name])
+        segment = min(round(1.2 / (LOWEST * dt)), len(values))
+        frequency, density = (np.asarray(a) for a in power_spectral_density(values - values.mean(), dt, segment))
+        inside = (frequency >= LOWEST) & (frequency <= HIGHEST)
+        by_channel[name] = Spectrum(frequency[inside], density[inside])
+    return by_channel
+
 
 FEWEST = 4  # fresh roads before their interval is looked at; then twice as many, and so on
 FIRST_SEED = 4711  # of fresh roads, which are thereby others than those of usual small seeds
@@ -96,11 +137,7 @@ class Rescore(AbstractResult):
         more = (Column("smallest", "%", "+.1f"), Column("largest", "%", "+.1f"))
         return comparison_table(title, "metric", ("before", "after"), rows, more)
 
-    def plot(self) -> "matplotlib.figure.Figure":
-        """The change of each ride metric on each road (`plots.rescore`)."""
-        from jaxdamp import plots
-
-        return plots.rescore(self)
+    plot = drawn_by("rescore", "The change of each ride metric on each road.")
 
     def content(self) -> dict[str, Any]:
         """All metrics on each road with units, ready for JSON; numbers that are not finite are None."""
@@ -147,11 +184,11 @@ def rescore(
     for i, road in enumerate(roads):
         if not isinstance(road, Scenarios):
             check_module(f"roads[{i}]", road, (AbstractRoad, WhiteRoad), call)
-    known, objective = list(result.start.ride_metrics), result.objective
-    known += [m for m in (objective.metrics if objective else ()) if m not in known]
-    units = {m.name: m.unit(result.start.units) for m in known} | (objective.units(result.start) if objective else {})
+    metrics, objective = list(result.start.ride_metrics), result.objective
+    metrics += [m for m in (objective.metrics if objective else ()) if m not in metrics]
+    units = {m.name: m.unit(result.start.units) for m in metrics} | (objective.units(result.start) if objective else {})
     cars = (result.start, result.vehicle)
-    return rescored(cars, roads, known, objective, units, result.metric, completed("rescore", run, RUN))
+    return rescored(cars, roads, metrics, objective, units, result.metric, completed("rescore", run, RUN))
 
 
 def rescored(
@@ -191,15 +228,6 @@ def on_fresh_roads(
     run: Mapping[str, Any],
 ) -> Rescore | None:
     """The vehicle before and after on other realisations of a road, on so many that gain and limits are decided.
-
-    Arguments:
-        cars: before and after.
-        road: of the tuning.
-        numbers: of the realisations, as many as there may be.
-        allowed: the limits.
-        objective: of the tuning.
-        units: of its metrics.
-        run: as in `simulate`.
 
     Returns:
         None where there is no other realisation.

@@ -10,15 +10,15 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_tied, with_unit
+from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_unit
 from jaxdamp.tune.limits import LimitRange, written
 from jaxdamp.tune.objective import Objective, Targets
-from jaxdamp.tune.rescoring import Rescore
+from jaxdamp.tune.ranges import Change
+from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
 from jaxdamp.tune.scenarios import Road
-from jaxdamp.tune.spectra import Spectrum, spectra
-from jaxdamp.tune.verdict import Verdict, verdict_of
+from jaxdamp.tune.verdict import Verdict, mean_change, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -27,49 +27,15 @@ if TYPE_CHECKING:
 
 
 V = TypeVar("V", bound=AbstractVehicle)
-
-
-class Change(NamedTuple):
-    """One parameter before and after.
-
-    Attributes:
-        name: path of the parameter.
-        before: value of the start, in the unit.
-        after: tuned value, in the unit.
-        unit: in SI.
-        note: empty, "at its lower bound" or "at its upper bound".
-        lower: lower bound of the search.
-        upper: upper bound of the search.
-        tied: the numbers that have the same value.
-    """
-
-    name: str
-    before: float
-    after: float
-    unit: str
-    note: str  # "", "at its lower bound" or "at its upper bound"
-    lower: float
-    upper: float
-    tied: tuple[str, ...] = ()  # the numbers that have the same value
-
-    @property
-    def remark(self) -> str:
-        """The note, and the names of the numbers tied to this one."""
-        return with_tied(self.note, self.tied)
+NAMED = 2  # parameters at bounds that a summary names; of more it says how many, and the table which
 
 
 class ScenarioValues(NamedTuple):
-    """All metrics in every scenario.
+    """All metrics in every scenario."""
 
-    Attributes:
-        names: of the scenarios.
-        before: metrics of the start, shape (scenarios,).
-        after: metrics of the tuned vehicle.
-    """
-
-    names: tuple[str, ...]
-    before: dict[str, Float[np.ndarray, " scenarios"]]
-    after: dict[str, Float[np.ndarray, " scenarios"]]
+    names: tuple[str, ...]  # of the scenarios
+    before: dict[str, Float[np.ndarray, " scenarios"]]  # metrics of the start, shape (scenarios,)
+    after: dict[str, Float[np.ndarray, " scenarios"]]  # metrics of the tuned vehicle
 
 
 class Drive(NamedTuple):
@@ -80,37 +46,22 @@ class Drive(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """The search from one start.
+    """The search from one start."""
 
-    Attributes:
-        start: the free numbers at its start.
-        end: the free numbers at its end.
-        metric: the metric at its end.
-        meets_limits: whether all limits are met there.
-        converged: whether it ended at an optimum.
-    """
-
-    start: np.ndarray
-    end: np.ndarray
-    metric: float
-    meets_limits: bool
-    converged: bool
+    start: np.ndarray  # the free numbers at its start
+    end: np.ndarray  # the free numbers at its end
+    metric: float  # the metric at its end
+    meets_limits: bool  # whether all limits are met there
+    converged: bool  # whether it ended at an optimum
 
 
 class ToleranceEffect(NamedTuple):
-    """The effect of the scatter of one parameter on a metric, to second order.
+    """The effect of the scatter of one parameter on a metric, to second order."""
 
-    Attributes:
-        parameter: its name.
-        scatter: its standard deviation relative to its value.
-        mean: mean change of the metric, relative: half the second derivative times the variance.
-        deviation: standard deviation of the metric, relative: slope times deviation, and the part of the curvature.
-    """
-
-    parameter: str
-    scatter: float
-    mean: float
-    deviation: float
+    parameter: str  # its name
+    scatter: float  # its standard deviation relative to its value
+    mean: float  # mean change of the metric, relative: half the second derivative times the variance
+    deviation: float  # standard deviation of the metric, relative: slope times deviation, and the part of the curvature
 
     def sentence(self, metric: str) -> str:
         """In words, such as "A 10 % scatter of damper.blow_off_rate costs 1.4 % of rms_sprung_acceleration"."""
@@ -144,7 +95,7 @@ class TuneResult(AbstractResult, Generic[V]):
         drive: what was driven over.
         without_effect: names of the parameters by which the derivative of the minimised metric is zero.
         violated: each metric or shape beyond its limit, in words with its number.
-        extrapolated: each damper that the tuned vehicle takes out of its fitted range for 1 % of the time or more.
+        extrapolated: by how much each damper of the tuned vehicle leaves its fitted range for 1 % of the time or more.
         allowed: the limits as they are written, which may be relative to the start on each road.
         elsewhere: where the numbers hold if there are no fresh roads, in words.
         tolerances: the effect of the scatter of each parameter on the metric, at the tuned vehicle, of `robust`.
@@ -180,11 +131,16 @@ class TuneResult(AbstractResult, Generic[V]):
         """Better or not, by how much and at what price: on fresh roads if there are any."""
         return verdict_of(self)
 
-    def plot(self, **options: Any) -> "Figure":
-        """The laws and the metrics before and after."""
-        from jaxdamp.plots import tuning
+    def plot(self, kind: str = "changes", **options: object) -> "Figure":
+        """The laws and the metrics before and after, or the sheet of the ride.
 
-        return tuning(self, **options)
+        Arguments:
+            kind: "changes" (`plots.tuning`), or "sheet" for one A4 page (`plots.ride_sheet`).
+            options: of that function.
+        """
+        from jaxdamp.plots import ride_sheet, tuning
+
+        return plotted(kind, {"changes": tuning, "sheet": ride_sheet}, self, **options)
 
     @property
     def summary(self) -> str:
@@ -192,8 +148,10 @@ class TuneResult(AbstractResult, Generic[V]):
         before, after, unit = self.before[self.metric], self.after[self.metric], self.units[self.metric]
         share = f" ({100 * (after / before - 1):+.1f} %)" if before else ""
         stops = [f"{name} at its limit" for name in self.active_limits]
-        stops += [f"{change.name} {change.note}" for change in self.parameters if change.note]
-        inside = "all parameters inside their bounds" if not any(c.note for c in self.parameters) else ""
+        at_bounds = [f"{change.name} {change.note}" for change in self.parameters if change.note]
+        inside = "" if at_bounds else "all parameters inside their bounds"
+        few = len(at_bounds) <= NAMED
+        stops += at_bounds if few else [f"{len(at_bounds)} of {len(self.parameters)} parameters at their bounds"]
         stops = [*(f"{name} beyond its limit" for name in self.violated), *stops]
         state = "an optimum" if self.converged else "not an optimum"
         stops += [f"no effect of {name}" for name in self.without_effect]
@@ -226,7 +184,7 @@ class TuneResult(AbstractResult, Generic[V]):
         """The ride metrics before and after, with notes on the minimised metric and on limits."""
         rows = []
         for (name, before), after in zip(self.before.items(), self.after.values(), strict=True):
-            on_fresh = () if self.fresh is None else (_mean_change(self.fresh, name),)
+            on_fresh = () if self.fresh is None else (mean_change(self, name),)
             more = (*on_fresh, self._note(name))
             rows.append(Compared(name, self.units[name], (before, after), percent_change(before, after), more))
         fresh = () if self.fresh is None else (Column("on fresh roads", "%", "+.1f"),)
@@ -313,32 +271,17 @@ class TuneResult(AbstractResult, Generic[V]):
     def content(self) -> dict[str, Any]:
         """The tuning as numbers with units and words, ready for JSON; numbers that are not finite are None."""
         sides = {"before": self.before, "after": self.after}
-        return {
+        words = ("metric", "violated", "active", "active_limits", "without_effect")
+        return self._data(*words, "parameters", "scenarios", "starts", "tolerances", "history") | {
             "verdict": self.verdict.outcome.name,
-            "violated": self.violated,
-            "metric": self.metric,
             "metrics": {
                 name: {side: plain(values[name]) for side, values in sides.items()} | {"unit": unit}
                 for name, unit in self.units.items()
             },
-            "parameters": [plain(change._asdict()) for change in self.parameters],
             "limits": {name: with_unit(limit, self.units[name]) for name, limit in self.limits.items()},
-            "active_limits": list(self.active_limits),
-            "active": list(self.active),
-            "without_effect": list(self.without_effect),
             "fresh": None if self.fresh is None else self.fresh.to_dict(),
-            "scenarios": None if self.scenarios is None else plain(self.scenarios._asdict()),
-            "starts": [plain(attempt._asdict()) for attempt in self.starts],
-            "tolerances": [plain(effect._asdict()) for effect in self.tolerances],
-            "history": plain(self.history),
         }
 
     def __repr__(self) -> str:
         tables = [table.to_text() for table in self.tables().values()]
         return "\n".join([self.summary, *tables, *(f"warning: {warning}" for warning in self.warnings)])
-
-
-def _mean_change(fresh: Rescore, name: str) -> float | None:
-    """Mean change of a metric on fresh roads [%]; none from zero."""
-    change = fresh.change(name)
-    return 100.0 * float(np.mean(change)) if np.all(np.isfinite(change)) else None

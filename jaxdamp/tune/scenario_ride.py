@@ -82,11 +82,7 @@ RISKS: dict[str, Risk] = {"mean": mean, "worst": worst}
 
 
 def risk_of(risk: str | Risk) -> Risk:
-    """The risk of a name, or the function itself.
-
-    Raises:
-        ValueError: an unknown name.
-    """
+    """The risk of a name, or the function itself."""
     if not isinstance(risk, str):
         if not callable(risk):
             must = "be 'mean', 'worst', `tune.CVaR(share)`, or a function of values and weights"
@@ -102,26 +98,16 @@ class ScenarioRide(eqx.Module):
 
     It is called as a `Ride` is, and `sweep`, `jax.jacfwd` and `jax.grad` take it as they take a `Ride`. `each` gives
     the metrics of every scenario. The conditions change numbers by `factor * value + offset`.
-
-    Attributes:
-        ride: of the vehicle on the first road, for many cars at a time.
-        roads: heights under the wheels in each scenario [m], shape (scenarios, time, wheels); or stacked white roads.
-        factors: by path, in each scenario.
-        offsets: by path, in each scenario.
-        weights: of the scenarios, which add up to one.
-        names: of the scenarios.
-        delays_axles: whether the delay from axle to axle follows from the vehicle, so that its axles must not move.
-        risk: how a metric becomes one number.
     """
 
-    ride: Ride
-    roads: Float[Array, "scenarios time wheels"] | WhiteRoad
-    factors: dict[str, Float[Array, "scenarios ..."]]
-    offsets: dict[str, Float[Array, "scenarios ..."]]
-    weights: Float[Array, " scenarios"]
-    names: tuple[str, ...] = eqx.field(static=True)
-    delays_axles: bool = eqx.field(static=True)
-    risk: Risk = eqx.field(static=True)
+    ride: Ride  # of the vehicle on the first road, for many cars at a time
+    roads: Float[Array, "scenarios time wheels"] | WhiteRoad  # heights under the wheels [m]; or stacked white roads
+    factors: dict[str, Float[Array, "scenarios ..."]]  # by path, in each scenario
+    offsets: dict[str, Float[Array, "scenarios ..."]]  # by path, in each scenario
+    weights: Float[Array, " scenarios"]  # of the scenarios, which add up to one
+    names: tuple[str, ...] = eqx.field(static=True)  # of the scenarios
+    delays_axles: bool = eqx.field(static=True)  # by the distance of the axles, which must not move then
+    risk: Risk = eqx.field(static=True)  # how a metric becomes one number
 
     def __repr__(self) -> str:
         return f"Ride of a {type(self.ride.vehicle).__name__} in {len(self.names)} scenarios"
@@ -157,7 +143,7 @@ class ScenarioRide(eqx.Module):
 
     def of_vehicle(self, vehicle: AbstractVehicle) -> "ScenarioRide":
         """The same scenarios for another vehicle."""
-        return eqx.tree_at(lambda whole: whole.ride, self, self.ride.of_vehicle(vehicle))
+        return eqx.tree_at(lambda scenarios: scenarios.ride, self, self.ride.of_vehicle(vehicle))
 
     def out_of_domain(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Why the vehicle cannot have the values of each of many points: a text, empty where it can."""
@@ -196,20 +182,15 @@ class ScenarioRide(eqx.Module):
 def scenario_ride(
     vehicle: AbstractVehicle, scenarios: Sequence["Scenario"], risk: Risk, options: Mapping[str, Any]
 ) -> ScenarioRide:
-    """The ride of a vehicle in scenarios, after the checks of a `Ride` on each road and in each condition.
-
-    Arguments:
-        vehicle: without conditions.
-        scenarios: each road with each condition.
-        risk: how a metric becomes one number.
-        options: of a `Ride`.
-    """
+    """The ride of a vehicle in scenarios, after the checks of a `Ride` on each road and in each condition."""
     check_module("vehicle", vehicle, (AbstractVehicle,), "scenarios.ride(vehicle)")
     changes = _changes(vehicle, [scenario.condition for scenario in scenarios])
     first, rides = _checked_rides(vehicle, scenarios, changes, options)
     white = isinstance(scenarios[0].road, WhiteRoad)
     inputs: Any = [ride.road if white else ride.heights for ride in rides]
-    common = eqx.tree_at(lambda r: (r.vehicle, r.road), first, (vehicle, inputs[0] if white else None), is_leaf=_none)
+    common = eqx.tree_at(
+        lambda r: (r.vehicle, r.road), first, (vehicle, inputs[0] if white else None), is_leaf=lambda leaf: leaf is None
+    )
     stacked = {path: [jnp.stack(side) for side in zip(*pairs, strict=True)] for path, pairs in changes.items()}
     ride = ScenarioRide(
         ride=common.side_by_side(),
@@ -253,10 +234,6 @@ def _checked_rides(
     return most, rides
 
 
-def _none(leaf: Any) -> bool:
-    return leaf is None
-
-
 def _changes(vehicle: AbstractVehicle, conditions: Sequence["Condition"]) -> dict[str, list[tuple[Array, Array]]]:
     """Factor and offset of every number that a condition changes, by path, in each scenario."""
     before = numbers(vehicle)
@@ -289,9 +266,9 @@ def numbers(tree: Any) -> dict[str, Any]:
     return by_path
 
 
-def _by_path(known: Mapping[str, Any], changes: Mapping[str, Any], argument: str) -> dict[str, Any]:
+def _by_path(numbers: Mapping[str, Any], changes: Mapping[str, Any], argument: str) -> dict[str, Any]:
     if not isinstance(changes, Mapping):
         _checks.refuse(
             argument, "be a mapping of parameters to numbers", repr(changes), "Write `{'sprung_mass': 1e3}`."
         )
-    return {path: value for name, value in changes.items() for path in match_paths(list(known), [name])}
+    return {path: value for name, value in changes.items() for path in match_paths(list(numbers), [name])}

@@ -37,19 +37,12 @@ class Condition(NamedTuple):
 
 
 class Scenario(NamedTuple):
-    """One road under one condition of the vehicle.
+    """One road under one condition of the vehicle."""
 
-    Attributes:
-        name: of the scenario.
-        road: what is driven over.
-        condition: values of the vehicle that differ.
-        weight: in a mean over scenarios [-].
-    """
-
-    name: str
-    road: Road
-    condition: Condition
-    weight: float
+    name: str  # of the scenario
+    road: Road  # what is driven over
+    condition: Condition  # values of the vehicle that differ
+    weight: float  # in a mean over scenarios [-]
 
 
 @final

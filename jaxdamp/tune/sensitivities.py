@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._jacobian import with_jacobian
 from jaxdamp._traced import of_known_numbers
 from jaxdamp._types import Number, Scalar, ScalarLike, Vector
 from jaxdamp.dampers import AbstractMemoryless
@@ -109,19 +110,19 @@ def sensitivity(
     first, run = (make(**given) if given else make), {name: asked[name] for name in RUN}
     objective = _objective(wanted, vehicle, white=is_white(first))
     hatted, paths = _with_curves(vehicle, first, asked, run)
-    own, free = _free(vehicle, hatted, asked["over"], asked["freeze"])
+    of_vehicle, free = _free(vehicle, hatted, asked["over"], asked["freeze"])
     point = np.array([*np.asarray(free.values, float), *given.values()])
     measured = _measured(hatted, make, list(given), objective, free, run)
     names = [name for name in objective.units(vehicle) if name in objective.names]
     values, slopes = _derivatives(measured, names, point)
     is_curve = np.array([is_hat(p.path, hatted) for p in free.owners] + [False] * len(given), bool)
     chosen = np.flatnonzero(~is_curve)
-    units = [*(p.unit for p in own.owners), *("m/s" if name == "speed" else "" for name in given)]
+    units = [*(p.unit for p in of_vehicle.owners), *("m/s" if name == "speed" else "" for name in given)]
     second = _second(measured, names, point, chosen) if second_order else None
     return Sensitivity(
         values=dict(zip(names, values.tolist(), strict=True)),
         units={name: objective.units(vehicle)[name] for name in names},
-        parameters=(*own.names, *given),
+        parameters=(*of_vehicle.names, *given),
         parameter_units=tuple(units),
         point=point[chosen],
         gradient=dict(zip(names, slopes[:, chosen], strict=True)),
@@ -180,10 +181,10 @@ def _check(wanted: Sequence[Any], vehicle: Any, road: Any, quantities: Mapping[s
 
 def _curves(vehicle: AbstractVehicle, pattern: str) -> list[str]:
     """The laws whose curves are looked at."""
-    known = damper_paths(vehicle)
-    chosen = matching(known, pattern)
+    paths = damper_paths(vehicle)
+    chosen = matching(paths, pattern)
     if not chosen:
-        _checks.refuse("dampers", f"name a law of the vehicle ({', '.join(known)})", repr(pattern), "None for none.")
+        _checks.refuse("dampers", f"name a law of the vehicle ({', '.join(paths)})", repr(pattern), "None for none.")
     return chosen
 
 
@@ -203,13 +204,13 @@ def _free(
     vehicle: AbstractVehicle, hatted: AbstractVehicle, over: Sequence[str], freeze: Sequence[str]
 ) -> tuple[FreeParameters, FreeParameters]:
     """The parameters of the vehicle, and the same of the vehicle with hats, with the forces of the hats."""
-    own = free_parameters(vehicle, over=name_patterns("over", over), freeze=freeze)
-    known = [p.path for p in parameters(vehicle)]
+    of_vehicle = free_parameters(vehicle, over=name_patterns("over", over), freeze=freeze)
+    paths = [p.path for p in parameters(vehicle)]
     moved = [p.path for p in parameters(hatted)]
     hats = [path for path in moved if is_hat(path, hatted)]
-    places = dict(zip(known, [path for path in moved if path not in hats], strict=True))
-    exact = [places[path] for path in match_paths(known, [p.path for p in own.chosen])]
-    return own, free_parameters(hatted, over=[*exact, *hats])
+    places = dict(zip(paths, [path for path in moved if path not in hats], strict=True))
+    exact = [places[path] for path in match_paths(paths, [p.path for p in of_vehicle.chosen])]
+    return of_vehicle, free_parameters(hatted, over=[*exact, *hats])
 
 
 def _measured(
@@ -239,31 +240,23 @@ def _derivatives(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The metrics, shape (names,), and their derivatives, shape (names, numbers)."""
 
-    @eqx.filter_jit
-    def both(x: jax.Array) -> tuple[jax.Array, jax.Array]:
-        def stacked(x: jax.Array) -> tuple[jax.Array, jax.Array]:
-            results = measured(x)
-            values = jnp.stack([results[name] for name in names])
-            return values, values
+    def stacked(x: jax.Array) -> jax.Array:
+        results = measured(x)
+        return jnp.stack([results[name] for name in names])
 
-        return jax.jacfwd(stacked, has_aux=True)(x)
-
-    slopes, values = both(jnp.asarray(point))
+    values, slopes = eqx.filter_jit(with_jacobian(stacked))(jnp.asarray(point))
     return np.asarray(values, float), np.asarray(slopes, float)
 
 
 def _second(measured: Callable[[Any], Any], names: Sequence[str], point: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """Second derivatives by some of the numbers, shape (names, chosen, chosen)."""
+    start = jnp.asarray(point)
 
-    @eqx.filter_jit
-    def twice(x: jax.Array) -> jax.Array:
-        def stacked(part: jax.Array) -> jax.Array:
-            results = measured(x.at[chosen].set(part))
-            return jnp.stack([results[name] for name in names])
+    def stacked(part: jax.Array) -> jax.Array:
+        results = measured(start.at[chosen].set(part))
+        return jnp.stack([results[name] for name in names])
 
-        return jax.jacfwd(jax.jacfwd(stacked))(x[chosen])
-
-    return np.asarray(twice(jnp.asarray(point)), float)
+    return np.asarray(eqx.filter_jit(jax.jacfwd(jax.jacfwd(stacked)))(start[chosen]), float)
 
 
 def _curve_parts(
@@ -286,10 +279,6 @@ class ForceHats(AbstractMemoryless):
     """A force that is linear between velocities at equal distances, zero at standstill, constant beyond the ends.
 
     Its derivative by one of its forces is the hat function around that velocity, exactly.
-
-    Arguments:
-        spacing: of the velocities [m/s], which are ±1, ±2, ... times this.
-        forces: at these velocities, increasing [N], shape (2 k,).
     """
 
     spacing: Number = setting("m/s", "spacing of the velocities", positive)
@@ -311,14 +300,7 @@ class ForceHats(AbstractMemoryless):
 
 
 def with_hats(vehicle: V, path: str, reach: float, count: int) -> V:
-    """The vehicle with hats of zero force beside the law at a path.
-
-    Arguments:
-        vehicle: with the law.
-        path: of the law.
-        reach: largest velocity of the hats [m/s].
-        count: number of hats on each side.
-    """
+    """The vehicle with hats of zero force beside the law at a path."""
     hats = ForceHats(reach / count, np.zeros(2 * count))
     return eqx.tree_at(lambda car: get(car, path), vehicle, get(vehicle, path) + hats)
 

@@ -1,18 +1,14 @@
 """The result of `sensitivity`: tables, sentences on the flatness of an optimum, and a picture."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._tables import Column, Table, plain, typeset_unit
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 FORCE_STEP = 100.0  # N, for which effects of the curve are stated
@@ -20,17 +16,11 @@ COST = 0.01  # of the metric, for which flat directions are stated
 
 
 class CurveSensitivity(NamedTuple):
-    """Derivatives by the force at each velocity of one damper curve.
+    """Derivatives by the force at each velocity of one damper curve."""
 
-    Attributes:
-        velocity: where the hats are [m/s], shape (points,).
-        force: of the curve there [N], with settled states.
-        gradient: for each metric its derivative by the height of each hat [unit of the metric per N].
-    """
-
-    velocity: Float[np.ndarray, " points"]
-    force: Float[np.ndarray, " points"]
-    gradient: dict[str, Float[np.ndarray, " points"]]
+    velocity: Float[np.ndarray, " points"]  # where the hats are [m/s], shape (points,)
+    force: Float[np.ndarray, " points"]  # of the curve there [N], with settled states
+    gradient: dict[str, Float[np.ndarray, " points"]]  # of each metric by the height of each hat [its unit per N]
 
 
 @final
@@ -156,17 +146,12 @@ class Sensitivity(AbstractResult):
                 sentences.append(f"{metric} rises by {100 * COST:g} % at ±{far:.3g} % along {words}.")
         return tuple(sentences)
 
-    def plot(self, **options: Any) -> "Figure":
-        """Damper curves coloured by their effect on each metric, and the effects of the parameters."""
-        from jaxdamp.plots import sensitivity
-
-        return sensitivity(self, **options)
+    plot = drawn_by("sensitivity", "Damper curves coloured by their effect on each metric; effects of the parameters.")
 
     def content(self) -> dict[str, Any]:
         """All derivatives as plain data, ready for JSON; numbers that are not finite are None."""
-        data = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        curves = {path: curve._asdict() for path, curve in self.curves.items()}
-        return plain(data | {"curves": curves, "elasticities": {name: self.elasticities(name) for name in self.values}})
+        elasticities = {name: plain(self.elasticities(name)) for name in self.values}
+        return self._data(*(field.name for field in dataclasses.fields(self))) | {"elasticities": elasticities}
 
     def __repr__(self) -> str:
         flat = [] if self.hessian is None else [s for name in self.values for s in self.flatness(name)]

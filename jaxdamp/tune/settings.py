@@ -95,11 +95,7 @@ LEAST = {"points": 1, "between": 0, "starts": 1, "seed": 0, "max_steps": 1, "fre
 
 
 def completed(call: str, given: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings with the defaults of a call.
-
-    Raises:
-        TypeError: a keyword that the call does not have.
-    """
+    """Settings with the defaults of a call."""
     for name in given:
         if name not in defaults:
             near = difflib.get_close_matches(name, defaults, 1)

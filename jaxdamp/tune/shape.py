@@ -28,25 +28,15 @@ POINTS = 24  # slopes along a curve
 @final
 @dataclasses.dataclass(frozen=True)
 class Shape:
-    """A constraint on the force-velocity curve at constant velocity; made by `slope`, `monotone`, `knee`, `ratio`.
+    """A constraint on the force-velocity curve at constant velocity; made by `slope`, `monotone`, `knee`, `ratio`."""
 
-    Attributes:
-        name: in words, such as "slope".
-        unit: of the numbers that are limited.
-        span: their smallest and largest allowed value.
-        velocities: at which the force is computed [m/s].
-        numbers: those that are limited, from velocities and forces.
-        places: of the numbers, in words; empty for a single one.
-        dampers: the laws, by their path in the vehicle or a pattern.
-    """
-
-    name: str
-    unit: str
+    name: str  # in words, such as "slope"
+    unit: str  # of the numbers that are limited
     span: tuple[float, float] = dataclasses.field(compare=False)  # programs do not depend on it
-    velocities: tuple[float, ...]
-    numbers: Callable[[Curve, Curve], Array]
-    places: tuple[str, ...] = ("",)
-    dampers: str = "*"
+    velocities: tuple[float, ...]  # at which the force is computed [m/s]
+    numbers: Callable[[Curve, Curve], Array]  # those that are limited, from velocities and forces
+    places: tuple[str, ...] = ("",)  # of the numbers, in words; empty for a single one
+    dampers: str = "*"  # the laws, by their path in the vehicle or a pattern
 
     def at(self, dampers: str) -> "Shape":
         """The same for some of the dampers of the vehicle only, such as `"front.*"`."""
@@ -134,13 +124,9 @@ def _mean_bend(v: Curve, f: Curve) -> Array:
 
 @final
 class ShapeNumbers(NamedTuple):
-    """The numbers that shape constraints limit, as a function of the vehicle.
+    """The numbers that shape constraints limit, as a function of the vehicle."""
 
-    Attributes:
-        pairs: each constraint with the path of a law.
-    """
-
-    pairs: tuple[tuple[Shape, str], ...]
+    pairs: tuple[tuple[Shape, str], ...]  # each constraint with the path of a law
 
     @classmethod
     def of(cls, vehicle: AbstractVehicle, shape: Sequence[Shape] | Shape) -> "ShapeNumbers":

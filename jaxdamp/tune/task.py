@@ -1,6 +1,7 @@
-"""The task of a search over designs of a vehicle: objectives, free parameters, limits and shapes."""
+"""The task of a search over designs of a vehicle: objectives, free parameters, limits and shapes; its doubts."""
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, NamedTuple, final
 
 import numpy as np
@@ -8,20 +9,85 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp.dampers import has_fitted_range
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation import stationary_notes
+from jaxdamp.simulation import (
+    DEVIATIONS,
+    CoarseStepWarning,
+    Ride,
+    far_outside,
+    over_runs,
+    range_sentences,
+    stationary_notes,
+)
 from jaxdamp.solve import Evaluation, Region
 from jaxdamp.tune.limits import Limit, LimitRange, limit_ends, limit_ranges, scaled
 from jaxdamp.tune.measuring import BatchProgram, Computed, Measurement
 from jaxdamp.tune.objective import Function, Targets, goal_limits, goal_objective, objective_of
 from jaxdamp.tune.ranges import search_range
 from jaxdamp.tune.result import V
-from jaxdamp.tune.run_notes import range_notes, rides_on, step_notes
 from jaxdamp.tune.scenarios import Road, Scenarios
 from jaxdamp.tune.settings import LEAST, RUN
 from jaxdamp.tune.shape import ShapeNumbers
 from jaxdamp.vehicles import AbstractVehicle
+
+
+def rides_on(
+    road: Road | Scenarios, metrics: Sequence[Metric], run: Mapping[str, Any]
+) -> list[Callable[[AbstractVehicle], Ride]]:
+    """For each road a function that makes the checked ride of a vehicle on it, in no special condition."""
+    roads = [s.road for s in road.scenarios] if isinstance(road, Scenarios) else [road]
+    distinct = list({id(one): one for one in roads}.values())
+
+    def on(one: Road) -> Callable[[AbstractVehicle], Ride]:
+        return lambda vehicle: Ride(vehicle, one, metrics=metrics, **run)
+
+    return [on(one) for one in distinct]
+
+
+def step_notes(start: AbstractVehicle, tuned: AbstractVehicle, ride_of: Callable[[AbstractVehicle], Ride]) -> list[str]:
+    """A sentence if the step is too long or too coarse for the tuned vehicle, or if its laws need more substeps."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("ignore")
+        taken = ride_of(start).substeps
+        warnings.simplefilter("always", CoarseStepWarning)
+        try:
+            needed = ride_of(tuned).substeps
+        except ValueError as error:
+            return [f"The tuned vehicle does not bear the step. {error}"]
+    notes = [str(warning.message) for warning in caught]
+    if needed > taken:
+        notes.append(
+            f"The tuned laws need {needed} steps between two instants, and the search took {taken}: tune again from "
+            "this result."
+        )
+    return notes
+
+
+def range_notes(
+    start: AbstractVehicle, tuned: AbstractVehicle, rides: Sequence[Callable[[AbstractVehicle], Ride]]
+) -> tuple[list[str], list[str]]:
+    """A sentence for each damper used outside its fitted range, before and after the tuning; and by how much, briefly.
+
+    Arguments:
+        start: the vehicle before.
+        tuned: the vehicle after.
+        rides: the ride of a vehicle on each road; on a white road, velocities up to three standard deviations are
+            compared.
+    """
+    if not rides or not has_fitted_range((start, tuned)):
+        return [], []
+    notes, uses = [], {}
+    for when, vehicle in (("At the start", start), ("After the tuning", tuned)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", CoarseStepWarning)  # reported by the notes on the step
+            ridden = [ride_of(vehicle) for ride_of in rides]
+        white = isinstance(ridden[0].road, WhiteRoad)
+        reach = f" (velocities of {DEVIATIONS:g} standard deviations)" if white else ""
+        uses = over_runs([ride.range_use() for ride in ridden])
+        notes += [f"{when}{reach}, {sentence}" for sentence in range_sentences(uses)]
+    return notes, far_outside(uses)
 
 
 class Tolerance(NamedTuple):
@@ -38,13 +104,6 @@ DOUBLE, SINGLE = Tolerance(1e-4, 1e-6, 1e-13), Tolerance(1e-2, 1e-4, 1e-6)
 @final
 class DesignTask(Generic[V]):
     """The numbers that a search computes of a vehicle, and the ranges in which they must stay.
-
-    Arguments:
-        objectives: one or more, as the `metric` of `minimise`.
-        vehicle: to start from.
-        road: as in `minimise`.
-        argument: name of the objectives in messages.
-        settings: all of them, as in `minimise`.
 
     Attributes:
         objective: all objectives, with their metrics.
@@ -70,15 +129,15 @@ class DesignTask(Generic[V]):
         self.run = {name: settings[name] for name in RUN}
         metrics, white = settings["metrics"], is_white(road)
         further = [m.name for m in metrics if isinstance(m, Metric)]
-        known = [*(m.name for m in vehicle.ride_metrics), *further]
+        metric_names = [*(m.name for m in vehicle.ride_metrics), *further]
         objectives = [
             one if one in further else goal_objective(one, vehicle, white=white, argument=argument)
             for one in objectives
         ]
         limits = goal_limits(settings["limits"], vehicle, white=white, known=further)
-        self.allowed = limit_ranges(limits, known)
+        self.allowed = limit_ranges(limits, metric_names)
         limited = [metric for metric in limits or {} if isinstance(metric, Metric)]
-        of_targets = _metrics_of_targets(objectives, known, limited)
+        of_targets = _metrics_of_targets(objectives, metric_names, limited)
         more = [*metrics, *limited, *of_targets]
         self.objective = objective_of(objectives, vehicle, more, list(self.allowed), white=white, argument=argument)
         _refuse_negative(self.allowed, self.objective.metrics)
@@ -95,11 +154,7 @@ class DesignTask(Generic[V]):
         return dict(zip(self.names, map(float, values), strict=True))
 
     def limits(self, before: Mapping[str, float]) -> list[Limit]:
-        """All limits, in every scenario, their distances scaled by the numbers of the start.
-
-        Raises:
-            ValueError: a start without finite metrics; only a true peak or settling time beside a smooth one may be so.
-        """
+        """All limits, in every scenario, their distances scaled by the numbers of the start."""
         exact = {m.name for m in self.objective.beside}
         wrong = {name: x for name, x in before.items() if name not in exact and not np.isfinite(x)}
         if wrong:
@@ -128,25 +183,19 @@ class DesignTask(Generic[V]):
 
     def notes_on_runs(self, design: AbstractVehicle) -> tuple[list[str], list[str]]:
         """Notes on the step and on the fitted ranges for a design, on every road; and the dampers far outside."""
-        rides, far, white = rides_on(self.road, self.objective.metrics, self.run), [], is_white(self.road)
+        rides, white = rides_on(self.road, self.objective.metrics, self.run), is_white(self.road)
         road = rides[0](design).road if white else None
         notes = stationary_notes(design, road) if isinstance(road, WhiteRoad) else []
-        for ride_of in rides:
-            coarse = [] if white else step_notes(self.vehicle, design, ride_of)
-            notes += coarse
-            if not any("does not bear" in note for note in coarse):
-                ranges, outside = range_notes(self.vehicle, design, ride_of)
-                notes, far = notes + ranges, far + outside
-        return notes, list(dict.fromkeys(far))
+        coarse = [[] if white else step_notes(self.vehicle, design, ride_of) for ride_of in rides]
+        notes += [note for of_ride in coarse for note in of_ride]
+        sound = [on for on, bad in zip(rides, coarse, strict=True) if not any("does not bear" in note for note in bad)]
+        ranges, far = range_notes(self.vehicle, design, sound)
+        return notes + ranges, far
 
 
 @final
 class Evaluator:
     """The rows that a search follows, at points given by their coordinates: objectives, then ends of limits.
-
-    Arguments:
-        task: with the metrics and the free parameters.
-        lanes: points simulated side by side.
 
     Attributes:
         program: that computes the numbers.
@@ -196,13 +245,15 @@ class Evaluator:
         return Region(space.lower / space.unit, space.upper / space.unit, *space.coordinates.order())
 
 
-def _metrics_of_targets(objectives: Sequence[Any], known: Sequence[str], limited: Sequence[Metric]) -> list[Metric]:
+def _metrics_of_targets(
+    objectives: Sequence[Any], metric_names: Sequence[str], limited: Sequence[Metric]
+) -> list[Metric]:
     """The metrics that targets are given for, after a check of their names."""
     targets = [one for one in objectives if isinstance(one, Targets)]
     of_targets = [metric for one in targets for metric in one.metrics]
     for name in (name for one in targets for name in one.values):
-        with_targets = [*known, *(metric.name for metric in (*limited, *of_targets))]
-        _checks.one_of("targets", current_name(name, known), with_targets)
+        with_targets = [*metric_names, *(metric.name for metric in (*limited, *of_targets))]
+        _checks.one_of("targets", current_name(name, metric_names), with_targets)
     return of_targets
 
 
@@ -220,14 +271,7 @@ def is_white(road: Any) -> bool:
 
 
 def check_call(call: str, vehicle: Any, road: Any, counts: Mapping[str, Any]) -> None:
-    """Refuse what is no vehicle or no road, and counts below their least value.
-
-    Arguments:
-        call: as it should be written, for messages.
-        vehicle: the argument of this name.
-        road: the argument of this name.
-        counts: value by argument; the others are not looked at.
-    """
+    """Refuse what is no vehicle or no road, and counts below their least value."""
     check_module("vehicle", vehicle, (AbstractVehicle,), call)
     _checks.untraced("vehicle", vehicle, "Call it outside `jax.jit` and `jax.grad`; a `Ride` can be traced.")
     if not isinstance(road, Scenarios):

@@ -64,14 +64,7 @@ class FrontProblem(NamedTuple):
 def trace_front(
     problem: FrontProblem, starts: np.ndarray, evaluations: Sequence[Evaluation], points: int
 ) -> list[SearchState]:
-    """The ends of the front, then the points between them, from coarse to fine.
-
-    Arguments:
-        problem: of the front.
-        starts: coordinates of one or more starts, from each of which the ends are searched.
-        evaluations: of the starts.
-        points: number of points of the front.
-    """
+    """The ends of the front, then the points between them, from coarse to fine."""
     evaluator, count, report = problem.evaluator, problem.objectives, problem.report
     grid = lattice(count, points)
     states, solver = _ends(problem, starts, evaluations, len(grid))

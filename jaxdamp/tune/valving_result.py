@@ -1,63 +1,39 @@
 """The result of a choice of valving."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, drawn_by
 from jaxdamp._status import Status
-from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._tables import Column, Table, with_unit
 from jaxdamp.dampers import MonoTube
 
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-
 class ValveParameter(NamedTuple):
-    """A chosen number with its bounds.
+    """A chosen number with its bounds."""
 
-    Attributes:
-        name: path of the parameter.
-        unit: in SI.
-        start: value of the start, in the unit.
-        value: chosen value, in the unit.
-        lower: lower bound of the search.
-        upper: upper bound of the search.
-        note: empty, "at its lower bound" or "at its upper bound".
-        meaning: in words.
-    """
-
-    name: str
-    unit: str
-    start: float
-    value: float
-    lower: float
-    upper: float
+    name: str  # path of the parameter
+    unit: str  # in SI
+    start: float  # value of the start, in the unit
+    value: float  # chosen value, in the unit
+    lower: float  # lower bound of the search
+    upper: float  # upper bound of the search
     note: str  # "", "at its lower bound" or "at its upper bound"
-    meaning: str
+    meaning: str  # in words
 
 
 class OutOfReach(NamedTuple):
-    """A part of the target that the damper does not reach.
+    """A part of the target that the damper does not reach."""
 
-    Attributes:
-        side: `"rebound"` or `"compression"`.
-        slowest: lowest speed with a large error [m/s].
-        fastest: highest speed with a large error [m/s].
-        largest_error: reached minus wanted force where they differ most [N].
-        at: velocity there [m/s].
-        binding: names of the parameters beyond whose bounds the error would be smaller, the most effective first.
-    """
-
-    side: str
-    slowest: float
-    fastest: float
-    largest_error: float
-    at: float
-    binding: tuple[str, ...]
+    side: str  # `"rebound"` or `"compression"`
+    slowest: float  # lowest speed with a large error [m/s]
+    fastest: float  # highest speed with a large error [m/s]
+    largest_error: float  # reached minus wanted force where they differ most [N]
+    at: float  # velocity there [m/s]
+    binding: tuple[str, ...]  # parameters beyond whose bounds the error would be smaller, the most effective first
 
     @property
     def sentence(self) -> str:
@@ -133,22 +109,11 @@ class ValvingResult(AbstractResult):
 
     def content(self) -> dict[str, Any]:
         """The result as numbers with units and words, ready for JSON; the law is written by `export.to_json`."""
-        return {
-            "feasible": self.feasible,
-            "rmse": with_unit(self.rmse, "N"),
-            "error": with_unit(self.error_percent, "%"),
-            "parameters": [plain(p._asdict()) for p in self.parameters],
-            "out_of_reach": [plain(part._asdict()) for part in self.out_of_reach],
-            "velocity": with_unit(self.velocity, "m/s"),
-            "target_force": with_unit(self.target_force, "N"),
-            "force": with_unit(self.force, "N"),
-        }
+        forces = self._data(rmse="N", velocity="m/s", target_force="N", force="N")
+        error = {"error": with_unit(self.error_percent, "%")}
+        return self._data("feasible", "parameters", "out_of_reach") | forces | error
 
-    def plot(self) -> "Figure":
-        """Wanted and reached force over velocity, with the parts out of reach, and the error below."""
-        from jaxdamp.plots import valving
-
-        return valving(self)
+    plot = drawn_by("valving", "Wanted and reached force over velocity with the parts out of reach; the error.")
 
     def __repr__(self) -> str:
         return f"{self.summary}\n{self.table().to_text()}"

@@ -1,8 +1,8 @@
 """`valving`: the bleed, valves and gas pressure of a mono-tube damper that give a wanted force."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, Unpack
 
 import equinox as eqx
 import jax
@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
+from jaxdamp._jacobian import with_jacobian
 from jaxdamp._progress import Progress
 from jaxdamp._status import Status
 from jaxdamp._traced import of_known_numbers
@@ -22,6 +23,7 @@ from jaxdamp.parameters import FreeParameters
 from jaxdamp.rig import march, quasi_static, respond
 from jaxdamp.solve import BoundedLevenbergMarquardt, Linearisation, least_squares_on_host
 from jaxdamp.tune.ranges import INSIDE, SearchRange, search_range
+from jaxdamp.tune.settings import Free, completed
 from jaxdamp.tune.valving_result import OutOfReach, ValveParameter, ValvingResult
 
 
@@ -33,6 +35,18 @@ CLOSE_ENOUGH = 0.05  # of the tolerance, at which no further start is tried
 HOPS = (0.01, 0.1)  # relative changes of each parameter that must not lower the error at the end of a search
 LOWER = 1e-6  # relative decrease of the squared error that is worth another search
 APART = 2.0  # a start is a factor of up to so much from the given one, within the bounds
+
+
+class ValvingSettings(Free, total=False):
+    """Further keywords of `valving`."""
+
+    bounds: Mapping[str, Any] | None
+    starts: int
+    max_steps: int
+
+
+DEFAULTS = {"over": ("piston.*", "gas.pressure"), "freeze": (), "bounds": None, "starts": 8, "max_steps": 200}
+ForceOf = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # of values: all forces, and their derivatives
 
 
 class Loop(NamedTuple):
@@ -78,13 +92,9 @@ def valving(
     *,
     velocities: Any = None,
     motions: Sequence[tuple[float, float]] = (),
-    over: Sequence[str] | Mapping[str, Any] = ("piston.*", "gas.pressure"),
-    freeze: Sequence[str] = (),
-    bounds: Mapping[str, Any] | None = None,
     tolerance: float = 0.03,
-    starts: int = 8,
     substeps: int = 1,
-    max_steps: int = 200,
+    **settings: Unpack[ValvingSettings],
 ) -> ValvingResult:
     """Find the valving of a mono-tube damper that gives a wanted force, or the nearest one within its bounds.
 
@@ -102,13 +112,11 @@ def valving(
         start: the damper to start from, with the geometry that is to stay.
         velocities: of the curve of a law [m/s]; −1 to 1 m/s if left out.
         motions: of a law also loops of sinusoidal motion, `[(frequency [Hz], amplitude [m]), ...]`, for its hysteresis.
-        over: the parameters to choose, as in `minimise`; all of the piston and the gas pressure by default.
-        freeze: parameters among these to hold at their start.
-        bounds: as in `minimise`, one third to three times the start by default.
         tolerance: largest error of a feasible valving: RMS over RMS of the wanted force.
-        starts: number of starts.
         substeps: steps between two samples of a record, as in `respond`.
-        max_steps: largest number of steps from each start.
+        settings: keywords, all optional: `over`, the parameters to choose, all of the piston and the gas pressure if
+            left out, `freeze` and `bounds`, as in `minimise`; `starts`, the number of starts, 8 if left out;
+            `max_steps`, the largest number of steps from each, 200 if left out.
 
     Returns:
         The damper with its error, the parameters with their bounds, and the parts of the target out of reach.
@@ -123,51 +131,31 @@ def valving(
     (True, True)
     """
     check_module("start", start, (MonoTube,), "valving(target, start)")
+    asked = completed("valving", settings, DEFAULTS)
     _checks.positive("tolerance", tolerance)
-    for name, number in (("starts", starts), ("substeps", substeps), ("max_steps", max_steps)):
-        if number < 1:
-            _checks.refuse(name, "be 1 or more", number)
+    _checks.counts(starts=asked["starts"], substeps=substeps, max_steps=asked["max_steps"])
     wanted = _wanted(target, start, velocities, motions)
     size = float(np.sqrt(np.mean(wanted.all_forces**2)))
     if not size > 0.0:
         _checks.refuse("target", "have a force", "zero everywhere")
-    space = search_range(start, over, freeze, bounds)
+    space = search_range(start, asked["over"], asked["freeze"], asked["bounds"])
     charge = np.array([name == "gas.pressure" for name in space.free.names])  # which must stay above that of a cavity
     cavity = (1.0 + INSIDE) * float(start.cavitation_pressure)
     space = dataclasses.replace(space, lower=np.where(charge, np.maximum(space.lower, cavity), space.lower))
     force_of = _forces(space.free, wanted, substeps)
-    best: _End | None = None
-    with Progress("Choosing the valving") as shown:
-        for number, begin in enumerate(_starts(space, starts)):
-            shown(f"start {number + 1} of {starts}")
-            end = _search(space, force_of, wanted.all_forces, begin, max_steps)
-            if np.isfinite(end.squares) and (best is None or end.squares < best.squares):
-                best = end
-            if best is not None and np.sqrt(best.squares / len(wanted.all_forces)) < CLOSE_ENOUGH * tolerance * size:
-                break
+    best = _best(space, force_of, wanted.all_forces, asked["starts"], asked["max_steps"], CLOSE_ENOUGH * tolerance)
     if best is None:
         _checks.refuse("start", "give a finite force", start, "Widen its valves, or shorten the motion.")
-    values = best.values
-    reached, slopes = force_of(values)
+    reached, slopes = force_of(best.values)
     error = reached - wanted.all_forces
     parameters = tuple(
-        ValveParameter(
-            name, p.unit, float(a), float(b), float(low), float(high), f"at its {side} bound" if side else "", p.meaning
-        )
-        for name, p, a, b, low, high, side in zip(
-            space.free.names,
-            space.free.owners,
-            space.start,
-            values,
-            space.lower,
-            space.upper,
-            space.side(values),
-            strict=True,
-        )
+        ValveParameter(c.name, c.unit, c.before, c.after, c.lower, c.upper, c.note, p.meaning)
+        for c, p in zip(space.changes(best.values), space.free.owners, strict=True)
     )
     rmse = float(np.sqrt(np.mean(error**2)))
+    far = rmse > tolerance * size
     return ValvingResult(
-        law=space.free.build(jnp.asarray(values, space.free.values.dtype)),
+        law=space.free.build(jnp.asarray(best.values, space.free.values.dtype)),
         start=start,
         parameters=parameters,
         velocity=wanted.all_velocities,
@@ -178,16 +166,29 @@ def valving(
         rmse=rmse,
         error_percent=100.0 * rmse / size,
         tolerance=tolerance,
-        out_of_reach=_out_of_reach(wanted, error, slopes, parameters, tolerance, size)
-        if rmse > tolerance * size
-        else (),
+        out_of_reach=_out_of_reach(wanted, error, slopes, parameters, tolerance * size) if far else (),
         status=best.status,
     )
 
 
+def _best(
+    space: SearchRange, force_of: ForceOf, wanted: np.ndarray, starts: int, max_steps: int, close: float
+) -> _End | None:
+    """The best end of searches from several starts, until an error relative to the wanted force is close enough."""
+    best: _End | None = None
+    with Progress("Choosing the valving") as line:
+        for number, begin in enumerate(_starts(space, starts)):
+            line(f"start {number + 1} of {starts}")
+            end = _search(space, force_of, wanted, begin, max_steps)
+            if np.isfinite(end.squares) and (best is None or end.squares < best.squares):
+                best = end
+            if best is not None and best.squares < close**2 * np.sum(wanted**2):
+                break
+    return best
+
+
 def _wanted(target: Any, start: MonoTube, velocities: Any, motions: Sequence[tuple[float, float]]) -> Wanted:
     """The target as points and loops."""
-    none = np.zeros(0)
     if isinstance(target, AbstractDamper):
         points = np.asarray(VELOCITIES if velocities is None else velocities, float)
         curve = np.asarray(quasi_static(target, points).force, float)
@@ -198,17 +199,22 @@ def _wanted(target: Any, start: MonoTube, velocities: Any, motions: Sequence[tup
         must = "be left out unless the target is a law"
         _checks.refuse("motions" if motions else "velocities", must, motions or velocities)
     if isinstance(target, tuple):
-        if len(target) != 2 or np.ndim(target[0]) != 1 or np.shape(target[0]) != np.shape(target[1]):
-            _checks.refuse("target", "be velocities and as many forces", _checks.described(target))
-        points, curve = (np.asarray(values, float) for values in target)
-        _checks.finite("target", np.concatenate([points, curve]))
-        return Wanted(points, curve, ())
+        return _points(target)
     runs = as_runs(target, "target", "valving(law or (velocities, forces) or records, start)")
     if not runs:
         _checks.refuse("target", "hold a record", _checks.described(target), "`bench.read(paths)` gives records.")
     loops = [(r, float(r.time[-1] - r.time[0]) / (len(r.time) - 1)) for r in runs]
     cut = tuple(Loop(dt, r.stroke, r.velocity, r.force, int(SETTLING * len(r.time))) for r, dt in loops)
-    return Wanted(none, none, cut)
+    return Wanted(np.zeros(0), np.zeros(0), cut)
+
+
+def _points(target: tuple[Any, ...]) -> Wanted:
+    """Velocities and forces as a target."""
+    if len(target) != 2 or np.ndim(target[0]) != 1 or np.shape(target[0]) != np.shape(target[1]):
+        _checks.refuse("target", "be velocities and as many forces", _checks.described(target))
+    points, curve = (np.asarray(values, float) for values in target)
+    _checks.finite("target", np.concatenate([points, curve]))
+    return Wanted(points, curve, ())
 
 
 def _loop(target: AbstractDamper, start: MonoTube, frequency: float, amplitude: float) -> Loop:
@@ -224,32 +230,30 @@ def _loop(target: AbstractDamper, start: MonoTube, frequency: float, amplitude: 
     return Loop(dt, stroke, velocity, np.asarray(wanted, float), steps)
 
 
-def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> Any:
+def _forces(free: FreeParameters, wanted: Wanted, substeps: int) -> ForceOf:
     """Every force of the damper as a function of the values of its free parameters, with derivatives."""
 
     @eqx.filter_jit
     def forces(free: FreeParameters, values: Array) -> tuple[Array, Array]:
-        def one(values: Array) -> tuple[Array, Array]:
+        def one(values: Array) -> Array:
             law = free.build(values)
             still = law.incompressible()
             curve = jax.vmap(lambda v: still.force(0.0, v, still.initial_state()))(jnp.asarray(wanted.velocity))
-            marched = [
-                march(law, jnp.asarray(loop.dt), jnp.asarray(loop.stroke), jnp.asarray(loop.velocity), substeps)[
-                    loop.first :
-                ]
-                for loop in wanted.loops
-            ]
-            force = jnp.concatenate([curve, *marched])
-            return force, force
+            return jnp.concatenate([curve, *(_marched(law, loop, substeps) for loop in wanted.loops)])
 
-        slopes, force = jax.jacfwd(one, has_aux=True)(values)
-        return force, slopes
+        return with_jacobian(one)(values)
 
     def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         computed = forces(free, jnp.asarray(values, free.values.dtype))
         return np.asarray(computed[0], np.float64), np.asarray(computed[1], np.float64)
 
     return evaluate
+
+
+def _marched(law: MonoTube, loop: Loop, substeps: int) -> Array:
+    """The force of a law at the compared samples of a motion."""
+    dt, stroke, velocity = (jnp.asarray(values) for values in (loop.dt, loop.stroke, loop.velocity))
+    return march(law, dt, stroke, velocity, substeps)[loop.first :]
 
 
 def _starts(space: SearchRange, count: int) -> list[np.ndarray]:
@@ -259,7 +263,7 @@ def _starts(space: SearchRange, count: int) -> list[np.ndarray]:
     return [space.start, *np.clip(moved, space.lower, space.upper)]
 
 
-def _search(space: SearchRange, force_of: Any, wanted: np.ndarray, begin: np.ndarray, max_steps: int) -> _End:
+def _search(space: SearchRange, force_of: ForceOf, wanted: np.ndarray, begin: np.ndarray, max_steps: int) -> _End:
     """Least squares within the bounds from one start, and again from lower points beside its end."""
     size = float(np.linalg.norm(wanted))
     precision = float(jnp.finfo(space.free.values.dtype).eps)
@@ -282,25 +286,20 @@ def _search(space: SearchRange, force_of: Any, wanted: np.ndarray, begin: np.nda
         end = least_squares_on_host(at, solver, (values / space.unit)[None], max_steps)
         values = np.clip(end.y[0] * space.unit, space.lower, space.upper)
         reached = float(np.sum(end.aux**2))
-        beside = np.clip(values * changes.reshape(-1, len(begin)), space.lower, space.upper)
-        others = [squares(point) for point in beside]
+        near = np.clip(values * changes.reshape(-1, len(begin)), space.lower, space.upper)
+        others = [squares(point) for point in near]
         if not min(others) < (1.0 - LOWER) * reached:
             return _End(values, reached, end.status[0])
-        values = beside[int(np.argmin(others))]
+        values = near[int(np.argmin(others))]
 
 
 def _out_of_reach(
-    wanted: Wanted,
-    error: np.ndarray,
-    slopes: np.ndarray,
-    parameters: Sequence[ValveParameter],
-    tolerance: float,
-    size: float,
+    wanted: Wanted, error: np.ndarray, slopes: np.ndarray, parameters: Sequence[ValveParameter], allowed: float
 ) -> tuple[OutOfReach, ...]:
     """The ranges of velocity in rebound and in compression where the error is large, with what prevents less."""
     velocity, parts = wanted.all_velocities, []
-    for side, own in (("rebound", velocity > 0.0), ("compression", velocity < 0.0)):
-        far = own & (np.abs(error) > tolerance * size)
+    for side, inside in (("rebound", velocity > 0.0), ("compression", velocity < 0.0)):
+        far = inside & (np.abs(error) > allowed)
         if not far.any():
             continue
         square = float(np.sum(error[far] ** 2))

@@ -1,21 +1,26 @@
-"""What came out of a tuning: better or not, by how much, at what price, where it was tried."""
+"""What came out of a tuning, in words: better or not, by how much, at what price, what holds it, and doubts."""
 
 import enum
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
+from jaxdamp._status import Status
 from jaxdamp._tables import percent_change, typeset_unit
 from jaxdamp.metrics import Metric
-from jaxdamp.tune.limits import LimitRange
+from jaxdamp.solve import Evaluation
+from jaxdamp.tune.limits import Limit, LimitRange
+from jaxdamp.tune.objective import Objective, exact_counterpart
+from jaxdamp.tune.ranges import FACTOR, Change, SearchRange
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind
 
 
 if TYPE_CHECKING:
+    from jaxdamp.tune.descending import Ended
     from jaxdamp.tune.rescoring import Rescore
-    from jaxdamp.tune.result import TuneResult
+    from jaxdamp.tune.result import Attempt, TuneResult
 
 
 WITHIN = 0.01  # relative excess over a limit on fresh roads up to which it counts as met
@@ -39,15 +44,10 @@ class Outcome(enum.Enum):
 
 
 class Verdict(NamedTuple):
-    """The outcome of a tuning and the sentence that says it.
+    """The outcome of a tuning and the sentence that says it."""
 
-    Attributes:
-        outcome: what it came to.
-        sentence: with its numbers.
-    """
-
-    outcome: Outcome
-    sentence: str
+    outcome: Outcome  # what it came to
+    sentence: str  # with its numbers
 
     @property
     def better(self) -> bool:
@@ -73,8 +73,9 @@ def verdict_of(result: "TuneResult[Any]") -> Verdict:
     elif not gain + error < -NOTICED:
         outcome, first = Outcome.NOT_SHOWN, f"Not shown to be better: {words}"
     elif result.extrapolated:
-        outcome, first = Outcome.EXTRAPOLATED, f"Not known to be better: {words} by the law, but outside its records"
-        held += "".join(f"; {sentence.rstrip('.')}" for sentence in result.extrapolated)
+        outside = "; ".join(result.extrapolated)
+        outcome = Outcome.EXTRAPOLATED
+        first = f"Not known to be better: {words} by the law, but outside its records ({outside})"
     elif name and price > -gain:
         outcome, first = Outcome.TRADE, f"A trade: {words}"
     else:
@@ -105,11 +106,11 @@ def _price(result: "TuneResult[Any]") -> tuple[float, str]:
     metrics = {m.name: m for m in result.objective.metrics} if result.objective else {}
     named = {result.metric, *result.limits}
     limited = {metrics[name].channel for name in result.limits if name in metrics}
-    known = {_mean_change(result, name) for name in named}
+    changes = {mean_change(result, name) for name in named}
     worst = (NOTICED, "")
     for name in result.units:
-        change, metric = _mean_change(result, name), metrics.get(name)
-        if change is None or name in named or any(x is not None and np.isclose(change, x, 1e-6) for x in known):
+        change, metric = mean_change(result, name), metrics.get(name)
+        if change is None or name in named or any(x is not None and np.isclose(change, x, 1e-6) for x in changes):
             continue
         if metric is None or (metric.channel not in limited and _has_price(metric, result.start)):
             worst = max(worst, (change, name))
@@ -121,7 +122,7 @@ def _has_price(metric: Metric, vehicle: AbstractVehicle) -> bool:
     return not metric.statistic.signed and vehicle.layout.by_name[metric.channel].kind in PRICED
 
 
-def _mean_change(result: "TuneResult[Any]", name: str) -> float | None:
+def mean_change(result: "TuneResult[Any]", name: str) -> float | None:
     """The change of a metric [%], the mean on fresh roads if there are any; none from zero."""
     if result.fresh is None or name not in result.fresh.before:
         return percent_change(result.before[name], result.after[name])
@@ -133,7 +134,7 @@ def _limits_in_words(result: "TuneResult[Any]") -> str:
     """How much of each limit is used, and on how many fresh roads it is broken."""
     texts = []
     for name in result.limits:
-        after, change = result.after[name], _mean_change(result, name)
+        after, change = result.after[name], mean_change(result, name)
         share = f"{after:.4g} {typeset_unit(result.units[name])}".rstrip() if change is None else f"{change:+.1f} %"
         text = f"{name} {share}{', at its limit' * (name in result.active_limits)}"
         if result.fresh is not None and name in result.allowed:
@@ -178,3 +179,148 @@ def decided(fresh: "Rescore", allowed: Mapping[str, LimitRange]) -> bool:
     offsets = [fresh.change(fresh.metric), *(excess(fresh, name, limit) - WITHIN for name, limit in allowed.items())]
     halves = [half_interval(offset, 0.99) for offset in offsets]
     return all(abs(np.mean(offset)) > half or half < WITHIN for offset, half in zip(offsets, halves, strict=True))
+
+
+_ROUNDING = 1e-12  # of a metric, by which its derivative times the parameter counts as zero
+ALIKE = 1e-3  # relative difference of metrics at ends that count as one optimum
+
+
+def bound_notes(space: SearchRange, changes: tuple[Change, ...]) -> list[str]:
+    """A sentence on the numbers at bounds for each origin of these, and the remedy."""
+    groups: dict[str, list[Change]] = {}
+    for change, origin in zip(changes, space.origin, strict=True):
+        if change.note:
+            groups.setdefault(origin["upper" in change.note], []).append(change)
+    notes = []
+    for origin, group in groups.items():
+        ends = [f"{c.name} ended {c.note}, {c.after:.5g} {c.unit}".rstrip() for c in group]
+        widen = f"`bounds={{{group[0].name.partition('[')[0]!r}: (lower, upper)}}`"
+        reason = {
+            "default": f"by default 1/{FACTOR:g} of the start or {FACTOR:g} times it; other bounds: {widen}",
+            "given": "as given",
+            "domain": "the end of the values it may take",
+        }[origin]
+        notes.append(f"{'; '.join(ends)} ({reason}). A better value may be beyond.")
+    return notes
+
+
+def early_end(ended: "Ended", max_steps: int) -> str:
+    """Why a search that satisfied all limits did not converge."""
+    slope = f"the remaining slope is {ended.slope_left:.1e} of the metric per 100 % of the parameters"
+    if ended.out_of_steps:
+        return f"The search stopped after {max_steps} steps, before an optimum: {slope}. Allow more with `max_steps`."
+    return (
+        f"{Status.NO_BETTER_STEP.sentence.rstrip('.')}: {slope}. A peak has a kink where another instant becomes the "
+        "largest. Compare with a tuning from another start."
+    )
+
+
+def missed_notes(short: Sequence[Limit], values: Mapping[str, float], changes: Sequence[Change]) -> list[str]:
+    """A sentence for each metric or shape that violates its limit, at its worst place, with what binds it."""
+    worst: dict[str, Limit] = {}
+    for limit in sorted(short, key=lambda limit: limit.margin(values[limit.name])):
+        worst.setdefault(limit.of, limit)
+    bounds = [change.name for change in changes if change.note]
+    bound = f" The search is held by the bounds of {', '.join(bounds)}." if bounds else ""
+    together = f" Not met together: {', '.join(worst)}." if len(worst) > 1 else ""
+    return [
+        f"The limit {limit.name} {limit.nearer(values[limit.name])} is not met: {values[limit.name]:.4g}. Relax it, or "
+        f"free more.{together}{bound}"
+        for limit in worst.values()
+    ]
+
+
+def true_value_notes(
+    objective: Objective, values: Mapping[str, float], before: Mapping[str, float], allowed: Mapping[str, LimitRange]
+) -> list[str]:
+    """A sentence for each limit on a smooth metric that the true one does not meet."""
+    notes = []
+    for metric in objective.metrics:
+        exact = exact_counterpart(metric)
+        if exact is not None and metric.name in allowed:
+            lower, upper = allowed[metric.name].at(before[metric.name])
+            if not lower <= values[exact.name] <= upper:
+                beyond = f"the true {exact.name} is {values[exact.name]:.4g}, beyond the limit"
+                notes.append(f"{metric.name} is limited, but {beyond}.")
+    return notes
+
+
+def active_words(
+    held: Sequence[Limit],
+    values: Mapping[str, float],
+    changes: Sequence[Change],
+    space: SearchRange,
+    ended: np.ndarray,
+) -> tuple[str, ...]:
+    """What holds the search, in words: limits, shapes, bounds, and neighbours in ordered vectors."""
+    groups: dict[str, list[str]] = {}
+    for limit in held:
+        text = f"{limit.of} {limit.nearer(values[limit.name])}"
+        groups.setdefault(text, []).append(limit.name.removeprefix(limit.of))
+    words = []
+    for text, (first, *others) in groups.items():
+        more = f" and {len(others)} more places" if others else ""
+        words.append(f"{text},{first}{more}" if first else text)
+    words += [
+        f"{change.name} {change.note}, {change.after:.4g} {change.unit}".rstrip() for change in changes if change.note
+    ]
+    rows, gaps = space.coordinates.order()
+    touching = np.abs(rows @ (ended / space.unit) - gaps) < 1e-9 if gaps.size else np.zeros(0, bool)
+    pairs = (np.array(space.free.names)[row != 0] for row in rows[touching])
+    return (*words, *(f"{' = '.join(pair)}, which must increase" for pair in pairs))
+
+
+def start_notes(attempts: Sequence["Attempt"], metric: str) -> list[str]:
+    """How many searches ended at the best optimum, if not all did."""
+    if not attempts:
+        return []
+    allowed = [a.metric for a in attempts if a.meets_limits] or [a.metric for a in attempts]
+    best, furthest = min(allowed), max(allowed)
+    alike = sum(value - best <= ALIKE * abs(best) for value in allowed)
+    if alike == len(attempts):
+        return []
+    worst = f", the worst at {furthest:.5g}" if furthest - best > ALIKE * abs(best) else ""
+    unmet = len(attempts) - len(allowed)
+    failed = f", and {unmet} met no limits" if unmet and unmet < len(attempts) else ""
+    return [f"{alike} of {len(attempts)} starts ended at the best {metric}, {best:.5g}{worst}{failed}."]
+
+
+def violations(short: Sequence[Limit], values: Mapping[str, float]) -> dict[str, str]:
+    """Each metric or shape beyond its limit, in words, at its worst place."""
+    worst = sorted(short, key=lambda limit: limit.margin(values[limit.name]), reverse=True)
+    return {
+        limit.of: f"{limit.name} is {values[limit.name]:.4g}, and must be {limit.nearer(values[limit.name])}"
+        for limit in worst
+    }
+
+
+def tightened_notes(limits: Sequence[Limit], searched: Sequence[Limit]) -> list[str]:
+    """A sentence on the limits that were tighter in the search than they are."""
+    pairs = zip(limits, searched, strict=True)
+    tight = [one.name for one, other in pairs if (one.lower, one.upper) != (other.lower, other.upper)]
+    words = "Tightened on the road of the tuning, so that they hold on others: the limits of"
+    return [f"{words} {', '.join(tight)}."] if tight else []
+
+
+def workshop_notes(space: SearchRange) -> list[str]:
+    """A sentence on the free parameters that no workshop can change."""
+    fixed = [p.path for p in space.free.chosen if not p.adjustable]
+    return [f"No workshop can change {', '.join(fixed)}: what was tuned cannot be built as it is."] if fixed else []
+
+
+def without_effect(space: SearchRange, sides: tuple[Evaluation, Evaluation], ended: np.ndarray) -> tuple[str, ...]:
+    """The parameters by which the derivative of the metric is zero at the start and at the end, but for rounding."""
+    idle = np.ones(len(ended), bool)
+    for at, (_, rows, slopes) in zip((space.start, ended), sides, strict=True):
+        rounded = np.abs(slopes[0] * at / space.unit) <= _ROUNDING * abs(rows[0])
+        idle &= (slopes[0] == 0.0) | (rounded & (at != 0.0))
+    return tuple(name for name, none in zip(space.free.names, idle, strict=True) if none)
+
+
+def effect_notes(idle: Sequence[str], metric: str) -> list[str]:
+    """A sentence on the parameters without effect."""
+    if not idle:
+        return []
+    theirs = "their tuned values say" if len(idle) > 1 else "its tuned value says"
+    remedy = "Free others, or choose another metric or road."
+    return [f"No effect on {metric}: {', '.join(idle)}; {theirs} nothing. {remedy}"]

@@ -11,42 +11,44 @@ z is up, pitch positive nose up, roll positive left side up.
 
 from jaxdamp._guesses import answer_guesses
 from jaxdamp.vehicles import presets
-from jaxdamp.vehicles.axle import Axle
 from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle
-from jaxdamp.vehicles.cab import Cab
-from jaxdamp.vehicles.channels import Channel as Channel, ChannelKind as ChannelKind
-from jaxdamp.vehicles.corner import Corner
-from jaxdamp.vehicles.cubic_spring import CubicSpring
+from jaxdamp.vehicles.cars import FullCar, HalfCar, QuarterCar, RollCar
+from jaxdamp.vehicles.channels import (
+    GOALS as GOALS,
+    Channel as Channel,
+    ChannelKind as ChannelKind,
+    is_stationary as is_stationary,
+)
+from jaxdamp.vehicles.corner import Axle, Corner
 from jaxdamp.vehicles.equilibrium import (
     refuse_restless as refuse_restless,
     rest_position as rest_position,
     static_equilibrium,
 )
-from jaxdamp.vehicles.force_driven import ForceDriven
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.frequency_response import frequency_response, spectral_rms
-from jaxdamp.vehicles.full_car import FullCar
-from jaxdamp.vehicles.guided import Guide, Guided
-from jaxdamp.vehicles.half_car import HalfCar
-from jaxdamp.vehicles.linear import LinearVehicle as LinearVehicle, delays_of as delays_of, linearise
-from jaxdamp.vehicles.modes import Modes as Modes, modes
-from jaxdamp.vehicles.oscillations import Oscillations as Oscillations, oscillations
-from jaxdamp.vehicles.parts import Body, Element, Link, Place, Wheel, prefixed as prefixed
-from jaxdamp.vehicles.points import Point
-from jaxdamp.vehicles.port_form import LinearMap as LinearMap, PortForm as PortForm
-from jaxdamp.vehicles.ports import Earlier as Earlier, Ports as Ports, States as States
-from jaxdamp.vehicles.quarter_car import QuarterCar
-from jaxdamp.vehicles.ride_metrics import is_stationary as is_stationary
-from jaxdamp.vehicles.roll_car import RollCar
-from jaxdamp.vehicles.seat import Seat, SeatMass
+from jaxdamp.vehicles.guided import ForceDriven, Guide, Guided
+from jaxdamp.vehicles.linear import (
+    LinearVehicle as LinearVehicle,
+    delays_of as delays_of,
+    linearise,
+    with_weightings as with_weightings,
+)
+from jaxdamp.vehicles.modes import Modes as Modes, Oscillations as Oscillations, modes, oscillations
+from jaxdamp.vehicles.parts import Body, Element as Element, Link, Place, Point as Point, Wheel, prefixed as prefixed
+from jaxdamp.vehicles.port_form import (
+    Earlier as Earlier,
+    LinearMap as LinearMap,
+    PortForm as PortForm,
+    Ports as Ports,
+    States as States,
+)
 from jaxdamp.vehicles.stationary import EquivalentDamper as EquivalentDamper, equivalent_dampers, stationary_rms
 from jaxdamp.vehicles.statistical import nonlinear_variables as nonlinear_variables
-from jaxdamp.vehicles.suspension import Suspension
+from jaxdamp.vehicles.suspension import CubicSpring, Seat, SeatMass, Suspension
 from jaxdamp.vehicles.system import Layout as Layout, System as System
-from jaxdamp.vehicles.tandem import IndependentTandem, WalkingBeam
-from jaxdamp.vehicles.tandem_truck import TandemTruck
+from jaxdamp.vehicles.tandem_truck import Cab, IndependentTandem, TandemTruck, WalkingBeam
 from jaxdamp.vehicles.tracked_hull import PitchDecay as PitchDecay, TrackedHull
-from jaxdamp.vehicles.weighted import with_weightings as with_weightings
 
 
 __all__ = [
@@ -56,7 +58,6 @@ __all__ = [
     "Cab",
     "Corner",
     "CubicSpring",
-    "Element",
     "ForceDriven",
     "Frame",
     "FullCar",
@@ -67,7 +68,6 @@ __all__ = [
     "Link",
     "LumpedVehicle",
     "Place",
-    "Point",
     "QuarterCar",
     "RollCar",
     "Seat",
@@ -86,30 +86,6 @@ __all__ = [
     "spectral_rms",
     "static_equilibrium",
     "stationary_rms",
-]
-# What the other packages of the library import, and what is only returned: a user writes none of these.
-__shared__ = [
-    "Channel",
-    "ChannelKind",
-    "Earlier",
-    "EquivalentDamper",
-    "Layout",
-    "LinearMap",
-    "LinearVehicle",
-    "Modes",
-    "Oscillations",
-    "PitchDecay",
-    "PortForm",
-    "Ports",
-    "States",
-    "System",
-    "delays_of",
-    "is_stationary",
-    "nonlinear_variables",
-    "prefixed",
-    "refuse_restless",
-    "rest_position",
-    "with_weightings",
 ]
 
 answer_guesses(__name__, __all__)

@@ -3,7 +3,7 @@
 import functools
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 import jax
@@ -15,10 +15,9 @@ from jaxdamp._types import Scalar
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import Metric, current_name
 from jaxdamp.parameters import Module, check_parameters, readable
-from jaxdamp.vehicles.channels import channels_of
+from jaxdamp.vehicles.channels import GOALS, channels_of, chosen_metrics, metrics_of_goal
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.port_form import PortForm
-from jaxdamp.vehicles.ride_metrics import GOALS, chosen_metrics, metrics_of_goal
 from jaxdamp.vehicles.system import Layout, System, assemble, layout_of
 
 
@@ -140,7 +139,7 @@ class AbstractVehicle(Module):
 
 
 @functools.lru_cache(maxsize=256)
-def _layout_of(structure: Any, leaves: tuple[Any, ...]) -> Layout:
+def _layout_of(structure: object, leaves: tuple[object, ...]) -> Layout:
     """The layout of vehicles of this structure, whose arrays have these shapes: their values do not change it."""
     layouts = []
 

@@ -1,14 +1,13 @@
-"""One wheel with its suspension, the building block of all cars."""
+"""One wheel with its suspension, the building block of all cars, and two of them on an axle."""
 
-from typing import Any, final
+from typing import final
 
 import equinox as eqx
 
-from jaxdamp._types import Number
+from jaxdamp._types import Number, ScalarLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import Module, nonnegative, parameter, positive
-from jaxdamp.vehicles.parts import AbstractPart, Body, Link, Wheel, prefixed
-from jaxdamp.vehicles.points import Point
+from jaxdamp.vehicles.parts import AbstractPart, Body, Link, Parts, Point, Wheel, prefixed
 from jaxdamp.vehicles.suspension import Suspension
 
 
@@ -31,8 +30,8 @@ class AbstractCorner(Module):
         name: str,
         mount: Point,
         *,
-        behind: Any = 0.0,
-        left: Any = 0.0,
+        behind: ScalarLike | int = 0.0,
+        left: ScalarLike | int = 0.0,
         beside: bool = False,
         sides: int = 1,
     ) -> tuple[Body, Link, Wheel]:
@@ -75,3 +74,41 @@ class Corner(AbstractCorner, AbstractPart):
     """
 
     damper_count: int = eqx.field(static=True, default=1)
+
+
+@final
+class Axle(AbstractPart):
+    """Two equal corners, half a track width left and right of the middle, with an anti-roll bar.
+
+    The energy of the bar is ½ k_R (φ − (z_ul − z_ur)/w)²: its twist is the roll angle of the body relative to the line
+    through the wheels.
+
+    Arguments:
+        corner: wheel, suspension and tyre of each side.
+        track_width: w [m].
+        anti_roll_rate: k_R [N m/rad], moment on the body per roll angle.
+    """
+
+    corner: Corner
+    track_width: Number = parameter("m", "distance between the left and the right wheel", positive, adjustable=False)
+    anti_roll_rate: Number = parameter("N m/rad", "stiffness of the anti-roll bar", nonnegative, default=0.0)
+
+    def parts(
+        self, name: str, body: Body, *, ahead: ScalarLike | int | None = None, behind: ScalarLike | int = 0.0
+    ) -> Parts:
+        """Left corner, right corner and anti-roll bar under a body that rolls.
+
+        Arguments:
+            name: prefix of the names of the parts, may be empty.
+            body: the body above the axle.
+            ahead: distance ahead of the centre of gravity [m], for a body that pitches.
+            behind: distance behind the front axle [m].
+        """
+        half = 0.5 * self.track_width
+        left, right = (
+            self.corner.parts(prefixed(name, side), body.at(ahead, y), behind=behind, left=y, beside=side == "right")
+            for side, y in (("left", half), ("right", -half))
+        )
+        line = (left[0].at() - right[0].at()) * (1.0 / self.track_width)
+        bar = Link(prefixed(name, "anti_roll_bar"), body.roll - line, self.anti_roll_rate)
+        return (left[0], right[0]), (left[1], right[1], bar), (left[2], right[2])

@@ -1,14 +1,14 @@
 """Where a vehicle comes to rest on the road, with every nonlinear spring."""
 
-from collections.abc import Callable
-from typing import Any, NoReturn, TypeAlias, final
+from collections.abc import Callable, Sequence
+from typing import NoReturn, TypeAlias, final
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, ArrayLike, Bool, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
@@ -18,8 +18,7 @@ from jaxdamp._sharded import varying_as
 from jaxdamp._types import Scalar
 from jaxdamp.dampers import coverage
 from jaxdamp.vehicles.base import AbstractVehicle
-from jaxdamp.vehicles.port_form import PortForm
-from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.port_form import PortForm, Ports
 from jaxdamp.vehicles.system import System
 
 
@@ -77,13 +76,17 @@ class _SharedNewton(optx.AbstractRootFinder):
 
     atol: float
     rtol: float = 0.0
-    norm: Callable[[Any], Array] = eqx.field(static=True, default=optx.max_norm)
+    norm: Callable[[PyTree], Array] = eqx.field(static=True, default=optx.max_norm)
 
-    def init(self, fn: Any, y: Any, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any) -> Array:
+    def init(
+        self, fn: object, y: Array, args: PyTree, options: object, f_struct: object, aux_struct: object, tags: object
+    ) -> Array:
         """Nothing is known of the first position."""
         return jnp.full_like(args[3], jnp.inf)
 
-    def step(self, fn: Any, y: Any, args: Any, options: Any, state: Array, tags: Any) -> tuple[Array, Array, None]:
+    def step(
+        self, fn: object, y: Array, args: PyTree, options: object, state: Array, tags: object
+    ) -> tuple[Array, Array, None]:
         """The best of some shares."""
         form, ports, road, scale = args
         residual, slope = _residual_force(form, ports, road, y)
@@ -93,14 +96,22 @@ class _SharedNewton(optx.AbstractRootFinder):
         return tries[best], sizes[best] / scale, None
 
     def terminate(
-        self, fn: Any, y: Any, args: Any, options: Any, state: Array, tags: Any
+        self, fn: object, y: object, args: object, options: object, state: Array, tags: object
     ) -> tuple[Bool[Array, ""], optx.RESULTS]:
         """Where rounding errors are left."""
         return state <= self.atol, optx.RESULTS.successful
 
     def postprocess(
-        self, fn: Any, y: Any, aux: Any, args: Any, options: Any, state: Any, tags: Any, result: Any
-    ) -> tuple[Any, Any, dict[str, Any]]:
+        self,
+        fn: object,
+        y: object,
+        aux: object,
+        args: object,
+        options: object,
+        state: object,
+        tags: object,
+        result: object,
+    ) -> tuple[object, object, dict[str, object]]:
         """As it is."""
         return y, aux, {}
 
@@ -110,7 +121,7 @@ def _rest(vehicle: AbstractVehicle, road: Float[Array, " wheels"]) -> Float[Arra
     return rest_position(vehicle.system(), road)
 
 
-def static_equilibrium(vehicle: AbstractVehicle, road: Any = None) -> dict[str, Array]:
+def static_equilibrium(vehicle: AbstractVehicle, road: ArrayLike | Sequence[float] | None = None) -> dict[str, Array]:
     """The static equilibrium: coordinates [m, rad] by name.
 
     Coordinates are measured from the equilibrium of the linear springs on level ground, without forces of laws. A gas

@@ -1,25 +1,25 @@
 """Frequency response of the linearised vehicle, from the road to every channel."""
 
-from typing import Any
+from collections.abc import Sequence
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Array, ArrayLike, Complex, Float
 
 from jaxdamp import _checks
 from jaxdamp._limits import root
 from jaxdamp._matrices import solve
-from jaxdamp._types import Scalar
+from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear
 
 
 def frequency_response(
     vehicle: AbstractVehicle | LinearVehicle,
-    frequency: Any,
+    frequency: ArrayLike | Sequence[float],
     *,
-    speed: Any = None,
+    speed: ScalarLike | int | None = None,
     in_phase: bool = False,
     by_wheel: bool = False,
 ) -> dict[str, Complex[Array, "..."]]:
@@ -94,12 +94,12 @@ def _imaginary(values: Float[Array, "..."]) -> Complex[Array, "..."]:
 
 def spectral_rms(
     vehicle: AbstractVehicle | LinearVehicle,
-    frequency: Any,
-    density: Any,
+    frequency: ArrayLike | Sequence[float],
+    density: ArrayLike | Sequence[float],
     *,
-    speed: Any = None,
+    speed: ScalarLike | int | None = None,
     in_phase: bool = False,
-    coherence: Any = None,
+    coherence: ArrayLike | Sequence[float] | None = None,
 ) -> dict[str, Scalar]:
     """RMS of every channel of the linearised vehicle on a random road of any spectrum, √∫ |H(f)|² S(f) df.
 

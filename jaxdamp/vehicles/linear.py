@@ -1,25 +1,63 @@
 """The linearised vehicle: about the static equilibrium, for a given amplitude of its laws, or on a random road."""
 
-from typing import Any, final
+from collections.abc import Sequence
+from typing import final
 
 import equinox as eqx
 import jax
 import jax.flatten_util
 import jax.numpy as jnp
+import jax.scipy.linalg
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._matrices import solve
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.dampers import coverage
+from jaxdamp.metrics import weighting_state_space
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position
-from jaxdamp.vehicles.equivalent import equivalent_slopes
-from jaxdamp.vehicles.linear_laws import LinearLaws, with_linear_laws
-from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.port_form import Ports, States
 from jaxdamp.vehicles.statistical import NoiseAtLaw, statistical_laws
+from jaxdamp.vehicles.system import LinearLaws, with_linear_laws
+
+
+POINTS = 256  # in a cycle
+CYCLES = 8  # the last one is evaluated; laws with states settle before
+
+
+def equivalent_slopes(
+    ports: Ports, centre: Float[Array, " ports"], amplitude: Float[Array, "..."], frequency: Scalar
+) -> tuple[Float[Array, " ports"], Float[Array, " ports"]]:
+    """First harmonic of each force for x = centre + X sin ωt: F ≈ k (x − centre) + c v.
+
+    k = (2/X) mean(F sin ωt) [N/m], c = (2/(Xω)) mean(F cos ωt) [N s/m] over the last of eight cycles of 256 points. c
+    dissipates the same energy as the law, k is its part in phase with the stroke. Zeros without elements.
+
+    Arguments:
+        ports: the laws at the ports.
+        centre: mean deflection [m], shape (ports,).
+        amplitude: X [m], one for all or one for each port.
+        frequency: ω/2π [Hz].
+    """
+    x_max = jnp.broadcast_to(jnp.abs(amplitude), centre.shape)
+    rate = 2.0 * jnp.pi * frequency
+    phase = 2.0 * jnp.pi * jnp.arange(CYCLES * POINTS + 1.0, dtype=centre.dtype) / POINTS
+    sine, cosine = jnp.sin(phase), jnp.cos(phase)
+    x = centre[None, :] + sine[:, None] * x_max[None, :]
+    v = cosine[:, None] * (rate * x_max)[None, :]
+
+    def step(states: States, ends: tuple[Array, ...]) -> tuple[States, Array]:
+        x0, v0, x1, v1 = ends
+        states = ports.advance(x0, v0, x1, v1, states, 1.0 / (frequency * POINTS))
+        return states, ports.force(x1, v1, states)
+
+    _, forces = jax.lax.scan(step, ports.initial(), (x[:-1], v[:-1], x[1:], v[1:]))
+    last, of_cycle = forces[-POINTS:], slice(-POINTS, None)
+    stiffness = 2.0 * jnp.mean(last * sine[of_cycle, None], axis=0) / x_max
+    return stiffness, 2.0 * jnp.mean(last * cosine[of_cycle, None], axis=0) / (rate * x_max)
 
 
 INSTEAD = 'Drive over a random road instead: `roads.iso8608("C", speed=20.0, length=1200.0, seed=1)`.'
@@ -73,10 +111,10 @@ class LinearVehicle(eqx.Module):
 def linearise(
     vehicle: AbstractVehicle,
     *,
-    amplitude: Any = None,
-    frequency: Any = None,
-    velocity_psd: Any = None,
-    speed: Any = None,
+    amplitude: ArrayLike | Sequence[float] | None = None,
+    frequency: ScalarLike | int | None = None,
+    velocity_psd: ScalarLike | int | None = None,
+    speed: ScalarLike | int | None = None,
     in_phase: bool = False,
 ) -> LinearVehicle:
     """Linearise the laws of a vehicle: at its static equilibrium, for a sinusoidal stroke or on a random road.
@@ -128,15 +166,17 @@ def linearise(
     if amplitude is not None:
         _checks.positive("amplitude", amplitude)
         _checks.positive("frequency", frequency)
-        amplitude, frequency = jnp.asarray(amplitude, dtype=float), jnp.asarray(frequency, dtype=float)
-    linear = _linearise(vehicle, amplitude, frequency)
+    sinusoidal = (None if a is None else jnp.asarray(a, dtype=float) for a in (amplitude, frequency))
+    linear = _linearise(vehicle, *sinusoidal)
     matrix = _checks.concrete(linear.state_matrix)
     if matrix is not None and not np.all(np.isfinite(matrix)):
         refuse_restless(vehicle)
     return linear
 
 
-def _on_random_road(vehicle: AbstractVehicle, velocity_psd: Any, speed: Any, in_phase: bool) -> LinearVehicle:
+def _on_random_road(
+    vehicle: AbstractVehicle, velocity_psd: ScalarLike | int, speed: ScalarLike | int | None, in_phase: bool
+) -> LinearVehicle:
     """With the nearest linear laws in the stationary motion."""
     _checks.positive("velocity_psd", velocity_psd)
     behind = jnp.stack([wheel.behind for wheel in vehicle.frame().wheels])
@@ -228,3 +268,51 @@ def as_linear(vehicle: AbstractVehicle | LinearVehicle) -> LinearVehicle:
     """The vehicle linearised about its static equilibrium, unless it is linear already."""
     check_module("vehicle", vehicle, (AbstractVehicle, LinearVehicle))
     return vehicle if isinstance(vehicle, LinearVehicle) else linearise(vehicle)
+
+
+def with_weightings(linear: LinearVehicle, weightings: Sequence[tuple[str, str]]) -> LinearVehicle:
+    """The linearised vehicle with added channels `weighted_…`: ẇ = A_w w + B_w y, output C_w w, for a channel y.
+
+    `stationary_rms` then gives the weighted RMS of a white road, `frequency_response` the weighted response.
+
+    Arguments:
+        linear: result of `linearise`.
+        weightings: pairs of a channel and a weighting, such as `[("sprung_acceleration", "Wk")]`.
+
+    Raises:
+        ValueError: an unknown channel or weighting.
+
+    >>> from jaxdamp.vehicles import linearise, stationary_rms
+    >>> from jaxdamp.vehicles.presets import quarter_car_000
+    >>> weighted = with_weightings(linearise(quarter_car_000()), [("sprung_acceleration", "Wk")])
+    >>> rms = stationary_rms(weighted, 3e-3)
+    >>> [round(float(rms[name]), 3) for name in ("sprung_acceleration", "weighted_sprung_acceleration")]
+    [1.6, 1.026]
+    """
+    for name, _ in weightings:
+        _checks.one_of("channel", name, linear.channels)
+    filters = [weighting_state_space(weighting) for _, weighting in weightings]
+    picked = jnp.array([linear.channels.index(name) for name, _ in weightings], dtype=int)
+    size, inner = linear.state_matrix.shape[0], sum(f.input_vector.size for f in filters)
+    into = jax.scipy.linalg.block_diag(*[f.input_vector[:, None] for f in filters])
+    out = jax.scipy.linalg.block_diag(*[f.output_vector[None, :] for f in filters])
+    own = jax.scipy.linalg.block_diag(*[f.state_matrix for f in filters])
+    above = jnp.concatenate([linear.state_matrix, jnp.zeros((size, inner))], axis=1)
+    below = jnp.concatenate([into @ linear.output[picked], own], axis=1)
+    unweighted = jnp.concatenate([linear.output, jnp.zeros((len(linear.channels), inner))], axis=1)
+    weighted = jnp.concatenate([jnp.zeros((len(filters), size)), out], axis=1)
+    wheels = linear.road_input.shape[1]
+    nothing = jnp.zeros((len(filters), wheels))
+    return LinearVehicle(
+        jnp.concatenate([above, below]),
+        jnp.concatenate([linear.road_input, into @ linear.road_feed[picked]]),
+        jnp.concatenate([linear.road_rate_input, into @ linear.feed_through[picked]]),
+        jnp.concatenate([unweighted, weighted]),
+        jnp.concatenate([linear.road_feed, nothing]),
+        jnp.concatenate([linear.feed_through, nothing]),
+        linear.behind,
+        linear.left,
+        linear.coordinates,
+        (*linear.channels, *[f"weighted_{name}" for name, _ in weightings]),
+        linear.axles,
+    )

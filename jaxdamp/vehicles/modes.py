@@ -1,16 +1,18 @@
 """Natural modes of a vehicle: frequencies, damping, shapes."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Array, Complex, Float
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._types import Contents
 from jaxdamp.vehicles.base import AbstractVehicle
-from jaxdamp.vehicles.linear import LinearVehicle, as_linear
+from jaxdamp.vehicles.linear import LinearVehicle, as_linear, linearise
 
 
 if TYPE_CHECKING:
@@ -75,7 +77,7 @@ class Modes(AbstractResult):
             "Modes", columns, tuple((*plain(row), words) for row, words in zip(numbers, amplitudes, strict=True))
         )
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Frequencies, damping ratios and shapes with units, ready for JSON; complex shapes as magnitude and phase."""
         magnitude, phase = np.abs(self.damped_shapes), np.angle(self.damped_shapes)
         return {
@@ -158,3 +160,32 @@ def _scaled(shapes: np.ndarray) -> np.ndarray:
     """Columns divided by their largest entry."""
     largest = np.argmax(np.abs(shapes), axis=0)
     return shapes / shapes[largest, np.arange(shapes.shape[1])]
+
+
+class Oscillations(NamedTuple):
+    """Damped oscillations, lowest frequency first; NaN where a mode does not oscillate.
+
+    Attributes:
+        frequency: |λ|/2π [Hz], shape (q,).
+        damping_ratio: −Re λ/|λ|, shape (q,).
+    """
+
+    frequency: Float[Array, " q"]
+    damping_ratio: Float[Array, " q"]
+
+
+def oscillations(vehicle: AbstractVehicle) -> Oscillations:
+    """Frequencies and damping ratios of the linearised vehicle, differentiable by its parameters.
+
+    The same numbers as `modes(vehicle)`, for targets and objectives; by forward derivatives.
+
+    >>> from jaxdamp.vehicles.presets import golden_car
+    >>> oscillations(golden_car()).frequency.round(3)
+    Array([ 1.236, 10.755], dtype=float64)
+    """
+    poles = jnp.linalg.eigvals(linearise(vehicle).state_matrix)
+    size = jnp.sqrt(jnp.real(poles) ** 2 + jnp.imag(poles) ** 2)
+    swings = jnp.imag(poles) > 1e-9 * size
+    order = jnp.argsort(jnp.where(swings, size, jnp.inf))[: len(vehicle.coordinates)]
+    size, decay = jnp.where(swings, size, jnp.nan)[order], -jnp.real(poles)[order]
+    return Oscillations(size / (2.0 * np.pi), decay / size)

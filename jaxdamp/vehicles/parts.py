@@ -1,14 +1,77 @@
 """The parts of a vehicle: rigid bodies, links between their points, wheels on the road."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias, final
 
 import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._types import Number, Scalar
+from jaxdamp._types import Number, Scalar, ScalarLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import Module, as_float, check_parameters, nonnegative, parameter, positive, readable
-from jaxdamp.vehicles.points import Point
+
+
+def _is_one(coefficient: object) -> bool:
+    return isinstance(coefficient, float) and coefficient == 1.0
+
+
+@final
+class Point(eqx.Module):
+    """Σ coefficient · coordinate: the height of a point [m] or an angle [rad], for small angles.
+
+    Points can be added, subtracted and scaled: the extension of a link is `body.at(1.2) - wheel.at()`. `Body.at` gives
+    points, `Body.pitch` and `Body.roll` give angles.
+
+    Attributes:
+        terms: the coefficient of each coordinate, by its name.
+
+    >>> twist = Point({"roll": 1.0}) - (Point({"z_left": 1.0}) - Point({"z_right": 1.0})) * 0.5
+    >>> twist.terms
+    {'roll': 1.0, 'z_left': -0.5, 'z_right': 0.5}
+    """
+
+    terms: dict[str, Any]
+
+    def __add__(self, other: "Point") -> "Point":
+        terms = dict(self.terms)
+        for name, coefficient in other.terms.items():
+            terms[name] = terms[name] + coefficient if name in terms else coefficient
+        return Point(terms)
+
+    def __mul__(self, factor: ScalarLike | int) -> "Point":
+        return Point({name: factor * coefficient for name, coefficient in self.terms.items()})
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> "Point":
+        return self * -1.0
+
+    def __sub__(self, other: "Point") -> "Point":
+        return self + -other
+
+    def of(self, values: Mapping[str, object]) -> Any:
+        """Its value for given values of the coordinates by name, such as a mode shape.
+
+        >>> Point({"z_sprung": 1.0, "pitch": -1.0}).of({"z_sprung": 0.5, "pitch": 0.25})
+        0.25
+        """
+        return sum(coefficient * values[name] for name, coefficient in self.terms.items())
+
+
+def matrix(points: Sequence[Point], coordinates: Sequence[str]) -> Float[Array, "points coordinates"]:
+    """The coefficients of points, one row each, in the order of the coordinates; other coordinates are ignored."""
+    numbers: list[Any] = [0.0, 1.0]  # each entry is one of these: a gather compiles faster than a stack of rows
+    entries = np.zeros((len(points), len(coordinates)), dtype=int)
+    column = {name: j for j, name in enumerate(coordinates)}
+    for i, point in enumerate(points):
+        for name, coefficient in point.terms.items():
+            if name in column:
+                entries[i, column[name]] = 1 if _is_one(coefficient) else len(numbers)
+                numbers += [] if _is_one(coefficient) else [coefficient]
+    return jnp.stack([jnp.asarray(number, dtype=float) for number in numbers])[entries]
 
 
 SPRUNG = "sprung"
@@ -25,7 +88,7 @@ def prefixed(name: str, word: str) -> str:
     return f"{name}_{word}" if name else word
 
 
-def _maybe(value: Any) -> Any:
+def _maybe(value: object) -> Any:
     return None if value is None else as_float(value)
 
 
@@ -74,7 +137,14 @@ class Body(AbstractPart):
     mass: Number = parameter("kg", "mass of the body", positive, adjustable=False)
     turns: tuple[Inertia, ...]
 
-    def __init__(self, name: str, mass: Any, *, pitch_inertia: Any = None, roll_inertia: Any = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        mass: ScalarLike | int,
+        *,
+        pitch_inertia: ScalarLike | int | None = None,
+        roll_inertia: ScalarLike | int | None = None,
+    ) -> None:
         self.name, self.mass = name, mass
         given = (("pitch", pitch_inertia), ("roll", roll_inertia))
         self.turns = tuple(Inertia(axis, moment) for axis, moment in given if moment is not None)
@@ -103,7 +173,7 @@ class Body(AbstractPart):
         """The roll angle, left side up [rad]."""
         return self._turn("roll")
 
-    def at(self, ahead: Any = None, left: Any = None) -> Point:
+    def at(self, ahead: ScalarLike | int | None = None, left: ScalarLike | int | None = None) -> Point:
         """The height of a point `ahead` and `left` of the centre of gravity [m], z + ahead θ + left φ."""
         point = Point({f"z_{self.name}": 1.0})
         point = point if ahead is None else point + as_float(ahead) * self.pitch

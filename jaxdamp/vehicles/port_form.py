@@ -7,16 +7,164 @@ The coordinates q [m, rad] are measured from the static equilibrium of the linea
 port is a row R of the geometry; its force acts through the same row, −Rᵀ F, so no sign is written by hand.
 """
 
-from collections.abc import Sequence
-from typing import final
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias, final
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp._matrices import solve
-from jaxdamp._vectors import Matrix, Vector, plus, rows, times
+from jaxdamp._types import Scalar, State
+from jaxdamp._vectors import Matrix, MemoryLayout, Vector, plus, rows, times
+from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
+
+
+# One array, or a tuple of scalars, as `MemoryLayout` says.
+if TYPE_CHECKING:
+    AtPorts: TypeAlias = Any
+else:
+    AtPorts = Float[Array, " ports"] | tuple[Scalar, ...]
+States = list[Array]  # by group: (states,) of a law alone, (laws, states) of a batch
+Earlier = tuple[list[Array | None], list[Array | None]]  # one and two steps before, of groups that are extrapolated
+
+
+def _alike(one: AbstractDamper, other: AbstractDamper) -> bool:
+    """Whether two laws differ only in the values of their arrays."""
+    if jax.tree.structure(one) != jax.tree.structure(other):
+        return False
+    pairs = list(zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True))
+    arrays = [eqx.is_array(a) and eqx.is_array(b) for a, b in pairs]
+    same_shape = [
+        jnp.shape(a) == jnp.shape(b) if array else a == b for (a, b), array in zip(pairs, arrays, strict=True)
+    ]
+    return any(arrays) and all(same_shape)
+
+
+@final
+class Ports(eqx.Module):
+    """Forces, states and steps of all elements of a vehicle, in the order of its ports.
+
+    Laws of the same kind are stacked and computed as one batch: four dampers of a car cost little more than one, and
+    are compiled once. A single law is called directly.
+
+    Deflections, rates and forces are one array or a tuple of scalars, as the layout says.
+
+    Arguments:
+        laws: the law at each port.
+        layout: one array; with scalars or lanes every law is called by itself.
+    """
+
+    laws: tuple[AbstractDamper, ...]  # one of each kind, its arrays stacked where there are several
+    members: tuple[tuple[int, ...], ...] = eqx.field(static=True)  # the ports of each kind
+    smooth: tuple[bool, ...] = eqx.field(static=True)  # whether the states of each kind may be extrapolated
+
+    def __init__(self, laws: Sequence[AbstractDamper], layout: MemoryLayout = MemoryLayout.ARRAY) -> None:
+        laws = [without_fitted_ranges(law) for law in laws]
+        kinds: list[list[int]] = []
+        for i, law in enumerate(laws):
+            alike = (kind for kind in kinds if layout is MemoryLayout.ARRAY and _alike(laws[kind[0]], law))
+            same = next(alike, None)
+            if same is None:
+                kinds.append([i])
+            else:
+                same.append(i)
+        self.members = tuple(tuple(kind) for kind in kinds)
+        self.smooth = tuple(laws[kind[0]].traits().extrapolable_states for kind in kinds)
+        self.laws = tuple(
+            laws[kind[0]] if len(kind) == 1 else jax.tree.map(_stacked, *[laws[i] for i in kind]) for kind in kinds
+        )
+
+    def initial(self) -> States:
+        """The states of elements at rest."""
+        return self._each(lambda law: law.initial_state(), [])
+
+    def force(self, x: AtPorts, v: AtPorts, states: States) -> AtPorts:
+        """Forces [N] at deflections [m] and rates [m/s]."""
+        forces = self._each(lambda law, x, v, state: law.force(x, v, state), [x, v], states)
+        if isinstance(x, tuple):
+            return tuple(forces)
+        flat = [force if len(kind) > 1 else force[None] for force, kind in zip(forces, self.members, strict=True)]
+        if not flat:
+            return jnp.zeros_like(x)
+        order = np.argsort([port for kind in self.members for port in kind])
+        joined = flat[0] if len(flat) == 1 else jnp.concatenate(flat)
+        return joined if np.all(order == np.arange(order.size)) else joined[order]
+
+    def state_rate(self, x: AtPorts, v: AtPorts, states: States) -> States:
+        """Time derivatives of the states [1/s]."""
+        return self._each(lambda law, x, v, state: law.state_rate(x, v, state), [x, v], states)
+
+    def advance(self, x0: AtPorts, v0: AtPorts, x1: AtPorts, v1: AtPorts, states: States, dt: Scalar) -> States:
+        """States after a step dt [s] over which deflections and rates go from (x0, v0) to (x1, v1)."""
+
+        def step(law: AbstractDamper, x0: Scalar, v0: Scalar, x1: Scalar, v1: Scalar, state: State) -> State:
+            return law.advance(x0, v0, x1, v1, state, dt)
+
+        return self._each(step, [x0, v0, x1, v1], states)
+
+    def first_earlier(self, states: States) -> Earlier:
+        """The earlier states at the start of a run: equal to the initial ones."""
+        extrapolated = [state if smooth else None for smooth, state in zip(self.smooth, states, strict=True)]
+        return extrapolated, extrapolated
+
+    def next_earlier(self, states: States, earlier: Earlier) -> Earlier:
+        """The earlier states for the next step."""
+        return [None if old is None else state for old, state in zip(earlier[0], states, strict=True)], earlier[0]
+
+    def predict(
+        self, x0: AtPorts, v0: AtPorts, x1: AtPorts, v1: AtPorts, states: States, earlier: Earlier, dt: Scalar
+    ) -> States:
+        """An approximation of `advance`, third order: smooth states are extrapolated, which costs almost nothing."""
+
+        def step(law: AbstractDamper, *arguments: PyTree) -> State:
+            x0, v0, x1, v1, state, before, two_before = arguments
+            return law.predict(x0, v0, x1, v1, state, dt) if before is None else 3.0 * (state - before) + two_before
+
+        return self._each(step, [x0, v0, x1, v1], states, *earlier)
+
+    def by_port(self, states: States) -> list[Float[Array, " _state"]]:
+        """The states of each element, in the order of the ports."""
+        of_port = {}
+        for kind, state in zip(self.members, states, strict=True):
+            of_port |= {port: state if len(kind) == 1 else state[i] for i, port in enumerate(kind)}
+        return [of_port[port] for port in sorted(of_port)]
+
+    def stiffness_and_damping(self, x: Float[Array, " ports"]) -> tuple[Array, Array]:
+        """Slopes ∂F/∂x [N/m] and ∂F/∂v [N s/m] of the forces at rest at the deflections x."""
+        states, still, one = self.initial(), jnp.zeros_like(x), jnp.ones_like(x)
+        _, stiffness = jax.jvp(lambda x: self.force(x, still, states), (x,), (one,))
+        _, damping = jax.jvp(lambda v: self.force(x, v, states), (still,), (one,))
+        return stiffness, damping
+
+    def _each(
+        self, call: Callable[..., Array], vectors: Sequence[AtPorts], *states: Sequence[Array | None]
+    ) -> list[Array]:
+        """The call for every law, as one batch for each kind."""
+        results = []
+        for i, (law, kind) in enumerate(zip(self.laws, self.members, strict=True)):
+            state = [some[i] for some in states]
+            if len(kind) == 1:
+                results.append(call(law, *[vector[kind[0]] for vector in vectors], *state))
+                continue
+            arrays, rest = eqx.partition(law, eqx.is_array)
+            picked = [_pick(vector, kind) for vector in vectors]
+            results.append(
+                jax.vmap(lambda a, *more, rest=rest: call(eqx.combine(a, rest), *more))(arrays, *picked, *state)
+            )
+        return results
+
+
+def _stacked(*leaves: PyTree) -> PyTree:
+    return jnp.stack(leaves) if eqx.is_array(leaves[0]) else leaves[0]
+
+
+def _pick(vector: AtPorts, kind: tuple[int, ...]) -> Float[Array, " laws"]:
+    """The entries of some ports, as a slice if they are consecutive: a gather would cost more in a loop."""
+    first, last = kind[0], kind[-1]
+    return vector[first : last + 1] if len(kind) == last - first + 1 else vector[np.array(kind)]
 
 
 @final

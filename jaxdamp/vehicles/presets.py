@@ -4,14 +4,10 @@ With `tyre_lifts=True` all tyres can lift off.
 """
 
 from jaxdamp.dampers import AbstractDamper, Besinger, Linear
-from jaxdamp.vehicles.axle import Axle
-from jaxdamp.vehicles.corner import Corner
-from jaxdamp.vehicles.full_car import FullCar
-from jaxdamp.vehicles.half_car import HalfCar
-from jaxdamp.vehicles.quarter_car import QuarterCar
-from jaxdamp.vehicles.seat import Seat
-from jaxdamp.vehicles.tandem import IndependentTandem, WalkingBeam
-from jaxdamp.vehicles.tandem_truck import TandemTruck
+from jaxdamp.vehicles.cars import FullCar, HalfCar, QuarterCar
+from jaxdamp.vehicles.corner import Axle, Corner
+from jaxdamp.vehicles.suspension import Seat
+from jaxdamp.vehicles.tandem_truck import IndependentTandem, TandemTruck, WalkingBeam
 from jaxdamp.vehicles.tracked_hull import TrackedHull
 
 

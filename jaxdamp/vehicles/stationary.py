@@ -11,7 +11,7 @@ from jaxdamp import _checks
 from jaxdamp._limits import at_least, root
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.vehicles.base import AbstractVehicle
-from jaxdamp.vehicles.covariance import channel_covariance
+from jaxdamp.vehicles.gaussian import channel_covariance
 from jaxdamp.vehicles.linear import LinearVehicle, linearise
 from jaxdamp.vehicles.statistical import nonlinear_variables
 

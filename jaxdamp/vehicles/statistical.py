@@ -18,19 +18,17 @@ import jax.flatten_util
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp._dependence import depends
 from jaxdamp._limits import at_least, within
 from jaxdamp._matrices import solve
 from jaxdamp._types import Scalar, State
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.vehicles.covariance import channel_covariance
 from jaxdamp.vehicles.equilibrium import rest_position
-from jaxdamp.vehicles.gaussian_points import gaussian_points
-from jaxdamp.vehicles.linear_laws import LinearLaws, motions_of, with_linear_laws
-from jaxdamp.vehicles.ports import Ports
-from jaxdamp.vehicles.system import System
+from jaxdamp.vehicles.gaussian import channel_covariance, gaussian_points
+from jaxdamp.vehicles.port_form import Ports
+from jaxdamp.vehicles.system import LinearLaws, System, motions_of, with_linear_laws
 
 
 BODY, WHEEL = 1.5, 10.0  # Hz, of a vehicle, to start the search from
@@ -89,7 +87,7 @@ def statistical_laws(
     laws = [law for of_port in parts for law in of_port]
     curved = [_curved(law, port, on_road[port], lifts[port]) for law, port in zip(laws, owners, strict=True)]
 
-    def settings(arrays: Any) -> tuple[System, list[_Kind], Scalar, Array]:
+    def settings(arrays: PyTree) -> tuple[System, list[_Kind], Scalar, Array]:
         system, psd, delays = eqx.combine(arrays, static)
         return system, _kinds([law for law in system.laws for law in _side_by_side(law)], curved, psd), psd, delays
 
@@ -99,7 +97,7 @@ def statistical_laws(
         return _nearest(kinds, begun, owners), jnp.ones(())
     start, unravel = jax.flatten_util.ravel_pytree(begun)
 
-    def again(y: Array, arrays: Any) -> Array:
+    def again(y: Array, arrays: object) -> Array:
         """The distributions of the vehicle with the laws nearest to given ones."""
         system, kinds, psd, delays = settings(arrays)
         spreads = _distributions(system, kinds, _nearest(kinds, unravel(y), owners), psd, delays)
@@ -136,7 +134,7 @@ def nonlinear_variables(law: AbstractDamper) -> tuple[int, ...]:
     count = 2 + law.initial_state().size
     still = [jnp.zeros(()) for _ in range(count)]
 
-    def slope(number: int) -> Any:
+    def slope(number: int) -> PyTree:
         def along(values: list[Scalar]) -> Array:
             def one(value: Scalar) -> Array:
                 return _answers(law, [*values[:number], value, *values[number + 1 :]])
@@ -177,7 +175,7 @@ def _kinds(laws: Sequence[AbstractDamper], curved: Sequence[tuple[int, ...]], ps
     return kinds
 
 
-def _each(function: Any, law: AbstractDamper, count: int, *rows: Any) -> Any:
+def _each(function: Callable[..., PyTree], law: AbstractDamper, count: int, *rows: PyTree) -> PyTree:
     """The function of each law, with its row of each array."""
     if count == 1:
         return jax.tree.map(lambda leaf: leaf[None], function(law, *jax.tree.map(lambda leaf: leaf[0], rows)))
@@ -269,10 +267,10 @@ def _nearest_of_one(
 
 def _triangle(correlation: Float[Array, " pairs"], size: int) -> Float[Array, "size size"]:
     """The lower triangle L with L Lᵀ = the matrix of these correlations, or the nearest that is regular."""
-    rows: list[list[Any]] = []
+    rows: list[list[Array]] = []
     pairs = iter(range(correlation.size))
     for i in range(size):
-        row: list[Any] = []
+        row: list[Array] = []
         for j in range(i):
             known = sum((row[k] * rows[j][k] for k in range(j)), jnp.zeros_like(correlation[0]))
             row.append((correlation[next(pairs)] - known) / rows[j][j])
@@ -306,14 +304,14 @@ def _distributions(
     return spreads
 
 
-def _fixed_point(function: Callable[[Array, Any], Array], start: Array, arguments: Any) -> tuple[Array, Scalar]:
+def _fixed_point(function: Callable[[Array, PyTree], Array], start: Array, arguments: object) -> tuple[Array, Scalar]:
     """The solution of y = function(y, arguments) by Newton's method with limited steps, and whether it was found.
 
     Derivatives by the arguments follow from the implicit function theorem, of any order and in both modes.
     """
     differentiable, rest = eqx.partition(arguments, eqx.is_inexact_array)
 
-    def slope(y: Array, differentiable: Any) -> tuple[Array, Array]:
+    def slope(y: Array, differentiable: object) -> tuple[Array, Array]:
         """1 − ∂function/∂y, and what is missing."""
 
         def at(y: Array) -> tuple[Array, Array]:
@@ -323,17 +321,19 @@ def _fixed_point(function: Callable[[Array, Any], Array], start: Array, argument
         slopes, value = jax.jacfwd(at, has_aux=True)(y)
         return jnp.eye(y.size, dtype=y.dtype) - slopes, value - y
 
-    def step(y: Array, differentiable: Any) -> Array:
+    def step(y: Array, differentiable: object) -> Array:
         return y + within(solve(*slope(y, differentiable)), -LONGEST_STEP, LONGEST_STEP)
 
     @jax.custom_jvp
-    def solution(start: Array, differentiable: Any) -> tuple[Array, Scalar]:
+    def solution(start: Array, differentiable: object) -> tuple[Array, Scalar]:
         accuracy = 1e-4 if start.dtype == jnp.float32 else 1e-9
         solver = optx.FixedPointIteration(rtol=accuracy, atol=accuracy)
         found = optx.fixed_point(step, solver, start, differentiable, max_steps=MOST_STEPS, throw=False)
         return found.value, jnp.where(found.result == optx.RESULTS.successful, 1.0, 0.0).astype(start.dtype)
 
-    def rule(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[tuple[Array, Scalar], tuple[Array, Scalar]]:
+    def rule(
+        primals: tuple[object, ...], tangents: tuple[object, ...]
+    ) -> tuple[tuple[Array, Scalar], tuple[Array, Scalar]]:
         y, found = solution(*primals)
         (_, now), (_, moved) = primals, tangents
         _, change = jax.jvp(lambda d: function(y, eqx.combine(d, rest)), (now,), (moved,))

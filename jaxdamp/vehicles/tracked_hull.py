@@ -13,8 +13,7 @@ from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.frame import Frame
 from jaxdamp.vehicles.parts import Body, Element, Place, Wheel
-from jaxdamp.vehicles.seat import Seat, seat_parts
-from jaxdamp.vehicles.suspension import Suspension
+from jaxdamp.vehicles.suspension import Seat, Suspension, seat_parts
 
 
 class PitchDecay(NamedTuple):

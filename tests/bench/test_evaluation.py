@@ -280,7 +280,7 @@ def test_plain_data_text_and_pictures(two_settings):
     assert len(plain["measurements"]) == len(two_settings.measurements)
     assert "Forces of each record" in repr(two_settings) and "±" in repr(two_settings)
     check = two_settings.check([Limit("rebound force", 0.0, 1.0, velocity=0.131)])
-    figure = two_settings.plot(two_settings, check)
+    figure = two_settings.plot(baseline=two_settings, limits=check)
     assert {axes.get_title(loc="left") for axes in figure.axes} >= {"Force over stroke", "Force over acceleration"}
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels[:3] == ["baseline", "setting 1", "setting 3"] and labels[-1] == "limits, not kept"

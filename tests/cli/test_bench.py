@@ -61,7 +61,7 @@ def test_bench_prints_and_writes_preflight_evaluation_and_limits(folder: Path, t
     for name in ("evaluation.png", "preflight.png", "gas_and_friction_1.png"):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png;base64,") == 3 and "Forces at stated velocities" in page and "FAILED" in page
+    assert page.count("data:image/png;base64,") == 4 and "Forces at stated velocities" in page and "FAILED" in page
     beside = page.partition("Forces beside the baseline")[2].partition("</tr>")[2].partition("</tr>")[0]
     change = float(re.findall(r"\+[\d.]+", beside)[-1])  # of the rebound force, with twice the rate of the baseline
     assert change == pytest.approx(100.0, abs=2.0)

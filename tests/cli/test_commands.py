@@ -87,7 +87,7 @@ def test_fit_writes_tables_pictures_and_a_report(records: Path, tmp_path: Path) 
     assert json.loads((out / "manifest.json").read_text())["files"] == [f for f in files if f != "manifest.json"] + [
         "manifest.json"
     ]
-    pictures = ["best_law_held_out.png", "best_law_loops.png", "force_velocity.png", "ladder.png"]
+    pictures = ["best_law_held_out.png", "best_law_loops.png", "damper_sheet.png", "force_velocity.png", "ladder.png"]
     assert [file for file in files if file.endswith(".png")] == pictures
     assert all((out / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
     ladder = _rows(out / "tables" / "ladder.csv")
@@ -96,7 +96,7 @@ def test_fit_writes_tables_pictures_and_a_report(records: Path, tmp_path: Path) 
     assert [row["use"] for row in _rows(out / "tables" / "records.csv")] == ["fitted", "fitted", "held out"]
     assert float(_rows(out / "tables" / "parameters_bilinear.csv")[0]["value"]) == pytest.approx(2600.0, rel=2e-3)
     report = (out / "report.html").read_text(encoding="utf-8")
-    assert report.count("data:image/png;base64,") == 4 and "held-out RMSE [N]" in report
+    assert report.count("data:image/png;base64,") == 5 and "held-out RMSE [N]" in report
     assert "Baseline on the same records: RMSE " in report and f"<pre>jaxdamp fit {records} --law linear" in report
 
 

@@ -43,7 +43,14 @@ def test_the_demo_goes_through_the_whole_chain(tmp_path: Path, capsys: pytest.Ca
     assert grip["note"].endswith("reached")
     assert float(grip["after"]) == pytest.approx(1.1 * float(grip["before"]), rel=1e-5)
     numbers = list(csv.DictReader((out / "tables" / "tuned_parameters.csv").read_text(encoding="utf-8").splitlines()))
-    assert all(float(row["lower"]) < float(row["after"]) < float(row["upper"]) for row in numbers)
+    # The search moves a rate to a third or three times its value at most; one that ends there is named.
+    for row in numbers:
+        inside = float(row["lower"]) < float(row["after"]) < float(row["upper"])
+        assert row["note"] == ("" if inside else f"at its {'lower' if row['after'] == row['lower'] else 'upper'} bound")
+        assert float(row["lower"]) <= float(row["after"]) <= float(row["upper"])
+        assert inside or f"{row['parameter']} is {row['note']}" in text
+    at_bounds = [row["parameter"] for row in numbers if row["note"]]
+    assert len(at_bounds) < len(numbers)
     fresh = list(csv.DictReader((out / "tables" / "tuned_on_fresh_roads.csv").read_text(encoding="utf-8").splitlines()))
     (held,) = [row for row in fresh if row["metric"] == comfort["metric"]]
     assert float(held["largest [%]"]) < -5.0
@@ -55,7 +62,7 @@ def test_the_demo_goes_through_the_whole_chain(tmp_path: Path, capsys: pytest.Ca
     for said in (
         "standard errors off",
         "on 2 fresh roads",
-        "all coefficients lie inside their bounds",
+        *([] if at_bounds else ["all coefficients lie inside their bounds"]),
         "Tuning for comfort: done",
         "Times",
         "report.html",

@@ -28,7 +28,19 @@ def _written(law: AbstractDamper, path: Path) -> Path:
 
 def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
     base, out = _written(Linear(1500.0), tmp_path / "base.json"), tmp_path / "ride"
-    words = ["--vehicle", "half_car_002", "--road", "bump:0.05:4", "--speed", "16", "--duration", "2", "--dt", "0.002"]
+    words = [
+        "--vehicle",
+        "half_car_002",
+        "--road",
+        "bump:0.05:4",
+        "--speed",
+        "16",
+        "--duration",
+        "2",
+        "--dt",
+        "0.002",
+        "--verbose",
+    ]
     text = jaxdamp("ride", law, "--baseline", base, *words, "--out", out).output
     assert "Axles: rear axle 0.156 s behind the front (2.5 m at 16 m/s)." in text
     assert "rear axle 0.156 s" in (out / "report.html").read_text()

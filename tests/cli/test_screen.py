@@ -52,6 +52,8 @@ def test_a_stage_shows_progress_and_keeps_its_time(terminal: bool, monkeypatch: 
 
 def test_a_pipe_with_colours_gets_no_live_frames(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")
+    clock = iter([100.0, 103.0])
+    monkeypatch.setattr(console, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
     screen = Screen()
     with screen.stage("Work", 2) as advance:
         advance("a part", 1)
@@ -76,3 +78,16 @@ def test_names_out_of_files_do_not_command_the_terminal() -> None:
     screen.say("record \x1b[2J\x9b31m of 3\u00a0Hz")
     screen.points(["\x1b]0;title\x07"])
     assert "record \\x1b[2J\\x9b31m of 3\u00a0Hz" in out.getvalue() and "\x1b]0" not in out.getvalue()
+
+
+def test_the_terminal_has_the_first_remarks_and_says_how_many_are_left() -> None:
+    screen, out = Screen(), io.StringIO()
+    screen.console = Console(file=out, width=100)
+    table = Table("All", (Column("a"),), (("b",),))
+    screen.remarks(list("abcde"))
+    screen.details(table)
+    assert "2 more in report.html" in out.getvalue() and "- d" not in out.getvalue() and "All" not in out.getvalue()
+    screen.verbose = True
+    screen.remarks(list("abcde"))
+    screen.details(table)
+    assert "- e" in out.getvalue() and "All" in out.getvalue()

@@ -112,7 +112,7 @@ WRONG = [
     (["export", "CSV", "--to", "c"], "LAW must be a law or a vehicle as JSON, but is {CSV}"),
     (["tune", "LAW", "white:C"], "VEHICLE must be a vehicle as JSON, but is a Linear"),
     (["tune", "BAD", "white:C"], "VEHICLE must be TOML, but is {BAD}"),
-    (["tune", "ODD", "white:C"], "be a TOML file of preset and [parameters]"),
+    (["tune", "ODD", "white:C"], "be a TOML file of preset, tyre_lifts (true or false) and [parameters]"),
     (["tune", "UNKNOWN", "white:C"], "must be one of"),
     (["tune", "WRONG", "white:C"], "did you mean 'sprung_mass'"),
     (["tune", "NEGATIVE", "white:C"], "must be positive"),

@@ -11,7 +11,7 @@ from jaxdamp import Ride, roads, sweep, vehicles
 from jaxdamp.codegen import _cuda, _lanes, _native, _scan, compiler, printed_scan
 from jaxdamp.dampers import Besinger, PowerLaw, SeriesSpring
 from jaxdamp.simulation import Exponential, simulate
-from jaxdamp.sweeps import runner
+from jaxdamp.sweeps import running
 
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -159,13 +159,13 @@ def test_a_sweep_of_all_ride_metrics():
 def test_a_long_sweep_tries_the_printed_loop_too(monkeypatch):
     """With the numbers of XLA, which does all where derivatives, functions or a missing compiler stand in the way."""
     ride = Ride(CAR, ROAD, metrics=["rms_sprung_acceleration"], duration=0.4)
-    tried, original = [], runner._Pace
+    tried, original = [], running._Pace
 
     class Slow(original):
         def __setattr__(self, name, value):
             super().__setattr__(name, np.inf if name == "seconds" else value)
 
-    monkeypatch.setattr(runner, "_Pace", lambda program: tried.append(program) or original(program))
+    monkeypatch.setattr(running, "_Pace", lambda program: tried.append(program) or original(program))
 
     def swept(function=ride, **options):
         tried.clear()
@@ -174,15 +174,15 @@ def test_a_long_sweep_tries_the_printed_loop_too(monkeypatch):
 
     plain, programs = swept()
     assert (programs, plain.attrs["loop"]) == (1, "compiled by XLA")  # too short
-    monkeypatch.setattr(runner, "LONG", 0.0)
-    monkeypatch.setattr(runner, "TURNS", 1)
+    monkeypatch.setattr(running, "LONG", 0.0)
+    monkeypatch.setattr(running, "TURNS", 1)
     found, programs = swept()
     assert programs == 2
     metric = "rms_sprung_acceleration"
     np.testing.assert_allclose(found[metric], plain[metric], rtol=1e-12)
     made = iter((Slow, original))
     with monkeypatch.context() as patched:
-        patched.setattr(runner, "_Pace", lambda program: next(made)(program))
+        patched.setattr(running, "_Pace", lambda program: next(made)(program))
         found = swept()[0]
     assert found.attrs["loop"] == "printed as C"
     np.testing.assert_allclose(found[metric], plain[metric], rtol=1e-12)

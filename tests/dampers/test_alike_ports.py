@@ -8,8 +8,8 @@ import pytest
 
 from jaxdamp import roads, simulate
 from jaxdamp.parameters import free_parameters
-from jaxdamp.testing.places import SLOTS, half_car, two_bumps
-from jaxdamp.vehicles.ports import Ports
+from jaxdamp.testing.law_checks import SLOTS, half_car, two_bumps
+from jaxdamp.vehicles.port_form import Ports
 
 from .test_contract import LAWS
 

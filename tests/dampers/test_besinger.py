@@ -7,7 +7,7 @@ import pytest
 
 from jaxdamp.dampers import Besinger, SeriesSpring
 from jaxdamp.dampers.besinger import least_rebound, transition_rate
-from jaxdamp.dampers.conditions import margins
+from jaxdamp.dampers.inside import margins
 from jaxdamp.export import from_json, to_json
 from jaxdamp.parameters import replace
 

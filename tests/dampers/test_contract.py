@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers
+from jaxdamp._guesses import shared_names
 from jaxdamp.dampers import (
     AbstractDamper,
     AccelerationSurface,
@@ -52,7 +53,7 @@ from jaxdamp.dampers import (
     ViscoPlastic,
 )
 from jaxdamp.testing import CHECKS, check_alike_ports, check_inside_wrappers, check_law
-from jaxdamp.testing.places import SLOTS
+from jaxdamp.testing.law_checks import SLOTS
 
 
 pytestmark = pytest.mark.users_flags
@@ -252,7 +253,7 @@ def _parts(law):
 
 def test_every_law_is_held_to_the_contract():
     exported = {c for c in vars(dampers).values() if inspect.isclass(c) and issubclass(c, AbstractDamper)}
-    assert {c.__name__ for c in exported} <= {*dampers.__all__, *dampers.__shared__}
+    assert {c.__name__ for c in exported} <= {*dampers.__all__, *shared_names(dampers)}
     assert set(LAWS) >= FURTHER | LONG
     held = {type(part) for name, make in LAWS.items() if name not in FURTHER for part in _parts(make())}
     assert {c for c in exported if not c.__name__.startswith("Abstract")} <= held

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers, parameters
+from jaxdamp._guesses import shared_names
 from jaxdamp.dampers import (
     AbstractMemoryless,
     Bilinear,
@@ -26,7 +27,7 @@ from jaxdamp.dampers import (
 )
 from jaxdamp.parameters import parameter, positive
 from jaxdamp.vehicles import presets
-from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.port_form import Ports
 
 
 SLOW = FittedRange(velocity=(-0.1, 0.2), stroke=(-0.02, 0.02), force=(-300.0, 500.0))
@@ -228,4 +229,4 @@ def test_laws_that_are_mixed_from_others_do_not_notice_their_ranges():
 
 def test_the_names_are_public():
     assert {"FittedRange", "OutsideFittedRangeWarning", "with_fitted_range"} <= set(dampers.__all__)
-    assert "range_use" in dampers.__shared__
+    assert "range_use" in shared_names(dampers)

@@ -25,7 +25,7 @@ from jaxdamp.dampers import (
 )
 from jaxdamp.identify import prepare
 from jaxdamp.identify.traces import Batch
-from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.port_form import Ports
 
 from .test_contract import network
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from jaxdamp.dampers import without_fitted_ranges
+from jaxdamp.export._c_text import DERIVATIVES, law_source
 from jaxdamp.export._law_program import LawProgram, law_numbers
-from jaxdamp.export._law_source import DERIVATIVES, law_source
 from jaxdamp.parameters import with_values
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import dampers, roads, vehicles
+from jaxdamp._guesses import shared_names
 from jaxdamp.dampers import (
     AbstractMemoryless,
     CoulombFriction,
@@ -23,7 +24,7 @@ from jaxdamp.dampers import (
     with_fitted_range,
 )
 from jaxdamp.export import from_json, to_json
-from jaxdamp.export._plain import known_classes
+from jaxdamp.export._rebuild import known_classes
 from jaxdamp.parameters import get, parameter, positive, replace, setting
 from jaxdamp.tune import minimise
 from jaxdamp.vehicles import Body, Element, Frame, Link, LumpedVehicle, Seat, SeatMass, Wheel, presets
@@ -217,7 +218,7 @@ def test_a_file_of_several_faults_is_named(tmp_path):
 
 
 def test_every_class_of_the_package_is_found_by_its_name():
-    kinds = [getattr(door, name) for door in (dampers, roads, vehicles) for name in door.__all__ + door.__shared__]
+    kinds = [getattr(door, name) for door in (dampers, roads, vehicles) for name in door.__all__ + shared_names(door)]
     kinds = [kind for kind in kinds if isinstance(kind, type) and issubclass(kind, eqx.Module)]
     kinds = [kind for kind in kinds if not inspect.isabstract(kind) and not kind.__name__.startswith("Abstract")]
     assert len(kinds) > 60 and all(known_classes()[kind.__name__] is kind for kind in kinds)

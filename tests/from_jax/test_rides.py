@@ -120,7 +120,7 @@ rates, spec = jnp.asarray([900.0, 1500.0]), PartitionSpec("device")
 mesh = Mesh(np.array(jax.devices()), ("device",))
 spread = jax.jit(jax.shard_map(jax.vmap(numbers), mesh=mesh, in_specs=spec, out_specs=spec))(rates)
 assert len(spread.sharding.device_set) == 2
-alone = jax.vmap(numbers)(rates)
+alone = jax.jit(jax.vmap(numbers))(rates)
 np.testing.assert_allclose(spread, alone, rtol=1e-4)
 
 placed = jax.device_put(rates, NamedSharding(mesh, spec))
@@ -132,11 +132,12 @@ def lift(charge):
     return numbers(charge)[3]
 
 slopes = jax.jit(jax.shard_map(jax.vmap(jax.grad(lift)), mesh=mesh, in_specs=spec, out_specs=spec))(rates)
-np.testing.assert_allclose(slopes, jax.vmap(jax.grad(lift))(rates), rtol=1e-3)
+np.testing.assert_allclose(slopes, jax.jit(jax.vmap(jax.grad(lift)))(rates), rtol=1e-3)
 """
 
 
 def test_runs_are_spread_over_devices_by_shard_map():
-    env = os.environ | {"XLA_FLAGS": "--xla_force_host_platform_device_count=2", "JAX_PLATFORMS": "cpu"}
+    flags = f"{os.environ['XLA_FLAGS']} --xla_force_host_platform_device_count=2"
+    env = os.environ | {"XLA_FLAGS": flags, "JAX_PLATFORMS": "cpu"}
     done = subprocess.run([sys.executable, "-c", ON_TWO_DEVICES], env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]

@@ -7,7 +7,7 @@ import pytest
 from jaxdamp.bench import SineTest, VirtualDyno, programmes
 from jaxdamp.dampers import Besinger, Bilinear, BoucWen, Lag, Linear, PiecewiseLinear
 from jaxdamp.dampers.base import Reach
-from jaxdamp.dampers.conditions import margins
+from jaxdamp.dampers.inside import margins
 from jaxdamp.export import from_json, to_json
 from jaxdamp.identify import fit
 from jaxdamp.identify.several import other_starts

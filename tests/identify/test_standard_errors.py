@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import Besinger, Bilinear, Linear
+from jaxdamp.bench import BenchRun, SineTest, VirtualDyno
+from jaxdamp.dampers import Besinger, Bilinear, Linear, PiecewiseLinear
 from jaxdamp.identify import fit
 from jaxdamp.identify.estimating import uncertainty, weak_directions
 from jaxdamp.identify.noise import Noise, _corrected, autocorrelation, correlation_time
@@ -108,3 +108,19 @@ def test_degrees_of_freedom_without_what_the_fit_has_removed(rng, memory):
     if not memory:
         assert corrected.dof == pytest.approx(55.0)
     np.testing.assert_allclose(corrected.sigma, 2.0 * np.sqrt(whole / (whole - removed)))
+
+
+def test_the_error_of_a_law_that_is_wrong_includes_what_it_misses():
+    """Bilinear for a curve whose valves open: the interval holds for the law, the spread for what it misses too."""
+    curve = PiecewiseLinear([-0.2, 0.0, 0.2], [600.0, 1200.0, 2600.0, 1000.0])
+    tests = [SineTest(0.02, f, cycles=4) for f in (1.0, 3.0, 5.0)]
+    runs = VirtualDyno(curve, sampling_rate=250.0, force_noise=5.0).run(tests)
+    wrong, right = fit(Bilinear, runs, starts=1), fit(PiecewiseLinear, runs, starts=1)
+    rate = wrong["rebound_rate"]
+    assert rate.spread is not None and rate.spread > 2.0 * rate.standard_error
+    slow = fit(Bilinear, runs[:1], starts=1)["rebound_rate"].value
+    assert abs(slow - rate.value) < 4.0 * rate.spread and abs(slow - rate.value) > 4.0 * rate.standard_error
+    assert any("hold for this law, not for the damper" in warning for warning in wrong.warnings)
+    assert "with what the law misses" in str(wrong.parameters_table())
+    assert wrong.to_dict()["parameters"][0]["spread"] == pytest.approx(rate.spread)
+    assert all(e.spread is None for e in right.parameters)

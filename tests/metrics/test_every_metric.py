@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import metrics
+from jaxdamp._guesses import shared_names
 
 
 pytestmark = pytest.mark.slow
@@ -219,6 +220,6 @@ def test_errors_of_shape(argument, metric, unchecked):
 
 
 def test_names():
-    names = {*metrics.__all__, *metrics.__shared__}
+    names = {*metrics.__all__, *shared_names(metrics)}
     assert all(hasattr(metrics, name) for name in names)
     assert names == set(METRICS) | OTHERS

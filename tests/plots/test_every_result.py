@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from jaxdamp import bench, identify, plots, roads, tune, vehicles
+from jaxdamp._guesses import shared_names
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.dampers import Bilinear
 from jaxdamp.identify import Posterior, Spread, TargetFit
@@ -94,7 +95,7 @@ def test_a_tuning_on_other_roads() -> None:
 def test_every_result_with_a_table_has_a_picture() -> None:
     words = {"LimitCheck", "Table", "Report", "MetricValues"}  # drawn by the evaluation, or numbers of other results
     for package in (bench, identify, roads, tune, vehicles):
-        for name in [*package.__all__, *getattr(package, "__shared__", ())]:
+        for name in [*package.__all__, *shared_names(package)]:
             kind = getattr(package, name)
             if isinstance(kind, type) and hasattr(kind, "table") and name not in words:
                 assert hasattr(kind, "plot"), f"{name} has a table and no picture"
@@ -102,7 +103,7 @@ def test_every_result_with_a_table_has_a_picture() -> None:
 
 def test_figures_say_what_they_show(runs: BenchSet) -> None:
     law = Bilinear(2600.0, 1200.0)
-    assert titles(plots.force_velocity(law, runs=list(runs)[:1])) == ["Force over velocity: Bilinear, 0.5Hz"]
+    assert titles(plots.force_velocity(law, runs=list(runs)[:1])) == ["Force over velocity: bilinear, 0.5Hz"]
     assert titles(plots.force_velocity({"a": law}, runs=list(runs))) == ["Force over velocity: 3 records"]
     assert titles(plots.force_velocity(law, title="Twin")) == ["Twin"]
     pair = {"A": law, "B": Bilinear(3000.0, 1500.0)}

@@ -30,7 +30,7 @@ def test_a_report_escapes_what_it_is_told() -> None:
     report.verdict("5 < 6", "")
     body = report.to_html("jaxdamp fit 'a & b'").partition("<body>")[2].partition("</body>")[0]
     verdict = '<div class="verdict"><p>5 &lt; 6</p></div>'
-    assert body.split("\n")[:4] == ["", "<h1>a &lt; b</h1>", "<p>x &amp; y</p>", verdict]
+    assert body.split("\n")[:5] == ["", "<main>", "<h1>a &lt; b</h1>", "<p>x &amp; y</p>", verdict]
     footer = body.partition("<footer>")[2]
     assert f"by jaxdamp {jaxdamp.__version__} (jax {jax.__version__}" in footer
     assert "<pre>jaxdamp fit &#x27;a &amp; b&#x27;</pre>" in footer and "<pre>" not in report.to_html()
@@ -41,8 +41,8 @@ def test_sections_are_linked_at_the_top() -> None:
     report.heading("a & b")
     assert "<nav>" not in report.to_html()
     report.heading("c")
-    assert '<nav><a href="#1">a &amp; b</a> · <a href="#2">c</a></nav>' in report.to_html()
-    assert '<h2 id="2">c</h2>' in report.to_html()
+    assert '<nav><a href="#part-1">a &amp; b</a> · <a href="#part-2">c</a></nav>' in report.to_html()
+    assert '<h2 id="part-2">c</h2>' in report.to_html()
 
 
 def test_pictures_stand_in_the_page_and_in_the_folder(tmp_path: Path) -> None:

@@ -52,13 +52,15 @@ def test_a_page_on_fits(comparison: Comparison, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "best_law_held_out.png",
         "best_law_loops.png",
+        "damper_sheet.pdf",
+        "damper_sheet.png",
         "force_velocity.png",
         "ladder.png",
     ]
-    assert page.count("data:image/png") == 4 and "could not be made" not in page
+    assert page.count("data:image/png") == 5 and "could not be made" not in page
     for table in (comparison.table(), comparison["linear"].table(title="Parameters of linear")):
         assert table.to_html() in page
-    body = page.partition("</nav>")[2]
+    body = re.sub("<nav>.*</nav>", "", page.partition("<main>")[2])
     order = [
         *comparison.verdict,
         ">Records</h2>",
@@ -109,7 +111,7 @@ def test_a_page_on_the_whole_chain(comparison: Comparison, rides: dict[str, Resp
     verdict = html.partition('<div class="verdict">')[2].partition("</div>")[0]
     for sentence in (found.summary, *comparison.verdict, *ride_verdict(rides), tuned.summary.replace(">", "&gt;")):
         assert sentence in verdict
-    sections = re.findall(r'<h2 id="\d+">(.*?)</h2>', html)
+    sections = re.findall(r'<h2 id="part-\d+">(.*?)</h2>', html)
     assert sections == [
         *(("Records", "Preflight") if found.findings else ("Records",)),
         *("Evaluation", "How good the laws are", "The recommended law: bilinear"),
@@ -119,19 +121,21 @@ def test_a_page_on_the_whole_chain(comparison: Comparison, rides: dict[str, Resp
 
 def test_a_page_on_one_ride_or_several(rides: dict[str, Response], tmp_path: Path) -> None:
     page = ride_report(rides, title="A bump", laws={"soft": Linear(1500.0)}, folder=tmp_path).to_html()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["damper.png", "ride.png"]
+    files = ["damper.png", "ride.png", "ride_sheet.pdf", "ride_sheet.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == files
     assert "<h1>A bump</h1>" in page and "<p>soft: Linear(rate=1500.0)</p>" in page
     assert "Use of the dampers beside the records of their laws" in page and "<li>firm: damper: velocity" in page
     assert "change [%]" in page
     alone = ride_report(rides["soft"]).to_html()
-    assert alone.count("data:image/png") == 2 and "Use of the dampers" not in alone and "change [%]" not in alone
+    assert alone.count("data:image/png") == 3 and "Use of the dampers" not in alone and "change [%]" not in alone
 
 
 def test_rides_in_words(rides: dict[str, Response]) -> None:
     (sentence,) = ride_verdict(rides)
     soft, firm = (float(run.metrics()["rms_dynamic_tyre_load"]) for run in rides.values())
     assert sentence.startswith("firm against soft: weighted RMS of the body acceleration ")
-    assert sentence.endswith(f"RMS of the dynamic tyre load {100 * (firm / soft - 1):+.1f} %.")
+    assert f"RMS of the dynamic tyre load {100 * (firm / soft - 1):+.1f} %; not certain, as the law is" in sentence
+    assert sentence.endswith(" % of the time.") and " times the velocity of its records" in sentence
     (alone,) = ride_verdict({"soft": rides["soft"]})
     assert f"tyre load {soft:.3g} N. ISO 2631-1 calls such an acceleration" in alone
 
@@ -140,7 +144,7 @@ def test_rides_in_words(rides: dict[str, Response]) -> None:
 def test_a_page_on_a_tuning_beside_another_vehicle(tuned: TuneResult) -> None:
     other = vehicles.presets.quarter_car_000(Linear(900.0))
     html = tuning_report(tuned, baseline=other).to_html()
-    assert "could not be made" not in html and html.count("data:image/png") == 2
+    assert "could not be made" not in html and html.count("data:image/png") == 3
     rows = html.partition("the change is from the baseline to the tuned vehicle")[2].partition("</table>")[0]
     values = dict(re.findall(r"<td>(rms_dynamic_tyre_load)</td><td>N</td><td class=\"number\">([\d.]+)</td>", rows))
     road = roads.white("C", 20.0)
@@ -154,7 +158,7 @@ def test_a_page_on_a_tuning(rides: dict[str, Response], tuned: TuneResult) -> No
     bump = roads.cosine_bump(0.05, start=0.1, duration=0.2)
     fresh = tune.rescore(tuned, [bump], duration=1.0, dt=0.002)
     page = tuning_report(tuned, rescored=fresh, rides=rides).to_html()
-    assert page.count("data:image/png") == 2 and "could not be made" not in page
+    assert page.count("data:image/png") == 3 and "could not be made" not in page
     tables = (tuned.table(), tuned.parameter_table(), fresh.table())
     assert all(table.to_html() in page for table in tables)
     assert fresh.summary in page and "not an optimum" not in page

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from jaxdamp import roads
+from jaxdamp._guesses import shared_names
 
 
 TIME = jnp.linspace(0.0, 1.0, 301)
@@ -90,7 +91,7 @@ def test_names():
         "iso8608 cosine_bump pothole step sine sweep_sine band_limited from_profile read_crg delayed two_track"
     )
     assert set(roads.__all__) >= set(of_the_design.split())
-    assert all(hasattr(roads, name) for name in roads.__all__ + roads.__shared__)
+    assert all(hasattr(roads, name) for name in roads.__all__ + shared_names(roads))
 
 
 SPEEDS = {"cosine_bump": 10.0, "pothole": 10.0, "profile": 10.0, "delayed": 10.0, "contact_patch": 10.0}

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from jaxdamp.roads import iso8608_filtered
-from jaxdamp.roads.filtered_noise import filtered_noise_variance
+from jaxdamp.roads.random_roads import filtered_noise_variance
 
 
 CLASS_C, N0, N1, SPACING = 256e-6, 0.1, 0.011, 0.05

@@ -12,7 +12,7 @@ from jax.tree_util import Partial
 
 from jaxdamp import roads
 from jaxdamp.export import from_json, to_json
-from jaxdamp.export._plain import known_classes
+from jaxdamp.export._rebuild import known_classes
 
 from .conftest import ROADS
 

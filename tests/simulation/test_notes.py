@@ -9,7 +9,7 @@ import pytest
 
 from jaxdamp import dampers, roads, simulate
 from jaxdamp.vehicles import Frame, LumpedVehicle, presets
-from jaxdamp.vehicles.lift_off import LiftOff, LiftOffWithLaws
+from jaxdamp.vehicles.frame import LiftOff, LiftOffWithLaws
 
 from ..vehicles.fleet import bumps, tracks
 

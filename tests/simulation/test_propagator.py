@@ -6,7 +6,7 @@ import scipy.linalg
 
 from jaxdamp._matrices import phi_functions
 from jaxdamp.parameters import replace
-from jaxdamp.simulation.propagator import Propagator
+from jaxdamp.simulation.exponential import Propagator
 from jaxdamp.vehicles import rest_position
 from jaxdamp.vehicles.presets import quarter_car_000
 

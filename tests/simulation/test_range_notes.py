@@ -15,9 +15,10 @@ from jaxdamp.dampers import (
     Linear,
     MotionRatio,
     OutsideFittedRangeWarning,
+    RangeUse,
     with_fitted_range,
 )
-from jaxdamp.simulation import range_notes
+from jaxdamp.simulation import notes, over_runs
 from jaxdamp.vehicles import AbstractVehicle, presets
 
 
@@ -61,7 +62,7 @@ def test_within_the_range_and_without_one_nothing_is_said(monkeypatch):
     for law in (with_fitted_range(LAW, WIDE), LAW):
         response = simulate(*half_car(law), **TIMES)
         assert response.notes == () and bool(response.range_use()) == (law is not LAW)
-    monkeypatch.setattr(range_notes, "named_laws", None)  # it would raise if it were called
+    monkeypatch.setattr(notes, "named_laws", None)  # it would raise if it were called
     assert simulate(*half_car(LAW), **TIMES).notes == ()
 
 
@@ -125,3 +126,10 @@ def test_respond_warns_as_well():
     slow = respond(law, time, 0.004 * np.sin(20 * time), 0.08 * np.cos(20 * time))
     np.testing.assert_allclose(slow, 1500.0 * 0.08 * np.cos(20 * time), rtol=1e-12)
     jax.jit(lambda scale: respond(law, time, scale * np.sin(20 * time)))(0.02)
+
+
+def test_of_several_runs_the_extremes_and_the_mean_share_count():
+    use = RangeUse("Linear", "velocity", "m/s", (-0.2, 0.1), (-0.1, 0.1), 0.1)
+    other = use._replace(used=(-0.1, 0.3), share=0.3)
+    (together,) = over_runs([{"damper": [use]}, {"damper": [other]}])["damper"]
+    assert together.used == (-0.2, 0.3) and together.share == pytest.approx(0.2)

@@ -10,7 +10,7 @@ import pytest
 import scipy.linalg
 
 from jaxdamp import Ride, dampers, metrics, roads, simulate, vehicles
-from jaxdamp.metrics.weighting import discrete_weighting
+from jaxdamp.metrics.weighted import discrete_weighting
 from jaxdamp.simulation import fixed_step
 from jaxdamp.simulation.observer import Filter
 from jaxdamp.vehicles import Body, Frame, Link, LumpedVehicle, Wheel

@@ -8,7 +8,7 @@ import scipy.integrate
 from jaxdamp import dampers, metrics, roads, simulate
 from jaxdamp.parameters import replace
 from jaxdamp.simulation import Adaptive, Exponential
-from jaxdamp.simulation.recorder import recorded
+from jaxdamp.simulation.observer import recorded
 from jaxdamp.simulation.run import sampled
 from jaxdamp.vehicles.presets import quarter_car_000
 

@@ -4,7 +4,7 @@ import pytest
 import xarray
 
 import jaxdamp
-from jaxdamp.sweeps import points, runner, running
+from jaxdamp.sweeps import points, running
 from jaxdamp.sweeps.file import SweepFile
 
 from .cases import AXES, decay
@@ -30,7 +30,7 @@ class _Interrupted:
 @pytest.mark.parametrize("over", [AXES, points({"b": np.linspace(0.1, 1.0, 35), "a": np.linspace(0.0, 1.0, 35)})])
 def test_a_sweep_goes_on_where_it_stopped(tmp_path, monkeypatch, over):
     options = {"chunk": 4, "devices": 1, "gradients": True}
-    monkeypatch.setattr(runner, "CALL", 0.0)  # one chunk a call
+    monkeypatch.setattr(running, "CALL", 0.0)  # one chunk a call
     expected = jaxdamp.sweep(decay(), over, **options)
     file = tmp_path / "sweep.nc"
     counter = _Interrupted(monkeypatch, at=4)

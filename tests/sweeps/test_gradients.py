@@ -6,7 +6,7 @@ import xarray
 
 import jaxdamp
 from jaxdamp._jacobian import choose_mode, value_and_jacobian
-from jaxdamp.sweeps.tracing import trace
+from jaxdamp.sweeps.function import trace
 
 from .cases import AXES, decay
 

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from jaxdamp.sweeps import points, runner
+from jaxdamp.sweeps import points, running
+from jaxdamp.sweeps.function import trace
 from jaxdamp.sweeps.program import Program, prepare
-from jaxdamp.sweeps.tracing import trace
 
 
 COUNT = 3000
@@ -17,7 +17,7 @@ COUNT = 3000
 def program(monkeypatch):
     """Makes a program that takes so many seconds a point, and counts the points that it takes."""
     clock, of = SimpleNamespace(now=0.0), {}
-    monkeypatch.setattr(runner.time, "perf_counter", lambda: clock.now)
+    monkeypatch.setattr(running.time, "perf_counter", lambda: clock.now)
     start = Program.start
 
     def timed(program, columns):
@@ -32,12 +32,12 @@ def program(monkeypatch):
         return made, of[id(made)][1]
 
     monkeypatch.setattr(Program, "start", timed)
-    monkeypatch.setattr(runner, "LONG", 30.0)
+    monkeypatch.setattr(running, "LONG", 30.0)
     return program
 
 
 def run(first, other):
-    runs = runner.Runner(first, points({"x": np.arange(float(COUNT))}), other)
+    runs = running.Runner(first, points({"x": np.arange(float(COUNT))}), other)
     parts = list(runs.results(np.arange(COUNT)))
     np.testing.assert_array_equal(np.concatenate([indices for indices, _ in parts]), np.arange(COUNT))
     doubled = np.concatenate([found["twice"] for _, found in parts if found is not None])

@@ -54,7 +54,8 @@ def test_wrong_choices_are_refused() -> None:
     law = dampers.PiecewiseLinear(np.array([-0.3, 0.1]), np.array([1500.0, 2500.0, 1500.0]))
     many = dampers.PiecewiseLinear(np.linspace(-0.3, 0.3, 7), np.full(8, 2000.0))
     car, over = vehicles.presets.quarter_car_000(law), {"slopes": tune.Choice([1000.0, 3000.0])}
-    result = tune.minimise(COMFORT, car, WHITE, over=over, max_steps=1)
+    bump = roads.cosine_bump(0.03, start=0.02, duration=0.1)
+    result = tune.minimise(COMFORT, car, bump, over=over, max_steps=1, duration=0.3, dt=2e-3)
     assert {change.after for change in result.parameters} <= {1000.0, 3000.0}
     with pytest.raises(ValueError, match="choices for up to 6 numbers, but is 8"):
         tune.minimise(COMFORT, vehicles.presets.quarter_car_000(many), WHITE, over={"slopes": tune.Choice([1e3, 3e3])})

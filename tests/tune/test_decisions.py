@@ -151,6 +151,8 @@ def test_estimates_find_their_numbers_in_the_law():
     assert effects.tolist() == [[0, 1, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0]]
     by_record = _effects([estimate("a[0]"), estimate("a[1]"), estimate("c")], names)
     assert by_record.tolist() == [[0.5, 0.5, 0], [0, 0, 0], [0, 0, 0], [0, 0, 1]]
+    within = _effects([estimate("law.rate"), estimate("lag_time")], ["law.rate", "lag_time"])  # a `Lag`
+    assert within.tolist() == [[1, 0], [0, 1]]
     with pytest.raises(ValueError, match=r"estimates among a, b.*'rate'"):
         _effects([estimate("rate")], names)
 

@@ -5,7 +5,7 @@ import pytest
 
 from jaxdamp import Ride, dampers, parameters, roads, simulate, tune, vehicles
 from jaxdamp.tune.ranges import search_range
-from jaxdamp.tune.run_notes import step_notes
+from jaxdamp.tune.task import step_notes
 
 
 CAR = vehicles.presets.quarter_car_000()

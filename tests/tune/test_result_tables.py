@@ -8,7 +8,7 @@ import pytest
 
 from jaxdamp import tune as typed_tune
 from jaxdamp.tune import Rescore, Status, TuneResult
-from jaxdamp.tune.result import Change
+from jaxdamp.tune.ranges import Change
 from jaxdamp.vehicles import presets
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from jaxdamp import Ride, dampers, metrics, parameters, roads, tune, vehicles
 from jaxdamp.metrics import Metric
-from jaxdamp.tune import smooth as smooth_metrics
+from jaxdamp.tune import objective as smooth_metrics
 from jaxdamp.tune.ranges import search_range, start_points
 from jaxdamp.tune.shape import held_force
 
@@ -39,8 +39,7 @@ def test_shapes_hold_and_are_named() -> None:
 
 def test_shapes_that_contradict_each_other_are_named() -> None:
     shape = [tune.slope(3000.0, 3100.0), tune.ratio(1.5, velocity=0.5)]
-    road = roads.white("C", 20.0)
-    result = tune.minimise("rms_sprung_acceleration", CAR, road, freeze=["*knots"], shape=shape)
+    result = tune.minimise("rms_sprung_acceleration", CAR, ROAD, freeze=["*knots"], shape=shape, **RUN)
     assert result.status is tune.Status.LIMIT_NOT_MET
     assert any("Not met together: " in w and "slope of damper" in w and "ratio" in w for w in result.warnings)
 
@@ -88,10 +87,9 @@ def test_an_error_inside_a_search_reaches_the_user() -> None:
     def stop(step: int, value: float) -> None:
         raise RuntimeError("enough")
 
+    car, road = vehicles.presets.quarter_car_000(dampers.Linear(700.0)), roads.white("C", 20.0)
     with pytest.raises(RuntimeError, match="enough"):
-        tune.minimise(
-            "rms_sprung_acceleration", CAR, roads.white("C", 20.0), freeze=["*knots"], starts=2, progress=stop
-        )
+        tune.minimise("rms_sprung_acceleration", car, road, bounds={"rate": (100.0, 2e4)}, starts=3, progress=stop)
 
 
 def test_smooth_metrics_stay_close_to_the_true_ones() -> None:

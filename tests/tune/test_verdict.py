@@ -10,6 +10,7 @@ import pytest
 from jaxdamp import dampers, roads, tune
 from jaxdamp.tune import Outcome, Rescore, Status, TuneResult
 from jaxdamp.tune.limits import limit_ranges
+from jaxdamp.tune.ranges import Change
 from jaxdamp.tune.verdict import decided, half_interval
 from jaxdamp.vehicles import presets
 
@@ -28,7 +29,8 @@ def made_up(comfort: list[float], tyre: list[float], travel: list[float], **more
     values = {name: float(x.mean()) for name, x in after.items()}
     words: dict[str, Any] = dict(warnings=(), status=Status.CONVERGED, history=(1.0,), fresh=fresh, active_limits=())
     limits: dict[str, Any] = dict(limits={TYRE: 1.1}, allowed=limit_ranges({TYRE: "+10%"}, [TYRE]))
-    return TuneResult(CAR, CAR, COMFORT, (), before, values, units, **(limits | words | more))
+    parameters = more.pop("parameters", ())
+    return TuneResult(CAR, CAR, COMFORT, parameters, before, values, units, **(limits | words | more))
 
 
 CASES = [
@@ -54,11 +56,21 @@ def test_the_verdict_is_that_of_the_fresh_roads(metrics, outcome, words):
 
 
 def test_outside_its_records_a_damper_is_not_called_better():
-    result = made_up([0.89, 0.90, 0.91], [1.05] * 3, [1.0] * 3, extrapolated=("damper: velocity 2 times",))
+    result = made_up([0.89, 0.90, 0.91], [1.05] * 3, [1.0] * 3, extrapolated=("damper at 2 times the velocity",))
     assert result.verdict.outcome is Outcome.EXTRAPOLATED and "2 times" in result.verdict.sentence
     law = dampers.with_fitted_range(dampers.Linear(2500.0), velocity=(-0.02, 0.02))
     tuned = tune.minimise(COMFORT, presets.quarter_car_000(law), WHITE)
     assert tuned.verdict.outcome is Outcome.EXTRAPOLATED and tuned.after[COMFORT] < tuned.before[COMFORT]
+    (outside,) = tuned.extrapolated
+    assert outside.startswith("damper at ") and " times the velocity of its records, " in outside
+    assert f"({outside})" in tuned.summary
+
+
+def test_of_many_parameters_at_bounds_the_summary_says_how_many():
+    notes = ["at its lower bound", "at its upper bound", "at its lower bound", ""]
+    changes = tuple(Change(f"damper.{i}", 1.0, 2.0, "N", note, 0.5, 2.0, ()) for i, note in enumerate(notes))
+    several = made_up([0.9] * 3, [1.0] * 3, [1.0] * 3, parameters=changes)
+    assert "3 of 4 parameters at their bounds" in several.summary and "damper.0" not in several.summary
 
 
 def test_a_violated_limit_is_said_first_with_its_number():

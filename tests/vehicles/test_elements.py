@@ -9,8 +9,8 @@ import scipy.optimize
 from jaxdamp import dampers, roads, simulate
 from jaxdamp.parameters import replace
 from jaxdamp.vehicles import CubicSpring, QuarterCar, linearise, static_equilibrium
-from jaxdamp.vehicles.lift_off import LiftOff
-from jaxdamp.vehicles.ports import Ports
+from jaxdamp.vehicles.frame import LiftOff
+from jaxdamp.vehicles.port_form import Ports
 
 from .fleet import full_quarter_car
 

@@ -20,7 +20,7 @@ from jaxdamp.vehicles import (
     modes,
     stationary_rms,
 )
-from jaxdamp.vehicles.points import matrix
+from jaxdamp.vehicles.parts import matrix
 from jaxdamp.vehicles.presets import full_car_jazar, half_car_002, quarter_car_000
 
 

@@ -7,7 +7,7 @@ import scipy.linalg
 from jaxdamp import dampers, roads, vehicles
 from jaxdamp.parameters import replace
 from jaxdamp.vehicles import QuarterCar, linearise, stationary_rms
-from jaxdamp.vehicles.covariance import lyapunov
+from jaxdamp.vehicles.gaussian import lyapunov
 from jaxdamp.vehicles.presets import quarter_car_000
 
 

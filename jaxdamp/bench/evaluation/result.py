@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from jaxdamp import _checks
-from jaxdamp._results import AbstractResult
+from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, percent_change, plain
 from jaxdamp.bench.analysis import FoldedCycles
 from jaxdamp.bench.contradictions import repeats
@@ -171,13 +171,16 @@ class Evaluation(AbstractResult):
         """All measurements as plain data."""
         return {"method": self.method, "notes": list(self.notes), "measurements": plain(self._list().records())}
 
-    def plot(
-        self, baseline: "Evaluation | None" = None, limits: LimitCheck | None = None
-    ) -> "matplotlib.figure.Figure":
-        """Mean loops over velocity, stroke, acceleration and time, and forces over velocity, over a baseline."""
+    def plot(self, kind: "str | Evaluation" = "cycles", **options: object) -> "matplotlib.figure.Figure":
+        """Mean loops over velocity, stroke, acceleration and time, and forces over velocity; or the damper's sheet.
+
+        Arguments:
+            kind: "cycles" (`plots.evaluation`), or "sheet" for one A4 page (`plots.damper_sheet`).
+            options: of that function, such as `baseline` and `limits`.
+        """
         from jaxdamp import plots
 
-        return plots.evaluation(self, baseline, limits)
+        return plotted(kind, {"cycles": plots.evaluation, "sheet": plots.damper_sheet}, self, "baseline", **options)
 
     def __repr__(self) -> str:
         return "\n\n".join([*(str(t) for name, t in self.tables().items() if name != "measurements"), *self.notes])

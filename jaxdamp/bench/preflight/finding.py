@@ -173,6 +173,15 @@ class Examined:
         return [Finding(severity, name, (self.run.name,), message, size, unit, place, remedy)]
 
 
+def clock_jitter(run: BenchRun) -> float:
+    """Standard deviation by which the instants of sampling of a record differ from those written [s]; 0 if unclear.
+
+    Arguments:
+        run: the record.
+    """
+    return Examined(run).jitter
+
+
 def step(values: Samples) -> float:
     """The step that all values are multiples of apart, if there is one; zero else.
 

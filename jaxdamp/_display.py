@@ -1,0 +1,218 @@
+"""Units and sign in which numbers are shown: tables, pictures and CSV ask here; computing and JSON stay in SI.
+
+Forces, velocities and strokes have the sign of the library everywhere else: positive in extension (rebound).
+"""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from jaxdamp import _checks
+
+
+Number = TypeVar("Number", float, np.ndarray)
+REBOUND, COMPRESSION = "rebound-positive", "compression-positive"
+_SI = {
+    "lbf": 4.4482216152605,
+    "kgf": 9.80665,
+    "N": 1.0,
+    "in": 0.0254,
+    "mm": 1e-3,
+    "m": 1.0,
+    "lb": 0.45359237,
+    "kg": 1.0,
+}
+_KINDS = {"lbf": "N", "kgf": "N", "N": "N", "in": "m", "mm": "m", "m": "m", "lb": "kg", "kg": "kg"}
+SYSTEMS = {"SI": {}, "metric": {"N": "N", "m": "mm"}, "imperial": {"N": "lbf", "m": "in", "kg": "lb"}}
+UNITS = {
+    "N": ("N", "N"),
+    "kgf": ("N", "kgf"),
+    "lbf": ("N", "lbf"),
+    "m/s": ("m", "m"),
+    "mm/s": ("m", "mm"),
+    "in/s": ("m", "in"),
+}
+_FACTOR = re.compile(r"(lbf|kgf|kN|N|mm|in|m|kg|lb|s)(?:\^(-?[\d.]+))?")
+_KEPT = re.compile(r"m/s(\^|²|\^2)|^m\^?[23²³]|m/km|cycle")  # accelerations, areas, road roughness: SI for everybody
+_AMOUNT = re.compile(
+    r"(?<![\w.])([-−+]?\d+(?:\.\d+)?)(?:( to | … )([-−+]?\d+(?:\.\d+)?))? (N s/m|N/mm|N/m|mm/s|m/s|mm|N)(?![\w²^/])"
+)
+_SIGNED = re.compile(
+    r"(mid-stroke |stated )?(rebound |compression |mean |static |gas |least |largest )?(force|velocity|stroke)( at .*)?"
+)
+_ENDS = (("lowest", "highest"), ("fitted from", "fitted to"), ("least force", "largest force"), ("from", "to"))
+_PHRASES = {  # of the library's sign, and of the other
+    "+ rebound, − compression": "+ compression, − rebound",
+    "+ rebound": "+ compression",
+    "rebound positive": "compression positive",
+    "+ resists extension": "+ resists compression",
+    "positive in rebound": "positive in compression",
+    "positive in extension (rebound)": "positive in compression",
+    "positive when it resists extension": "positive when it resists compression",
+}
+_SIGN_WORDS = re.compile("|".join(map(re.escape, _PHRASES)))
+
+
+class Shown(NamedTuple):
+    """How numbers of one unit are shown.
+
+    Attributes:
+        unit: that is printed.
+        factor: number printed = factor · number; negative where the sign is the other one.
+    """
+
+    unit: str
+    factor: float
+
+    def __call__(self, values: Number) -> Number:
+        """The numbers that are printed."""
+        return values if self.factor == 1.0 else values * self.factor
+
+
+@dataclass(frozen=True)
+class Display:
+    """Units and sign of what is shown.
+
+    Arguments:
+        units: "SI" (as the library computes), "metric" (N, mm, mm/s), "imperial" (lbf, in, in/s, lb), or a force and a
+            velocity such as "kgf,mm/s".
+        sign: "rebound-positive" or "compression-positive": the direction in which strokes, velocities and the forces
+            that resist them are positive.
+
+    Raises:
+        ValueError: another word.
+
+    >>> shop = Display("imperial", "compression-positive")
+    >>> shop.of("N s/m").unit, round(shop.of("N", signed=True)(-444.822), 2)
+    ('lbf s/in', 100.0)
+    >>> shop.text("velocity [m/s]   (+ rebound)"), Display("kgf,mm/s").words("at -0.5 to 0.5 m/s: 98.1 N")
+    ('velocity [in/s]   (+ compression)', 'at -500 to 500 mm/s: 10 kgf')
+    """
+
+    units: str = "SI"
+    sign: str = REBOUND
+
+    def __post_init__(self) -> None:
+        _checks.one_of("sign", self.sign, (REBOUND, COMPRESSION))
+        for word in () if self.units in SYSTEMS else self.units.split(","):
+            _checks.one_of("units", word.strip(), (*SYSTEMS, *UNITS))
+
+    @property
+    def plain(self) -> bool:
+        """Whether everything is shown as the library computes it."""
+        return not self._system and self.sign == REBOUND
+
+    @property
+    def described(self) -> str:
+        """The units and the sign in words; empty for those of the library."""
+        parts = [f"units {self.units}"] * bool(self._system)
+        parts += ["compression positive"] * (self.sign == COMPRESSION)
+        return (
+            ""
+            if self.plain
+            else f"Shown in {', '.join(parts)}; JSON files and parameters of formulas keep the library's sign."
+        )
+
+    @property
+    def _system(self) -> dict[str, str]:
+        if self.units in SYSTEMS:
+            return SYSTEMS[self.units]
+        return dict(UNITS[word.strip()] for word in self.units.split(","))
+
+    def of(self, unit: str, *, signed: bool = False) -> Shown:
+        """How numbers of a unit are shown.
+
+        Arguments:
+            unit: in which the numbers are, such as "N s/m" or "mm".
+            signed: whether their sign is that of the direction: forces, velocities and strokes.
+        """
+        shown = _converted(unit, tuple(sorted(self._system.items())))
+        return shown._replace(factor=-shown.factor) if signed and self.sign == COMPRESSION else shown
+
+    def signed(self, quantity: str) -> bool:
+        """Whether the sign of a quantity is that of the direction, by its name: "rebound force at 0.1 m/s"."""
+        return bool(_SIGNED.fullmatch(quantity))
+
+    def turned(self, names: tuple[str, ...]) -> list[int]:
+        """The order in which columns of lowest and highest values are shown, by their names."""
+        order = list(range(len(names)))
+        for low, high in _ENDS if self.sign == COMPRESSION else ():
+            if low in names and high in names:
+                first, second = names.index(low), names.index(high)
+                order[first], order[second] = second, first
+        return order
+
+    def amount(self, value: float, unit: str, spec: str = ".4g", *, signed: bool = False) -> str:
+        """A number with its unit: "125 lbf"."""
+        shown = self.of(unit, signed=signed)
+        return f"{format(shown(value), spec)} {shown.unit}".rstrip()
+
+    def text(self, label: str) -> str:
+        """The label of an axis or a table, with the unit in brackets and the words on the sign that are shown."""
+        return self._turned(re.sub(r"\[([^\[\]]+)\]", lambda found: f"[{self.of(found[1]).unit}]", label))
+
+    def words(self, sentence: str) -> str:
+        """A sentence with its forces, velocities and lengths in the units that are shown; names in it stay."""
+        return self._turned(_AMOUNT.sub(self._amount, sentence) if self._system else sentence)
+
+    def _turned(self, text: str) -> str:
+        return _SIGN_WORDS.sub(lambda found: _PHRASES[found[0]], text) if self.sign == COMPRESSION else text
+
+    def _amount(self, found: re.Match[str]) -> str:
+        shown = self.of(found[4])
+        numbers = [
+            f"{shown(float(text.replace('−', '-'))):.{_figures(text)}g}" for text in (found[1], found[3]) if text
+        ]
+        return f"{(found[2] or '').join(numbers)} {shown.unit}"
+
+
+def _figures(text: str) -> int:
+    """Significant figures of a number as it is written, three at the least."""
+    return max(3, len(re.sub(r"^[-−+]?0*\.?0*|\.", "", text)))
+
+
+@lru_cache(maxsize=256)
+def _converted(unit: str, system: tuple[tuple[str, str], ...]) -> Shown:
+    """A unit with the units of a system in the place of those that it is made of."""
+    wanted, factor = dict(system), 1.0
+    if not wanted or not unit or _KEPT.search(unit):
+        return Shown(unit, 1.0)
+    pieces: list[list[str]] = []
+    for side, text in enumerate(unit.split("/")):
+        words = []
+        for word in text.split():
+            found = _FACTOR.fullmatch(word.strip("()"))
+            if side > 1 or found is None:
+                return Shown(unit, 1.0)
+            base = "N" if found[1] == "kN" else found[1]
+            target = wanted.get(_KINDS.get(base, ""), base)
+            scale = _SI.get(base, 1.0) / _SI.get(target, 1.0) * (1e3 if found[1] == "kN" and target != "N" else 1.0)
+            name = found[1] if target == base else target
+            factor *= scale ** (float(found[2] or 1) * (1 - 2 * side))
+            words.append(word.replace(found[1], name, 1))
+        pieces.append(words)
+    return Shown("/".join(" ".join(words) for words in pieces), factor)
+
+
+_present: ContextVar[Display] = ContextVar("display", default=Display())  # noqa: B039 - it cannot be changed
+
+
+def display() -> Display:
+    """The units and the sign in force."""
+    return _present.get()
+
+
+@contextmanager
+def shown_in(chosen: Display) -> Iterator[None]:
+    """Tables, pictures and CSV made inside are in these units and this sign."""
+    token = _present.set(chosen)
+    try:
+        yield
+    finally:
+        _present.reset(token)

@@ -1,0 +1,250 @@
+"""Force-velocity tables, such as a manufacturer's sheet: points of one setting or of many, as laws and for fits."""
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._files import FOLDER_SUFFIXES, find_files
+from jaxdamp._tables import Column as TableColumn, Table
+from jaxdamp.bench import sign as signs
+from jaxdamp.bench.columns import Choice
+from jaxdamp.bench.problems import Problems
+from jaxdamp.bench.readers import READERS, Reader, read_tables, with_own
+from jaxdamp.bench.runs import BenchRun
+from jaxdamp.bench.sets import BenchSet
+from jaxdamp.bench.table_points import SIDES, Curve, How, Points, curves_of, is_force_velocity, sides_of, with_headers
+from jaxdamp.dampers import AbstractDamper, FittedRange, Scheduled, SplineTable, Table as TableLaw, with_fitted_range
+
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+
+_CYCLES, _SAMPLES = 3, 400  # of the motion of `runs`, samples in each cycle
+_LARGEST = 2**20  # bytes of a table
+_STROKE = 0.05  # m, from end to end
+
+
+@final
+@dataclass(frozen=True, repr=False, eq=False)
+class ForceVelocityTable:
+    """Forces over velocity of one setting or of several, as `bench.read_table` reads them.
+
+    Attributes:
+        name: of the file.
+        curves: the points of each setting.
+        notes: what was decided on units, sign and settings.
+    """
+
+    name: str
+    curves: tuple[Curve, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The names of the settings."""
+        return tuple(curve.setting for curve in self.curves)
+
+    @property
+    def is_family(self) -> bool:
+        """Whether there are several settings, each with a number."""
+        return len(self.curves) > 1 and all(curve.command is not None for curve in self.curves)
+
+    def law(
+        self, setting: str | None = None, kind: type[TableLaw] | type[SplineTable] = TableLaw
+    ) -> TableLaw | SplineTable | Scheduled:
+        """The law through the points: of one setting, or of all that have numbers as one law of a command.
+
+        Arguments:
+            setting: its name; left out, all settings are the levels of a `Scheduled`, at the first one.
+            kind: `dampers.Table` (straight lines) or `dampers.SplineTable` (monotone cubics).
+
+        Returns:
+            The law, with the velocities of the points as its range.
+
+        Raises:
+            ValueError: an unknown setting; several settings without numbers.
+        """
+        _checks.one_of("kind", getattr(kind, "__name__", str(kind)), (TableLaw.__name__, SplineTable.__name__))
+        if setting is None and len(self.curves) > 1:
+            if not self.is_family:
+                there = ", ".join(map(repr, self.settings))
+                _checks.refuse("setting", "be named", "left out", f"The settings have no numbers: {there}.")
+            grid = np.unique(np.concatenate([curve.velocity for curve in self.curves]))
+            laws = tuple(kind(grid, _on(curve, grid)) for curve in self.curves)
+            levels = [float(curve.command or 0.0) for curve in self.curves]
+            law = Scheduled(laws, levels, levels[0])
+            return with_fitted_range(law, replace(_range(self.curves), command=(levels[0], levels[-1])))
+        if setting is not None:
+            _checks.one_of("setting", setting, self.settings)
+        curve = self.curves[0 if setting is None else self.settings.index(setting)]
+        return with_fitted_range(kind(curve.velocity, curve.force), _range([curve]))
+
+    def laws(self) -> dict[str, AbstractDamper]:
+        """The `dampers.Table` of each setting by its name."""
+        return {curve.setting: self.law(curve.setting) for curve in self.curves}
+
+    def runs(self) -> BenchSet:
+        """Records to fit any law of the velocity to: a motion over all velocities with the forces of the table.
+
+        Each setting is moved through its velocities in half sines, rebound and compression; forces lie on straight
+        lines between the points. Only laws without hysteresis can be fitted, since a table says nothing of it.
+        """
+        return BenchSet(_motion(curve, self) for curve in self.curves)
+
+    def table(self) -> Table:
+        """The forces, a row for each velocity and a column for each setting."""
+        grid = np.unique(np.concatenate([curve.velocity for curve in self.curves]))
+        columns = (TableColumn("velocity", "m/s", ".4g"), *(TableColumn(_heading(c), "N", ".4g") for c in self.curves))
+        cells = [dict(zip(curve.velocity.tolist(), curve.force.tolist(), strict=True)) for curve in self.curves]
+        rows = ((v, *(of.get(v) for of in cells)) for v in grid.tolist())
+        return Table(f"Forces of {self.name} (velocity positive in rebound)", columns, tuple(rows))
+
+    def plot(self, kind: str = "family") -> "matplotlib.figure.Figure":
+        """Force over velocity of all settings.
+
+        Arguments:
+            kind: "family", or "sheet" for an A4 page with the forces in a table.
+        """
+        from jaxdamp import plots
+
+        _checks.one_of("kind", kind, ("family", "sheet"))
+        return plots.force_velocity_family(self, page=kind == "sheet")
+
+    def __repr__(self) -> str:
+        return "\n".join([f"{self.table()}", *self.notes])
+
+
+def _heading(curve: Curve) -> str:
+    return f"force at {curve.setting}" if curve.setting else "force"
+
+
+def _on(curve: Curve, grid: Points) -> Points:
+    """Forces of a curve at other velocities, with its end slopes beyond its points."""
+    return np.asarray([float(TableLaw(curve.velocity, curve.force).force_velocity(v)) for v in grid])
+
+
+def _range(curves: Sequence[Curve]) -> FittedRange:
+    velocity = np.concatenate([curve.velocity for curve in curves])
+    force = np.concatenate([curve.force for curve in curves])
+    return FittedRange(velocity=(velocity.min(), velocity.max()), force=(force.min(), force.max()))
+
+
+def _motion(curve: Curve, table: ForceVelocityTable) -> BenchRun:
+    """A record of half sines of the velocity, up to the outermost points of the curve on both sides."""
+    up, down = float(curve.velocity[-1]), float(-curve.velocity[0])
+    shares = np.array([down, up]) / (up + down)  # of the period: the stroke there and back is the same
+    phase = (np.arange(_CYCLES * _SAMPLES) / _SAMPLES) % 1.0
+    out = phase < shares[0]
+    within = np.where(out, phase / shares[0], (phase - shares[0]) / shares[1])
+    velocity = np.where(out, up * np.sin(np.pi * within), -down * np.sin(np.pi * within))
+    period = 0.5 * np.pi * _STROKE / (up * shares[0])
+    place = 0.5 * _STROKE * np.cos(np.pi * within)
+    time = np.arange(len(phase)) * period / _SAMPLES
+    force = np.interp(velocity, curve.velocity, curve.force)
+    name = f"{table.name}_{curve.setting}" if curve.setting else table.name
+    notes = ("a motion over the velocities of a force-velocity table, forces on straight lines between its points",)
+    return BenchRun.from_arrays(
+        name, time, np.where(out, -place, place), force, velocity, command=curve.command, notes=(*notes, *table.notes)
+    )
+
+
+def read_table(
+    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    *,
+    sign: str | None = None,
+    side: str | None = None,
+    columns: Mapping[str, str | int | None] | None = None,
+    units: Mapping[str, str] | None = None,
+    delimiter: str | None = None,
+    readers: Mapping[str, Reader] | None = None,
+) -> ForceVelocityTable:
+    r"""Read a force-velocity table: a manufacturer's sheet, or points at peak velocity.
+
+    A column of velocities, and of forces either one column with settings in another ("clicks"), or a column for each
+    setting ("4 clicks [lbf]", "R 4", "0.5A"), on several sheets or in several blocks if need be. The direction stands
+    in the headers or in the names of sheets and files (rebound, compression), in a column of words, or in the signs of
+    velocity or force, which `sign` then must explain. Forces may be magnitudes; then there is none at rest. Units must
+    be named by the headers or by `units`.
+
+    Arguments:
+        paths: a file or several, which are one table.
+        sign: "rebound-positive" or "compression-positive": the direction in which velocities, or else forces, are
+            positive, where only their signs tell rebound from compression.
+        side: of a table with one direction only: "rebound" or "compression", of which another file holds the other, or
+            "symmetric" if both are the same.
+        columns: "velocity" and "force" to header or number (from 0) of the column.
+        units: "velocity" and "force" to their units, where the headers have none.
+        delimiter: the character between columns of text files, if the search fails.
+        readers: suffix to function that reads such files, as in `read`.
+
+    Returns:
+        The points of each setting in SI, in natural order of the settings.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: no such table; a unit, a sign or a direction that the file does not state; all problems at once.
+
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> file = Path(tempfile.mkdtemp()) / "sheet.csv"
+    >>> lines = ["velocity [in/s],R 1 [lbf],R 2 [lbf],C 1 [lbf],C 2 [lbf]", "1,20,30,10,12", "5,60,90,25,30"]
+    >>> _ = file.write_text("\n".join(lines))
+    >>> table = read_table(file)
+    >>> print(table.table())
+    Forces of sheet (velocity positive in rebound)
+    velocity [m/s]  force at 1 [N]  force at 2 [N]
+            -0.127          -111.2          -133.4
+           -0.0254          -44.48          -53.38
+                 0               0               0
+            0.0254           88.96           133.4
+             0.127           266.9           400.3
+    """
+    if side is not None:
+        _checks.one_of("side", side, SIDES)
+    signs.check_words(sign, None)
+    how = How(Choice({**(columns or {})}, {**(units or {})}), sign, side)
+    files = find_files(paths, {*FOLDER_SUFFIXES, *(readers or {})})
+    sides, notes, problems = [], [], Problems()
+    for file in files:
+        with problems.collected():
+            tables = [with_headers(table) for table in read_tables(file, with_own(readers), delimiter)]
+            fitting = [table for table in tables if is_force_velocity(table, how.choice)]
+            if not fitting:
+                there = ", ".join(name for table in tables for name in table.names)
+                what = "which has a velocity, forces and no time"
+                raise ValueError(f"{file} is no force-velocity table, {what}: its columns are {there}.")
+            for table in fitting:
+                found, said = sides_of(table, how)
+                sides += found
+                notes += said
+    problems.raise_any()
+    curves, said = curves_of(sides, how)
+    return ForceVelocityTable(files[0].stem, curves, tuple(dict.fromkeys([*notes, *said])))
+
+
+def are_tables(
+    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    *,
+    columns: Mapping[str, str | int | None] | None = None,
+    units: Mapping[str, str] | None = None,
+    delimiter: str | None = None,
+    sign: str | None = None,
+) -> bool:
+    """Whether files are force-velocity tables rather than records; arguments as in `read_table`.
+
+    Files that are too large for a table, or cannot be read, are none.
+    """
+    choice = Choice({**(columns or {})}, {**(units or {})})
+    files = find_files(paths, FOLDER_SUFFIXES)
+    if any(file.stat().st_size > _LARGEST for file in files):
+        return False
+    try:
+        first = read_tables(files[0], READERS, delimiter)
+        return any(is_force_velocity(table, choice) for table in first)
+    except (ValueError, OSError, ImportError):  # said by who reads them
+        return False

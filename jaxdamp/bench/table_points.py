@@ -1,0 +1,289 @@
+"""Points of force-velocity tables: columns of files to settings and directions, in SI and the library's sign."""
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp._checks import ArgumentError, Setting
+from jaxdamp._files import natural_key
+from jaxdamp.bench.columns import Choice, column_of, find_one, role_of, split_header
+from jaxdamp.bench.problems import Problems
+from jaxdamp.bench.raw import RawColumn, RawTable
+from jaxdamp.bench.settings import settings_in_name
+
+
+Directions = dict[int, dict[str, list[np.ndarray]]]  # points by direction and setting
+SIDES = ("rebound", "compression", "symmetric")
+_REBOUND = {"rebound", "reb", "extension", "ext", "tension", "zug", "zugstufe", "r"}
+_COMPRESSION = {"compression", "comp", "bump", "jounce", "druck", "druckstufe", "c"}
+_SETTING = {"setting", "settings", "click", "clicks", "clk", "position", "adjuster", "current", "valve", "turns"}
+_DIRECTION = {"direction", "side", "stage"}
+_MOST_ROWS = 5000  # of a table; more is a record
+Points = Float[np.ndarray, " points"]
+
+
+class Curve(NamedTuple):
+    """The points of one setting.
+
+    Attributes:
+        setting: its name, such as "4" for a click; empty if there is only one.
+        command: its number; None where the name has none.
+        velocity: increasing [m/s], positive in rebound.
+        force: [N], positive when it resists extension.
+    """
+
+    setting: str
+    command: float | None
+    velocity: Points
+    force: Points
+
+
+class Side(NamedTuple):
+    """Points of one column and setting; direction is 1 in rebound, -1 in compression, 0 where signs say it."""
+
+    setting: str
+    direction: Points
+    velocity: Points
+    force: Points
+    where: str
+
+
+@dataclass(frozen=True)
+class How:
+    """What the caller says about the files."""
+
+    choice: Choice
+    sign: str | None
+    side: str | None
+
+
+def is_force_velocity(table: RawTable, choice: Choice) -> bool:
+    """Whether a table of a file holds points of forces over velocity rather than a record over time."""
+    table = with_headers(table)
+    if not table.is_named or len(table) > _MOST_ROWS or any(column.unit == "s" for column in table.columns):
+        return False
+    roles = {role_of(column.name, column.unit) for column in table.columns}
+    named = find_one(table, "velocity", choice)
+    return named is not None and "time" not in roles and bool(list(_forces(table, named, choice)))
+
+
+def with_headers(table: RawTable) -> RawTable:
+    """The table with the numbers in its first row as headers, where the other cells of that row are words."""
+    if table.is_named or not any(0 in column.faults and column.faults[0] for column in table.columns):
+        return table
+    columns = []
+    for column in table.columns:
+        head = column.faults.get(0, "") or f"{np.asarray(column.values)[0]:g}"
+        faults = {row - 1: text for row, text in column.faults.items() if row}
+        columns.append(RawColumn(head, np.asarray(column.values)[1:], column.unit, faults))
+    return replace(table, columns=tuple(columns), lines=table.lines[1:])
+
+
+def _words(text: str) -> list[str]:
+    return re.findall(r"[a-z]+|\d+(?:\.\d+)?", split_header(text)[0].lower())
+
+
+def _direction(text: str) -> int:
+    """The direction that a header or a name states: 1 rebound, -1 compression, 0 none or both."""
+    words = set(_words(text))
+    return int(bool(words & _REBOUND)) - int(bool(words & _COMPRESSION))
+
+
+def _setting(text: str) -> str:
+    """The setting that a header or a name states: its numbers, or its words but for force and direction."""
+    found = settings_in_name(text)
+    if len(found) == 1:
+        return f"{next(iter(found.values())):g}"
+    name = split_header(text)[0]
+    if found:
+        return name.strip()
+    words = [word for word in _words(name) if word not in _REBOUND | _COMPRESSION | _SETTING and role_of(word) is None]
+    numbers = [word for word in words if word[0].isdigit()]
+    return numbers[0] if len(numbers) == 1 else " ".join(words)
+
+
+def _forces(table: RawTable, velocity: int, choice: Choice) -> Iterator[int]:
+    """The columns of forces: named so, or as a setting or a direction."""
+    if "force" in choice.columns:
+        index = find_one(table, "force", choice)
+        yield from [] if index is None else [index]
+        return
+    for index, column in enumerate(table.columns):
+        role, words = role_of(column.name, column.unit), set(_words(column.name))
+        if index == velocity or column.is_text or role not in (None, "force"):
+            continue
+        speaks = any(word[0].isdigit() for word in words) or words & (_REBOUND | _COMPRESSION)
+        if role == "force" or speaks or settings_in_name(column.name):
+            yield index
+
+
+def _column_of_words(table: RawTable, wanted: set[str], besides: Sequence[int]) -> int | None:
+    """The column that one of these words names, such as that of the clicks."""
+    names = {index: set(_words(name)) for index, name in enumerate(table.names) if index not in besides}
+    named = (i for i, words in names.items() if wanted & words and not any(word[0].isdigit() for word in words))
+    return next(named, None)
+
+
+def sides_of(table: RawTable, how: How) -> tuple[list[Side], list[str]]:
+    """The points of every column of forces, in SI, and notes."""
+    at = find_one(table, "velocity", how.choice)
+    assert at is not None
+    forces = list(_forces(table, at, how.choice))
+    clicks = _column_of_words(table, _SETTING, [at])
+    forces = [index for index in forces if index != clicks]
+    words = _column_of_words(table, _DIRECTION, [at, *forces])
+    velocity, unit = _values(table, at, "velocity", how)
+    units, found, problems = {"velocity": unit}, [], Problems()
+    name = f"{table.file.stem} {table.record}"
+    for index in forces:
+        with problems.collected():
+            force, units["force"] = _values(table, index, "force", how)
+            there = np.isfinite(velocity) & np.isfinite(force)
+            direction = np.full(len(velocity), _direction(table.names[index]) or _direction(name), dtype=float)
+            if words is not None:
+                direction = np.array([_direction(str(cell)) for cell in table.columns[words].values], dtype=float)
+            settings = np.full(len(velocity), _setting(table.names[index]) or _setting(table.record), dtype=object)
+            if clicks is not None:
+                settings = np.array([_cell(value) for value in table.columns[clicks].values], dtype=object)
+            where = f"{table.where}, column {table.names[index]!r}"
+            for setting in dict.fromkeys(settings.tolist()):
+                rows = there & (settings == setting)
+                found.append(Side(setting, direction[rows], velocity[rows], force[rows], where))
+    problems.raise_any()
+    read = ", ".join(f"{role} in {text}" for role, text in units.items())
+    return found, [f"a force-velocity table: {read}; brought to SI", *table.notes]
+
+
+def _cell(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _values(table: RawTable, index: int, role: str, how: How) -> tuple[Points, str]:
+    """A column in SI, NaN where a cell is empty; and its unit."""
+    raw = table.columns[index]
+    wrong = {row: text for row, text in raw.faults.items() if text}
+    if wrong:
+        row, text = min(wrong.items())
+        where = f"{table.where}, {table.place(row)}, column {table.names[index]!r}"
+        raise ValueError(f"{where}: {text!r} is not a number. Mend or remove the line.")
+    column = column_of(table, role, index, how.choice)
+    assert column.conversion is not None
+    return column.conversion(np.asarray(raw.values, np.float64)), column.unit
+
+
+def curves_of(sides: Sequence[Side], how: How) -> tuple[tuple[Curve, ...], list[str]]:
+    """The points by setting, both directions joined, and notes."""
+    notes: list[str] = []
+    points: Directions = {1: {}, -1: {}}
+    for side in sides:
+        velocity, force = _oriented(side, how, notes)
+        for direction, there in ((1, velocity >= 0.0), (-1, velocity < 0.0)):
+            if there.any():
+                points[direction].setdefault(side.setting, []).append(np.stack([velocity[there], force[there]]))
+    for direction, word in ((1, "rebound"), (-1, "compression")):
+        if not points[direction]:
+            _refuse_half(sides[0].where, word)
+        _share(points[direction], points[-direction], word, notes)
+    if all(np.all(side.force >= 0.0) or np.all(side.force <= 0.0) for side in sides):
+        _rest(points[1].values(), notes)
+    names = sorted({*points[1], *points[-1]}, key=natural_key)
+    lacking = [name for name in names if name not in points[1] or name not in points[-1]]
+    if lacking:
+        raise ValueError(f"{sides[0].where}: {', '.join(map(repr, lacking))} is there in one direction only.")
+    curves = [_curve(name, [*points[-1][name], *points[1][name]], notes) for name in names]
+    notes += [f"{len(curves)} settings, by columns, rows or sheets: {', '.join(names)}"] * (len(curves) > 1)
+    return tuple(sorted(curves, key=_command)), notes
+
+
+def _command(curve: Curve) -> float:
+    return np.inf if curve.command is None else curve.command
+
+
+def _rest(settings: Iterable[list[np.ndarray]], notes: list[str]) -> None:
+    """A point of no force at zero velocity, for settings that have none there."""
+    for parts in settings:
+        if not any(np.any(part[0] == 0.0) for part in parts):
+            parts.append(np.zeros((2, 1)))
+    notes.append("no force at rest, since forces are given as magnitudes by direction")
+
+
+def _share(own: dict[str, list[np.ndarray]], others: Iterable[str], word: str, notes: list[str]) -> None:
+    """Take a direction that has no settings for all those of the other."""
+    if len(own) == 1 and set(own) != set(others):
+        (only,) = own.values()
+        own.clear()
+        own.update(dict.fromkeys(others, only))
+        notes.append(f"{word} is the same at all settings")
+
+
+def _curve(name: str, parts: Sequence[np.ndarray], notes: list[str]) -> Curve:
+    velocity, force = np.concatenate(parts, axis=1)
+    unique, place, count = np.unique(np.round(velocity, 9), return_inverse=True, return_counts=True)
+    if np.any(count > 1):
+        notes.append("points at the same velocity are averaged")
+    number = re.fullmatch(r"[-+]?\d+(?:\.\d+)?", name)
+    return Curve(name, float(name) if number else None, unique, np.bincount(place.ravel(), force) / count)
+
+
+def _oriented(side: Side, how: How, notes: list[str]) -> tuple[Points, Points]:
+    """Velocity and force of a column, positive in rebound; a refusal where the file does not tell the direction."""
+    velocity, force, factor = side.velocity, side.force, -1.0 if how.sign == "compression-positive" else 1.0
+    both = bool(np.any(force < 0.0) and np.any(force > 0.0))
+    if np.all(side.direction != 0.0):
+        if any(np.ptp(np.sign(force[(side.direction == d) & (force != 0.0)])) > 0 for d in set(side.direction)):
+            raise ValueError(f"{side.where} has forces of both signs in one direction: subtract the gas force.")
+        notes.append("rebound and compression as headers or names say")
+        return np.abs(velocity) * side.direction, np.abs(force) * side.direction
+    if np.any(velocity < 0.0):
+        _require_sign(side, how, "velocities")
+        velocity = factor * velocity
+        if not both:
+            notes.append(f"positive velocity is {_positive(how)}; forces are magnitudes")
+            return velocity, np.abs(force) * np.sign(velocity)
+        same = float(np.dot(force, velocity)) >= 0.0
+        agree = "resists motion in that direction" if same == (factor > 0) else "is counted the other way"
+        notes.append(f"positive velocity is {_positive(how)}; the force {agree}, because a damper takes in energy")
+        return velocity, force if same else -force
+    if both:
+        _require_sign(side, how, "forces")
+        notes.append(f"positive force is {_positive(how)}")
+        return velocity * np.sign(force) * factor, factor * force
+    if how.side is None:
+        _refuse_half(side.where)
+    notes.append(f"{how.side}, as it was said")
+    if how.side == "symmetric":
+        return np.concatenate([-velocity, velocity]), np.concatenate([-np.abs(force), np.abs(force)])
+    direction = 1.0 if how.side == "rebound" else -1.0
+    return direction * velocity, direction * np.abs(force)
+
+
+def _positive(how: How) -> str:
+    return "compression, as it was said" if how.sign == "compression-positive" else "rebound, as it was said"
+
+
+def _require_sign(side: Side, how: How, what: str) -> None:
+    if how.sign is None:
+        ways = Setting("sign", "rebound-positive"), Setting("sign", "compression-positive")
+        raise ArgumentError(
+            f"{side.where}: positive {what} may be rebound or compression, and the file does not say which. Pass "
+            f"{ways[0]} or {ways[1]}.",
+            *ways,
+        )
+
+
+def _refuse_half(where: str, missing: str = "") -> None:
+    ways = Setting("side", "symmetric"), Setting("side", "rebound"), Setting("side", "compression")
+    what = (
+        f"has no points in {missing}"
+        if missing
+        else "has velocities and forces of one sign, and no header says of which"
+    )
+    raise ArgumentError(
+        f"{where} {what}. Write rebound or compression into the header, give a file for each direction, or pass "
+        f"{ways[0]} if both are the same{'' if missing else f', {ways[1]} or {ways[2]}'}.",
+        *ways,
+    )

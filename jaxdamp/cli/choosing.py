@@ -1,0 +1,152 @@
+"""The best setting of dampers whose law depends on one, such as the clicks of a sheet: each is driven."""
+
+import itertools
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import numpy as np
+
+from jaxdamp import Ride, export
+from jaxdamp._tables import Column, Table, plain, typeset_unit
+from jaxdamp.cli.console import Screen
+from jaxdamp.cli.jobs import without_range_warnings, write_tables
+from jaxdamp.cli.vehicle_words import damper_places, write_laws
+from jaxdamp.dampers import Scheduled, with_command
+from jaxdamp.parameters import get
+from jaxdamp.report import Report
+from jaxdamp.roads import AbstractRoad
+from jaxdamp.tune import limit_spans
+from jaxdamp.vehicles import AbstractVehicle
+
+
+MOST = 2000  # combinations that are driven
+
+
+class Chosen(NamedTuple):
+    """Every setting, driven.
+
+    Attributes:
+        vehicle: with the best setting.
+        verdict: in words.
+        table: a row for each setting.
+        met: whether a setting meets the limits.
+    """
+
+    vehicle: AbstractVehicle
+    verdict: str
+    table: Table
+    met: bool
+
+    def write(self, folder: Path) -> None:
+        """The law at the best setting, the vehicle, and the table."""
+        write_laws(folder, self.vehicle)
+        export.to_json(self.vehicle, folder / "vehicle.json")
+        write_tables(folder, {"settings": self.table})
+        text = json.dumps({"verdict": self.verdict, "settings": plain(self.table.records())}, ensure_ascii=False)
+        (folder / "settings.json").write_text(text + "\n", encoding="utf-8")
+
+    def page(self, *, folder: Path, attempts: Any) -> Report:
+        """The page."""
+        page = Report("The best setting", folder, attempts)
+        page.verdict(self.verdict)
+        page.heading("All settings")
+        page.table(self.table)
+        return page
+
+
+def settings_of(car: AbstractVehicle) -> dict[str, list[float]]:
+    """The settings of dampers with a law of several, by the path of the damper."""
+    laws = {path: get(car, path) for path in damper_places(car)}
+    return {path: np.asarray(law.levels).tolist() for path, law in laws.items() if isinstance(law, Scheduled)}
+
+
+def _at(car: AbstractVehicle, setting: Mapping[str, float]) -> AbstractVehicle:
+    """The vehicle with dampers at these settings."""
+    for path, command in setting.items():
+        law = with_command(get(car, path), command)
+        car = eqx.tree_at(lambda vehicle, path=path: get(vehicle, path), car, law)
+    return car
+
+
+def choose(
+    screen: Screen,
+    car: AbstractVehicle,
+    metric: str,
+    roads: Sequence[AbstractRoad],
+    limits: Mapping[str, Any],
+    run: Mapping[str, Any],
+    *,
+    white: bool,
+) -> Chosen:
+    """Drive every combination of settings and take the one with the smallest metric that meets the limits.
+
+    Arguments:
+        screen: the terminal.
+        car: whose laws depend on a setting.
+        metric: a short name or a ride metric; of several the mean counts.
+        roads: of which the mean counts.
+        limits: by short name or ride metric; relative ones are to the setting of the start.
+        run: options of a ride.
+        white: whether the road is white.
+    """
+    levels = settings_of(car)
+    combinations = _combinations(levels)
+    wanted = car.goal_metrics(metric, white=white)
+    allowed = {name: limit for word, limit in limits.items() for name in car.goal_metrics(word, white=white)}
+    names = list(dict.fromkeys([*wanted, *allowed]))
+    rides = [Ride(car, road, metrics=names, **run) for road in roads]
+    vehicles = [_at(car, dict(zip(levels, setting, strict=True))) for setting in combinations]
+    settings = [_words(levels, setting) for setting in combinations]
+    with screen.stage("Driving every setting", total=len(vehicles)) as advance, without_range_warnings():
+        spans = limit_spans(allowed, names, _driven(rides, car))
+        rows = []
+        for vehicle, setting in zip(vehicles, settings, strict=True):
+            advance(setting, len(rows))
+            rows.append(_driven(rides, vehicle))
+    met = [all(low <= row[name] <= high for name, (low, high) in spans.items()) for row in rows]
+    score = np.mean([list(map(row.get, wanted)) for row in rows], axis=1)
+    best = int(np.argmin(np.where(met, score, np.inf) if any(met) else score))
+    units = {m.name: typeset_unit(m.unit(car.units)) for m in rides[0].metrics}
+    columns = [Column("setting"), *(Column(name, units[name]) for name in rows[0]), Column("limits")]
+    cells = [
+        (setting, *row.values(), "met" if ok else "not met")
+        for setting, row, ok in zip(settings, rows, met, strict=True)
+    ]
+    number = f"{wanted[0]} {rows[best][wanted[0]]:.4g} {units[wanted[0]]}"
+    return Chosen(
+        vehicles[best],
+        _verdict(settings[best], number, met),
+        Table("All settings", tuple(columns), tuple(cells)),
+        any(met),
+    )
+
+
+def _driven(rides: Sequence[Ride], vehicle: AbstractVehicle) -> dict[str, float]:
+    """The metrics of a vehicle, their mean over the rides."""
+    each = [ride.of_vehicle(vehicle)() for ride in rides]
+    return {name: float(np.mean([float(values[name]) for values in each])) for name in each[0]}
+
+
+def _verdict(setting: str, number: str, met: Sequence[bool]) -> str:
+    """The best setting in words."""
+    if any(met):
+        return f"The best setting is {setting}: {number}. {sum(met)} of {len(met)} settings meet the limits."
+    return f"No setting meets the limits; the smallest {number} is that of {setting}."
+
+
+def _combinations(levels: Mapping[str, Sequence[float]]) -> list[tuple[float, ...]]:
+    combinations = list(itertools.product(*levels.values()))
+    if len(combinations) > MOST:
+        many = f"{len(combinations)} combinations of settings are more than {MOST}"
+        raise ValueError(f"{many}: name parameters with --over.")
+    return combinations
+
+
+def _words(levels: Mapping[str, Sequence[float]], setting: Sequence[float]) -> str:
+    """A combination of settings in words."""
+    if len(levels) == 1:
+        return f"{setting[0]:g}"
+    return ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in zip(levels, setting, strict=True))

@@ -1,0 +1,65 @@
+"""Questions to all the laws in a law or vehicle: commands, valid range, conditions between parameters."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from jaxdamp import _checks
+from jaxdamp.dampers.base import AbstractDamper, laws_inside
+from jaxdamp.parameters import declared_inside
+
+
+def command_paths(tree: object, prefix: str = "") -> list[str]:
+    """Paths of the commands in a law and in the laws inside.
+
+    Arguments:
+        tree: a law, a vehicle or another module.
+        prefix: put before each path.
+    """
+    return [path for path, _, has in declared_inside(tree, prefix) if has.get("setting", {}).get("command")]
+
+
+def coverage(law: AbstractDamper) -> str:
+    """The valid range of a law and of the laws inside, in words; empty without limits.
+
+    Arguments:
+        law: the damper law.
+    """
+    return " ".join(filter(None, [law.validity(), *map(coverage, law.inner_laws())]))
+
+
+def require_finite_force(law: AbstractDamper, force: ArrayLike, where: str) -> None:
+    """Refuse forces [N] of a law that are not finite (traced ones cannot be checked).
+
+    Arguments:
+        law: the damper law.
+        force: its forces [N].
+        where: for the message, such as "over the whole motion".
+    """
+    known = _checks.concrete(force)
+    if known is not None and not np.all(np.isfinite(known)):
+        missing = f"{type(law).__name__} with none at {np.count_nonzero(~np.isfinite(known))} of {known.size} samples"
+        _checks.refuse("law", f"give a finite force {where}", missing, coverage(law))
+
+
+def margins(tree: object) -> Float[Array, " conditions"]:
+    """The margin of each condition of all laws in a law, a vehicle or another module; negative if violated.
+
+    Every margin is in the unit of the parameter that the condition limits.
+
+    Arguments:
+        tree: the module.
+    """
+    each = [getattr(law, c.parameter) - c.least for _, law in laws_inside(tree) for c in law.conditions()]
+    return jnp.concatenate([jnp.ravel(margin) for margin in each]) if each else jnp.zeros(0)
+
+
+def keeps_conditions(tree: object) -> bool:
+    """Whether all laws in a law, a vehicle or another module satisfy their conditions; nothing is compiled.
+
+    Arguments:
+        tree: the module.
+    """
+    plain = [jax.tree.map(np.asarray, law) for _, law in laws_inside(tree) if law.has_conditions()]
+    return all(np.all(getattr(law, c.parameter) > c.least) for law in plain for c in law.conditions())

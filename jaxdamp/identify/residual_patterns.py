@@ -1,0 +1,263 @@
+"""Patterns that effects leave in the residual of a fit on a bench: of a machine, of its channels, of a damper's law."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
+
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.traces import Batch
+
+
+FRICTION_VELOCITY = 0.005  # m/s, width of the sign change of friction
+GAPS = (0.01, 0.015, 0.02, 0.03, 0.045, 0.07, 0.1)  # clearances that are tried, relative to the half stroke
+KNEES = 12  # of a curve of the velocity
+FEWEST = 8  # samples of a record
+SHORT = 50.0  # sampling steps for each time constant below which a filter and a delay are one
+OF_LAW = ("curve", "hysteresis")  # effects that no machine has
+PLAY = "look for play in the mounts, or put the law into `Play`"
+
+Values = Float[np.ndarray, " samples"]
+
+
+class Pattern(NamedTuple):
+    """What an effect leaves in the residual, and what it means.
+
+    Attributes:
+        name: of the effect.
+        signals: weighted force for a unit of each of its numbers.
+        signed: whether its numbers may have either sign.
+        words: what it is, with its numbers.
+        remedy: what to do.
+        at_rest: force [N] at velocity zero for a unit of each number; None where that says nothing.
+    """
+
+    name: str
+    signals: Float[np.ndarray, "samples numbers"]
+    signed: bool
+    words: Callable[[np.ndarray], str]
+    remedy: str
+    at_rest: np.ndarray | None = None
+
+
+class Motion(NamedTuple):
+    """One record as it stands in the residuals; the force as predicted, the rise of a measured temperature."""
+
+    time: Values
+    stroke: Values
+    velocity: Values
+    force: Values
+    rise: Values | None
+
+
+class Record(NamedTuple):
+    """The samples of a fitted record in the residuals.
+
+    Attributes:
+        number: of the record.
+        at: places among the used samples.
+        weight: of each sample.
+        motion: of the record there.
+        cycle: samples in a period; 0 where the record is shorter than two.
+    """
+
+    number: int
+    at: np.ndarray
+    weight: Values
+    motion: Motion
+    cycle: int
+
+
+def records_of(problem: Problem, best: SearchEnd) -> Iterator[Record]:
+    """Each fitted record in the residuals.
+
+    Arguments:
+        problem: a problem on bench records that was minimised.
+        best: its minimum.
+    """
+    stroke, velocity, force, weight = (_channel(problem, name) for name in ("stroke", "velocity", "force", "weight"))
+    predicted = force + np.divide(best.residual[: weight.size], weight, out=np.zeros_like(force), where=weight > 0)
+    first = [run.temperature[0] for run in problem.runs if run.temperature is not None]
+    place = np.cumsum(problem.used) - 1
+    for i, run in enumerate(problem.runs):
+        at = np.flatnonzero((problem.owner == i) & problem.used)
+        if at.size < FEWEST:
+            continue
+        step = problem.sample_steps[i]
+        time = step * np.arange(at.size)
+        rise = None
+        if run.temperature is not None:
+            end = run.time[-1] - run.time[0]
+            rise = np.interp(time + max(end - time[-1], 0.0), run.time - run.time[0], run.temperature) - min(first)
+        cycle = round(1.0 / (step * run.frequency)) if run.frequency > 0 else 0
+        motion = Motion(time, stroke[at], velocity[at], predicted[at], rise)
+        yield Record(i, place[at], weight[at], motion, cycle if at.size >= 2 * cycle else 0)
+
+
+def _channel(problem: Problem, name: str) -> Values:
+    """One channel at all samples of the residuals of bench records."""
+    parts = [part for part in problem.residuals if isinstance(part, Batch)]
+    return np.concatenate([np.ravel(np.asarray(getattr(part, name))) for part in parts])
+
+
+def column(records: Sequence[Record], change: Callable[[Motion], Values]) -> Float[np.ndarray, "samples 1"]:
+    """The weighted change of the force by an effect, over all used samples.
+
+    Arguments:
+        records: all of them.
+        change: of the measured force in one record [N].
+    """
+    values = np.zeros((sum(record.at.size for record in records), 1))
+    for _, at, weight, motion, _ in records:
+        values[at, 0] = weight * change(motion)
+    return values
+
+
+def proportional(problem: Problem, records: Sequence[Record]) -> list[Pattern]:
+    """The effects of a machine that are proportional to their size, the likelier ones first.
+
+    Arguments:
+        problem: the problem.
+        records: its records in the residuals.
+    """
+    machine = 'add "{}" to the machine (`rig`)'
+    kinds: list[tuple[str, bool, str, str, Callable[[Motion], Values]]] = [
+        ("offset", True, "a constant force of {:.3g} N", f'add "gas" or {machine.format("offset")[4:]}', _one),
+        (
+            "gas_stiffness",
+            False,
+            "a spring of {:.3g} N/m",
+            f"{machine.format('gas_stiffness')}, or a `Spring` to the law",
+            lambda m: m.stroke,
+        ),
+        (
+            "mass",
+            False,
+            "a moving mass of {:.3g} kg",
+            machine.format("mass"),
+            lambda m: np.gradient(m.velocity, m.time),
+        ),
+        (
+            "friction",
+            False,
+            "friction of {:.3g} N",
+            f"{machine.format('friction')}, or take a law with friction",
+            lambda m: np.tanh(m.velocity / FRICTION_VELOCITY),
+        ),
+        (
+            "heat",
+            True,
+            "damping that falls as the oil warms up",
+            f"{machine.format('heat')}, or cut the records",
+            _heated,
+        ),
+        (
+            "drift",
+            True,
+            "a zero that drifts by {:.3g} N/s",
+            "let the bench warm up, and set the load cell to zero before each record",
+            lambda m: m.time,
+        ),
+    ]
+    amplitude = problem.reach.stroke
+    for gap in GAPS:
+        words = f"a clearance of about {1e3 * gap * amplitude:.2g} mm (no force after each reversal)"
+        kinds.append(("clearance", False, words, PLAY, lambda m, gap=gap * amplitude: _lost(m, gap)))
+    patterns = [
+        Pattern(name, column(records, change), signed, lambda sizes, words=words: words.format(*sizes), remedy)
+        for name, signed, words, remedy, change in kinds
+    ]
+    return [*patterns, *_gains(problem, records), _curve(records)]
+
+
+def _one(motion: Motion) -> Values:
+    return np.ones_like(motion.time)
+
+
+def _heated(motion: Motion) -> Values:
+    time, _, v, force, rise = motion
+    power = 0.5 * (force[1:] * v[1:] + force[:-1] * v[:-1])
+    return -force * (np.concatenate([[0.0], np.cumsum(power * np.diff(time))]) if rise is None else rise)
+
+
+def _lost(motion: Motion, gap: float) -> Values:
+    """The force that a clearance takes away, within a distance [m] behind each reversal."""
+    x, v = motion.stroke, motion.velocity
+    turns = np.flatnonzero(np.signbit(v[1:]) != np.signbit(v[:-1])) + 1
+    last = np.searchsorted(turns, np.arange(x.size), side="right") - 1
+    since = np.abs(x - x[turns[np.maximum(last, 0)]]) if turns.size else np.full(x.size, np.inf)
+    return -motion.force * (np.where(last >= 0, since, np.inf) < gap)
+
+
+def _gains(problem: Problem, records: Sequence[Record]) -> list[Pattern]:
+    """For each of several records a force that is larger or smaller than in all others."""
+    patterns = []
+    for number, at, weight, motion, _ in records if len(records) > 1 else ():
+        values = np.zeros((sum(record.at.size for record in records), 1))
+        values[at, 0] = weight * motion.force
+
+        def words(sizes: np.ndarray, name: str = problem.runs[number].name) -> str:
+            return f"a gain of {1.0 + float(sizes[0]):.3g} in {name}"
+
+        remedy = "was a range or a setting changed? Leave the record out, or fit it apart"
+        patterns.append(Pattern("gain", values, True, words, remedy))
+    return patterns
+
+
+def _curve(records: Sequence[Record]) -> Pattern:
+    """Another curve of the velocity, by straight lines between knees that each have as many samples."""
+    velocity = np.concatenate([record.motion.velocity for record in records])
+    knees = np.unique(np.quantile(velocity, np.linspace(0.0, 1.0, KNEES)))
+    units = np.eye(knees.size)
+    parts = [column(records, lambda m, unit=unit: np.interp(m.velocity, knees, unit)) for unit in units]
+    remedy = "take a law with a free curve, such as piecewise_linear or table"
+    words = "the shape of the damper's curve over the velocity"
+    at_rest = np.array([float(np.interp(0.0, knees, unit)) for unit in units])
+    return Pattern("curve", np.concatenate(parts, axis=1), True, lambda sizes: words, remedy, at_rest)
+
+
+def hysteresis(records: Sequence[Record], late: dict[str, float]) -> Pattern:
+    """A force that is late by another time in each record and direction, which is memory of a damper.
+
+    Arguments:
+        records: all of them.
+        late: delay and lag of the force [s] that were found before, by name.
+    """
+    values = np.zeros((sum(record.at.size for record in records), 2 * len(records)))
+    for k, (_, at, weight, motion, _) in enumerate(records):
+        force = motion.force + sum(LATE[name](motion, size) for name, size in late.items())
+        rate = -weight * np.gradient(force, motion.time)
+        values[at, 2 * k], values[at, 2 * k + 1] = rate * (force > 0), rate * (force <= 0)
+
+    def words(sizes: np.ndarray) -> str:
+        times = 1e3 * (sizes + sum(late.values()))
+        ends = f"{times.min():.2g} to {times.max():.2g} ms late over records and directions"
+        return f"memory of the damper, whose force is {ends} and so by no delay of a channel"
+
+    remedy = "take a law with memory, such as besinger_series_spring, besinger_lag or series_spring_dahl"
+    return Pattern("hysteresis", values, True, words, remedy)
+
+
+def delayed(motion: Motion, delay: float) -> Values:
+    """The force a time later [s], less the force."""
+    time, force = motion.time, motion.force
+    return CubicSpline(time, force)(np.clip(time - delay, time[0], time[-1])) - force
+
+
+def filtered(motion: Motion, lag: float) -> Values:
+    """The force behind a first-order lag [s], exact for straight lines between the samples, less the force."""
+    force, ratio = motion.force, (motion.time[1] - motion.time[0]) / abs(lag)
+    if ratio > SHORT:
+        return -lag * np.gradient(force, motion.time)
+    decay, part = np.exp(-ratio), -np.expm1(-ratio) / ratio
+    feed, first = np.array([1.0 - part, part - decay]), force[0] - (force[1] - force[0]) / ratio
+    following, _ = lfilter(feed, [1.0, -decay], force[1:], zi=[feed[1] * force[0] + decay * first])
+    return np.concatenate([[first], following]) - force
+
+
+LATE = {"delay": delayed, "lag": filtered}
+"""Changes of the force by effects that are not proportional to their size."""

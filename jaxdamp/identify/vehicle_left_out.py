@@ -1,0 +1,145 @@
+"""Effects that a fit of a vehicle left out: a sensor that is late, shifted, scaled or reversed, and a free scale.
+
+A sensor that is late, shifted or scaled leaves the slope of its channel, a constant, or the channel in the residual.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from jaxdamp.bench import RideRecord
+from jaxdamp.identify.model import VehicleTest
+from jaxdamp.identify.noise import channel_noise
+from jaxdamp.identify.problem import Problem
+from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.vehicle_preparing import FreeScale
+from jaxdamp.identify.vehicle_residuals import RideBatch
+from jaxdamp.identify.vehicle_result import ChannelScore
+from jaxdamp.parameters import get
+from jaxdamp.rig import Sensor
+
+
+SURE = 6.0  # standard errors from which an effect is named
+NOTICEABLE = 0.01  # sampling intervals of a delay, and tenths of a channel, below which an effect does not matter
+REVERSED = -0.3  # correlation of a channel with its prediction below which its sign is doubted
+POORLY = 30.0  # fit [%] of a channel below which the vehicle of the start is asked too
+OF_ITS_OWN = 1e-3  # share of an effect that no fitted number has, below which it cannot be shown
+
+
+def on_signs(scores: Sequence[ChannelScore], at_start: Sequence[ChannelScore]) -> list[str]:
+    """A sentence on each channel that the vehicle predicts with the other sign.
+
+    A fit may bend the vehicle until a reversed channel runs with it a little, and explain it badly all the same: then
+    the vehicle that the fit started from tells.
+    """
+    notes = []
+    for score, first in zip(scores, at_start, strict=True):
+        which, against = "fitted vehicle", score.correlation
+        if score.fit_percent < POORLY:
+            which, against = min((which, against), ("vehicle of the start", first.correlation), key=lambda one: one[1])
+        if against < REVERSED:
+            notes.append(
+                f"{score.channel} of {score.record} runs against the {which} (correlation {against:.2f}): its sign, or"
+                " that of the other channels, is reversed. Accelerations and heights count positive up, travels in"
+                " extension; `read_rides(..., reversed_channels=[...])` and --reversed turn a channel round."
+            )
+    return notes
+
+
+def on_free_scale(scale: FreeScale, model: VehicleTest) -> list[str]:
+    """A sentence on numbers of which the records show the ratios only."""
+    if not scale.names:
+        return []
+    value = f"{float(get(model, scale.held_name)):.6g}" if scale.held_name else ""
+    held = f" {scale.held_name} was held at {value}; the standard errors are for this." if value else ""
+    return [
+        "These records hold no force, so only ratios of masses, rates and forces can be determined:"
+        f" {', '.join(scale.names)} may all be larger by one factor.{held}"
+        " Fix one mass that is known, or measure a force."
+    ]
+
+
+def on_sensors(
+    problem: Problem,
+    end: SearchEnd,
+    records: Sequence[RideRecord],
+    channels: Sequence[str],
+    sensors: Mapping[str, Sensor],
+) -> list[str]:
+    """A sentence on each sensor whose channel looks late, shifted or scaled, beside all fitted numbers.
+
+    The residual is regressed on what each sensor could add to first order (the slope of its channel, a constant, the
+    channel itself), after both are freed of what the fitted numbers can explain.
+
+    Arguments:
+        problem: the problem that was solved.
+        end: its minimum.
+        records: the records.
+        channels: all channels in the order of `problem.sigma`.
+        sensors: the fitted sensors.
+    """
+    effects, columns = [], []
+    for channel in channels:
+        given = sensors[channel].given if channel in sensors else ()
+        for effect in ("delay", "offset", "gain"):
+            if effect not in given and not (effect == "delay" and "lag" in given):
+                column = _column(problem, end, records, channel, effect)
+                if column is not None:
+                    effects.append((channel, effect))
+                    columns.append(column)
+    if not columns:
+        return []
+    whole = np.stack([*columns, end.residual], axis=1)
+    basis, _ = np.linalg.qr(end.jacobian / np.linalg.norm(end.jacobian, axis=0).clip(1e-300))
+    rest = whole - basis @ (basis.T @ whole)
+    shown = np.linalg.norm(rest[:, :-1], axis=0) > OF_ITS_OWN * np.linalg.norm(whole[:, :-1], axis=0)
+    inverse = np.linalg.pinv(rest[:, :-1][:, shown])
+    sizes = inverse @ rest[:, -1]
+    left = channel_noise(problem, rest[:, -1] - rest[:, :-1][:, shown] @ sizes, end.values.size)
+    errors = np.linalg.norm(inverse * left.sigma, axis=1)
+    chosen = [effect for effect, own in zip(effects, shown, strict=True) if own]
+    sentences = []
+    for (channel, effect), size, error in zip(chosen, map(float, sizes), errors, strict=True):
+        values = np.concatenate([record[channel] for record in records if channel in record.channels])
+        unit = {"delay": records[0].dt, "offset": 0.1 * float(np.std(values)), "gain": 0.1}[effect]
+        if abs(size) > max(SURE * error, NOTICEABLE * unit):
+            sentences.append(_sentence(channel, effect, size, problem.law.units[channel]))
+    return sentences
+
+
+def _column(
+    problem: Problem, end: SearchEnd, records: Sequence[RideRecord], channel: str, effect: str
+) -> Float[np.ndarray, " samples"] | None:
+    """Change of the weighted residual for each unit of an effect; None for a law on a bench."""
+    parts, begin, found = [], 0, False
+    for part in problem.residuals:
+        size = part.used().size
+        column = np.zeros(size)
+        if isinstance(part, RideBatch) and channel in part.channels:
+            weight = np.asarray(part.weight)
+            row, shaped, found = part.channels.index(channel), column.reshape(weight.shape), True
+            errors = end.residual[begin : begin + size].reshape(weight.shape)
+            for i, number in enumerate(np.asarray(part.number)):
+                counts = weight[i, row] > 0
+                error = np.divide(errors[i, row], weight[i, row], out=np.zeros(counts.size), where=counts)
+                expected = records[number][channel] + error
+                slope = np.gradient(expected, records[number].dt)
+                by_effect = {"delay": slope, "offset": -np.ones_like(slope), "gain": -expected}
+                shaped[i, row] = weight[i, row] * by_effect[effect]
+        parts.append(column)
+        begin += size
+    return np.concatenate(parts) if found else None
+
+
+def _sentence(channel: str, effect: str, size: float, unit: str) -> str:
+    words = {
+        "delay": f"comes {1e3 * abs(size):.3g} ms too {'late' if size > 0 else 'early'}",
+        "offset": f"has a zero error of {size:.3g} {unit}",
+        "gain": f"has a gain of {1 + size:.4g}",
+    }
+    how = {"delay": "lag or delay"}.get(effect, effect)
+    return (
+        f"By its residual, {channel} {words[effect]}, unless the vehicle misses something else:"
+        f" fit the {how} of its sensor."
+    )

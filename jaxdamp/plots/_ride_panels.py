@@ -1,0 +1,267 @@
+"""The panels of a ride sheet, and what they show: vehicles before and after on a road."""
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from jaxdamp import metrics
+from jaxdamp._tables import typeset_unit
+from jaxdamp.parameters import get
+from jaxdamp.plots import _rides, _sheet, _style, fitted_range
+from jaxdamp.plots.rides import default_channels
+from jaxdamp.rig import quasi_static
+from jaxdamp.roads import assess_roughness, class_limits, road_class
+from jaxdamp.vehicles import modes
+
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+
+
+_MM, _BINS, _MOST_BARS = 1e3, 31, 6
+SETTLED = 0.05  # share of the peak below which the motion over a bump has settled
+
+
+def vehicle(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+    """Bodies on springs and dampers on wheels, with masses and rates."""
+    from matplotlib.patches import Rectangle
+
+    _sheet.blank(axes)
+    frame, blue = shown.cars[1].frame(), _style.AFTER["color"]
+    small = {"fontsize": 6.5, "va": "center"}
+    axes.add_patch(Rectangle((0.05, 0.68), 0.9, 0.26, facecolor="0.92", edgecolor=_style.BLACK))
+    body = f"body {_style.short(float(frame.main_body.mass))} kg"
+    axes.text(0.5, 0.81, body, ha="center", va="center", fontsize=_sheet.SMALL)
+    others = [one for one in frame.bodies if one is not frame.main_body]
+    pairs = list(zip(frame.wheels, frame.links, strict=False))[:3]
+    places = np.linspace(0.5 / len(pairs), 1.0 - 0.5 / len(pairs), len(pairs)) if pairs else []
+    for number, (x, (wheel, link)) in enumerate(zip(places, pairs, strict=True)):
+        turns = x - 0.04 + 0.014 * np.array([0, 0, 1, -1, 1, -1, 1, 0, 0])
+        axes.plot(turns, np.linspace(0.34, 0.68, 9), color=_style.BLACK, linewidth=1.0)
+        axes.plot([x + 0.04] * 2, [0.34, 0.68], color=blue, linewidth=1.5)
+        axes.plot([x + 0.04] * 2, [0.46, 0.56], color=blue, linewidth=6.0, solid_capstyle="butt")
+        axes.plot(x, 0.2, "o", markersize=26, markerfacecolor="white", color=_style.BLACK)
+        axes.text(x - 0.07, 0.51, f"{_style.short(1e-3 * float(link.stiffness))} N/mm", ha="right", **small)
+        mass = f"{_style.short(float(others[number].mass))} kg, " if number < len(others) else ""
+        tyre = f"{mass}tyre\n{_style.short(1e-3 * float(wheel.stiffness))} N/mm"
+        axes.text(x + 0.075, 0.2, tyre, ha="left", **small)
+    axes.axhline(0.03, color=_style.BLACK, linewidth=1.0)
+    frequencies = [_style.short(float(f)) for f in modes(shown.cars[1]).undamped_frequency]
+    axes.set_title(f"Natural frequencies {', '.join(frequencies[:6])} Hz", loc="left")
+
+
+def road(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+    """The spectrum of a random road among the classes of ISO 8608, or the heights of a bump."""
+    if shown.road is None:
+        _sheet.remarks(axes, "Road", ["Several roads or conditions; see the page."], width=40)
+        return
+    speed, n = shown.speed, np.geomspace(0.02, 2.0, 60)
+    heights = None if shown.responses is None else np.asarray(shown.responses[0].road)[:, 0]
+    if shown.responses is not None and heights is not None and (shown.is_event or speed is None):
+        axes.plot(shown.responses[0].time, _MM * heights, color=_style.BLACK, linewidth=1.3)
+        height = _style.short(_MM * float(np.ptp(heights)))
+        _style.dress(axes, "time [s]", "height [mm]", f"Road: {height} mm from the lowest to the highest point")
+        return
+    speed = 1.0 if speed is None else speed
+    if shown.responses is None or heights is None:
+        roughness = float(shown.road.velocity_psd) / (2.0 * np.pi) ** 2 / speed / 0.1**2
+        axes.loglog(n, roughness * (n / 0.1) ** -2.0, **_style.AFTER)
+        name = road_class(roughness)
+    else:
+        spacing = speed * float(shown.responses[0].time[1] - shown.responses[0].time[0])
+        measured = assess_roughness(heights, spacing, bands_per_octave=3)
+        axes.loglog(measured.spatial_frequency, measured.displacement_psd, **_style.AFTER)
+        name = measured.road_class
+    line = (n / 0.1) ** -2.0
+    for letter in "ABCDEFGH":
+        axes.loglog(n, class_limits(letter)[1] * line, color="0.8", linewidth=0.6, zorder=0.5)
+    low, high = class_limits(name)
+    low, high = max(low, high / 4.0 if np.isfinite(high) else 0.0), min(high, 4.0 * low if low else np.inf)
+    axes.fill_between(n, low * line, high * line, color="0.55", alpha=0.3, linewidth=0.0)
+    axes.set_ylim(0.2 * low * line[-1], 4.0 * high * line[0])
+    axes.set_xlim(n[0], n[-1])
+    _style.frequency_axis(axes.xaxis)
+    title = f"Road: ISO 8608 class {name}, {_style.short(speed)} m/s"
+    _style.dress(axes, "spatial frequency [cycle/m]", "height PSD [m³]", title)
+
+
+def plane(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+    """Comfort over grip: present and new, the curve of constant damping, limits."""
+    comfort, grip = shown.goal("comfort"), shown.goal("grip")
+    if not comfort or not grip or shown.road is None:
+        _sheet.remarks(axes, "Comfort and grip", ["No metrics of comfort and grip for this road."], width=50)
+        return
+    curve = _rides.constant_damping(shown, comfort, grip)
+    if isinstance(curve, str):
+        why = textwrap.fill(f"No curve of constant damping: {curve}", 60)
+        axes.text(0.02, 0.02, why, transform=axes.transAxes, fontsize=6.0, color=_style.GREY)
+    else:
+        axes.plot(*curve, color=_style.GREY, linewidth=1.2, marker=".", markersize=4, label="constant damping")
+        for at, word in ((0, "soft"), (-1, "firm")):
+            place, small = (curve[0][at], curve[1][at]), {"color": _style.GREY, "fontsize": _sheet.SMALL}
+            axes.annotate(word, place, (4, 3), textcoords="offset points", **small)
+    places = [(_mean(side, comfort), _mean(side, grip)) for side in shown.values]
+    if not shown.single:
+        arrow = {"arrowstyle": "-|>", "color": _style.AFTER["color"], "linewidth": 1.4, "shrinkA": 5, "shrinkB": 6}
+        axes.annotate("", places[1], places[0], arrowprops=arrow)
+        axes.plot(
+            *places[0], "o", color=_style.BLACK, markersize=8, label=_style.in_words(shown.names[0]), linestyle=""
+        )
+    label = _style.in_words(shown.names[1])
+    axes.plot(*places[1], "*", color=_style.AFTER["color"], markersize=14, label=label, linestyle="")
+    _limits(axes, shown, comfort, grip)
+    units = [typeset_unit(shown.units[names[0]]) for names in (comfort, grip)]
+    x = f"less comfort →   {_style.metric_words(comfort[0])} [{units[0]}]"
+    y = f"less grip →   tyre load variation, RMS [{units[1]}]"
+    _style.dress(axes, x, y, "Comfort and grip")
+    axes.margins(0.12)
+    axes.legend(frameon=False, loc="best")
+
+
+def _mean(values: Mapping[str, float], names: Sequence[str]) -> float:
+    return float(np.mean([values[name] for name in names]))
+
+
+def _limits(axes: "matplotlib.axes.Axes", shown: _rides.Rides, comfort: Sequence[str], grip: Sequence[str]) -> None:
+    """The limits of the plane: of metrics that are alone on their axis."""
+    bottom, top = axes.get_ylim()
+    for names, line in ((comfort, axes.axvline), (grip, axes.axhline)):
+        upper = shown.limits.get(names[0], (0.0, np.inf))[1]
+        if len(names) == 1 and np.isfinite(upper):
+            line(upper, **_style.LIMIT, label="limit")
+            axes.set_ylim(bottom, max(top, 1.02 * upper) if names is grip else top)
+
+
+def _main_metrics(shown: _rides.Rides) -> list[str]:
+    """The names of the metrics of a sheet: what was minimised, comfort, pitch, travel, grip, what is limited."""
+    minimised = [shown.tuning.metric] if shown.tuning else []
+    pitch = [n for n in shown.values[0] if n.startswith(("rms_pitch_acc", "weighted_rms_pitch_acc"))][-1:]
+    names = [*minimised, *shown.goal("comfort"), *pitch, *shown.goal("travel"), *shown.goal("grip"), *shown.limits]
+    return list(dict.fromkeys(names))[:_MOST_BARS]
+
+
+def bars(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+    """The main metrics: change with whiskers over unseen roads and marks at limits, or their values for one ride."""
+    names = _main_metrics(shown)
+    if shown.single:
+        rows = [(_style.metric_words(n), _style.quantity(shown.values[1][n], shown.units[n])) for n in names]
+        _sheet.table(axes, "The main numbers", ["", ""], rows, [1.0], step=0.1)
+        return
+    for row, name in enumerate(names):
+        _bar(axes, shown, row, name)
+    axes.set_ylim(len(names) - 0.5, -0.6)
+    axes.set_yticks([])
+    whiskers = ", whiskers: unseen roads" * (shown.fresh is not None)
+    title = f"{_style.in_words(shown.names[0])} → {_style.in_words(shown.names[1])}{whiskers}"
+    _style.dress(axes, "change [%]", "", title + ", red: limit" * bool(shown.limits))
+    axes.grid(False, axis="y")
+    _style.cross(axes, horizontal=False)
+    axes.margins(x=0.08)
+
+
+def _bar(axes: "matplotlib.axes.Axes", shown: _rides.Rides, row: int, name: str) -> None:
+    """The change of one metric."""
+    before, after = (side[name] for side in shown.values)
+    change = 100.0 * (after / before - 1.0) if before else 0.0
+    axes.barh(row + 0.1, change, 0.4, color=_style.GOOD if change < 0.0 else _style.COLOURS[1], zorder=2)
+    if shown.fresh is not None and np.all(np.isfinite(shown.fresh.change(name))):
+        spread = 100.0 * shown.fresh.change(name)
+        axes.plot([spread.min(), spread.max()], [row + 0.1] * 2, "|-", color=_style.BLACK, linewidth=1.2, zorder=3)
+        axes.plot(spread.mean(), row + 0.1, "D", color=_style.BLACK, markersize=3.5, zorder=3)
+    ends = [100.0 * (end / before - 1.0) for end in shown.limits.get(name, ()) if np.isfinite(end) and before]
+    for end in ends:
+        axes.plot([end, end], [row - 0.15, row + 0.35], color=_style.BAD, linewidth=2.0, zorder=4)
+    values = " → ".join(_style.quantity(value, shown.units[name]) for value in (before, after))
+    text = f"{_style.metric_words(name)}:  {values}, {_style.percent(change)}"
+    axes.text(0.01, row - 0.3, text, transform=axes.get_yaxis_transform(), fontsize=6.5, va="center", zorder=5)
+
+
+def damper(curves: "matplotlib.axes.Axes", shares: "matplotlib.axes.Axes", shown: _rides.Rides, path: str) -> None:
+    """A damper before and after over mm/s, and the share of time at each velocity with its four quadrants."""
+    laws = [get(car, path) for car in shown.cars]
+    velocities = [_rides.damper_velocity(shown, path, number) for number in (0, 1)]
+    known = [np.abs(v).max() for v in velocities if v is not None]
+    reach = 1.05 * float(max(known)) if known else 1.0
+    points = np.linspace(-reach, reach, 401)
+    for label, style, number in shown.styles():
+        force = np.asarray(quasi_static(laws[number], points).force)
+        fitted_range.curve(curves, laws[number], points, force, label=label or "law", **style)
+        velocity = velocities[number]
+        if velocity is not None:
+            edges = np.linspace(-reach, reach, _BINS + 1)
+            share = 100.0 * np.asarray(metrics.velocity_histogram(velocity, edges))
+            shares.step(0.5 * (edges[1:] + edges[:-1]), share, where="mid", **style)
+    fitted_range.shade(curves, laws, points)
+    _thousandths(curves, shares)
+    _style.dress(curves, "", "force [N]", f"{_style.in_words(path).removesuffix(' law').capitalize()}")
+    _style.cross(curves)
+    _style.dress(shares, "velocity [mm/s]   (+ rebound)", "time [%]", _rides.quadrants(velocities[1]))
+    curves.tick_params(labelbottom=False)
+    curves.set_xlim(-reach, reach)
+    if len(shown.styles()) > 1:
+        curves.legend(frameon=False, loc="upper left")
+
+
+def _thousandths(*panels: "matplotlib.axes.Axes") -> None:
+    """Ticks of axes over m/s in mm/s."""
+    from matplotlib.ticker import FuncFormatter
+
+    for axes in panels:
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _style.short(_MM * value)))
+
+
+def spectrum(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+    """The spectrum of the body acceleration before and after, smoothed, with the bands of body and wheels."""
+    channel = default_channels(shown.cars[0].layout)[0]
+    pair = _rides.body_spectra(shown, channel)
+    if pair is None:
+        _sheet.remarks(axes, "Spectrum", ["Several roads or conditions; see the page."], width=60)
+        return
+    for label, style, number in shown.styles():
+        axes.loglog(*_rides.smoothed(*pair[number]), label=label, **style)
+    low, high = axes.get_ylim()
+    for frequency in modes(shown.cars[1]).undamped_frequency:
+        axes.axvspan(frequency / 1.15, frequency * 1.15, color=_style.SHADE, linewidth=0.0, zorder=0.1)
+    frequencies = np.asarray(modes(shown.cars[1]).undamped_frequency, float)
+    for word, group in (("body", frequencies[frequencies < 4.0]), ("wheels", frequencies[frequencies >= 4.0])):
+        if group.size:
+            middle = float(np.exp(np.mean(np.log(group))))
+            axes.text(
+                middle, 0.97, word, transform=axes.get_xaxis_transform(), ha="center", va="top", color=_style.GREY
+            )
+    axes.set_ylim(max(low, 1e-5 * high), high)
+    _style.frequency_axis(axes.xaxis)
+    axes.set_xlim(0.5, 30.0)
+    unit = typeset_unit(shown.cars[0].units[channel])
+    title = f"Spectrum of the {_style.metric_words(channel)}{_rides.dips(shown)}"
+    _style.dress(axes, "frequency [Hz]", f"PSD [({unit})²/Hz]", title)
+    if len(shown.styles()) > 1:
+        axes.legend(frameon=False, loc="lower left")
+
+
+def event(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+    """The motion of the body over a bump, with its peaks, overshoot and settling time."""
+    assert shown.responses is not None
+    channel = next((n for n in ("sprung_displacement", "chassis_displacement") if n in shown.responses[0].units), "")
+    channel = channel or default_channels(shown.cars[0].layout)[0]
+    factor = _MM if shown.responses[0].units[channel] == "m" else 1.0
+    unit = "mm" if factor == _MM else typeset_unit(shown.responses[0].units[channel])
+    for label, style, number in shown.styles():
+        response = shown.responses[number]
+        time, values = np.asarray(response.time), factor * np.asarray(response[channel])
+        moved = np.abs(np.asarray(response.road_rate)).max(axis=1)
+        end = float(time[np.flatnonzero(moved > 1e-3 * moved.max())[-1]])
+        after = values[time > end]
+        over = f", {_style.short(float(np.abs(after).max()))} {unit} after it" if after.size else ""
+        last = float(time[np.flatnonzero(np.abs(values) > SETTLED * np.abs(values).max())[-1]])
+        settled = (
+            "not settled" if last > 0.99 * time[-1] else f"settled {_style.short(max(last - end, 0.0))} s after it"
+        )
+        words = f"up {_style.short(values.max())} {unit}, down {_style.short(values.min())} {unit}{over}, {settled}"
+        axes.plot(time, values, label=f"{label}: {words}" if label else words, **style)
+    _style.dress(axes, "time [s]", f"[{unit}]   (+ up)", f"{_style.metric_words(channel).capitalize()} over the bump")
+    _style.cross(axes, vertical=False)
+    axes.legend(frameon=False, loc="best")

@@ -1,0 +1,202 @@
+"""What a ride sheet shows: vehicles before and after on a road, their numbers, velocities and spectra."""
+
+import dataclasses
+import functools
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp import metrics
+from jaxdamp.dampers import Linear, without_fitted_ranges
+from jaxdamp.parameters import get
+from jaxdamp.plots import _style
+from jaxdamp.rig import quasi_static
+from jaxdamp.roads import WhiteRoad, from_profile
+from jaxdamp.simulation import Response, Ride, simulate
+from jaxdamp.tune import Rescore, TuneResult, damper_paths, limit_spans
+from jaxdamp.vehicles import AbstractVehicle
+
+
+if TYPE_CHECKING:
+    pass
+
+
+GOALS = {"comfort": "body acceleration", "travel": "suspension travel", "grip": "tyre load variation"}
+FACTORS = np.geomspace(0.3, 3.0, 13)  # of the damping, along the curve of constant damping
+BANDS = 9  # points of a spectrum in an octave
+_MOST_DAMPERS = 2
+_EVENT = 0.35  # share of the run within which the road is moved: less is a bump
+
+
+@dataclasses.dataclass(frozen=True)
+class Rides:
+    """Vehicles before and after, with their numbers; equal ones for a single ride."""
+
+    names: tuple[str, str]
+    cars: tuple[AbstractVehicle, AbstractVehicle]
+    responses: tuple[Response, Response] | None  # None on a white road
+    road: Any
+    run: Mapping[str, object]
+    values: tuple[Mapping[str, float], Mapping[str, float]]
+    units: Mapping[str, str]
+    limits: Mapping[str, tuple[float, float]]
+    fresh: Rescore | None
+    tuning: TuneResult | None
+
+    @classmethod
+    def of_tuning(cls, result: TuneResult) -> "Rides":
+        """A tuning, driven again on its road, as long as that is known."""
+        drive, cars = result.drive, (result.start, result.vehicle)
+        road, run = (None, {}) if drive is None else (drive.road, drive.run)
+        responses = None
+        if road is not None and not isinstance(road, WhiteRoad):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the notes of the tuning say it
+                first, second = (simulate(car, road, **run) for car in cars)
+                responses = (first, second)
+        limits = limit_spans(result.limits, list(result.before))
+        sides = (result.before, result.after)
+        return cls(("before", "after"), cars, responses, road, run, sides, result.units, limits, result.fresh, result)
+
+    @classmethod
+    def of_responses(cls, rides: Mapping[str, Response], limits: Mapping[str, object] | None) -> "Rides":
+        """Rides on one road, the first against the last."""
+        first, last = next(iter(rides)), list(rides)[-1]
+        pair = (rides[first], rides[last])
+        sides = tuple({name: float(v) for name, v in each.metrics().items()} for each in pair)
+        time = np.asarray(pair[0].time)
+        dt = float(f"{(time[-1] - time[0]) / (len(time) - 1):.6g}")  # single precision has no more digits
+        road = from_profile(dt * np.arange(len(time)), np.asarray(pair[0].road))
+        run = {"duration": dt * (len(time) - 1), "dt": dt}
+        units = pair[0].metric_units()
+        spans = limit_spans(limits, list(sides[0]))
+        cars = (pair[0].vehicle, pair[1].vehicle)
+        return cls((first, last), cars, pair, road, run, (sides[0], sides[1]), units, spans, None, None)
+
+    @property
+    def single(self) -> bool:
+        return self.names[0] == self.names[1]
+
+    @property
+    def speed(self) -> float | None:
+        """Of the vehicle [m/s], where it is known."""
+        speed = getattr(self.road, "speed", None)
+        if speed is None and self.responses is not None:
+            speed = self.responses[0].axle_timing.speed
+        return None if speed is None else float(speed)
+
+    @property
+    def white(self) -> bool:
+        return isinstance(self.road, WhiteRoad)
+
+    def goal(self, goal: str) -> list[str]:
+        """The metrics of a goal that are known of both."""
+        try:
+            names = self.cars[0].goal_metrics(goal, white=self.white)
+        except ValueError:
+            return []
+        return [name for name in names if name in self.values[0]]
+
+    @functools.cached_property
+    def is_event(self) -> bool:
+        """Whether the road is one bump or hole, after and before which it is level."""
+        if self.responses is None:
+            return False
+        rate = np.abs(np.asarray(self.responses[0].road_rate)[:, 0])
+        return float(np.mean(rate > 1e-3 * rate.max())) < _EVENT if rate.max() > 0.0 else True
+
+    def styles(self) -> list[tuple[str, _style.Look, int]]:
+        """Label, look and number of what is drawn: one ride, or before and after."""
+        if self.single:
+            return [("", dict(_style.AFTER), 1)]
+        words = [_style.in_words(name) for name in self.names]
+        return [(words[0], dict(_style.BEFORE), 0), (words[1], dict(_style.AFTER), 1)]
+
+    def dampers(self) -> list[str]:
+        """The paths of the first laws that differ, or of the first ones."""
+        paths = damper_paths(self.cars[0])
+        differ = [p for p in paths if repr(get(self.cars[0], p)) != repr(get(self.cars[1], p))]
+        return (differ or paths)[:_MOST_DAMPERS]
+
+
+def constant_damping(shown: Rides, comfort: Sequence[str], grip: Sequence[str]) -> tuple[np.ndarray, np.ndarray] | str:
+    """The mean metrics of comfort and grip with linear dampers from soft to firm; or why they cannot be driven."""
+    car = without_fitted_ranges(shown.cars[0])
+    paths = damper_paths(car)
+    rates = {path: _slope(get(car, path)) for path in paths}
+    try:
+        linear = eqx.tree_at(lambda c: [get(c, path) for path in paths], car, [Linear(rates[path]) for path in paths])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            ride = Ride(linear, shown.road, metrics=[*comfort, *grip], **({} if shown.white else shown.run))
+            drive = jax.jit(jax.vmap(lambda f: ride({f"{path}.rate": f * rate for path, rate in rates.items()})))
+            driven = {name: np.asarray(values) for name, values in drive(jnp.asarray(FACTORS)).items()}
+    except ValueError as error:
+        return str(error)
+    return np.mean([driven[name] for name in comfort], axis=0), np.mean([driven[name] for name in grip], axis=0)
+
+
+def _slope(law: Any) -> float:
+    """The damping of a law between ± 0.2 m/s [N s/m]."""
+    force = np.asarray(quasi_static(law, np.array([-0.2, 0.2])).force)
+    return max(float(force[1] - force[0]) / 0.4, 50.0)
+
+
+def damper_velocity(shown: Rides, path: str, number: int) -> np.ndarray | None:
+    """The velocity of a damper over time [m/s]; None on a white road, or where the damper has no channel."""
+    if shown.responses is None:
+        return None
+    response = shown.responses[number]
+    names = [d for d in response.dampers if path.replace(".", "_").startswith(d)] or list(response.dampers)[:1]
+    return np.asarray(response[f"{names[0]}_velocity"]) if names else None
+
+
+def quadrants(velocity: np.ndarray | None) -> str:
+    """Shares of time at low and high speed on both sides, with the border at the RMS velocity."""
+    if velocity is None:
+        return ""
+    border = float(np.sqrt(np.mean(velocity**2)))
+    if not border:
+        return "The damper does not move"
+    low, high = np.abs(velocity) <= border, np.abs(velocity) > border
+    shares = [100.0 * np.mean(side & speed) for side in (velocity > 0, velocity < 0) for speed in (low, high)]
+    rebound, compression = (f"{a:.0f} % slow, {b:.0f} % fast" for a, b in (shares[:2], shares[2:]))
+    return f"Rebound {rebound}\ncompression {compression} (from {_style.short(1e3 * border)} mm/s)"
+
+
+def dips(shown: Rides) -> str:
+    """Where the axles of a car with two cancel each other, in words."""
+    delays = None if shown.responses is None else shown.responses[0].axle_timing.delays
+    if delays is None or len(delays) != 2 or not float(delays[1]):
+        return ""
+    dips = (0.5 + np.arange(3)) / float(delays[1])
+    return f" (dips at {', '.join(map(_style.short, dips))} Hz: the axles one after the other)"
+
+
+def body_spectra(shown: Rides, channel: str) -> list[tuple[np.ndarray, np.ndarray]] | None:
+    """Frequencies and densities before and after."""
+    if shown.responses is None:
+        pair = {} if shown.tuning is None else shown.tuning.spectra([channel])
+        return [(one.frequency, one.density) for one in pair[channel]] if pair else None
+    both = []
+    for response in shown.responses:
+        values, dt = np.asarray(response[channel]), float(response.time[1] - response.time[0])
+        size = min(round(4.0 / dt), len(values))
+        frequency, density = (np.asarray(a) for a in metrics.power_spectral_density(values - values.mean(), dt, size))
+        both.append((frequency[1:], density[1:]))
+    return both
+
+
+def smoothed(frequency: np.ndarray, density: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Means of the density in bands of equal width in octaves."""
+    band = np.round(BANDS * np.log2(np.maximum(frequency, 1e-9))).astype(int)
+    inside = (frequency >= 0.4) & (frequency <= 35.0)
+    bands = np.unique(band[inside])
+    return np.array([np.exp(np.mean(np.log(frequency[band == b]))) for b in bands]), np.array(
+        [density[band == b].mean() for b in bands]
+    )

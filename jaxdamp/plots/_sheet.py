@@ -1,0 +1,120 @@
+"""What the sheets share: one A4 page with a sentence at the top, panels, tables of text, remarks."""
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from jaxdamp.plots import _style
+
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+
+
+A4 = (8.27, 11.69)  # inch
+SMALL = 7.5  # pt, of tables
+_TEXT: _style.Look = {"va": "top", "linespacing": 1.35}
+
+
+def page() -> "matplotlib.figure.Figure":
+    """An empty page with margins."""
+    figure = _style.new_figure(*A4)
+    figure.set_layout_engine("constrained", rect=(0.05, 0.03, 0.91, 0.94))
+    return figure
+
+
+@contextmanager
+def lettering() -> Iterator[None]:
+    """Letters of a printed page while a sheet is drawn."""
+    from matplotlib import rc_context
+
+    sizes: dict[Any, Any] = {"font.size": 8.5, "legend.fontsize": 7.5, "figure.titlesize": 8.5}
+    sizes |= {"axes.titlesize": 8.5, "axes.labelsize": 8.0, "xtick.labelsize": 7.5, "ytick.labelsize": 7.5}
+    with rc_context(sizes):
+        yield
+
+
+def head(
+    axes: "matplotlib.axes.Axes", name: str, sentence: str, facts: str, *, answer: str = "", colour: str = _style.BLACK
+) -> None:
+    """The head of a sheet: its name, the sentence that says what to do, and what was measured or driven.
+
+    Arguments:
+        axes: over the width of the page.
+        name: of the damper or vehicle.
+        sentence: the finding.
+        facts: in small print below.
+        answer: in a few words before the sentence: build it or not.
+        colour: of the answer, or of the sentence without one: good or bad.
+    """
+    blank(axes)
+    axes.text(0.0, 1.0, f"{_style.typeset(name)}   ·   {_style.typeset(facts)}"[:130], color=_style.GREY, **_TEXT)
+    if answer:
+        axes.text(0.0, 0.79, answer, fontsize=14.0, fontweight="bold", color=colour, **_TEXT)
+        look, width, top = {"fontsize": 8.5}, 118, 0.46
+    else:
+        look, width, top = {"fontsize": 10.5, "fontweight": "bold", "color": colour}, 80, 0.76
+    lines = textwrap.wrap(_style.typeset(sentence), width)
+    lines = [*lines[:2], f"{lines[2].rstrip(' ,;.')} …"] if len(lines) > 3 else lines
+    axes.text(0.0, top, "\n".join(lines), **look, **_TEXT)
+
+
+def blank(axes: "matplotlib.axes.Axes") -> None:
+    """Axes that only hold text."""
+    axes.set_axis_off()
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(0.0, 1.0)
+
+
+def table(
+    axes: "matplotlib.axes.Axes",
+    title: str,
+    headings: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    ends: Sequence[float],
+    *,
+    step: float,
+    colours: Sequence[str] = (),
+) -> None:
+    """A table of text: the first column to the left, the others to the right at their ends.
+
+    Arguments:
+        axes: to write in.
+        title: above.
+        headings: of the columns.
+        rows: cells of each.
+        ends: right end of each column but the first, as a share of the width.
+        step: height of a row, as a share of the height.
+        colours: of the rows; black if left out.
+    """
+    blank(axes)
+    axes.text(0.0, 1.0, title, **_TEXT)
+    for number, cells in enumerate([headings, *rows]):
+        colour = _style.GREY if number == 0 else colours[number - 1] if colours else _style.BLACK
+        y = 1.0 - step * (number + 1.5)
+        for place, cell in zip((0.0, *ends), cells, strict=True):
+            side = "left" if place == 0.0 else "right"
+            axes.text(place, y, cell, fontsize=SMALL, color=colour, ha=side, va="center")
+
+
+def remarks(
+    axes: "matplotlib.axes.Axes", title: str, sentences: Sequence[str], *, width: int, none: str = "", most: int = 3
+) -> None:
+    """At most so many sentences under a title; the others are counted.
+
+    Arguments:
+        axes: to write in.
+        title: above.
+        sentences: the most important first.
+        width: letters in a line.
+        none: what is written where there are none.
+        most: sentences to write.
+    """
+    blank(axes)
+    shown = [textwrap.shorten(_style.typeset(s), 3 * width, placeholder=" …") for s in sentences[:most]]
+    lines = [line for s in shown or [none] for line in textwrap.wrap(s, width, subsequent_indent="   ")]
+    lines += [f"and {len(sentences) - most} more on the page"] * (len(sentences) > most)
+    axes.text(0.0, 1.0, title, **_TEXT)
+    axes.text(0.0, 0.86, "\n".join(lines), fontsize=SMALL, **_TEXT)

@@ -1,0 +1,350 @@
+"""The sheet of a damper: one A4 page of what was measured, the law fitted to it, and how far to trust it."""
+
+import dataclasses
+import functools
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._tables import rounded, typeset_unit
+from jaxdamp._traced import of_known_numbers
+from jaxdamp.bench import BenchRun, Evaluation, LimitCheck, evaluate, last_steady_cycle, peak_velocity_points
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify import Band, Comparison, FitResult, Rung
+from jaxdamp.plots import _sheet, _style, fitted_range
+from jaxdamp.plots.loops import spread
+from jaxdamp.rig import quasi_static
+
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+
+
+VELOCITIES = (25, 50, 100, 200, 300, 500, 700, 1000, 1500, 2000)  # mm/s, of the table of forces
+_MOST_SETTINGS, _MOST_LOOPS, _MOST_ROWS = 4, 6, 11
+_MM = 1e3
+
+
+@dataclasses.dataclass(frozen=True)
+class _Damper:
+    """What a sheet shows: an evaluation of records, and a fit of them if there is one."""
+
+    evaluation: Evaluation
+    rung: Rung | None
+    fit: FitResult | None
+    laws: Mapping[str, AbstractDamper]
+    static_force: float  # N, of gas and load cell: in the records and not in the curves
+    name: str
+
+    @classmethod
+    def of(cls, result: Comparison | FitResult | Evaluation, evaluation: Evaluation | None) -> "_Damper":
+        if isinstance(result, Evaluation):
+            gas = [each.gas_force for each in result.gas_and_friction.values()]
+            return cls(result, None, None, {}, float(np.mean(gas)) if gas else 0.0, "Damper records")
+        rung, fit = (result.best, result.best.result) if isinstance(result, Comparison) else (None, result)
+        measured = evaluate(fit.runs) if evaluation is None else evaluation
+        name = _style.law_name(fit.law) if rung is None else _style.in_words(rung.name)
+        laws = {_style.in_words(name): law for name, law in rung.laws().items()} if rung else {name: fit.law}
+        static = 0.0 if fit.rig is None else float(fit.rig.force_offset) + float(fit.rig.gas_force)
+        return cls(measured, rung, fit, laws, static, name)
+
+    @property
+    def runs(self) -> tuple[BenchRun, ...]:
+        return tuple(self.evaluation.runs)
+
+    @functools.cached_property
+    def colours(self) -> _style.Look:
+        """The colour of each setting; a single one is measured grey."""
+        names = list(self.evaluation.settings)
+        return {n: _style.graded(i, len(names)) if len(names) > 1 else _style.GREY for i, n in enumerate(names)}
+
+    @property
+    def expected(self) -> dict[str, np.ndarray]:
+        """The fitted force of each record."""
+        if self.fit is None:
+            return {}
+        return {run.name: force for run, force in zip(self.fit.runs, self.fit.respond(self.fit.runs), strict=True)}
+
+    @property
+    def largest(self) -> float:
+        return max(float(np.abs(run.force - self.static_force).max()) for run in self.runs)
+
+
+@of_known_numbers
+def damper_sheet(
+    result: Comparison | FitResult | Evaluation,
+    *,
+    evaluation: Evaluation | None = None,
+    sentence: str = "",
+    name: str = "",
+    warnings: Sequence[str] | None = None,
+    baseline: AbstractDamper | None = None,
+    band: Band | None = None,
+    limits: LimitCheck | None = None,
+) -> "matplotlib.figure.Figure":
+    """One A4 page of a damper, to print or to send: `result.plot("sheet")`.
+
+    Force over velocity with the points at peak velocity, the loops and the law; forces at stated velocities; loops over
+    stroke; the error of each record over its frequency; gas force and friction; parameters; the first warnings. Gas
+    force and zero error of the load cell are taken off, and the sheet says how much. Save it by
+    `figure.savefig("damper.pdf")`.
+
+    Arguments:
+        result: of `identify.compare`, `identify.fit` or `bench.evaluate`.
+        evaluation: of `bench.evaluate` for the fitted records; computed if left out.
+        sentence: at the top; the verdict or summary of the result if left out.
+        name: of the damper; that of the law if left out.
+        warnings: doubts, the most important first; those of the result if left out.
+        baseline: another law, drawn black and dashed.
+        band: 95 % band of the law (`FitResult.band`).
+        limits: of `evaluation.check`, drawn as bars and named in the table.
+    """
+    remedy = "Take the result of `identify.compare`, `identify.fit` or `bench.evaluate`."
+    _checks.instance("result", result, (Comparison, FitResult, Evaluation), "be a fit or an evaluation", remedy)
+    damper = _Damper.of(result, evaluation)
+    if not sentence:
+        sentence = result.verdict[0] if isinstance(result, Comparison) else result.summary
+    fit = damper.fit
+    doubts = damper.evaluation.notes if fit is None else fit.main_warnings or fit.warnings
+    with _sheet.lettering():
+        figure = _sheet.page()
+        rows = figure.add_gridspec(4, 1, height_ratios=(0.95, 4.6, 3.0, 2.5), hspace=0.02)
+        _sheet.head(figure.add_subplot(rows[0].subgridspec(1, 1)[0]), name or damper.name, sentence, _facts(damper))
+        first = rows[1].subgridspec(1, 2, width_ratios=(2.5, 1.0))
+        _force_velocity(figure.add_subplot(first[0]), damper, baseline, band, limits)
+        _forces(figure.add_subplot(first[1]), damper)
+        second = [figure.add_subplot(at) for at in rows[2].subgridspec(1, 3)]
+        _loops(second[0], damper)
+        _errors(second[1], damper)
+        _gas_and_friction(second[2], damper)
+        third = [figure.add_subplot(at) for at in rows[3].subgridspec(1, 2, width_ratios=(1.15, 1.0))]
+        _parameters(third[0], damper)
+        none = "No warnings" + ": what was fitted is determined, and the residual looks like noise." * bool(fit)
+        _sheet.remarks(third[1], "Warnings", doubts if warnings is None else warnings, width=62, none=none)
+    return figure
+
+
+def _facts(damper: _Damper) -> str:
+    """Records, their range, temperature and settings in a line."""
+    runs, settings = damper.runs, [name for name in damper.evaluation.settings if name]
+    fastest, slowest = (end(run.frequency for run in runs) for end in (max, min))
+    facts = [f"{len(runs)} record{'s' * (len(runs) > 1)}"]
+    facts += [f"{_style.short(slowest)} to {_style.short(fastest)} Hz" if fastest > slowest else f"{fastest:.3g} Hz"]
+    facts += [f"up to {_style.short(_MM * max(run.peak_velocity for run in runs))} mm/s"]
+    facts += [f"settings {', '.join(settings)}"] * (len(settings) > 1)
+    temperatures = [float(run.temperature.mean()) for run in runs if run.temperature is not None]
+    facts += [f"{np.mean(temperatures) - 273.15:.0f} °C"] if temperatures else []
+    return " · ".join([*facts, "+ rebound, − compression"])
+
+
+def _force_velocity(
+    axes: "matplotlib.axes.Axes",
+    damper: _Damper,
+    baseline: AbstractDamper | None,
+    band: Band | None,
+    limits: LimitCheck | None,
+) -> None:
+    """Points at peak velocity over loops, and the law."""
+    reach = _MM * max(run.peak_velocity for run in damper.runs)
+    lines = _records(axes, damper)
+    for number, (label, law) in enumerate(damper.laws.items()):
+        alone = len(damper.laws) == 1
+        style = _style.AFTER if alone else _style.AFTER | {"color": _style.graded(number, len(damper.laws))}
+        _curve(axes, law, reach, "law" if alone else label, style)
+    if baseline is not None:
+        _curve(axes, baseline, reach, "reference damper", _style.BEFORE)
+    if band is not None:
+        ends = {"color": _style.AFTER["color"], "alpha": 0.25, "linewidth": 0.0, "label": "95 % band of the law"}
+        axes.fill_between(_MM * np.asarray(band.velocity), band.lower, band.upper, **ends)
+    if limits is not None:
+        _tolerances(axes, limits, damper.static_force)
+    _style.dress(axes, "velocity [mm/s]", "force [N]", _force_title(damper))
+    _style.cross(axes)
+    axes.set_xlim(-1.05 * reach, 1.05 * reach)
+    if len(damper.evaluation.settings) > 1:
+        _style.label_ends(axes, lines if damper.fit is None else axes.get_lines()[-len(damper.laws) :])
+    else:
+        axes.plot([], [], color=_style.GREY, linewidth=0.7, label="loops (CVP)")
+        axes.legend(loc="best", frameon=False)
+
+
+def _records(axes: "matplotlib.axes.Axes", damper: _Damper) -> list:
+    """Loops and peak-velocity points of each setting; the lines through the points."""
+    lines: list = []
+    for setting, runs in damper.evaluation.settings.items():
+        colour = damper.colours[setting]
+        for run in spread(runs, _MOST_LOOPS):
+            part = last_steady_cycle(run)
+            loop = {"color": colour, "linewidth": 0.7, "alpha": 0.55, "zorder": 1.2}
+            axes.plot(_MM * run.velocity[part], run.force[part] - damper.static_force, **loop)
+        peaks = peak_velocity_points(runs)
+        velocity, force = (np.asarray(a).ravel() for a in (peaks.velocity, peaks.force))
+        order = np.argsort(velocity)
+        points = _MM * velocity[order], force[order] - damper.static_force
+        several = len(damper.evaluation.settings) > 1 and damper.fit is None
+        look = {"color": colour, "linestyle": "-" if several else "", "linewidth": 1.4}
+        look |= {"marker": "o", "markersize": 4.5, "markerfacecolor": "white", "zorder": 3.0}
+        lines += axes.plot(*points, label=setting or "peak-velocity points", **look)
+    return lines
+
+
+def _force_title(damper: _Damper) -> str:
+    """What the picture shows and what was taken off."""
+    off = f", without the static force of {_style.short(damper.static_force)} N" if damper.static_force else ""
+    return f"Force over velocity{off}"
+
+
+def _curve(axes: "matplotlib.axes.Axes", law: AbstractDamper, reach: float, label: str, style: Mapping) -> None:
+    """A settled law over velocities in mm/s, dotted where it is extrapolated."""
+    points = np.linspace(-1.05 * reach, 1.05 * reach, 401) / _MM
+    force = np.asarray(quasi_static(law, points).force)
+    drawn = fitted_range.curve(axes, law, points, force, label=label, **style)
+    for line in [*drawn, *[one for one in axes.get_lines()[-2:] if one not in drawn]]:
+        if np.size(line.get_xdata()) == points.size:
+            line.set_xdata(_MM * points)
+
+
+def _tolerances(axes: "matplotlib.axes.Axes", limits: LimitCheck, static: float) -> None:
+    """Bars from the least to the largest force at stated velocities, red where the measured force is outside."""
+    for limit, measured in limits.results:
+        if limit.velocity is not None and measured is not None and measured.unit == "N":
+            at = _MM * (limit.velocity if limit.quantity.startswith("rebound") else -limit.velocity)
+            ends = [measured.value if end is None else end for end in (limit.minimum, limit.maximum)]
+            colour = _style.GOOD if limit.kept_by(measured.value) else _style.BAD
+            axes.plot([at, at], [end - static for end in ends], color=colour, linewidth=6.0, alpha=0.6, zorder=1.0)
+
+
+def _forces(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
+    """Rebound and compression at stated velocities: of the law where there is one, otherwise measured."""
+    if damper.laws:
+        reach = _MM * max(run.peak_velocity for run in damper.runs)
+        speeds = np.array([v for v in VELOCITIES if v <= 1.02 * reach], dtype=float) / _MM
+        name, law = list(damper.laws.items())[-1]
+        sides = np.split(np.asarray(quasi_static(law, np.concatenate([speeds, -speeds])).force), 2)
+        title = "Forces of the law [N]" + f", {name}" * (len(damper.laws) > 1)
+        columns = dict(zip(("rebound", "compr."), sides, strict=True))
+    else:
+        speeds, columns = _measured_forces(damper)
+        title = "Measured forces [N]"
+    cells = zip(_MM * speeds, *columns.values(), strict=True)
+    ends = list(np.linspace(1.0, 0.3, len(columns) + 1)[:-1][::-1])
+    step = min(0.066, 0.9 / (len(speeds) + 1))
+    _sheet.table(axes, title, ["mm/s", *columns], [[*map(_style.short, row)] for row in cells], ends, step=step)
+
+
+def _measured_forces(damper: _Damper) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Velocities [m/s] and forces [N] by column: both sides of one setting, or the first settings over both sides."""
+    evaluation, settings = damper.evaluation, list(damper.evaluation.settings)[:_MOST_SETTINGS]
+    speeds = np.array(evaluation.velocities, dtype=float)
+    forces = {
+        (side, setting): np.array([evaluation.get(f"{side} force", setting=setting, velocity=v).value for v in speeds])
+        - damper.static_force
+        for side in ("rebound", "compression")
+        for setting in settings
+    }
+    if len(settings) == 1:
+        return speeds, {"rebound": forces["rebound", settings[0]], "compr.": forces["compression", settings[0]]}
+    both = {s: np.append(forces["rebound", s], forces["compression", s]) for s in settings}
+    return np.append(speeds, -speeds), both
+
+
+def _loops(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
+    """Force over stroke by speed: measured broad, the fit thin over it."""
+    shown = spread(damper.runs, _MOST_LOOPS)
+    fitted = damper.expected
+    for number, run in enumerate(shown):
+        cycle, colour = np.arange(len(run))[last_steady_cycle(run)], _style.graded(number, len(shown))
+        part = np.append(cycle, cycle[0])  # closed
+        stroke = _MM * run.stroke[part]
+        force = run.force[part] - damper.static_force
+        broad: _style.Look = {"linewidth": 3.0, "alpha": 0.35} if fitted else {"linewidth": 1.2}
+        axes.plot(stroke, force, color=colour, **broad)
+        if run.name in fitted:
+            expected = fitted[run.name][part] - damper.static_force
+            axes.plot(stroke, expected, color=colour, linewidth=1.0)
+    fastest, slowest = (_style.short(_MM * shown[i].peak_velocity) for i in (-1, 0))
+    speeds = f"{slowest} (dark) to {fastest} mm/s" if len(shown) > 1 else f"{fastest} mm/s"
+    _style.dress(
+        axes, "stroke [mm]", "force [N]", f"Loops, {speeds}" + ("\nbroad: measured, thin: law" if fitted else "")
+    )
+    _style.cross(axes)
+
+
+def _errors(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
+    """The error of each record over its frequency; without a law, the scatter of its cycles."""
+    frequency = {run.name: run.frequency for run in damper.runs}
+    if damper.fit is not None:
+        groups = {"fitted": damper.fit.scores}
+        if damper.rung is not None and damper.rung.judged_on:
+            groups = {"fitted": damper.fit.scores, "not fitted": damper.rung.scores}
+        sizes = {label: {s.name: s.rmse for s in scores} for label, scores in groups.items()}
+        title = "Error of the law"
+    else:
+        cycles = damper.evaluation.cycles
+        values = {name: c.force.std(axis=0, ddof=1).mean() for name, c in cycles.items() if len(c.periods) > 1}
+        sizes, title = {"": values}, "Scatter from cycle to cycle"
+    for (label, errors), mark in zip(sizes.items(), ("o", "x"), strict=False):
+        at = [(frequency[name], 100.0 * rmse / damper.largest) for name, rmse in errors.items() if name in frequency]
+        colour = _style.AFTER["color"] if mark == "o" else _style.COLOURS[1]
+        if at:
+            axes.semilogx(*np.array(at).T, mark, color=colour, markersize=5, label=label)
+    _style.dress(axes, "frequency [Hz]", "% of the largest force", f"{title},\nby record")
+    _style.frequency_axis(axes.xaxis)
+    axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
+    if "not fitted" in sizes:
+        axes.legend(frameon=False)
+
+
+def _gas_and_friction(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
+    """The slowest record in both directions, with gas force and friction in numbers."""
+    separated = next(iter(damper.evaluation.gas_and_friction.values()), None)
+    if separated is None:
+        note = "Run a slow triangle or sine, below 20 mm/s, to tell gas force from friction."
+        _sheet.remarks(axes, "Gas force and friction: not measured", [note], width=36)
+        return
+    stroke, inner = _MM * separated.stroke, slice(len(separated.stroke) // 20, -max(len(separated.stroke) // 20, 1))
+    for force, colour, label in (
+        (separated.rebound, _style.REBOUND, "into rebound"),
+        (separated.compression, _style.COMPRESSION, "into compression"),
+    ):
+        axes.plot(stroke[inner], force[inner], color=colour, linewidth=1.4, label=label)
+    axes.plot(stroke[inner], separated.static_force(separated.stroke)[inner], ":", color=_style.BLACK, label="static")
+    values = {m.quantity: m for m in separated.measurements}
+    gas, friction = (" ± ".join(_pair(values[name])) for name in ("gas force", "friction"))
+    rate = _style.short(separated.gas_rate / _MM)
+    _style.dress(axes, "stroke [mm]", "force [N]", f"Static {gas} N, {rate} N/mm,\nfriction {friction} N")
+    axes.legend(frameon=False, loc="best")
+
+
+def _pair(measurement: Any) -> tuple[str, ...]:
+    """A measured value, and half its interval where it is known."""
+    if not measurement.uncertainty:
+        return (_style.short(measurement.value),)
+    return tuple(text.replace("-", "−") for text in rounded(measurement.value, measurement.uncertainty))
+
+
+def _parameters(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
+    """The numbers of the law with half their 95 % intervals; of records alone, rates, knees, gas force and friction."""
+    if damper.fit is not None:
+        rows, colours = [], []
+        for e in damper.fit.parameters:
+            value, error = rounded(e.value, 1.96 * e.standard_error)
+            name = _style.in_words(e.name.removeprefix("law.").replace("law.", "").replace("rig.", "machine: "))
+            doubtful = bool(e.note)
+            text = f"{_style.short(e.value)}  ({e.note})" if doubtful else f"{value} ± {error}".replace("-", "−")
+            rows.append([name, text, typeset_unit(e.unit, "–")])
+            colours.append(_style.BAD if doubtful else _style.BLACK)
+        title, headings = "Parameters, ± 95 %", ["", "value", "unit"]
+    else:
+        texts = damper.evaluation.settings_table().texts()
+        rows = [[name, value.replace("-", "−"), unit] for name, unit, value, *_ in texts]
+        setting = next(iter(damper.evaluation.settings))
+        title, headings = "Rates, knees, gas force" + f", setting {setting}" * bool(setting), ["", "value", "unit"]
+        colours = [_style.BLACK] * len(rows)
+    more = len(rows) - _MOST_ROWS
+    if more > 0:
+        rows, colours = [*rows[:_MOST_ROWS], [f"and {more} more on the page", "", ""]], colours[: _MOST_ROWS + 1]
+    _sheet.table(axes, title, headings, rows, [0.78, 0.97], step=0.075, colours=colours)

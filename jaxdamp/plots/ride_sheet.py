@@ -1,0 +1,89 @@
+"""The sheet of a ride: one A4 page of a vehicle before and after, its road, its dampers, and what to build."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from jaxdamp._traced import of_known_numbers
+from jaxdamp.plots import _ride_panels, _rides, _sheet, _style
+from jaxdamp.simulation import Response
+from jaxdamp.tune import TuneResult
+
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+
+
+@of_known_numbers
+def ride_sheet(
+    rides: TuneResult | Response | Mapping[str, Response],
+    *,
+    sentence: str = "",
+    name: str = "",
+    limits: Mapping[str, object] | None = None,
+) -> "matplotlib.figure.Figure":
+    """One A4 page of a ride or a tuning, to print or to send: `result.plot("sheet")`.
+
+    The vehicle with its numbers; its road among the classes of ISO 8608; comfort over grip with the curve of constant
+    damping; the dampers with the share of time at each velocity; the spectrum of the body with the bands of body and
+    wheels, or of a bump peaks, overshoot and settling; the changes of the main metrics, with whiskers over the roads
+    that the tuning had not seen, and marks at limits. Save it by `figure.savefig("ride.pdf")`.
+
+    Arguments:
+        rides: of `tune.minimise`, or of `simulate`, several by name: the first is compared with the last.
+        sentence: at the top; the verdict of the tuning, or the changes, if left out.
+        name: of the vehicle and its road.
+        limits: of metrics, for rides; a tuning has its own.
+
+    Raises:
+        ValueError: no ride, an unknown metric in the limits.
+    """
+    if isinstance(rides, TuneResult):
+        shown, sentence = _rides.Rides.of_tuning(rides), sentence or rides.verdict.sentence
+        good = _style.GOOD if rides.verdict.better else _style.BAD
+        answer = {"answer": rides.verdict.outcome.value, "colour": good}
+    else:
+        by_name = _style.by_name("rides", rides, Response, "a response", _style.SIMULATE)
+        shown, answer = _rides.Rides.of_responses(by_name, limits), {}
+    with _sheet.lettering():
+        figure = _sheet.page()
+        rows = figure.add_gridspec(5, 1, height_ratios=(1.0, 1.9, 3.2, 3.0, 3.0), hspace=0.02)
+        title = name or _style.class_words(shown.cars[0]).capitalize()
+        top = figure.add_subplot(rows[0].subgridspec(1, 1)[0])
+        _sheet.head(top, title, sentence or _changes(shown), _facts(shown), **answer)
+        first = [figure.add_subplot(at) for at in rows[1].subgridspec(1, 2, width_ratios=(1.0, 1.15))]
+        _ride_panels.vehicle(first[0], shown)
+        _ride_panels.road(first[1], shown)
+        second = [figure.add_subplot(at) for at in rows[2].subgridspec(1, 2)]
+        _ride_panels.plane(second[0], shown)
+        _ride_panels.bars(second[1], shown)
+        paths = shown.dampers()
+        third = rows[3].subgridspec(2, max(len(paths), 1), height_ratios=(2.4, 1.0))
+        for column, path in enumerate(paths):
+            curves = figure.add_subplot(third[0, column])
+            _ride_panels.damper(curves, figure.add_subplot(third[1, column], sharex=curves), shown, path)
+        last = figure.add_subplot(rows[4].subgridspec(1, 1)[0])
+        _ride_panels.event(last, shown) if shown.is_event else _ride_panels.spectrum(last, shown)
+    return figure
+
+
+def _changes(shown: _rides.Rides) -> str:
+    """The change of each goal, or its value for a single ride."""
+    said = []
+    for goal, words in _rides.GOALS.items():
+        if names := shown.goal(goal):
+            before, after = (float(np.mean([side[name] for name in names])) for side in shown.values)
+            change = _style.percent(100.0 * (after / before - 1.0)) if before else "–"
+            said.append(f"{words} {_style.quantity(after, shown.units[names[0]]) if shown.single else change}")
+    first, last = map(_style.in_words, shown.names)
+    return ", ".join(said).capitalize() if shown.single else f"{last} against {first}: {', '.join(said)}"
+
+
+def _facts(shown: _rides.Rides) -> str:
+    """Speed, time and roads that were not seen, in a line."""
+    facts = [f"{_style.short(shown.speed)} m/s"] if shown.speed is not None else []
+    facts += [f"{_style.short(float(shown.responses[0].time[-1]))} s"] if shown.responses else []
+    facts += [f"{shown.fresh.roads} roads that the tuning had not seen"] if shown.fresh is not None else []
+    return " · ".join(facts)

@@ -1,0 +1,126 @@
+"""Force-velocity tables: units, signs, directions and settings as sheets have them; and several tests in one file."""
+
+import numpy as np
+import openpyxl
+import pytest
+
+from jaxdamp import bench, identify
+from jaxdamp.dampers import SplineTable, with_command
+from jaxdamp.plots import force_velocity_family
+
+
+LBF, INCH = 4.4482216152605, 0.0254
+SI = {"velocity": "m/s", "force": "N"}
+SHEET = "velocity [in/s],R1 [lbf],R2 [lbf],C1 [lbf],C2 [lbf]\n1,10,20,5,6\n5,40,60,15,18\n"
+
+
+def written(folder, text, name="sheet.csv"):
+    (folder / name).write_text(text)
+    return folder / name
+
+
+def test_a_sheet_in_pounds_is_a_family(tmp_path):
+    table = bench.read_table(written(tmp_path, SHEET))
+    assert table.settings == ("1", "2") and table.is_family
+    assert np.allclose(table.curves[1].velocity, np.array([-5, -1, 0, 1, 5]) * INCH)
+    assert np.allclose(table.curves[1].force, np.array([-18, -6, 0, 20, 60]) * LBF)
+    law = table.law()
+    assert float(with_command(law, 1.5).force(0.0, 5 * INCH, law.initial_state())) == pytest.approx(50 * LBF)
+    assert law.fitted_to.command == (1.0, 2.0)
+    assert isinstance(table.law("2", SplineTable), SplineTable)
+    assert len(force_velocity_family(table).axes[0].lines) >= 2
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("v [m/s],F [N]\n-0.2,-30\n-0.1,-20\n0.1,50\n0.2,70\n", {"sign": "rebound-positive"}),
+        ("v [m/s],F [N]\n0.2,30\n0.1,20\n-0.1,-50\n-0.2,-70\n", {"sign": "compression-positive"}),
+        ("v [m/s],F [N]\n-0.2,30\n-0.1,20\n0.1,-50\n0.2,-70\n", {"sign": "rebound-positive"}),
+        ("v [m/s],F [N]\n-0.2,30\n-0.1,20\n0.1,50\n0.2,70\n", {"sign": "rebound-positive"}),
+        ("v [m/s],F [N]\n0.1,20\n0.2,30\n0.1,-50\n0.2,-70\n", {"sign": "compression-positive"}),
+        ("v [mm/s];rebound [N];bump [N]\n100;50;-20\n200;70;-30\n", {}),
+        ("speed,load,direction\n0.1,50,reb\n0.2,70,reb\n0.1,20,comp\n0.2,30,comp\n", {"units": SI}),
+    ],
+)  # fmt: skip
+def test_every_way_to_write_directions_gives_the_same_points(tmp_path, text, options):
+    (curve,) = bench.read_table(written(tmp_path, text), **options).curves
+    moving = curve.velocity != 0.0
+    assert np.allclose(curve.velocity[moving], [-0.2, -0.1, 0.1, 0.2])
+    assert np.allclose(curve.force[moving], [-30, -20, 50, 70]) and not np.any(curve.force[~moving])
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "words"),
+    [
+        ("v [m/s],F [N]\n-0.1,-20\n0.1,50\n", {}, 'sign="compression-positive"'),
+        ("v [m/s],F [N]\n0.1,20\n0.1,-50\n", {}, "positive forces may be rebound or compression"),
+        ("v [m/s],F [N]\n0.1,20\n0.2,50\n", {}, 'side="symmetric"'),
+        ("v [m/s],F [N]\n0.1,20\n0.2,50\n", {"side": "rebound"}, "no points in compression"),
+        ("v,F [N]\n0.1,20\n0.2,50\n", {"side": "symmetric"}, "names no unit"),
+        ("t [s],v [m/s],F [N]\n0,0.1,20\n1,0.2,50\n", {}, "is no force-velocity table"),
+        ("v [m/s],F [N]\n0.1,20\n0.2,50\n", {"side": "up"}, "`side` must be one of"),
+    ],
+)
+def test_what_the_file_does_not_say_is_asked_for(tmp_path, text, options, words):
+    with pytest.raises(ValueError) as caught:
+        bench.read_table(written(tmp_path, text), **options)
+    assert words in str(caught.value)
+
+
+def test_settings_stand_in_rows_blocks_sheets_and_headers(tmp_path):
+    rows = "clicks,v [m/s],reb [N],comp [N]\n1,0.1,10,5\n1,0.2,20,9\n2,0.1,12,5\n2,0.2,22,9\n"
+    blocks = (
+        "1 clk\nv [m/s],reb [N],comp [N]\n0.1,10,5\n0.2,20,9\n\n2 clk\nv [m/s],reb [N],comp [N]\n0.1,12,5\n0.2,22,9\n"
+    )
+    numbers = "v [m/s],1,2\n-0.2,-9,-9\n-0.1,-5,-5\n0.1,10,12\n0.2,20,22\n"
+    book = openpyxl.Workbook()
+    for clicks, forces in ((1, (10, 20)), (2, (12, 22))):
+        sheet = book.create_sheet(f"{clicks} clicks")
+        for row in (("v [m/s]", "rebound [N]", "compression [N]"), (0.1, forces[0], 5), (0.2, forces[1], 9)):
+            sheet.append(row)
+    book.save(tmp_path / "book.xlsx")
+    tables = [
+        bench.read_table(written(tmp_path, rows, "rows.csv")),
+        bench.read_table(written(tmp_path, blocks, "blocks.csv")),
+        bench.read_table(written(tmp_path, numbers, "n.csv"), units={"force": "N"}, sign="rebound-positive"),
+        bench.read_table(tmp_path / "book.xlsx"),
+    ]
+    for table in tables:
+        assert table.settings == ("1", "2")
+        assert np.allclose([c.force[c.velocity != 0] for c in table.curves], [[-9, -5, 10, 20], [-9, -5, 12, 22]]), (
+            table.name
+        )
+
+
+def test_a_law_is_fitted_to_a_table(tmp_path):
+    table = bench.read_table(written(tmp_path, "v [m/s],F [N]\n0.1,100\n0.2,200\n0.5,500\n"), side="symmetric")
+    result = identify.fit(identify.default_ladder(table.runs(), ["linear"])["linear"], table.runs())
+    assert float(result.law.rate) == pytest.approx(1000.0, rel=1e-3)
+
+
+TIME = np.arange(400) / 200
+WAVE = 20 * np.sin(9 * TIME), 0.5 * np.cos(9 * TIME)
+
+
+def test_tests_in_one_file_are_split_and_said(tmp_path):
+    one = [f"{t:.4f},{x:.5f},{f:.6f}" for t, x, f in zip(TIME, *WAVE, strict=True)]
+    head = "t_s,x_mm,F_kN"
+    restart = bench.read(written(tmp_path, "\n".join([head, *one, *one]), "restart.csv"))
+    assert restart.names == ("restart/test 1", "restart/test 2") and "starts again" in restart[1].describe()
+    column = [f"{k},{row}" for k in (7, 8) for row in one]
+    numbered = bench.read(written(tmp_path, "\n".join([f"Test No.,{head}", *column]), "numbered.csv"))
+    assert numbered.names == ("numbered/test 7", "numbered/test 8")
+    blocks = bench.read(written(tmp_path, "\n".join(["Test 0.5A", head, *one, "Test 1A", head, *one]), "blocks.csv"))
+    assert blocks.names == ("blocks/Test 0.5A", "blocks/Test 1A")
+    assert [run.settings["current"] for run in blocks] == [0.5, 1.0] and "by its name" in blocks[0].describe()
+    for runs in (restart, numbered, blocks):
+        assert all(len(run) == 400 for run in runs)
+
+
+def test_a_record_whose_time_only_stumbles_is_still_refused(tmp_path):
+    times = TIME.copy()
+    times[200:] -= 0.3
+    rows = [f"{t:.4f},{x:.5f},{f:.6f}" for t, x, f in zip(times, *WAVE, strict=True)]
+    with pytest.raises(ValueError, match="must increase"):
+        bench.read(written(tmp_path, "\n".join(["t_s,x_mm,F_kN", *rows]), "a.csv"))

@@ -1,0 +1,48 @@
+"""From a manufacturer's sheet to the best click, in the units of the shop."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from jaxdamp.export import from_json
+
+from .invoking import jaxdamp, refused
+
+
+@pytest.fixture
+def sheet(tmp_path: Path) -> Path:
+    """A sheet of three clicks in lbf at in/s."""
+    rows = ["velocity [in/s],R1 [lbf],R2 [lbf],R3 [lbf],C1 [lbf],C2 [lbf],C3 [lbf]"]
+    rows += [f"{v},{5 * v},{8 * v},{11 * v},{3 * v},{4 * v},{5 * v}" for v in (1, 5, 10)]
+    (tmp_path / "sheet.csv").write_text("\n".join(rows))
+    return tmp_path / "sheet.csv"
+
+
+def test_a_sheet_becomes_a_family_and_a_best_click(sheet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = sheet.parent
+    monkeypatch.chdir(folder)
+    (folder / "jaxdamp.toml").write_text('[show]\nunits = "metric"\n')
+    said = jaxdamp("fit", sheet, "--units", "imperial", "--out", folder / "fit").output
+    assert "Shown in units imperial" in said and "8 settings" not in said
+    rows = list(csv.reader((folder / "fit/tables/forces.csv").read_text().splitlines()))
+    assert rows[0] == ["velocity [in/s]", "force at 1 [lbf]", "force at 2 [lbf]", "force at 3 [lbf]"]
+    assert [float(cell) for cell in rows[-1]] == pytest.approx([10.0, 50.0, 80.0, 110.0])
+    assert (
+        (folder / "fit/sheet.pdf").read_bytes()[:4] == b"%PDF"
+        and (folder / "fit/family.png").is_file()
+        and (folder / "fit/laws/3.json").is_file()
+    )
+    ride = ("quarter_car_000", "iso:A", "--start", folder / "fit/best_law.json", "--duration", "1")
+    said = jaxdamp("tune", *ride, "--limit", "grip=+20%", "--out", folder / "tune").output
+    assert "The best setting is" in said and "Shown in units metric" in said and "(from jaxdamp.toml)" in said
+    assert float(from_json(folder / "tune/law.json").command) in (1.0, 2.0, 3.0)
+    none = jaxdamp("tune", *ride, "--limit", "grip=0.001", "--out", folder / "none", code=1).output
+    assert "No setting meets the limits" in none
+
+
+def test_what_says_nothing_of_a_sheet_is_refused(sheet: Path) -> None:
+    words = ("fit", sheet, "--out", sheet.parent / "a")
+    assert "without hysteresis" in refused(sheet.parent, *words, "--law", "bouc_wen")
+    assert "force-velocity table" in refused(sheet.parent, *words, "--cross-validate")
+    assert "'imperial'" in refused(sheet.parent, *words, "--units", "imperal")

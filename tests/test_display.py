@@ -1,0 +1,76 @@
+"""Units and sign in which tables, sentences and pictures are shown."""
+
+import numpy as np
+import pytest
+
+from jaxdamp._display import Display, display, shown_in
+from jaxdamp._tables import Column, Shown, Table
+from jaxdamp.plots import _style
+
+
+SHOP = Display("imperial", "compression-positive")
+
+
+@pytest.mark.parametrize(
+    ("unit", "shown", "factor"),
+    [
+        ("N", "lbf", 1 / 4.4482216152605),
+        ("mm", "in", 1 / 25.4),
+        ("N s/m", "lbf s/in", 0.0254 / 4.4482216152605),
+        ("kN", "lbf", 1e3 / 4.4482216152605),
+        ("N s^0.5/m^0.5", "lbf s^0.5/in^0.5", 0.0254**0.5 / 4.4482216152605),
+        ("m/s^2", "m/s^2", 1.0),
+        ("m^3", "m^3", 1.0),
+        ("Hz", "Hz", 1.0),
+        ("", "", 1.0),
+    ],
+)
+def test_units_are_converted_by_what_they_are_made_of(unit, shown, factor):
+    assert SHOP.of(unit).unit == shown and SHOP.of(unit).factor == pytest.approx(factor)
+    assert Display().of(unit) == (unit, 1.0)
+
+
+def test_a_table_is_shown_in_shop_units_and_its_plain_data_stay():
+    columns = (Column("quantity"), Column("unit"), Column("value"), Column("scatter"), Column("count", spec="d"))
+    rows = (("rebound force", "N", Shown(444.822, "444.8 ± 4.4"), 4.44822, 3), ("ratio", "–", 2.0, 0.1, 3))
+    table = Table("Forces at 0.254 m/s (positive in rebound)", columns, rows)
+    with shown_in(SHOP):
+        assert table.texts()[0] == ("rebound force", "lbf", "-100.00 ± 0.99", "1", "3")
+        assert table.texts()[1] == ("ratio", "–", "2", "0.1", "3")
+        assert table.to_csv().splitlines()[1].startswith("rebound force,lbf,-99.99")
+        assert "positive in compression" in table.to_html()
+    assert table.texts()[0][2] == "444.8 ± 4.4" and display().plain
+    assert table.records()[0]["value"] == 444.822
+
+
+def test_lowest_and_highest_change_places_with_the_sign():
+    ends = Table("", (Column("run"), Column("least force", "N"), Column("largest force", "N")), (("a", -300.0, 700.0),))
+    rows = (("velocity", "m/s", -0.5, 0.9), ("frequency", "Hz", 1.0, 5.0))
+    spans = Table("", (Column("quantity"), Column("unit"), Column("lowest"), Column("highest")), rows)
+    with shown_in(Display("SI", "compression-positive")):
+        assert ends.shown().rows == (("a", -700.0, 300.0),)
+        assert spans.shown().rows == (("velocity", "m/s", -0.9, 0.5), ("frequency", "Hz", 1.0, 5.0))
+
+
+def test_sentences_have_the_unit_and_names_in_them_stay():
+    text = "RMSE 44.48 N at −0.254 to 0.508 m/s of '20 mm_a', from 'F [N]', 3 m/s^2"
+    assert SHOP.words(text) == "RMSE 10 lbf at -10 to 20 in/s of '20 mm_a', from 'F [N]', 3 m/s^2"
+
+
+def test_a_picture_has_ticks_in_the_unit_and_runs_the_other_way():
+    figure = _style.new_figure(4, 3)
+    axes = figure.subplots()
+    axes.plot([-0.5, 0.5], [-500.0, 800.0])
+    with shown_in(SHOP):
+        _style.dress(axes, _style.VELOCITY, _style.FORCE)
+    axes.set_xlim(-0.5, 0.5)
+    assert axes.get_xlabel() == "velocity [in/s]   (+ compression, − rebound)" and axes.xaxis_inverted()
+    ticks = np.sort(-axes.get_xticks() / 0.0254)
+    assert np.allclose(ticks, np.round(ticks)) and axes.yaxis.get_major_formatter()(-444.8221615) == "100"
+
+
+def test_unknown_words_are_refused():
+    with pytest.raises(ValueError, match="Did you mean 'imperial'"):
+        Display("imperal")
+    with pytest.raises(ValueError, match="`sign` must be one of"):
+        Display("SI", "up")
