@@ -21,7 +21,7 @@ from jaxdamp.simulation.notes import range_sentences, range_uses
 from jaxdamp.simulation.run import refuse_stacked
 from jaxdamp.simulation.stability import known_cars, known_system, step_need
 from jaxdamp.simulation.step_size import USUAL
-from jaxdamp.vehicles import AbstractVehicle, ChannelKind, Layout, delays_of, refuse_restless
+from jaxdamp.vehicles import AbstractVehicle, ChannelKind, Layout, delays_of, static_equilibrium
 
 
 if TYPE_CHECKING:
@@ -207,7 +207,7 @@ def harmonic_response(
     channels = jnp.where(is_steady(change)[..., None, None], cycles.channels, jnp.nan)
     known = _checks.concrete(cycles.motion)
     if known is not None and not np.any(np.isfinite(known)):
-        refuse_restless(vehicle)
+        static_equilibrium(vehicle)  # which refuses one that has none
     if known is not None and has_fitted_range(vehicle):
         flat = [values.reshape(-1, values.shape[-1]) for values in cycles[1:]]
         motion, force, road, rate = flat
