@@ -235,9 +235,14 @@ def are_tables(
     delimiter: str | None = None,
     sign: str | None = None,
 ) -> bool:
-    """Whether files are force-velocity tables rather than records; arguments as in `read_table`.
+    """Whether files are force-velocity tables rather than records. Files too large for one, or unreadable, are none.
 
-    Files that are too large for a table, or cannot be read, are none.
+    Arguments:
+        paths: files, folders or patterns.
+        columns: of quantities by name or place, as in `read_table`, which has the other arguments too.
+        units: of quantities.
+        delimiter: between cells.
+        sign: not needed to tell.
     """
     choice = Choice({**(columns or {})}, {**(units or {})})
     files = find_files(paths, FOLDER_SUFFIXES)

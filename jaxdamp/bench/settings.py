@@ -152,15 +152,22 @@ def settings_apart(runs: Sequence[BenchRun]) -> tuple[dict[str, str], str]:
 
 def _candidates(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
     """What may tell records apart: each setting that all of them state, and each word of their names, from the last."""
-    keys = [key for key in runs[0].settings if all(key in run.settings for run in runs)]
-    stated = [(f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs}) for key in keys]
     words = {run.name: re.split(r"[_\s,;()]+|-(?=\D)", run.name) for run in runs}
     places = range(-1, -min(map(len, words.values())) - 1, -1)
     named = [("a word of their names", {name: parts[i] for name, parts in words.items()}) for i in places]
-    read = {run.name: settings_in_name(run.name) for run in runs}  # such settings are words of the names first of all
-    own = [all(read[run.name].get(key) == run.settings[key] for run in runs) for key in keys]
-    first = [candidate for candidate, of_names in zip(stated, own, strict=True) if not of_names]
-    return [*first, *named, *(candidate for candidate, of_names in zip(stated, own, strict=True) if of_names)]
+    stated, read = _stated(runs)
+    return [*stated, *named, *read]
+
+
+def _stated(runs: Sequence[BenchRun]) -> list[list[tuple[str, dict[str, str]]]]:
+    """The settings that all records state: those from elsewhere, and those that were read from their names."""
+    divided: list[list[tuple[str, dict[str, str]]]] = [[], []]
+    read = [settings_in_name(run.name) for run in runs]
+    for key in runs[0].settings:
+        if all(key in run.settings for run in runs):
+            of_names = all(names.get(key) == run.settings[key] for names, run in zip(read, runs, strict=True))
+            divided[of_names].append((f"`{key}`", {run.name: f"{run.settings[key]}" for run in runs}))
+    return divided
 
 
 def by_number(text: str) -> tuple[float, str]:

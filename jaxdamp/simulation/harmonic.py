@@ -1,13 +1,13 @@
 """Frequency response of a vehicle whose laws are not linear: its steady motion on a sine of given amplitude."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, final
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Array, ArrayLike, Complex, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
@@ -15,6 +15,7 @@ from jaxdamp._limits import largest
 from jaxdamp._steady_cycles import AbstractSteadyCycles, is_steady, span
 from jaxdamp._tables import Column, Table, with_unit
 from jaxdamp._traced import behind
+from jaxdamp._types import Contents, ScalarLike
 from jaxdamp.dampers import has_fitted_range, warn_outside
 from jaxdamp.simulation.harmonic_cycle import Cycle, Excitation, sweep
 from jaxdamp.simulation.notes import range_sentences, range_uses
@@ -118,7 +119,7 @@ class HarmonicResponse(AbstractSteadyCycles):
             rows.append((channel.name, channel.unit, *map(float, numbers)))
         return Table("Largest steady response", columns, tuple(rows))
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> Contents:
         """Frequencies, amplitudes, status, and first harmonics and half ranges of every channel, ready for JSON."""
         units = self.layout.units
         return {
@@ -144,10 +145,10 @@ class HarmonicResponse(AbstractSteadyCycles):
 
 def harmonic_response(
     vehicle: AbstractVehicle,
-    frequency: Any,
-    amplitude: Any,
+    frequency: ArrayLike | Sequence[float],
+    amplitude: ArrayLike | Sequence[float] | Sequence[Sequence[float]],
     *,
-    speed: Any = None,
+    speed: ScalarLike | None = None,
     in_phase: bool = False,
     samples: int = SAMPLES,
     substeps: int | None = None,
@@ -218,7 +219,9 @@ def harmonic_response(
     )  # fmt: skip
 
 
-def _checked(frequency: Any, amplitude: Any) -> tuple[Array, Array]:
+def _checked(
+    frequency: ArrayLike | Sequence[float], amplitude: ArrayLike | Sequence[float] | Sequence[Sequence[float]]
+) -> tuple[Array, Array]:
     """Frequencies, and an amplitude for each of them."""
     _checks.positive("frequency", frequency)
     _checks.positive("amplitude", amplitude)
