@@ -158,9 +158,8 @@ def _candidates(runs: Sequence[BenchRun]) -> list[tuple[str, dict[str, str]]]:
     places = range(-1, -min(map(len, words.values())) - 1, -1)
     named = [("a word of their names", {name: parts[i] for name, parts in words.items()}) for i in places]
     read = {run.name: settings_in_name(run.name) for run in runs}  # such settings are words of the names first of all
-    own = [all(read[run.name].get(key) == run.settings[key] for run in runs) for key in keys]
-    first = [candidate for candidate, of_names in zip(stated, own, strict=True) if not of_names]
-    return [*first, *named, *(candidate for candidate, of_names in zip(stated, own, strict=True) if of_names)]
+    of_names = {f"`{key}`" for key in keys if all(read[run.name].get(key) == run.settings[key] for run in runs)}
+    return sorted([*stated, *named], key=lambda kind: 2 * (kind[0] in of_names) + (kind in named))
 
 
 def by_number(text: str) -> tuple[float, str]:
