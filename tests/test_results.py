@@ -28,7 +28,7 @@ from jaxdamp.tune.valving_result import OutOfReach, ValveParameter
 
 CAR = vehicles.presets.quarter_car_000()
 # They have a table, but are records, a dictionary or a tuple of numbers.
-NO_RESULTS = {"BenchSet", "MetricValues", "RoughnessBySegment", "Report"}
+NO_RESULTS = {"BenchSet", "ForceVelocityTable", "MetricValues", "RoughnessBySegment", "Report"}
 
 
 def result_classes() -> list[type[AbstractResult]]:
