@@ -17,7 +17,7 @@ from jaxdamp._tables import Column, Table, with_unit
 from jaxdamp._traced import behind
 from jaxdamp.dampers import has_fitted_range, warn_outside
 from jaxdamp.simulation.harmonic_cycle import Cycle, Excitation, sweep
-from jaxdamp.simulation.range_notes import range_sentences, range_uses
+from jaxdamp.simulation.notes import range_sentences, range_uses
 from jaxdamp.simulation.run import refuse_stacked
 from jaxdamp.simulation.stability import known_cars, known_system, step_need
 from jaxdamp.simulation.step_size import USUAL
