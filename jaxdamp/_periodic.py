@@ -59,7 +59,7 @@ def shoot(period: Period, state: State, setting: Setting) -> Shot:
         return after, (after, scale)
 
     slopes, (after, scale) = jax.jacfwd(both, has_aux=True)(state)
-    used = scale > 0
+    used = ~(scale <= 0)  # NaN counts
     return Shot(after, slopes, jnp.max(jnp.where(used, jnp.abs(after - state) / jnp.where(used, scale, 1.0), 0.0)))
 
 
