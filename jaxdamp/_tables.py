@@ -120,9 +120,12 @@ class Table:
         """The names of the columns with the units that are shown."""
         return [column.heading for column in self.shown().columns]
 
-    def only(self, first_cells: Collection[str]) -> "Table":
-        """The rows whose first cell is one of these."""
-        return dataclasses.replace(self, rows=tuple(row for row in self.rows if row[0] in first_cells))
+    def only(self, rows: Collection[str] | None = None, columns: Collection[str] | None = None) -> "Table":
+        """The rows whose first cell is one of these, and the columns of these names."""
+        places = [i for i, column in enumerate(self.columns) if columns is None or column.name in columns]
+        chosen = (row for row in self.rows if rows is None or row[0] in rows)
+        cells = tuple(tuple(row[i] for i in places) for row in chosen)
+        return dataclasses.replace(self, columns=tuple(self.columns[i] for i in places), rows=cells)
 
     def records(self) -> list[dict[str, Cell]]:
         """The rows as dictionaries by the names of the columns: a list that `pandas.DataFrame` takes as it is."""

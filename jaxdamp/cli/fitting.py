@@ -27,6 +27,9 @@ from jaxdamp.report import (
 )
 
 
+_BRIEF = ("law", "free", "fit", "held-out fit", "held-out RMSE", "note")  # columns of the ladder at the terminal
+
+
 class Fitted:
     """The fits of a command, and the laws that an interruption left without one.
 
@@ -240,15 +243,15 @@ def show(screen: Screen, fits: Fitted) -> None:
     comparison, best = fits.comparison, fits.comparison.best
     several = len(comparison.rungs) > 1
     lines = 1 + several  # of the verdict: which law, and why
-    screen.say()
-    screen.say(" ".join(comparison.verdict[:lines]), style="bold")
-    screen.table(comparison.table() if several else parameters_of(best), mark=best.name)
+    screen.answer(*comparison.verdict[:lines])
+    if several:
+        ladder = comparison.table()
+        screen.table(ladder if screen.verbose else ladder.only(columns=_BRIEF), mark=best.name)
+    if not several or screen.verbose:
+        screen.table(parameters_of(best))
     screen.points(fits.failures, style="red")
-    screen.say(" ".join(comparison.verdict[lines:]))
-    result = best.result
-    screen.points([in_command_line(warning) for warning in result.main_warnings], style="yellow")
-    if len(result.warnings) > len(result.main_warnings):
-        screen.points([f"all {len(result.warnings)} warnings of {best.name} are in report.html"])
+    warnings = best.result.warnings if screen.verbose else best.result.main_warnings
+    screen.remarks([*map(in_command_line, warnings), *comparison.verdict[lines:]], style="yellow")
 
 
 def write_fits(folder: Path, comparison: Comparison, runs: BenchSet, attempts: Attempts) -> None:
