@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from jaxdamp import _checks
 from jaxdamp._status import Status
-from jaxdamp._tables import Table, plain, with_unit
-from jaxdamp._types import Contents
+from jaxdamp._tables import Contents, Table, plain, with_unit
 
 
 if TYPE_CHECKING:

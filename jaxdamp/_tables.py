@@ -7,16 +7,16 @@ import io
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._display import Display, display
-from jaxdamp._types import Contents
 
 
 Cell = str | float | int | None
+Contents: TypeAlias = dict[str, Any]  # numbers, texts, lists and dictionaries of such, ready for JSON
 
 
 class Shown(float):

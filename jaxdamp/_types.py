@@ -1,7 +1,7 @@
 """Array types with meaning. Shapes are checked at run time in the tests only."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from jax import Array
@@ -12,7 +12,6 @@ Scalar = Float[Array, ""]
 State = Float[Array, " state"]
 Signal = Float[Array, " time"]
 VectorLike = Float[Array, " _"] | Float[np.ndarray, " _"] | Sequence[float]
-Contents: TypeAlias = dict[str, Any]  # numbers, texts, lists and dictionaries of such, ready for JSON
 SignalLike = Float[Array, " time"] | Float[np.ndarray, " time"]
 
 # Any number goes in as a scalar. Fields of modules: the constructor takes numbers and sequences, the converter of the

@@ -33,8 +33,9 @@ def _library(module: str, file: Path) -> ModuleType:
 
 def read_xlsx(file: Path) -> list[RawTable]:
     """Read a workbook: every sheet with rows of numbers is a record."""
+    library = _library("openpyxl", file)
     _check_inflation(file)
-    book = _library("openpyxl", file).load_workbook(file, read_only=True, data_only=True)
+    book = library.load_workbook(file, read_only=True, data_only=True)
     try:
         sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
     finally:

@@ -137,6 +137,8 @@ def _with_names_apart(tables: list[RawTable]) -> list[RawTable]:
 
 def _check_width(file: Path, top: list[tuple[int, str]]) -> None:
     """Refuse lines with more columns than any record has, before they are divided."""
+    if _other_format(top[0][1]):
+        return  # which is what is said of it
     number, line = max(top, key=lambda one: len(one[1]))
     count = 1 + max(max(line.count(mark) for mark in ",;\t|"), len(line.split()) - 1)
     if count > _MOST_COLUMNS:

@@ -12,7 +12,8 @@ import numpy as np
 from jax.tree_util import Partial
 
 from jaxdamp import _checks
-from jaxdamp._types import Contents, Number
+from jaxdamp._tables import Contents
+from jaxdamp._types import Number
 from jaxdamp.dampers import UNITS, AbstractDamper, FittedRange, with_fitted_range
 from jaxdamp.parameters import as_float
 

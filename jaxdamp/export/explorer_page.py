@@ -14,7 +14,7 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
-from jaxdamp._types import Contents
+from jaxdamp._tables import Contents
 from jaxdamp._writing import write_whole
 from jaxdamp.bench import BenchRun
 from jaxdamp.codegen import JavaScript, PrintedFunction, Program, lower, symbols

@@ -9,7 +9,7 @@ import equinox as eqx
 
 from jaxdamp import _checks
 from jaxdamp._documents import parse_json, read_text
-from jaxdamp._types import Contents
+from jaxdamp._tables import Contents
 from jaxdamp._writing import write_whole
 from jaxdamp.dampers import AbstractDamper, has_fitted_range
 from jaxdamp.export._rebuild import FITTED_TO, plain_module, rebuilt

@@ -102,7 +102,7 @@ def left_out(problem: Problem, best: SearchEnd) -> list[str]:
     if (named and named[-1].effect.name in OF_LAW) or (
         not static and repeated > 0 and left > max(OF_THE_LAW * repeated, sure)
     ):
-        return [*of_clock, _of_the_law(named, left / repeated), *of_mains]
+        return [*of_clock, _of_the_law(named, left / repeated if repeated > 0 else 1.0), *of_mains]
     return [*of_clock, *map(_of_the_machine, named), *of_mains]
 
 

@@ -9,8 +9,7 @@ from typing import Any, final
 import jax
 
 from jaxdamp import _checks
-from jaxdamp._tables import Compared, Table, comparison_table, with_unit
-from jaxdamp._types import Contents
+from jaxdamp._tables import Compared, Contents, Table, comparison_table, with_unit
 
 
 # Old name: new name, of the functions here and of ride metrics, alone or after the name of a corner ("front_…"). Remove

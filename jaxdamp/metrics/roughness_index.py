@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._tables import Column, Table
-from jaxdamp._types import Contents, Scalar, ScalarLike, Signal, SignalLike
+from jaxdamp._tables import Column, Contents, Table
+from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.metrics._signals import as_signal
 
 

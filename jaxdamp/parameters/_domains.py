@@ -69,7 +69,8 @@ def _sigmoid(raw: np.ndarray) -> np.ndarray:
 
 def _inverse_softplus(y: Numbers) -> Numbers:
     xp = _library(y)
-    return xp.where(y > 30.0, y, xp.log(xp.expm1(xp.minimum(y, 30.0))))
+    with np.errstate(divide="ignore"):  # minus infinity at the end of the domain
+        return xp.where(y > 30.0, y, xp.log(xp.expm1(xp.minimum(y, 30.0))))
 
 
 def _positive_to_raw(value: Array, scale: Array) -> Array:

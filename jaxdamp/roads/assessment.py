@@ -9,9 +9,8 @@ from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
-from jaxdamp._tables import Column, Table, plain, with_unit
+from jaxdamp._tables import Column, Contents, Table, plain, with_unit
 from jaxdamp._traced import of_known_numbers
-from jaxdamp._types import Contents
 from jaxdamp.roads.iso_classes import (
     HIGHEST_SPATIAL_FREQUENCY,
     LOWEST_SPATIAL_FREQUENCY,

@@ -13,9 +13,9 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._limits import largest
 from jaxdamp._steady_cycles import AbstractSteadyCycles, is_steady, span
-from jaxdamp._tables import Column, Table, with_unit
+from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp._traced import behind
-from jaxdamp._types import Contents, ScalarLike
+from jaxdamp._types import ScalarLike
 from jaxdamp.dampers import has_fitted_range, warn_outside
 from jaxdamp.simulation.harmonic_cycle import Cycle, Excitation, sweep
 from jaxdamp.simulation.notes import range_sentences, range_uses

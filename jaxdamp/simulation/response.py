@@ -12,8 +12,8 @@ from jaxtyping import Array, Float, Int
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, plotted
-from jaxdamp._tables import Table, with_unit
-from jaxdamp._types import Contents, Scalar, Signal
+from jaxdamp._tables import Contents, Table, with_unit
+from jaxdamp._types import Scalar, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import Metric
 from jaxdamp.simulation.energy import absorbed_by, energy_balance

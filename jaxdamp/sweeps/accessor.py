@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 import xarray
 
-from jaxdamp._tables import Column, Table, plain, typeset_unit
-from jaxdamp._types import Contents
+from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
 
 
 if TYPE_CHECKING:

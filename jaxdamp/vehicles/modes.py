@@ -9,8 +9,7 @@ from jaxtyping import Array, Complex, Float
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
-from jaxdamp._tables import Column, Table, plain, with_unit
-from jaxdamp._types import Contents
+from jaxdamp._tables import Column, Contents, Table, plain, with_unit
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear, linearise
 

@@ -53,7 +53,7 @@ def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
     row = rows["front_working_space_peak_to_peak"]
     assert float(row["law"]) == pytest.approx(float(expected["front_working_space_peak_to_peak"]), rel=1e-9)
     assert float(row["change [%]"]) == pytest.approx(100 * (float(row["law"]) / float(row["baseline"]) - 1))
-    pictures = {"ride.png", "front_damper.png", "rear_damper.png"}
+    pictures = {"ride_sheet.png", "ride_sheet.pdf", "ride.png", "front_damper.png", "rear_damper.png"}
     tables = {"metrics.csv", "comfort.csv", "channels_law.csv", "channels_baseline.csv"}
     files = {file.name for file in out.iterdir()}
     assert files == pictures | tables | {"law.json", "baseline.json", "report.html", "manifest.json"}

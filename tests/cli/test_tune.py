@@ -51,7 +51,7 @@ def test_tune_writes_a_better_law(law: Path, tmp_path: Path) -> None:
     assert json.loads((out / "tuning.json").read_text())["converged"] is True
     assert {file.name for file in out.iterdir()} == {
         "law.json", "vehicle.json", "parameters.csv", "metrics.csv", "tuning.json", "tuning.png", "report.html",
-        "baseline_damper.png", "manifest.json",
+        "baseline_damper.png", "manifest.json", "ride_sheet.png", "ride_sheet.pdf",
     }  # fmt: skip
 
 

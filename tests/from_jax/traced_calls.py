@@ -32,7 +32,7 @@ PACKAGES += ["simulation", "sweeps", "tune", "vehicles"]
 # They take names, texts, files, functions or results, which JAX cannot trace.
 NO_NUMBERS = {
     "": {"configure"},
-    "bench": {"read", "read_limits", "read_rides", "contradictions_in_words"},
+    "bench": {"read", "read_limits", "read_rides", "read_table", "contradictions_in_words"},
     "codegen": {"compiler", "is_printing", "lower", "printed_scan", "printing", "symbols"},
     "dampers": {"from_samples", "own_states", "sentence", "warn_outside", "drives_motion"},
     "export": {"from_json"},
@@ -288,6 +288,10 @@ SAMPLES: dict[str, dict[str, list[Call]]] = {
         "gas_and_friction": [lambda f, x: f(bench.separate_gas_and_friction(run(x)))],
     },
     "rig": {
+        "dynamic_stiffness": [
+            lambda f, x: f(law(x), F, 0.01).stiffness,
+            lambda f, x: f(law(1.0), F * x, 0.01).stiffness,
+        ],
         "march": [lambda f, x: f(law(x), jnp.asarray(1e-3) * x, jnp.asarray(X), jnp.asarray(V), 1)],
         "quasi_static": [lambda f, x: f(law(x), F), lambda f, x: f(law(1.0), F * x)],
         "solve_law": [lambda f, x: f(law(x), *map(jnp.asarray, (T, X, V)), __import__("diffrax").Tsit5(), 1e-6, 1e-6)],
@@ -343,6 +347,12 @@ SAMPLES: dict[str, dict[str, list[Call]]] = {
         **{
             name: [lambda f, x: f(response(x))] for name in ("absorbed_by", "comfort", "energy_balance", "ride_metrics")
         },
+        "far_outside": [lambda f, x: f(response(x).range_use())],
+        "over_runs": [lambda f, x: f([response(x).range_use()])],
+        "harmonic_response": [
+            lambda f, x: f(car(x), F, 0.01, substeps=8).gain("z_sprung"),
+            lambda f, x: f(car(1.0), F * x, 0.01 * x).gain("z_sprung"),
+        ],
         "comfort_table": [lambda f, x: f({"a": response(x)})],
         "metrics_table": [lambda f, x: f({"a": response(x)})],
         "moves_axles": [lambda f, x: f(lambda v: half_car_002(Linear(v)), 1500.0 * x)],

@@ -151,7 +151,7 @@ def test_a_search_that_is_cut_short_says_so(sines):
 
 def test_correlated_residuals_are_said(sines):
     wrong = fit(Linear, sines(BESINGER, noise=5.0))
-    assert any("Neighbouring residuals are alike" in w for w in wrong.warnings)
+    assert any("The residual repeats from cycle to cycle: the law misses" in w for w in wrong.warnings)
     right = fit(BESINGER, sines(BESINGER, noise=5.0))
     assert right.warnings == ()
     assert fit(Linear, sines(BESINGER, noise=5.0), force_noise=5.0).warnings == ()

@@ -106,8 +106,8 @@ def test_table_dictionary_and_picture(on_roads):
     assert json.loads(json.dumps(found.to_dict()))["differences"][1]["metric"] == TYRE
     figure = found.plot()
     assert [tick.get_text() for tick in figure.axes[0].get_yticklabels()] == [
-        "rms sprung acceleration",
-        "rms dynamic tyre load",
+        "body acceleration, RMS",
+        "tyre load variation, RMS",
     ]
 
 
