@@ -13,7 +13,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -60,7 +60,7 @@ class Case(NamedTuple):
 Make = Callable[[dampers.AbstractDamper, np.random.Generator, int], list[bench.BenchRun]]
 
 
-def _measured(law: dampers.AbstractDamper, seed: int, **settings: float) -> list[bench.BenchRun]:
+def _measured(law: dampers.AbstractDamper, seed: int, **settings: Any) -> list[bench.BenchRun]:
     settings = {"force_noise": NOISE, "stroke_noise": 1e-5} | settings
     return list(bench.VirtualDyno(law, sampling_rate=RATE, seed=seed, **settings).run(TESTS))
 

@@ -46,7 +46,7 @@ class AbstractSteadyCycles(eqx.Module, AbstractResult):
         remedy = "In compiled or differentiated code take those of `monodromy`."
         _checks.untraced("multipliers", self.monodromy, remedy)
         matrices = np.asarray(self.monodromy)
-        usable = np.isfinite(matrices).all(axis=(-2, -1), keepdims=True)
+        usable = np.asarray(np.isfinite(matrices).all(axis=(-2, -1), keepdims=True))
         values = np.linalg.eigvals(np.where(usable, matrices, 0.0))
         values = np.take_along_axis(values, np.argsort(-np.abs(values), axis=-1), axis=-1)
         return np.where(usable[..., 0], values, np.nan)

@@ -45,7 +45,7 @@ MORE_PROGRAMS = {
 }
 COMPILED = "/jax/core/compile/backend_compile_duration"
 compiled: Counter[str] = Counter()
-jax.monitoring.register_event_duration_secs_listener(lambda event, _, **__: compiled.update([event]))
+jax.monitoring.register_event_duration_secs_listener(lambda event, *_, **__: compiled.update([event]))
 
 
 # Traced programs are millions of objects, and looking through all of them for cycles takes seconds each time.

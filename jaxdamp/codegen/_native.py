@@ -80,7 +80,7 @@ def library(text: str) -> ctypes.CDLL:
 
 def _lasting_folder() -> Path | None:
     """Beside the compiled programs of JAX, if these are kept, in a folder that only this user can write."""
-    kept = jax.config.jax_compilation_cache_dir
+    kept = getattr(jax.config, "jax_compilation_cache_dir", None)
     if not kept or "://" in kept or not hasattr(os, "getuid"):
         return None
     folder = Path(kept) / "printed"

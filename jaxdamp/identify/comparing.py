@@ -137,7 +137,7 @@ class Comparison(AbstractResult):
             "failed": {failure.name: failure.reason for failure in self.failed},
         }
 
-    def plot(self, kind: str = "ladder", **options: object) -> "Figure":
+    def plot(self, kind: str = "ladder", **options: Any) -> "Figure":
         """The errors of the laws side by side (`plots.ladder`), or the sheet of the recommended law.
 
         Arguments:

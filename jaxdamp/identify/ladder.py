@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, final
 import equinox as eqx
 import jax
 import numpy as np
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks, dampers
 from jaxdamp._tables import Column, Table
@@ -56,12 +57,12 @@ def _friction(velocity: np.ndarray, force: np.ndarray) -> AbstractDamper:
 def _rate(law: AbstractMemoryless, velocity: np.ndarray) -> float:
     """Secant slope [N s/m] at the RMS velocity."""
     v = float(np.sqrt(np.mean(velocity**2)))
-    up, down = (float(_force(law, np.asarray(speed))) for speed in (v, -v))
+    up, down = (float(_force(law, jax.numpy.asarray(speed))) for speed in (v, -v))
     return (up - down) / (2 * v)
 
 
 @eqx.filter_jit
-def _force(law: AbstractMemoryless, v: np.ndarray) -> Scalar:
+def _force(law: AbstractMemoryless, v: Float[Array, ""]) -> Scalar:
     """In one program: JAX would compile each operation."""
     return law.force_velocity(v)
 

@@ -56,9 +56,8 @@ def _records(batch: Batch) -> list[Record]:
             fine = _refined(stroke, step * velocity, parts), _refined(velocity, step * _slopes(velocity, step), parts)
         used = np.flatnonzero(weight > 0)
         count = int(used[-1]) + 1 if used.size else 0
-        motion = map(np.ascontiguousarray, (stroke, velocity, *fine))
-        weights = map(np.ascontiguousarray, (weight, force))
-        rows.append(Record(*motion, parts, float(step) / parts, *weights, count))
+        x, v, fine_x, fine_v, w, f = map(np.ascontiguousarray, (stroke, velocity, *fine, weight, force))
+        rows.append(Record(x, v, fine_x, fine_v, parts, float(step) / parts, w, f, count))
     return rows
 
 

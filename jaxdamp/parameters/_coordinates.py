@@ -162,6 +162,7 @@ class HostMap(NamedTuple):
         """Values and derivatives at coordinates."""
         values, slopes = y * self.units, self.slopes.copy() if self.smooth else self.slopes
         for own, domain, scale in self.smooth:
+            assert domain.slopes is not None
             values[own], slopes[own, own] = domain.from_raw(y[own], scale), domain.slopes(y[own], scale)
         return values, slopes
 

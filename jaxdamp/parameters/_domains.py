@@ -14,6 +14,9 @@ from jaxtyping import Array, PyTree
 from jaxdamp._traced import of_known_numbers
 
 
+Numbers: TypeAlias = PyTree  # arrays of JAX or NumPy, as the arguments are
+
+
 @dataclasses.dataclass(frozen=True)
 class Domain:
     """The values a parameter may take, and a smooth one-to-one map to them from the whole real line.
@@ -33,11 +36,11 @@ class Domain:
 
     name: str
     contains: Callable[[np.ndarray], bool]
-    from_raw: Callable[[Array, Array], Array]
-    to_raw: Callable[[Array, Array], Array]
+    from_raw: Callable[[Numbers, Numbers], Numbers]
+    to_raw: Callable[[Numbers, Numbers], Numbers]
     lower: float = -np.inf
     upper: float = np.inf
-    steps: Callable[[Array], Array] | None = None
+    steps: Callable[[Numbers], Numbers] | None = None
     slopes: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
     remade: tuple[Callable[..., "Domain"], tuple[float, ...]] | None = dataclasses.field(default=None, repr=False)
 
@@ -50,9 +53,6 @@ class Domain:
     def ordered(self) -> bool:
         """Whether it is a domain of increasing vectors."""
         return self.steps is not None
-
-
-Numbers: TypeAlias = PyTree  # arrays of JAX or NumPy, as the arguments are
 
 
 def _library(array: object) -> ModuleType:
@@ -73,7 +73,7 @@ def _inverse_softplus(y: Numbers) -> Numbers:
         return xp.where(y > 30.0, y, xp.log(xp.expm1(xp.minimum(y, 30.0))))
 
 
-def _positive_to_raw(value: Array, scale: Array) -> Array:
+def _positive_to_raw(value: Numbers, scale: Numbers) -> Numbers:
     return _inverse_softplus(jnp.maximum(value / scale, 1e-12))
 
 

@@ -41,7 +41,7 @@ class Rides:
     cars: tuple[AbstractVehicle, AbstractVehicle]
     responses: tuple[Response, Response] | None  # None on a white road
     road: Any
-    run: Mapping[str, object]
+    run: Mapping[str, Any]
     values: tuple[Mapping[str, float], Mapping[str, float]]
     units: Mapping[str, str]
     limits: Mapping[str, tuple[float, float]]

@@ -229,13 +229,13 @@ def _rescale(axis: "matplotlib.axis.Axis", label: str) -> None:
     class Ticks(MaxNLocator):
         def tick_values(self, vmin: float, vmax: float) -> Any:
             ends = sorted((shown(vmin), shown(vmax)))
-            return np.sort(super().tick_values(*ends) / shown.factor)
+            return np.sort(np.asarray(super().tick_values(*ends)) / shown.factor)
 
     axis.set_major_locator(Ticks(nbins="auto", steps=[1, 2, 2.5, 5, 10]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(shown(value), 9) + 0.0:g}".replace("-", "−")))
     if shown.factor < 0.0:
         axis.set_inverted(True)
-        change = f"{axis.axis_name}lim_changed"
+        change = f"{'x' if axis is axis.axes.xaxis else 'y'}lim_changed"
         axis.axes.callbacks.connect(change, lambda _: None if axis.get_inverted() else axis.set_inverted(True))
 
 

@@ -133,7 +133,8 @@ class _Stroke(eqx.Module):
         dt = 1.0 / (self.frequency * count)
 
         def step(state: State, ends: tuple[Array, ...]) -> tuple[State, None]:
-            return self.law.advance(*ends, state, dt), None
+            x0, v0, x1, v1 = ends
+            return self.law.advance(x0, v0, x1, v1, state, dt), None
 
         def sample(state: State, ends: tuple[Array, ...]) -> tuple[State, State]:
             return jax.lax.scan(step, state, ends)[0], state

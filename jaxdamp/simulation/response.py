@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import equinox as eqx
 import jax
@@ -239,7 +239,7 @@ class Response(eqx.Module, AbstractResult):
             "energy_balance": {name: with_unit(value, "J") for name, value in self.energy_balance().items()},
         }
 
-    def plot(self, kind: str = "ride", **options: object) -> "Figure":
+    def plot(self, kind: str = "ride", **options: Any) -> "Figure":
         """Channels over time and the spectrum of the first, or the sheet of the ride.
 
         Arguments:

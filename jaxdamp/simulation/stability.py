@@ -56,11 +56,13 @@ class Slopes(NamedTuple):
 class _Samples(NamedTuple):
     """Slopes of a law at many velocities and strokes, as `Slopes` takes the largest of them; arrays."""
 
-    over_step: np.ndarray | None = None  # where states are extrapolated, [N s/m]
-    damping: np.ndarray | None = None  # at an instant, [N s/m]
-    by_velocity: np.ndarray | None = None  # through the states, [N/m]
-    by_stroke: np.ndarray | None = None  # [N/m]
-    rates: np.ndarray | None = None  # of the states by the states, where an explicit step carries them on, [1/s]
+    over_step: Array | np.ndarray | None = None  # where states are extrapolated, [N s/m]
+    damping: Array | np.ndarray | None = None  # at an instant, [N s/m]
+    by_velocity: Array | np.ndarray | None = None  # through the states, [N/m]
+    by_stroke: Array | np.ndarray | None = None  # [N/m]
+    rates: Array | np.ndarray | None = (
+        None  # of the states, where an explicit step carries them on, [1/s]
+    )
 
     def largest(self) -> Slopes:
         """The largest of each."""

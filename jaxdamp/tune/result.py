@@ -131,7 +131,7 @@ class TuneResult(AbstractResult, Generic[V]):
         """Better or not, by how much and at what price: on fresh roads if there are any."""
         return verdict_of(self)
 
-    def plot(self, kind: str = "changes", **options: object) -> "Figure":
+    def plot(self, kind: str = "changes", **options: Any) -> "Figure":
         """The laws and the metrics before and after, or the sheet of the ride.
 
         Arguments:

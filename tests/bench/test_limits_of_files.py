@@ -17,7 +17,7 @@ def test_too_many_columns_are_refused_before_they_are_divided(tmp_path):
 
 def test_a_workbook_that_swells_is_refused(tmp_path):
     book = openpyxl.Workbook()
-    book.active.append(["t_s", "x_mm", "F_N"])
+    book.create_sheet("a").append(["t_s", "x_mm", "F_N"])
     book.save(tmp_path / "a.xlsx")
     with (
         zipfile.ZipFile(tmp_path / "a.xlsx") as old,

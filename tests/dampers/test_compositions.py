@@ -55,7 +55,7 @@ def test_what_is_no_law_does_not_add():
     with pytest.raises(TypeError, match="unsupported operand"):
         Linear(1.0) + 5.0  # type: ignore[operator]
     with pytest.raises(TypeError, match="unsupported operand"):
-        assert Linear(1.0) * Linear(1.0)
+        assert Linear(1.0) * Linear(1.0)  # type: ignore[operator]
     with pytest.raises(ValueError, match="`terms` must hold at least one law"):
         Sum(())
 

@@ -12,6 +12,7 @@ from jaxdamp.bench import SineTest, VirtualDyno
 from jaxdamp.codegen import _native
 from jaxdamp.dampers import Besinger, Lag, Linear, LuGre, Spring
 from jaxdamp.identify import printed, printed_law, search
+from jaxdamp.identify.traces import Batch
 
 
 TRUTH = LuGre.guess(np.array([-0.3, 0.0, 0.3]), np.array([-600.0, 100.0, 900.0])) + Linear(1500.0) + Spring(2000.0)
@@ -58,6 +59,7 @@ def test_residual_jacobian_and_prediction_are_those_of_xla(name, runs) -> None:
         assert np.all(np.abs(answer - right) <= 1e-9 * scale)
     model = problem.free.build(jnp.asarray(values))
     for batch in problem.residuals:
+        assert isinstance(batch, Batch)
         forces, right = printed.predicted(batch, model), np.asarray(batch.predict(model))
         assert forces is not None and np.abs(forces - right).max() <= 1e-9 * np.abs(right).max()
 
@@ -100,6 +102,7 @@ def test_one_program_serves_records_of_any_number_and_length(runs) -> None:
 
 def test_without_a_compiler_xla_computes_it_and_the_log_says_so(runs, monkeypatch, caplog) -> None:
     monkeypatch.setattr(_native, "compiler", lambda: None)
+    monkeypatch.setattr(_native, "_lasting_folder", lambda: None)  # nor one compiled earlier
     for memory in ("_laws", "_refused"):
         monkeypatch.setattr(printed_law, memory, {})
     printed_law.say.cache_clear()

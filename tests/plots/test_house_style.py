@@ -61,7 +61,7 @@ def figures(
         "ride": plots.ride(responses, weighting="Wk"),
         "damper use": plots.damper_use(responses),
         "tuning": tuned.plot(),
-        "curves": plots.force_velocity({"besinger_lag": comparison.best.result.law}, runs=runs),
+        "curves": plots.force_velocity({"besinger_lag": comparison.best.result.law}, runs=list(runs)),
     }
 
 

@@ -70,7 +70,7 @@ def test_a_colour_means_the_same_in_every_figure(responses: dict[str, Response],
     before, after = ("#222222", "--"), ("#0072B2", "-")
     curves = styles(plots.force_velocity(laws, np.linspace(-1.0, 1.0, 5), baseline="before"))
     assert (curves["before"], curves["after"]) == (before, after) and curves["other"] not in (before, after)
-    rides = dict(zip(("before", "after"), responses.values(), strict=True))
+    rides: dict[str, Response] = dict(zip(("before", "after"), responses.values(), strict=True))
     for figure in (plots.ride(rides), plots.damper_use(rides), plots.tuning(tuned)):
         drawn = styles(figure)
         assert (drawn["before"], drawn["after"]) == (before, after)
