@@ -83,7 +83,7 @@ def _clearance(law: dampers.AbstractDamper, rng: np.random.Generator, seed: int)
         for k, x in enumerate(stroke):
             new = min(max(piston, x - 0.5 * gap), x + 0.5 * gap)
             moved[k], piston = float(new != piston), new
-        lost = np.asarray(law.force_velocity(velocity)) * (1.0 - moved)  # type: ignore[attr-defined]
+        lost = np.asarray(jax.vmap(law.force_velocity)(velocity)) * (1.0 - moved)  # type: ignore[attr-defined]
         runs.append(replace(run, force=run.force - lost))
     return runs
 

@@ -140,11 +140,12 @@ def _alike(residual: np.ndarray, records: Sequence[Record]) -> float:
 
 def _repeated(residual: np.ndarray, records: Sequence[Record]) -> float:
     """The part of the sum of squares that returns one cycle later, over records of two cycles or more."""
-    return sum(
+    parts = (
         float(residual[at[:-cycle]] @ residual[at[cycle:]]) * at.size / (at.size - cycle)
         for _, at, _, _, cycle in records
         if cycle
     )
+    return sum(parts, start=0.0)
 
 
 def _search(
@@ -174,7 +175,7 @@ def _is_static(found: _Named) -> bool:
     if found.effect.at_rest is None:
         return False
     size = np.sqrt(np.mean((found.effect.signals @ found.sizes) ** 2) / np.mean(np.sum(found.effect.signals, 1) ** 2))
-    return abs(float(found.effect.at_rest @ found.sizes)) > STATIC * size
+    return bool(abs(float(found.effect.at_rest @ found.sizes)) > STATIC * size)
 
 
 def _late(records: Sequence[Record], residual: np.ndarray, span: np.ndarray) -> list[Pattern]:

@@ -29,7 +29,7 @@ def _blank(tree: PyTree) -> PyTree:
     return jax.tree.map(lambda leaf: np.full(leaf.shape, -1.0) if is_number(leaf) else leaf, tree)
 
 
-def _refusal(parts: Sequence[object], model: Model) -> str:
+def _refusal(parts: Sequence[object], model: PyTree) -> str:
     """Why these records with this model are left to XLA; empty if they are not."""
     for part in parts:
         if not isinstance(part, Batch):
@@ -163,10 +163,11 @@ def evaluator(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> E
         say(f"Computed by XLA: {reason}.")
         return None
     taken_tree = _taken(free)
+    model = free.build(free.values)  # with the values that are tied to others
     places, rows, offset, first = [], [], 0, None
     for batch in batches:
         for row, record in enumerate(_records(batch)):
-            numbers = numbers_on_rig(_of_row(batch, free.tree, row))
+            numbers = numbers_on_rig(_of_row(batch, model, row))
             marked = _of_row(dataclasses.replace(batch, fixed={}), _marked(taken_tree, batch), row)
             taken = numbers_on_rig(marked, _blank(plain_rig()))
             first = first or numbers

@@ -219,7 +219,7 @@ def _substeps(law: AbstractDamper, frequency: Array, samples: int, wanted: int |
         return 1
     known = behind(frequency)
     if known is None:
-        _checks.refuse("substeps", "be given where the frequencies are not known", None, "Pass `substeps=4`.")
+        _checks.refuse("substeps", "be given where the frequencies are traced", None, "Pass `substeps=4`.")
     lowest = float(np.min(known))
     count = int(np.ceil(1.0 / (lowest * samples * LONGEST_STEP) * (1.0 - 1e-9)))
     if count * samples > MOST_STEPS:

@@ -60,9 +60,7 @@ class _Samples(NamedTuple):
     damping: Array | np.ndarray | None = None  # at an instant, [N s/m]
     by_velocity: Array | np.ndarray | None = None  # through the states, [N/m]
     by_stroke: Array | np.ndarray | None = None  # [N/m]
-    rates: Array | np.ndarray | None = (
-        None  # of the states, where an explicit step carries them on, [1/s]
-    )
+    rates: Array | np.ndarray | None = None  # of the states, where an explicit step carries them on, [1/s]
 
     def largest(self) -> Slopes:
         """The largest of each."""
@@ -199,8 +197,8 @@ def _of_term(law: AbstractDamper, dt: float) -> _Samples:
     return _Samples(None, *_slopes_at_instant(law, velocity, jnp.asarray(_STROKES)), rates)
 
 
-def _largest(values: np.ndarray) -> float:
-    return float(np.max(np.nan_to_num(values), initial=0.0))
+def _largest(values: Array | np.ndarray) -> float:
+    return float(np.max(np.nan_to_num(np.asarray(values)), initial=0.0))
 
 
 @eqx.filter_jit

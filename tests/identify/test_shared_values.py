@@ -177,8 +177,9 @@ def test_a_class_may_start_from_records(sines):
     class Own(Bilinear):  # type: ignore[misc]
         @classmethod
         def from_runs(cls, runs):
-            return Bilinear(*(float(max(run.peak_velocity for run in runs)),) * 2)
+            fastest = float(max(run.peak_velocity for run in runs))
+            return Bilinear(fastest, fastest)
 
-    assert get(prepare(Own, runs).law, "rebound_rate") == pytest.approx(max(run.peak_velocity for run in runs))
+    assert get(prepare(Own, runs).law, "rebound_rate") == pytest.approx(max(one.peak_velocity for one in runs))
     assert get(prepare(lambda runs: Linear(float(len(runs))), runs).law, "rate") == 3.0
     assert jnp.isfinite(get(prepare(Linear, runs).law, "rate"))
