@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import jax  # noqa: E402
 import numpy as np
 
 import jaxdamp
