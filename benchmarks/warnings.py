@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-import jax  # noqa: E402
+import jax
 import numpy as np
 
 import jaxdamp
