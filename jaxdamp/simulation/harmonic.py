@@ -246,7 +246,7 @@ def _substeps(vehicle: AbstractVehicle, frequency: Array, samples: int, wanted: 
     cars = None if known is None else known_cars(known_system(vehicle), dt)
     if cars is None:
         remedy = "Pass as many as `harmonic_response(...).substeps` says outside the compiled function."
-        _checks.refuse("substeps", "be given where the numbers of the vehicle are not known", None, remedy)
+        _checks.refuse("substeps", "be given where the numbers of the vehicle are traced", None, remedy)
     needed = max(step_need(*car, dt, most=np.inf).substeps for car in cars)
     count = max(needed, int(np.ceil(dt / USUAL * (1.0 - 1e-9))))
     if count * samples > MOST_STEPS:
