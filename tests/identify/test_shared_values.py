@@ -1,5 +1,7 @@
 """Values that parameters share (ties), values that records have of their own, and the three steps of a fit."""
 
+from typing import Any
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -176,7 +178,7 @@ def test_a_class_may_start_from_records(sines):
 
     class Own(Bilinear):  # type: ignore[misc]
         @classmethod
-        def from_runs(cls, runs):
+        def from_runs(cls, runs: Any):
             fastest = float(max(run.peak_velocity for run in runs))
             return Bilinear(fastest, fastest)
 
