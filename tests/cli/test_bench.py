@@ -180,7 +180,7 @@ def test_records_of_several_currents_are_fitted_as_one_law(folder: Path, tmp_pat
     out = tmp_path / "out"
     files = [folder / f"10mm_{speed}Hz.csv" for speed in (1, 2, 4)]
     words = ("--command", "*_1Hz=0,*_2Hz=1,*_4Hz=2", "--law", "linear", "--out", out)
-    said = " ".join(jaxdamp("fit", *files, *words).output.split())
+    said = " ".join(jaxdamp("fit", *files, *words, "--verbose").output.split())
     assert "linear interpolated to 1, whose records it was not fitted to: RMSE" in said
     law = from_json(out / "best_law.json")
     assert isinstance(law, Scheduled) and [float(level) for level in law.levels] == [0.0, 1.0, 2.0]
