@@ -250,6 +250,9 @@ def show(screen: Screen, fits: Fitted) -> None:
     if not several or screen.verbose:
         screen.table(parameters_of(best))
     screen.points(fits.failures, style="red")
+    further = len(set(identify.LAWS) - {rung.name for rung in comparison.rungs})
+    if several and best.doubt and further:
+        screen.points([f"{further} further laws may be without such doubt: --law all"])
     warnings = best.result.warnings if screen.verbose else best.result.main_warnings
     screen.remarks([*map(in_command_line, warnings), *comparison.verdict[lines:]], style="yellow")
 

@@ -121,7 +121,7 @@ NAMED_LAWS = {
 
 LAWS = tuple(name for name, law in NAMED_LAWS.items() if not law.optional)
 CURVES = ("bilinear", "besinger", "piecewise_linear")  # tried on all records
-LAGGING, RUBBING = ("besinger_lag", "besinger_series_spring"), ("bouc_wen", "series_spring_dahl")
+LAGGING, RUBBING = ("besinger_lag", "besinger_series_spring"), ("lugre_spring", "series_spring_dahl")
 BINS = 30  # of the velocity, in which the halves of a stroke are compared
 LOOP = 2e-3  # share of the squared force that is hysteresis, above which records show a loop
 DRY = 0.5  # share of the loop that is within `SLOW` of the largest velocity: friction that gives before it slides
