@@ -316,7 +316,7 @@ def _gas_and_friction(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
     gas, friction = (" ± ".join(_pair(values[name])) for name in ("gas force", "friction"))
     rate = _style.short(separated.gas_rate / _MM)
     _style.dress(axes, "stroke [mm]", "force [N]", f"Static {gas} N, {rate} N/mm,\nfriction {friction} N")
-    axes.legend(frameon=False, loc="best")
+    axes.legend(frameon=False, loc="center")
 
 
 def _pair(measurement: Any) -> tuple[str, ...]:

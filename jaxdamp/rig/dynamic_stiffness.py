@@ -37,8 +37,8 @@ class DynamicStiffness(AbstractSteadyCycles):
 
     Attributes:
         frequency: f [Hz], shape (frequencies,).
-        amplitude: X [m], shape (*amplitudes, frequencies).
-        force: over a cycle that begins in the middle of extension [N], shape (*amplitudes, frequencies, samples).
+        amplitude: X [m], shape (..., frequencies).
+        force: over a cycle that begins in the middle of extension [N], shape (..., frequencies, samples).
         mean: x₀ [m].
         monodromy: derivatives of the states of the law by their values a period earlier.
         change: the largest change of the states over a period, relative to their largest values in it.

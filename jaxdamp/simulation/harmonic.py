@@ -44,8 +44,8 @@ class HarmonicResponse(AbstractSteadyCycles):
     Attributes:
         layout: names and units of the vehicle.
         frequency: [Hz], in the order of the sweep, shape (frequencies,).
-        amplitude: of the road [m], shape (*amplitudes, frequencies).
-        cycles: all channels, shape (*amplitudes, frequencies, samples, channels).
+        amplitude: of the road [m], shape (..., frequencies).
+        cycles: all channels, shape (..., frequencies, samples, channels).
         monodromy: derivatives of motion, states of laws, and memory of the steps, by their values a period earlier.
         change: the largest change over a period, relative to the largest values in it.
         substeps: steps from one sample to the next.
@@ -169,7 +169,7 @@ def harmonic_response(
         vehicle: any vehicle.
         frequency: [Hz], in the order of the sweep, shape (frequencies,).
         amplitude: A [m], one, or one for each frequency (`v / (2 * np.pi * frequency)` for an amplitude v of the
-            velocity), or rows of them for several sweeps: shape (*amplitudes, frequencies), or (*amplitudes, 1).
+            velocity), or rows of them for several sweeps: shape (..., frequencies), or (..., 1).
         speed: of the vehicle [m/s], with which one axle comes after the other; not needed for a single axle.
         in_phase: the road is under all axles at once, instead of a speed.
         samples: of a period that are kept; superharmonics up to half as many.
