@@ -34,14 +34,14 @@ class AbstractSteadyCycles(eqx.Module, AbstractResult):
     """
 
     frequency: eqx.AbstractVar[Float[Array, " frequencies"]]
-    monodromy: eqx.AbstractVar[Float[Array, "*amplitudes frequencies state state"]]
-    change: eqx.AbstractVar[Float[Array, "*amplitudes frequencies"]]
+    monodromy: eqx.AbstractVar[Float[Array, "... frequencies state state"]]
+    change: eqx.AbstractVar[Float[Array, "... frequencies"]]
 
     def __repr__(self) -> str:
         return AbstractResult.__repr__(self)
 
     @property
-    def multipliers(self) -> Complex[np.ndarray, "*amplitudes frequencies state"]:
+    def multipliers(self) -> Complex[np.ndarray, "... frequencies state"]:
         """Eigenvalues of the monodromy matrix, the largest first: what a period makes of small disturbances."""
         remedy = "In compiled or differentiated code take those of `monodromy`."
         _checks.untraced("multipliers", self.monodromy, remedy)

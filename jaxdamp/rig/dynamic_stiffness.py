@@ -45,31 +45,31 @@ class DynamicStiffness(AbstractSteadyCycles):
     """
 
     frequency: Float[Array, " frequencies"]
-    amplitude: Float[Array, "*amplitudes frequencies"]
-    force: Float[Array, "*amplitudes frequencies samples"]
+    amplitude: Float[Array, "... frequencies"]
+    force: Float[Array, "... frequencies samples"]
     mean: Scalar
-    monodromy: Float[Array, "*amplitudes frequencies state state"]
-    change: Float[Array, "*amplitudes frequencies"]
+    monodromy: Float[Array, "... frequencies state state"]
+    change: Float[Array, "... frequencies"]
 
     @property
-    def complex_stiffness(self) -> Complex[Array, "*amplitudes frequencies"]:
+    def complex_stiffness(self) -> Complex[Array, "... frequencies"]:
         """K* [N/m], first harmonic of the force over the amplitude of the stroke."""
         angle = 2.0 * jnp.pi * jnp.arange(float(self.force.shape[-1])) / self.force.shape[-1]
         phase = jax.lax.complex(jnp.cos(angle), -jnp.sin(angle))
         return 2j / phase.size * (self.force.astype(phase.dtype) @ phase) / self.amplitude.astype(phase.dtype)
 
     @property
-    def stiffness(self) -> Float[Array, "*amplitudes frequencies"]:
+    def stiffness(self) -> Float[Array, "... frequencies"]:
         """Dynamic stiffness |K*| [N/m]."""
         return jnp.abs(self.complex_stiffness)
 
     @property
-    def loss_angle(self) -> Float[Array, "*amplitudes frequencies"]:
+    def loss_angle(self) -> Float[Array, "... frequencies"]:
         """δ, by which the force leads the stroke [rad]; π/2 for a dashpot, 0 for a spring."""
         return jnp.angle(self.complex_stiffness)
 
     @property
-    def damping(self) -> Float[Array, "*amplitudes frequencies"]:
+    def damping(self) -> Float[Array, "... frequencies"]:
         """Equivalent damping K″/(2πf) [N s/m], which dissipates the energy of a cycle, ∮ F dx = πωX² times it."""
         return jnp.imag(self.complex_stiffness) / (
             2.0 * jnp.pi * jnp.broadcast_to(self.frequency, self.amplitude.shape)
@@ -231,7 +231,7 @@ def _substeps(law: AbstractDamper, frequency: Array, samples: int, wanted: int |
 @eqx.filter_jit
 def _forces(
     law: AbstractDamper, frequency: Array, amplitude: Array, mean: Scalar, samples: int, substeps: int
-) -> tuple[Float[Array, "*amplitudes frequencies samples"], Shot]:
+) -> tuple[Float[Array, "... frequencies samples"], Shot]:
     """Steady forces, and a period of the states."""
 
     def steady(frequency: Scalar, amplitude: Scalar) -> tuple[Signal, Shot]:

@@ -53,18 +53,18 @@ class HarmonicResponse(AbstractSteadyCycles):
 
     layout: Layout = eqx.field(static=True)
     frequency: Float[Array, " frequencies"]
-    amplitude: Float[Array, "*amplitudes frequencies"]
-    cycles: Float[Array, "*amplitudes frequencies samples channels"]
-    monodromy: Float[Array, "*amplitudes frequencies state state"]
-    change: Float[Array, "*amplitudes frequencies"]
+    amplitude: Float[Array, "... frequencies"]
+    cycles: Float[Array, "... frequencies samples channels"]
+    monodromy: Float[Array, "... frequencies state state"]
+    change: Float[Array, "... frequencies"]
     substeps: int = eqx.field(static=True)
 
-    def __getitem__(self, channel: str) -> Float[Array, "*amplitudes frequencies samples"]:
+    def __getitem__(self, channel: str) -> Float[Array, "... frequencies samples"]:
         """A channel over the steady cycles, in its unit."""
         _checks.one_of("channel", channel, self.layout.numbers)
         return self.cycles[..., self.layout.numbers[channel]]
 
-    def harmonics(self, channel: str) -> Complex[Array, "*amplitudes frequencies orders"]:
+    def harmonics(self, channel: str) -> Complex[Array, "... frequencies orders"]:
         """Complex amplitudes Y_k of a channel in its unit, y(t) = Y_0 + Im Σ Y_k exp(2πi k f t).
 
         The mean, the first harmonic, and the superharmonics 2f, 3f ...; the road is Im A exp(2πift).
@@ -74,17 +74,17 @@ class HarmonicResponse(AbstractSteadyCycles):
         orders = spectrum[..., : values.shape[-1] // 2]
         return jnp.concatenate([orders[..., :1], 2j * orders[..., 1:]], axis=-1)
 
-    def gain(self, channel: str) -> Complex[Array, "*amplitudes frequencies"]:
+    def gain(self, channel: str) -> Complex[Array, "... frequencies"]:
         """First harmonic of a channel over the amplitude of the road, in its unit per metre: the transmissibility."""
         first = self.harmonics(channel)[..., 1]
         return first / self.amplitude.astype(first.dtype)
 
-    def peak(self, channel: str) -> Float[Array, "*amplitudes frequencies"]:
+    def peak(self, channel: str) -> Float[Array, "... frequencies"]:
         """Half of the difference between the highest and the lowest value of a channel in a cycle, in its unit."""
         values = self[channel]
         return 0.5 * (largest(values, axis=-1) + largest(-values, axis=-1))
 
-    def distortion(self, channel: str) -> Float[Array, "*amplitudes frequencies"]:
+    def distortion(self, channel: str) -> Float[Array, "... frequencies"]:
         """RMS of the superharmonics of a channel over that of its first harmonic."""
         squares = jnp.abs(self.harmonics(channel)) ** 2
         return jnp.sqrt(jnp.sum(squares[..., 2:], axis=-1) / squares[..., 1])
