@@ -53,13 +53,13 @@ class AbstractSteadyCycles(eqx.Module, AbstractResult):
 
     @property
     def steady(self) -> np.ndarray:
-        """Where a steady motion was found, shape (*amplitudes, frequencies)."""
+        """Where a steady motion was found, shape (..., frequencies)."""
         _checks.untraced("steady", self.change, "In compiled or differentiated code look at `change`.")
         return np.asarray(self.change) <= CLOSE[str(self.change.dtype)]
 
     @property
     def stable(self) -> np.ndarray:
-        """Where all multipliers are less than one: small disturbances die out, shape (*amplitudes, frequencies)."""
+        """Where all multipliers are less than one: small disturbances die out, shape (..., frequencies)."""
         return self.steady & ~(np.max(np.abs(self.multipliers), axis=-1, initial=0.0) > 1.0 + STABLE)
 
     @property
