@@ -113,11 +113,10 @@ class Display:
         """The units and the sign in words; empty for those of the library."""
         parts = [f"units {self.units}"] * bool(self._system)
         parts += ["compression positive"] * (self.sign == COMPRESSION)
-        return (
-            ""
-            if self.plain
-            else f"Shown in {', '.join(parts)}; JSON files and parameters of formulas keep the library's sign."
-        )
+        if self.plain:
+            return ""
+        kept = "; sentences, JSON files and parameters of formulas count rebound positive"
+        return f"Shown in {', '.join(parts)}{kept * (self.sign == COMPRESSION)}."
 
     @property
     def _system(self) -> dict[str, str]:

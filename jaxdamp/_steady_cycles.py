@@ -1,8 +1,11 @@
 """Results on steady cycles at many frequencies: which were found, which are stable."""
 
+from collections.abc import Sequence
+
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Complex, Float
+from jaxtyping import Array, ArrayLike, Bool, Complex, Float
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
@@ -22,6 +25,25 @@ def span(values: np.ndarray) -> str:
     """The lowest and the highest value, or the only one."""
     low, high = float(np.min(values)), float(np.max(values))
     return f"{low:.4g}" if high - low <= 1e-9 * high else f"{low:.4g} to {high:.4g}"
+
+
+def checked_points(
+    frequency: ArrayLike | Sequence[float], amplitude: ArrayLike | Sequence[float] | Sequence[Sequence[float]]
+) -> tuple[Float[Array, " frequencies"], Float[Array, "... frequencies"]]:
+    """Frequencies [Hz], and an amplitude for each of them, in one sweep or in rows of them.
+
+    Raises:
+        ValueError: numbers that are not positive, or shapes that do not fit together.
+    """
+    _checks.positive("frequency", frequency)
+    _checks.positive("amplitude", amplitude)
+    points, sizes = jnp.asarray(frequency, dtype=float), jnp.asarray(amplitude, dtype=float)
+    if points.ndim != 1 or not points.size:
+        _checks.refuse("frequency", "have one axis", f"of shape {points.shape}", "Pass `np.linspace(0.5, 20.0, 100)`.")
+    if sizes.ndim and sizes.shape[-1] not in (1, points.size):
+        must = f"be one number, one for each of {points.size} frequencies, or rows of them"
+        _checks.refuse("amplitude", must, f"of shape {sizes.shape}", "For several amplitudes pass `sizes[:, None]`.")
+    return points, jnp.broadcast_to(sizes, (*sizes.shape[:-1], points.size))
 
 
 class AbstractSteadyCycles(eqx.Module, AbstractResult):

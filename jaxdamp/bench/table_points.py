@@ -137,12 +137,13 @@ def sides_of(table: RawTable, how: How) -> tuple[list[Side], list[str]]:
     forces = [index for index in forces if index != clicks]
     words = _column_of_words(table, _DIRECTION, [at, *forces])
     velocity, unit = _values(table, at, "velocity", how)
-    units, found, problems = {"velocity": unit}, [], Problems()
+    units, found, problems, missing = {"velocity": unit}, [], Problems(), 0
     name = f"{table.file.stem} {table.record}"
     for index in forces:
         with problems.collected():
             force, units["force"] = _values(table, index, "force", how)
             there = np.isfinite(velocity) & np.isfinite(force)
+            missing += int(np.sum(~there))
             direction = np.full(len(velocity), _direction(table.names[index]) or _direction(name), dtype=float)
             if words is not None:
                 direction = np.array([_direction(str(cell)) for cell in table.columns[words].values], dtype=float)
@@ -155,7 +156,8 @@ def sides_of(table: RawTable, how: How) -> tuple[list[Side], list[str]]:
                 found.append(Side(setting, direction[rows], velocity[rows], force[rows], where))
     problems.raise_any()
     read = ", ".join(f"{role} in {text}" for role, text in units.items())
-    return found, [f"a force-velocity table: {read}; brought to SI", *table.notes]
+    lost = [f"left out: {missing} cell{'s' * (missing > 1)} of velocity or force without a number"] * bool(missing)
+    return found, [f"a force-velocity table: {read}; brought to SI", *lost, *table.notes]
 
 
 def _cell(value: object) -> str:

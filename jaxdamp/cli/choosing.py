@@ -18,7 +18,7 @@ from jaxdamp.dampers import Scheduled, with_command
 from jaxdamp.parameters import get
 from jaxdamp.report import Report
 from jaxdamp.roads import AbstractRoad
-from jaxdamp.tune import limit_spans
+from jaxdamp.tune import half_interval, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
 
 
@@ -101,33 +101,61 @@ def choose(
     vehicles = [_at(car, dict(zip(levels, setting, strict=True))) for setting in combinations]
     settings = [_words(levels, setting) for setting in combinations]
     with screen.stage("Driving every setting", total=len(vehicles)) as advance, without_range_warnings():
-        spans = limit_spans(allowed, names, _driven(rides, car))
-        rows = []
+        spans = limit_spans(allowed, names, _means(_driven(rides, car)))
+        driven = []
         for vehicle, setting in zip(vehicles, settings, strict=True):
-            advance(setting, len(rows))
-            rows.append(_driven(rides, vehicle))
+            advance(setting, len(driven))
+            driven.append(_driven(rides, vehicle))
+    rows = list(map(_means, driven))
     met = [all(low <= row[name] <= high for name, (low, high) in spans.items()) for row in rows]
     score = np.mean([list(map(row.get, wanted)) for row in rows], axis=1)
-    best = int(np.argmin(np.where(met, score, np.inf) if any(met) else score))
+    order = np.argsort(np.where(met, score, np.inf) if any(met) else score, kind="stable")
+    best = int(order[0])
     units = {m.name: typeset_unit(m.unit(car.units)) for m in rides[0].metrics}
-    columns = [Column("setting"), *(Column(name, units[name]) for name in rows[0]), Column("limits")]
-    cells = [
-        (setting, *row.values(), "met" if ok else "not met")
-        for setting, row, ok in zip(settings, rows, met, strict=True)
-    ]
     number = f"{wanted[0]} {rows[best][wanted[0]]:.4g} {units[wanted[0]]}"
+    on_roads = np.array([np.mean([each[name] for name in wanted], axis=0) for each in driven])
+    verdict = _verdict(settings[best], number, met)
+    if sum(met) > 1:
+        verdict += f" {_beside_next(on_roads[order[:2]], settings[int(order[1])], white=white)}"
     return Chosen(
         vehicles[best],
-        _verdict(settings[best], number, met),
-        Table("All settings", tuple(columns), tuple(cells)),
+        verdict,
+        _table(settings, rows, met, units),
         any(met),
     )
 
 
-def _driven(rides: Sequence[Ride], vehicle: AbstractVehicle) -> dict[str, float]:
-    """The metrics of a vehicle, their mean over the rides."""
+def _table(
+    settings: Sequence[str], rows: Sequence[Mapping[str, float]], met: Sequence[bool], units: Mapping[str, str]
+) -> Table:
+    """The metrics of every setting, and whether they meet the limits."""
+    columns = (Column("setting"), *(Column(name, units[name]) for name in rows[0]), Column("limits"))
+    words = ("met" if ok else "not met" for ok in met)
+    cells = zip(settings, rows, words, strict=True)
+    return Table("All settings", columns, tuple((setting, *row.values(), word) for setting, row, word in cells))
+
+
+def _driven(rides: Sequence[Ride], vehicle: AbstractVehicle) -> dict[str, list[float]]:
+    """The metrics of a vehicle on each ride."""
     each = [ride.of_vehicle(vehicle)() for ride in rides]
-    return {name: float(np.mean([float(values[name]) for values in each])) for name in each[0]}
+    return {name: [float(values[name]) for values in each] for name in each[0]}
+
+
+def _means(metrics: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    return {name: float(np.mean(values)) for name, values in metrics.items()}
+
+
+def _beside_next(on_roads: np.ndarray, following: str, *, white: bool) -> str:
+    """By how much the best setting (row 0) differs from the next best (row 1) over roads, and whether that is sure."""
+    gains = 100.0 * (on_roads[0] / on_roads[1] - 1.0)
+    gain = f"{np.mean(gains):+.1f}"
+    if white:
+        return f"That is {gain} % beside {following}, the next."
+    if gains.size < 2:
+        return f"That is {gain} % beside {following}, the next, on one road: --roads 4 says whether on others too."
+    half = half_interval(gains)
+    sure = "" if -np.mean(gains) > half else ", so that these roads do not tell them apart"
+    return f"That is {gain} ± {half:.1f} % beside {following}, the next, over {gains.size} roads{sure}."
 
 
 def _verdict(setting: str, number: str, met: Sequence[bool]) -> str:

@@ -2,6 +2,7 @@
 
 from jaxdamp._guesses import answer_guesses
 from jaxdamp._status import Status
+from jaxdamp.identify.bayes import Posterior as Posterior, Spread as Spread
 from jaxdamp.identify.comparing import Comparison as Comparison, compare, fit_each as fit_each
 from jaxdamp.identify.cross_validation import CrossValidation as CrossValidation, cross_validate
 from jaxdamp.identify.design_goal import MachineLimits
@@ -38,13 +39,7 @@ from jaxdamp.identify.predicting import (
 from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.problem import AbstractResiduals, Problem
 from jaxdamp.identify.profile import ProfileCurve as ProfileCurve
-from jaxdamp.identify.propagation import (
-    Band as Band,
-    Evidence as Evidence,
-    Posterior as Posterior,
-    Propagated as Propagated,
-    Spread as Spread,
-)
+from jaxdamp.identify.propagation import Band as Band, Evidence as Evidence, Propagated as Propagated
 from jaxdamp.identify.record_sensitivity import RecordSensitivity as RecordSensitivity
 from jaxdamp.identify.result import Fit as Fit
 from jaxdamp.identify.rungs import Failure as Failure, Rung as Rung

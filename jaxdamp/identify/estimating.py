@@ -213,8 +213,8 @@ def on_minima(minima: Sequence[Minimum], estimates: Sequence[Estimate]) -> list[
     return notes
 
 
-def on_misfit(noise: Noise, estimates: Sequence[Estimate] = ()) -> list[str]:
-    """A sentence on a residual that is not noise, and for what the intervals then hold."""
+def on_misfit(noise: Noise, estimates: Sequence[Estimate], explained: bool) -> list[str]:
+    """For what the intervals hold where the residual is not noise; and that it is not, unless that is explained."""
     if not noise.systematic:
         return []
     factors = [
@@ -224,9 +224,11 @@ def on_misfit(noise: Noise, estimates: Sequence[Estimate] = ()) -> list[str]:
     ]
     factor, name = max(factors, default=(1.0, ""))
     wider = f"; with what the law misses, the error of {name} is {factor:.2g} times as large" * (factor > WIDER)
+    lead = "The residual repeats from cycle to cycle: the law misses something systematic, or the machine is left out. "
     return [
-        "The residual repeats from cycle to cycle: the law misses something systematic, or the machine is left out."
-        f" The intervals hold for this law, not for the damper{wider}. The standard errors count the residual as noise"
+        lead
+        * (not explained)
+        + f"The intervals hold for this law, not for the damper{wider}. The standard errors count the residual as noise"
         f" with its correlation, which makes them {noise.inflation:.3g} times those of independent noise."
     ]
 

@@ -70,7 +70,8 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
     notes = on_status(best, _REMEDY)
     on_records = (*notes_on(law, problem.fitted_to), *off_span(model, problem.fitted_to, problem.initial_state))
-    on_rest, effects = on_misfit(noise, estimates.estimates), left_out(problem, best)
+    effects = left_out(problem, best)
+    on_rest = on_misfit(noise, estimates.estimates, bool(effects))
     main = (*notes, *on_records, *effects, *estimates.summary, *on_rest)
     notes += [*on_records, *estimates.notes, *on_rest, *effects]
     return FitResult(

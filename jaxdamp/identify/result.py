@@ -10,9 +10,10 @@ from jaxtyping import Float
 from jaxdamp._results import AbstractResult, Derived
 from jaxdamp._status import Status
 from jaxdamp._tables import Table, plain
+from jaxdamp.identify.bayes import Posterior, posterior
 from jaxdamp.identify.estimates import Estimate, Minimum, describe, parameter_table, rounded
 from jaxdamp.identify.profile import ProfileCurve, profile_curve
-from jaxdamp.identify.propagation import Evidence, Posterior, Propagated, posterior, propagate
+from jaxdamp.identify.propagation import Evidence, Propagated, propagate
 
 
 class AbstractModelResult(AbstractResult):

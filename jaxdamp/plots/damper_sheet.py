@@ -221,7 +221,7 @@ def _forces(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
     """Rebound and compression at stated velocities: of the law where there is one, otherwise measured."""
     if damper.laws:
         reach = _MM * max(run.peak_velocity for run in damper.runs)
-        speeds = np.array([v for v in VELOCITIES if v <= 1.02 * reach], dtype=float) / _MM
+        speeds = np.array([v for v in VELOCITIES if v <= 1.02 * reach] or [reach], dtype=float) / _MM
         name, law = list(damper.laws.items())[-1]
         sides = np.split(np.asarray(quasi_static(law, np.concatenate([speeds, -speeds])).force), 2)
         title = "Forces of the law [N]" + f", {name}" * (len(damper.laws) > 1)

@@ -1,21 +1,22 @@
 """Dynamic stiffness and damping of a law over frequency and amplitude, as test machines measure them."""
 
-from typing import TYPE_CHECKING, Any, final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, final
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Array, ArrayLike, Complex, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._periodic import Shot, shoot, steady_state, with_derivatives
 from jaxdamp._sharded import varying_as
-from jaxdamp._steady_cycles import AbstractSteadyCycles, is_steady, span
+from jaxdamp._steady_cycles import AbstractSteadyCycles, checked_points, is_steady, span
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp._traced import behind
-from jaxdamp._types import Scalar, Signal, State
+from jaxdamp._types import Scalar, ScalarLike, Signal, State
 from jaxdamp.dampers import AbstractDamper
 
 
@@ -151,10 +152,10 @@ def _period(state: State, stroke: _Stroke) -> tuple[State, State]:
 
 def dynamic_stiffness(
     law: AbstractDamper,
-    frequency: Any,
-    amplitude: Any,
+    frequency: ArrayLike | Sequence[float],
+    amplitude: ArrayLike | Sequence[float] | Sequence[Sequence[float]],
     *,
-    mean: Any = 0.0,
+    mean: ScalarLike = 0.0,
     samples: int = SAMPLES,
     substeps: int | None = None,
 ) -> DynamicStiffness:
@@ -189,16 +190,8 @@ def dynamic_stiffness(
     [1998, 1059]
     """
     check_module("law", law, (AbstractDamper,), "dynamic_stiffness(law, frequency, amplitude)")
-    _checks.positive("frequency", frequency)
-    _checks.positive("amplitude", amplitude)
     _checks.finite("mean", mean)
-    points, sizes = jnp.asarray(frequency, dtype=float), jnp.asarray(amplitude, dtype=float)
-    if points.ndim != 1 or not points.size:
-        _checks.refuse("frequency", "have one axis", f"of shape {points.shape}", "Pass `np.geomspace(0.1, 100.0, 40)`.")
-    if sizes.ndim and sizes.shape[-1] not in (1, points.size):
-        must = f"be one number, one for each of {points.size} frequencies, or rows of them"
-        _checks.refuse("amplitude", must, f"of shape {sizes.shape}", "For several amplitudes pass `sizes[:, None]`.")
-    sizes = jnp.broadcast_to(sizes, (*sizes.shape[:-1], points.size))
+    points, sizes = checked_points(frequency, amplitude)
     count = _substeps(law, points, samples, substeps)
     middle = jnp.asarray(mean, dtype=float)
     force, shots = _forces(law, points, sizes, middle, samples, count)

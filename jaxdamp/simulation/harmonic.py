@@ -12,7 +12,7 @@ from jaxtyping import Array, ArrayLike, Complex, Float
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._limits import largest
-from jaxdamp._steady_cycles import AbstractSteadyCycles, is_steady, span
+from jaxdamp._steady_cycles import AbstractSteadyCycles, checked_points, is_steady, span
 from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp._traced import behind
 from jaxdamp._types import ScalarLike
@@ -198,7 +198,7 @@ def harmonic_response(
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "harmonic_response(vehicle, frequency, amplitude)")
     refuse_stacked(vehicle)
-    points, sizes = _checked(frequency, amplitude)
+    points, sizes = checked_points(frequency, amplitude)
     behind_front = jnp.stack([wheel.behind for wheel in vehicle.frame().wheels])
     delays = delays_of(behind_front, max(vehicle.layout.axles) + 1, speed, in_phase)
     if not isinstance(samples, int | np.integer) or samples < 16 or samples % 2:
@@ -217,21 +217,6 @@ def harmonic_response(
         layout=vehicle.layout, frequency=points, amplitude=sizes, cycles=channels, monodromy=monodromy, change=change,
         substeps=substeps,
     )  # fmt: skip
-
-
-def _checked(
-    frequency: ArrayLike | Sequence[float], amplitude: ArrayLike | Sequence[float] | Sequence[Sequence[float]]
-) -> tuple[Array, Array]:
-    """Frequencies, and an amplitude for each of them."""
-    _checks.positive("frequency", frequency)
-    _checks.positive("amplitude", amplitude)
-    points, sizes = jnp.asarray(frequency, dtype=float), jnp.asarray(amplitude, dtype=float)
-    if points.ndim != 1 or not points.size:
-        _checks.refuse("frequency", "have one axis", f"of shape {points.shape}", "Pass `np.linspace(0.5, 20.0, 100)`.")
-    if sizes.ndim and sizes.shape[-1] not in (1, points.size):
-        must = f"be one number, one for each of {points.size} frequencies, or rows of them"
-        _checks.refuse("amplitude", must, f"of shape {sizes.shape}", "For several sweeps pass `sizes[:, None]`.")
-    return points, jnp.broadcast_to(sizes, (*sizes.shape[:-1], points.size))
 
 
 def _substeps(vehicle: AbstractVehicle, frequency: Array, samples: int, wanted: int | None) -> int:

@@ -163,7 +163,12 @@ def excess(fresh: "Rescore", name: str, allowed: LimitRange) -> Float[np.ndarray
 
 
 def half_interval(values: Float[np.ndarray, " roads"], level: float = 0.95) -> float:
-    """Half the interval of the mean of independent values, by Student's distribution; infinite for one value."""
+    """Half the interval of the mean of independent values, by Student's distribution; infinite for one value.
+
+    Arguments:
+        values: one for each road.
+        level: of the interval.
+    """
     from scipy.stats import t
 
     if len(values) < 2:

@@ -35,7 +35,10 @@ def test_a_sheet_becomes_a_family_and_a_best_click(sheet: Path, monkeypatch: pyt
     )
     ride = ("quarter_car_000", "iso:A", "--start", folder / "fit/best_law.json", "--duration", "1")
     said = jaxdamp("tune", *ride, "--limit", "grip=+20%", "--out", folder / "tune").output
-    assert "The best setting is" in said and "Shown in units metric" in said and "(from jaxdamp.toml)" in said
+    assert "The best setting is" in said and "the next, on one road: --roads 4 says" in " ".join(said.split())
+    several = jaxdamp("tune", *ride, "--limit", "grip=+20%", "--roads", "2", "--out", folder / "two").output
+    assert "over 2 roads" in " ".join(several.split())
+    assert "Shown in units metric" in said and "(from jaxdamp.toml)" in said
     assert float(from_json(folder / "tune/law.json").command) in (1.0, 2.0, 3.0)
     none = jaxdamp("tune", *ride, "--limit", "grip=0.001", "--out", folder / "none", code=1).output
     assert "No setting meets the limits" in none

@@ -159,6 +159,25 @@ class _Compiled(AbstractMemoryless):
         return self.rate * v * (1.1 if isinstance(v, jax.Array) and _checks.concrete(v) is not None else 1.0)
 
 
+@jax.custom_jvp
+def _itself(number):
+    return number
+
+
+@_itself.defjvp
+def _slope_of_itself(primals, tangents):
+    return primals[0], tangents[0] * (1.1 if _checks.concrete(primals[0]) is not None else 1.0)
+
+
+class _CompiledSlope(AbstractMemoryless):
+    """Has the same force compiled, but another derivative."""
+
+    rate: jax.Array = parameter("N s/m", "slope", positive)
+
+    def force_velocity(self, v):
+        return _itself(self.rate) * v
+
+
 class _Cancelling(AbstractMemoryless):
     """Loses its digits in single precision."""
 
@@ -203,6 +222,7 @@ class _Deaf(AbstractMemoryless):
         (_AnyStates, "refusals"),
         (_Silent, "text"),
         (_Compiled, "compiled"),
+        (_CompiledSlope, "compiled"),
         (_Cancelling, "single precision"),
         (_Gap, "inside wrappers"),
         (_Deaf, "alike ports"),
