@@ -108,7 +108,7 @@ def choose(
             driven.append(_driven(rides, vehicle))
     rows = list(map(_means, driven))
     met = [all(low <= row[name] <= high for name, (low, high) in spans.items()) for row in rows]
-    score = np.mean([list(map(row.get, wanted)) for row in rows], axis=1)
+    score = np.mean([[row[name] for name in wanted] for row in rows], axis=1)
     order = np.argsort(np.where(met, score, np.inf) if any(met) else score, kind="stable")
     best = int(order[0])
     units = {m.name: typeset_unit(m.unit(car.units)) for m in rides[0].metrics}
