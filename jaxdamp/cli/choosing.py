@@ -108,12 +108,12 @@ def choose(
             driven.append(_driven(rides, vehicle))
     rows = list(map(_means, driven))
     met = [all(low <= row[name] <= high for name, (low, high) in spans.items()) for row in rows]
-    score = np.mean([[row[name] for name in wanted] for row in rows], axis=1)
+    on_roads = np.array([np.mean([each[name] for name in wanted], axis=0) for each in driven])
+    score = on_roads.mean(axis=1)
     order = np.argsort(np.where(met, score, np.inf) if any(met) else score, kind="stable")
     best = int(order[0])
     units = {m.name: typeset_unit(m.unit(car.units)) for m in rides[0].metrics}
     number = f"{wanted[0]} {rows[best][wanted[0]]:.4g} {units[wanted[0]]}"
-    on_roads = np.array([np.mean([each[name] for name in wanted], axis=0) for each in driven])
     verdict = _verdict(settings[best], number, met)
     if sum(met) > 1:
         verdict += f" {_beside_next(on_roads[order[:2]], settings[int(order[1])], white=white)}"
