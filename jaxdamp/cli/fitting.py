@@ -252,7 +252,7 @@ def show(screen: Screen, fits: Fitted) -> None:
     screen.points(fits.failures, style="red")
     further = len(set(identify.LAWS) - {rung.name for rung in comparison.rungs})
     if several and best.doubt and further:
-        screen.points([f"{further} further laws may be without such doubt: --law all"])
+        screen.points([f"--law all tries {further} further laws"])
     warnings = best.result.warnings if screen.verbose else best.result.main_warnings
     screen.remarks([*map(in_command_line, warnings), *comparison.verdict[lines:]], style="yellow")
 

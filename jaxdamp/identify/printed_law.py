@@ -8,14 +8,13 @@ from collections.abc import Hashable
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
 from jaxdamp.codegen import Signature, library, symbols, with_slopes
 from jaxdamp.dampers import laws_inside, margins
 from jaxdamp.identify.model import Model, OnRig, law_of, rig_of
-from jaxdamp.rig import LawNumbers, Rig, numbers_of
+from jaxdamp.rig import LawNumbers, Rig, gas_and_friction, numbers_of
 
 
 _LOG = logging.getLogger("jaxdamp.identify.printed")
@@ -115,10 +114,8 @@ class PrintedLaw:
         def force(arrays: list[Array], s: Array, x: Array, v: Array) -> Array:
             law, rig = numbers.built(arrays).law, numbers.built(arrays).rig
             assert rig is not None
-            inside = x - rig.stroke_offset
-            gas = rig.gas_force + rig.gas_stiffness * inside
-            friction = rig.friction * jnp.tanh(v / rig.friction_velocity)
-            return law.force(inside, v, s) + gas + friction + rig.force_offset
+            gas, friction = gas_and_friction(rig, x, v)
+            return law.force(x - rig.stroke_offset, v, s) + gas + friction + rig.force_offset
 
         def advance(arrays: list[Array], s: Array, x0: Array, v0: Array, x1: Array, v1: Array, h: Array) -> Array:
             law, rig = numbers.built(arrays).law, numbers.built(arrays).rig

@@ -2,7 +2,7 @@
 
 from jaxdamp.rig.constant_velocity import QuasiStatic as QuasiStatic, quasi_static
 from jaxdamp.rig.dynamic_stiffness import DynamicStiffness as DynamicStiffness, dynamic_stiffness
-from jaxdamp.rig.machine import Readings as Readings, Rig
+from jaxdamp.rig.machine import Readings as Readings, Rig, gas_and_friction as gas_and_friction
 from jaxdamp.rig.marching import march as march, solve_law as solve_law
 from jaxdamp.rig.numbers import LawNumbers as LawNumbers, is_number as is_number, numbers_of as numbers_of
 from jaxdamp.rig.response import AbstractLawEngine as AbstractLawEngine, StartsInMotionWarning, respond

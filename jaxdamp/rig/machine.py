@@ -186,6 +186,18 @@ class Rig(Module):
         return tuple(effect for effect, values in values_of.items() if any(v is None or v.any() for v in values))
 
 
+def gas_and_friction(rig: Rig, stroke: Array, velocity: Array) -> tuple[Array, Array]:
+    """F_g + k (x − x₀) and F_f tanh(v/v_f) [N], which the machine adds at once, its oil at the reference temperature.
+
+    Arguments:
+        rig: the machine.
+        stroke: measured [m].
+        velocity: [m/s].
+    """
+    gas = rig.gas_force + rig.gas_stiffness * (stroke - rig.stroke_offset)
+    return gas, rig.friction * jnp.tanh(velocity / rig.friction_velocity)
+
+
 @eqx.filter_jit
 def _readings(
     rig: Rig,
@@ -197,7 +209,7 @@ def _readings(
     temperature: Signal | None,
 ) -> Readings:
     """`Rig.readings` from the force of the law, without checks."""
-    friction = rig.friction * jnp.tanh(velocity / rig.friction_velocity)
+    gas, friction = gas_and_friction(rig, stroke, velocity)
     samples = rig.force_delay / dt
     if temperature is not None:
         rise = temperature - rig.reference_temperature
@@ -206,7 +218,6 @@ def _readings(
         rise = _temperature_rise(rig, dt, law_force * velocity, friction * velocity)
     else:
         rise = jnp.zeros_like(law_force)
-    gas = rig.gas_force + rig.gas_stiffness * (stroke - rig.stroke_offset)
     force = law_force * (1.0 - rig.temperature_slope * rise) + gas * (1.0 + rig.gas_temperature_slope * rise)
     force = force + friction
     if "inertia" in effects:

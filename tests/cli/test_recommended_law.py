@@ -1,13 +1,16 @@
 """Verdict, object, table, page and files name the same law, whatever the records."""
 
+import io
 import json
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from jaxdamp import bench, identify
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
-from jaxdamp.cli.fitting import write_fits
+from jaxdamp.cli.console import Screen
+from jaxdamp.cli.fitting import Fitted, show, write_fits
 from jaxdamp.cli.wording import in_command_line
 from jaxdamp.dampers import Bilinear, Lag, Linear, PiecewiseLinear
 from jaxdamp.export import from_json
@@ -39,6 +42,11 @@ def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: P
     assert json.loads(json.dumps(comparison.to_dict()))["best"] == best.name
     assert [r["law"] for r in comparison.table().records() if "recommended" in str(r["note"])] == [best.name]
     assert f"Recommended: {best.name}, " in fit_report(comparison).to_html()
+    screen, text = Screen(), io.StringIO()
+    screen.console = Console(file=text, width=400)
+    show(screen, Fitted(comparison, []))
+    assert text.getvalue().strip().startswith(f"Recommended: {best.name}, ")
+    assert ("--law all tries" in text.getvalue()) == bool(best.doubt)
     attempts = Attempts()
     write_fits(tmp_path, comparison, BenchSet(bench.as_runs(runs)), attempts)
     assert not attempts.troubles

@@ -101,9 +101,14 @@ def test_a_hardening_spring_jumps_where_duffing_says() -> None:
     assert result.stable.all()
     assert up.max() == pytest.approx(peak, rel=0.02)
     assert frequency[np.argmax(up)] == pytest.approx(jump, rel=0.02)
-    several = np.flatnonzero(up > 1.5 * down[::-1])  # two steady motions at one frequency
-    assert several.size >= 5
-    assert np.all(np.diff(several) == 1)
+    bend, drag = 0.75 * cubic / MASS, (damping * 2 * np.pi * frequency / MASS) ** 2
+    off = RATE / MASS - (2 * np.pi * frequency) ** 2
+    curves = zip(2 * bend * off, off**2 + drag, strict=True)  # of the amplitude squared, a cubic equation
+    roots = [np.roots([bend**2, square, linear, -((force / MASS) ** 2)]) for square, linear in curves]
+    expected = np.flatnonzero([np.all(np.abs(np.imag(root)) < 1e-9 * np.abs(root)) for root in roots])
+    several = np.flatnonzero(up > 1.2 * down[::-1])  # two steady motions at one frequency
+    assert np.all(np.diff(several) == 1) and expected.size > 2
+    assert np.abs(several[[0, -1]] - expected[[0, -1]]).max() <= 1, (several, expected)
     np.testing.assert_allclose(up[-3:], down[2::-1], rtol=1e-6)
     third = 0.25 * cubic * peak**2 / (9 * MASS * (2 * np.pi * jump) ** 2 - RATE - 1.5 * cubic * peak**2)
     assert np.asarray(result.distortion("stroke")).max() == pytest.approx(third, rel=0.05)
