@@ -69,7 +69,7 @@ def test_a_fit_without_the_machine_is_wrong_and_says_so(result):
     rate = blind["rebound_rate"]
     assert abs(rate.value - 2600.0) > 500.0  # the offset pulls both slopes together
     assert rate.standard_error > 100.0  # inflated by the correlation of the residual
-    assert any("misses something systematic" in warning for warning in blind.warnings)
+    assert any("intervals hold for this law, not for the damper" in warning for warning in blind.warnings)
     assert blind.rig is None and blind.fit_percent < result.fit_percent - 15.0
 
 
