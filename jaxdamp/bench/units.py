@@ -99,9 +99,10 @@ def conversion(role: str, written: str) -> Conversion | None:
     if any(text in units for units in _KNOWN.values()):
         factor = _KNOWN.get(role, {}).get(text)
         return None if factor is None else Conversion(text, factor)
+    registry = _registry()  # not within `try`: that it does not start says nothing of the text
     try:
-        unit = _registry().Unit(text)
-        zero, one, two = (_registry().Quantity(x, unit).to(SI[role]).magnitude for x in (0.0, 1.0, 2.0))
+        unit = registry.Unit(text)
+        zero, one, two = (registry.Quantity(x, unit).to(SI[role]).magnitude for x in (0.0, 1.0, 2.0))
     except Exception:  # pint answers unknown text with errors of many classes, its tokeniser's among them
         return None
     if zero == 0.0:
@@ -124,8 +125,9 @@ def ratio(written: str, other: str) -> float | None:
     """
     if written.strip().lower() == other.strip().lower():
         return 1.0
+    registry = _registry()
     try:
-        return float(_registry().Quantity(1.0, written.strip()).to(other.strip()).magnitude)
+        return float(registry.Quantity(1.0, written.strip()).to(other.strip()).magnitude)
     except Exception:  # as in `conversion`
         return None
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from jaxdamp.bench import read
+from jaxdamp.bench import read, units
 from jaxdamp.bench.units import gain_conversion
 
 
@@ -60,3 +60,19 @@ def test_units_decide_between_candidates(write):
     assert any("stroke from 'Displacement (mm)' rather than 'Displacement (V)', by their units" in n for n in run.notes)
     run = read(path, gains={"stroke": "1 mm/V"})[0]
     assert run.amplitude == pytest.approx(0.002, rel=1e-3)
+
+
+def test_a_broken_library_of_units_is_no_unknown_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the library raises when it starts is shown: with pint 0.24 and a newer flexparser no unit was known."""
+
+    def broken(**_: object) -> None:
+        raise TypeError("cannot inherit frozen dataclass from a non-frozen one")
+
+    monkeypatch.setattr("pint.UnitRegistry", broken)
+    units._registry.cache_clear()
+    try:
+        for convert in (lambda: units.conversion("force", "hectonewton"), lambda: units.ratio("hectovolt", "V")):
+            with pytest.raises(TypeError, match="frozen dataclass"):
+                convert()
+    finally:
+        units._registry.cache_clear()
