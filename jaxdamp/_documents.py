@@ -44,8 +44,10 @@ def read_text(file: Path, kind: str) -> str:
     """The text of a file of settings.
 
     Raises:
-        ValueError: larger than such a file is, or no text in UTF-8.
+        ValueError: a pipe or a device, larger than such a file is, or no text in UTF-8.
     """
+    if file.exists() and not file.is_file() and not file.is_dir():
+        raise ValueError(f"{file} is a pipe or a device, not a file of {kind}: save it to a file.")
     size = file.stat().st_size
     if size > LARGEST:
         raise ValueError(f"{file} has {size / 2**20:.0f} MiB, more than a file of {kind} here may have: is it another?")

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from jaxdamp._types import Scalar, ScalarLike
@@ -31,6 +33,14 @@ class MemoryLayout(enum.Enum):
     ARRAY = "one array"
     SCALARS = "a tuple of scalars, for one small car"
     LANES = "a tuple of scalars, each a lane for every car of a batch"
+
+
+def joined(parts: Sequence[Float[Array, " _"]]) -> Float[Array, " _"]:
+    """The entries of several vectors; of known ones without a program for it."""
+    if any(isinstance(part, Tracer) for part in parts):
+        return jnp.concatenate(parts)
+    together = np.concatenate(parts)
+    return jnp.asarray(together, together.dtype)
 
 
 def scalars(vector: Float[Array, " _"]) -> tuple[Scalar, ...]:

@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[1] / "jaxdamp"
 MOST_LINES = 60  # of a function, without its docstring
 MOST_BRANCHES = 15  # cyclomatic complexity: ways through a function
-STILL_ABOVE = {"identify": 6}  # functions of packages that are being rewritten; never more
+STILL_ABOVE = {"identify": 5}  # functions of packages that are being rewritten; never more
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 BRANCHES = (ast.If, ast.IfExp, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.Assert, ast.match_case)
 

@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parents[1] / "jaxdamp"
 
 STOREYS = [
-    {"parameters", "solve", "configuration", "codegen"},  # and every private module `_*.py` at the top
+    {"parameters", "solve", "configuration", "codegen", "blocks"},  # and every private module `_*.py` at the top
     {"dampers", "roads", "metrics"},
     {"vehicles", "rig"},
     {"simulation", "bench"},

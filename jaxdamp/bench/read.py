@@ -232,8 +232,12 @@ def _read_files(
     for file, name in zip(files, _names(files), strict=True):
         try:
             good += records(read_tables(file, readers, delimiter), name)
+        except ArithmeticError as error:
+            said = f"its numbers cannot be computed with ({type(error).__name__}: {error})"
+            errors.append(ValueError(f"{file}: {said}. Export it again."))
         except (ValueError, OSError, ImportError) as error:
-            errors.append(error)
+            unnamed = type(error) is ValueError and str(file) not in str(error)
+            errors.append(ValueError(f"{file}: {error}") if unnamed else error)
     return good, errors
 
 

@@ -1,6 +1,5 @@
 """`jaxdamp report`: bench records, a vehicle and a road in; laws, rides, a tuned damper and one page out."""
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,7 +14,7 @@ from jaxdamp.cli.records import Reading, decisions, grouped, law_names
 from jaxdamp.cli.riding import Driving, headline, unusual
 from jaxdamp.cli.tuning import exit_code_of, tuned, tuning_arguments, write_tuning
 from jaxdamp.cli.vehicle_words import parse_vehicle
-from jaxdamp.identify import FitResult
+from jaxdamp.dampers import AbstractDamper, not_identified
 from jaxdamp.parameters import parameters
 from jaxdamp.report import chain_report, records_table, ride_tables, ride_verdict
 from jaxdamp.roads import AbstractRoad
@@ -72,12 +71,12 @@ def report(
         best = fits.comparison.best.result
         fitted = make(best.law)
         result, cars = None, {"vehicle as it is": car, "fitted law": fitted}
-        adjusting, sentences = _what_can_be_tuned(best, search)
-        if adjusting is None:
+        if _nothing_to_tune(best.law, search):
+            can = "the law has no parameter that a workshop can change and that the records determine"
+            sentences = [f"Nothing is tuned: {can}."]
             screen.points(sentences)
         else:
-            call, chosen = tuning_arguments(fitted, minimise, [surface], adjusting, driving.seed, run)
-            sentences = [*chosen, *sentences]
+            call, sentences = tuning_arguments(fitted, minimise, [surface], search, driving.seed, run)
             screen.points(sentences)
             result = tuned(screen, call)
             cars["tuned law"] = result.vehicle
@@ -97,32 +96,10 @@ def report(
     exit_code_of(result)
 
 
-def _what_can_be_tuned(fit: FitResult, search: Call) -> tuple[Call | None, list[str]]:
-    """The tuning of what can be built and was identified, unless other parameters are named; and remarks."""
-    if "over" in search.given:
-        return search, []
-    unknown = not_identified(fit)
-    adjustable = [p.path for p in parameters(fit.law) if p.adjustable]
-    if not set(adjustable) - set(unknown):
-        sentence = "the law has no parameter that a workshop can change and that the records determine."
-        return None, [f"Nothing is tuned: {sentence}"]
-    left_alone = [path for path in adjustable if path in unknown]
-    if not left_alone:
-        return search, []
-    held = [*search.given.get("freeze", ()), *(f"*damper.{path}" for path in left_alone)]
-    less = dataclasses.replace(search, given={**search.given, "freeze": held})
-    return less, [f"Not tuned, since the records do not determine it: {', '.join(left_alone)}."]
-
-
-def not_identified(fit: FitResult) -> list[str]:
-    """The parameters of the law of which the records determine no number."""
-    inside = "law." if fit.rig is not None or fit.record_starts else ""
-    notes: dict[str, list[bool]] = {}
-    for estimate in fit.parameters:
-        if estimate.name.startswith(inside):
-            path = estimate.name.removeprefix(inside).partition("[")[0]
-            notes.setdefault(path, []).append(estimate.note == "not identifiable")
-    return [path for path, unknown in notes.items() if all(unknown)]
+def _nothing_to_tune(law: AbstractDamper, search: Call) -> bool:
+    """Whether no parameter is named, and the law has none that can be built and that the records determine."""
+    adjustable = {parameter.path for parameter in parameters(law) if parameter.adjustable}
+    return "over" not in search.given and adjustable <= set(not_identified(law))
 
 
 def _rides(

@@ -41,6 +41,7 @@ NOT_OFFERED = {  # arguments of library functions, and why
         "progress": "shown at the terminal",
     },
     "sweeps.sweep": {
+        "cluster": "an object of Python",
         "gradients": "for programs",
         "progress": "shown at the terminal",
     },

@@ -31,8 +31,11 @@ from jaxdamp.dampers.fitted_range import (
     FittedRange,
     Motion as Motion,
     OutsideFittedRangeWarning,
+    StandardError as StandardError,
     has_fitted_range as has_fitted_range,
+    has_standard_errors as has_standard_errors,
     without_fitted_ranges as without_fitted_ranges,
+    without_standard_errors as without_standard_errors,
 )
 from jaxdamp.dampers.force_surface import ForceSurface
 from jaxdamp.dampers.frequency_selective import FrequencySelective
@@ -63,10 +66,12 @@ from jaxdamp.dampers.power_law import PowerLaw
 from jaxdamp.dampers.range_use import (
     RangeUse as RangeUse,
     extrapolated as extrapolated,
+    not_identified as not_identified,
     range_use as range_use,
     sentence as sentence,
     warn_outside as warn_outside,
     with_fitted_range,
+    with_standard_errors as with_standard_errors,
 )
 from jaxdamp.dampers.saturating import Saturating
 from jaxdamp.dampers.scheduled import Scheduled

@@ -25,7 +25,7 @@ from jaxdamp.dampers.contract import (
     from_samples,
     starts_of_bends,
 )
-from jaxdamp.dampers.fitted_range import FittedRange, Motion, RangeNote
+from jaxdamp.dampers.fitted_range import FittedRange, Motion, RangeNote, StandardError
 from jaxdamp.parameters import Module, check_parameters, modules_inside, readable
 
 
@@ -67,6 +67,11 @@ class AbstractDamper(Module):
     def fitted_to(self) -> FittedRange | None:
         """The range of the records that the law was fitted to (`with_fitted_range`); results of `jit` have none."""
         return self.range_note.fitted_to
+
+    @property
+    def standard_errors(self) -> tuple[StandardError, ...]:
+        """Standard errors of the fit that gave the law, whatever was changed later; empty for a law without one."""
+        return self.range_note.standard_errors
 
     @abstractmethod
     def initial_state(self) -> State:

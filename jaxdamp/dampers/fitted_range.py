@@ -15,6 +15,24 @@ from jaxdamp._types import ScalarLike
 
 UNITS = {"velocity": "m/s", "stroke": "m", "frequency": "Hz", "force": "N", "temperature": "K", "command": ""}
 Limits = tuple[float | int, float | int]
+
+
+class StandardError(NamedTuple):
+    """How well a fit determined one number of a law.
+
+    Attributes:
+        name: of the number, as in the table of the fit.
+        value: the standard error, in the unit; infinite if no record determines the number.
+        unit: in SI.
+        identified: whether the records tell this number from the others.
+    """
+
+    name: str
+    value: float
+    unit: str
+    identified: bool
+
+
 Tree = TypeVar("Tree")
 
 
@@ -124,9 +142,11 @@ class RangeNote:
 
     Arguments:
         fitted_to: the range, if any.
+        standard_errors: of the numbers that the records gave.
     """
 
     fitted_to: FittedRange | None = None
+    standard_errors: tuple[StandardError, ...] = ()
 
 
 class _Unseen:
@@ -147,7 +167,8 @@ class _Unseen:
 
 def _noted(note: RangeNote) -> RangeNote:
     """The note, without a range in a program that JAX compiles."""
-    return RangeNote() if note.fitted_to is not None and unsafe_am_i_under_a_jit_DO_NOT_USE() else note
+    filled = note.fitted_to is not None or note.standard_errors
+    return RangeNote() if filled and unsafe_am_i_under_a_jit_DO_NOT_USE() else note
 
 
 jax.tree_util.register_pytree_node(
@@ -162,6 +183,24 @@ def without_fitted_ranges(tree: Tree) -> Tree:
         tree: the tree.
     """
     return jax.tree.map(lambda leaf: RangeNote() if _is_note(leaf) else leaf, tree, is_leaf=_is_note)
+
+
+def without_standard_errors(tree: Tree) -> Tree:
+    """A law, a vehicle or any tree without the standard errors of the fits of its laws.
+
+    Arguments:
+        tree: the tree.
+    """
+    return jax.tree.map(lambda leaf: RangeNote(leaf.fitted_to) if _is_note(leaf) else leaf, tree, is_leaf=_is_note)
+
+
+def has_standard_errors(tree: object) -> bool:
+    """Whether any law in a tree has the standard errors of its fit.
+
+    Arguments:
+        tree: a law, a vehicle or another module.
+    """
+    return any(_is_note(note) and note.standard_errors for note in jax.tree.leaves(tree, is_leaf=_is_note))
 
 
 def has_fitted_range(tree: object) -> bool:

@@ -1,7 +1,7 @@
 """By how much a law is used outside the range that it was fitted to."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._traced import is_traced, of_known_numbers
-from jaxdamp.dampers.base import AbstractDamper
+from jaxdamp.dampers.base import AbstractDamper, laws_inside
 from jaxdamp.dampers.fitted_range import (
     UNITS,
     FittedRange,
@@ -17,9 +17,11 @@ from jaxdamp.dampers.fitted_range import (
     Motion,
     OutsideFittedRangeWarning,
     RangeNote,
+    StandardError,
     has_fitted_range,
     shown_unit,
     span,
+    without_standard_errors,
 )
 from jaxdamp.dampers.inside import command_paths
 from jaxdamp.parameters import get
@@ -186,6 +188,7 @@ def extrapolated(law: AbstractDamper, velocities: Float[np.ndarray, " points"]) 
 
 
 L = TypeVar("L")
+D = TypeVar("D", bound=AbstractDamper)
 
 
 def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Limits) -> L:
@@ -217,7 +220,37 @@ def with_fitted_range(law: L, fitted_to: FittedRange | None = None, **limits: Li
     if (fitted_to is None) == (not limits):
         remedy = "Write for example `with_fitted_range(law, velocity=(-0.5, 0.5))`."
         _checks.refuse("fitted_to", "be given, or limits by name, and not both", repr(fitted_to), remedy)
+    return _with_note(law, RangeNote(fitted_to or FittedRange(**limits), law.standard_errors))
+
+
+def with_standard_errors(law: D, errors: Iterable[StandardError]) -> D:
+    """The same law with the standard errors of its fit, instead of any previous ones, also of laws inside.
+
+    Arguments:
+        law: any law.
+        errors: of numbers of the law, by path; not finite where the records say nothing.
+    """
+    noted = [error if np.isfinite(error.value) else error._replace(value=float("inf")) for error in errors]
+    law = without_standard_errors(law)
+    return _with_note(law, RangeNote(law.fitted_to, tuple(noted)))
+
+
+def not_identified(tree: object) -> list[str]:
+    """The paths of the parameters of fitted laws of which the records determine no number.
+
+    Arguments:
+        tree: a law, a vehicle or another module.
+    """
+    numbers: dict[str, list[bool]] = {}
+    for prefix, law in laws_inside(tree):
+        for error in law.standard_errors:
+            numbers.setdefault(prefix + error.name.partition("[")[0], []).append(error.identified)
+    return [path for path, identified in numbers.items() if not any(identified)]
+
+
+def _with_note(law: L, note: RangeNote) -> L:
+    """The law with another note."""
     changed = object.__new__(type(law))
-    for name, value in (vars(law) | {"range_note": RangeNote(fitted_to or FittedRange(**limits))}).items():
+    for name, value in (vars(law) | {"range_note": note}).items():
         object.__setattr__(changed, name, value)
     return changed

@@ -10,6 +10,7 @@ from jaxtyping import Array
 from jaxdamp import _checks
 from jaxdamp._traced import behind
 from jaxdamp._types import Number, Scalar, ScalarLike, State
+from jaxdamp._vectors import joined
 from jaxdamp.dampers.base import START, AbstractDamper
 from jaxdamp.dampers.contract import Traits, combined_traits
 from jaxdamp.dampers.fitted_range import Motion
@@ -81,7 +82,7 @@ class Sum(AbstractDamper):
 
     def initial_state(self) -> State:
         """The states of all terms."""
-        return jnp.concatenate([term.initial_state() for term in self.terms])
+        return joined([term.initial_state() for term in self.terms])
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Sum of the forces [N]."""

@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Scalar, ScalarLike, State
+from jaxdamp._vectors import joined
 from jaxdamp.dampers.base import START, AbstractDamper
 from jaxdamp.dampers.contract import Traits
 
@@ -72,7 +73,7 @@ class AbstractWrapper(AbstractDamper):
         """Own states at zero, then those of the law inside."""
         inner = self.inner_law().initial_state()
         count = self.own_state_count()
-        return jnp.concatenate([jnp.zeros(count), inner]) if count else inner
+        return joined([jnp.zeros(count), inner]) if count else inner
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Force [N]."""

@@ -14,11 +14,18 @@ from jax.tree_util import Partial
 from jaxdamp import _checks
 from jaxdamp._tables import Contents
 from jaxdamp._types import Number
-from jaxdamp.dampers import UNITS, AbstractDamper, FittedRange, with_fitted_range
+from jaxdamp.dampers import (
+    UNITS,
+    AbstractDamper,
+    FittedRange,
+    StandardError,
+    with_fitted_range,
+    with_standard_errors,
+)
 from jaxdamp.parameters import as_float
 
 
-FITTED_TO = "fitted_to"
+FITTED_TO, STANDARD_ERRORS = "fitted_to", "standard_errors"  # what a law has beside its fields
 BORROWED = ("equinox", "lineax", "optimistix", "diffrax")  # whose modules are no part of a law, a vehicle or a road
 
 
@@ -72,6 +79,11 @@ def plain_module(module: eqx.Module) -> Contents:
     covered = module.fitted_to if isinstance(module, AbstractDamper) else None
     if covered is not None:
         result[FITTED_TO] = {q.name: {"value": list(q.limits), "unit": q.unit} for q in covered.known()}
+    if isinstance(module, AbstractDamper) and module.standard_errors:
+        result[STANDARD_ERRORS] = {
+            e.name: {"value": e.value if np.isfinite(e.value) else None, "unit": e.unit, "identified": e.identified}
+            for e in module.standard_errors
+        }
     return result
 
 
@@ -134,12 +146,13 @@ def rebuilt(plain: object, where: str) -> Any:
     # fields that were added to a class after the file was written get their default
     later = [f for f in fields if declared(f) is None and f.default is not dataclasses.MISSING]
     is_law = issubclass(kind, AbstractDamper)
-    given = {key: value for key, value in plain.items() if not (is_law and key == FITTED_TO)}
+    notes = {key: plain[key] for key in (FITTED_TO, STANDARD_ERRORS) if is_law and key in plain}
+    given = {key: value for key, value in plain.items() if key not in notes}
     _same_names(name, ["class", *(f.name for f in fields)], {f.name: None for f in later} | given)
-    return _filled(object.__new__(kind), given, plain.get(FITTED_TO) if is_law else None)
+    return _filled(object.__new__(kind), given, notes)
 
 
-def _filled(module: Any, given: Contents, fitted_to: Any) -> Any:
+def _filled(module: Any, given: Contents, notes: Contents) -> Any:
     """An empty module with the values of a file; fields that it does not give have their default."""
     name, fields = type(module).__name__, own_fields(type(module))
     for field in fields:
@@ -151,8 +164,9 @@ def _filled(module: Any, given: Contents, fitted_to: Any) -> Any:
     if not isinstance(module, AbstractDamper):
         return module
     object.__setattr__(module, "range_note", type(module).range_note)
-    covered = _fitted_to(fitted_to, name)
-    return module if covered is None else with_fitted_range(module, covered)
+    covered = _fitted_to(notes.get(FITTED_TO), name)
+    module = module if covered is None else with_fitted_range(module, covered)
+    return with_standard_errors(module, _errors(notes[STANDARD_ERRORS], name)) if STANDARD_ERRORS in notes else module
 
 
 def _class_named(name: str, where: str) -> type:
@@ -188,6 +202,21 @@ def _fitted_to(plain: object, owner: str) -> FittedRange | None:
         low, high = quantity["value"]
         limits[name] = float(low), float(high)
     return FittedRange(**limits)
+
+
+def _errors(plain: object, owner: str) -> list[StandardError]:
+    """The standard errors of a law, as `plain_module` writes them."""
+    must = 'be written as {"rate": {"value": ..., "unit": "...", "identified": true}, ...}'
+    where, errors = f"{owner}.{STANDARD_ERRORS}", []
+    for name, error in plain.items() if isinstance(plain, dict) else [("", plain)]:
+        if not isinstance(error, dict) or error.keys() != {"value", "unit", "identified"}:
+            _checks.refuse(where, must, json.dumps(plain)[:80])
+        value, unit, identified = error["value"], error["unit"], error["identified"]
+        positive = value is None or (isinstance(value, int | float) and value >= 0)
+        if not (positive and isinstance(unit, str) and isinstance(identified, bool)):
+            _checks.refuse(f"{where}.{name}", must, json.dumps(error)[:80])
+        errors.append(StandardError(name, float("inf") if value is None else float(value), unit, identified))
+    return errors
 
 
 def _value(plain: object, where: str) -> Any:

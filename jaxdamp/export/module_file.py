@@ -11,8 +11,8 @@ from jaxdamp import _checks
 from jaxdamp._documents import parse_json, read_text
 from jaxdamp._tables import Contents
 from jaxdamp._writing import write_whole
-from jaxdamp.dampers import AbstractDamper, has_fitted_range
-from jaxdamp.export._rebuild import FITTED_TO, plain_module, rebuilt
+from jaxdamp.dampers import AbstractDamper, has_fitted_range, has_standard_errors
+from jaxdamp.export._rebuild import FITTED_TO, STANDARD_ERRORS, plain_module, rebuilt
 from jaxdamp.parameters import checked
 from jaxdamp.roads import AbstractRoad, WhiteRoad
 from jaxdamp.vehicles import AbstractVehicle
@@ -25,14 +25,16 @@ KINDS: Contents = {  # kinds of files, the most specific first
     "module": eqx.Module,
 }
 FORMATS = {f"jaxdamp {kind}": kind for kind in KINDS}
-PLAIN, WITH_RANGES = 1, 2  # versions of the format: without and with fitted ranges
+PLAIN, WITH_RANGES, WITH_ERRORS = 1, 2, 3  # versions of the format: fitted ranges came second, standard errors third
 
 
 def to_json(module: eqx.Module, path: str | os.PathLike[str] | None = None) -> str:
     """Write a law, a vehicle, a road or any other module of this package or of your own as JSON.
 
     Every number has its unit and all digits: `from_json` gives exactly the same module. Your own classes are written by
-    their name. The fitted range of a law is written as "fitted_to".
+    their name. The fitted range of a law is written as "fitted_to", the standard errors of its fit as
+    "standard_errors", with null where the records say nothing: a tuning of the
+    law then leaves alone what they do not determine.
 
     Arguments:
         module: any composition.
@@ -59,8 +61,7 @@ def to_json(module: eqx.Module, path: str | os.PathLike[str] | None = None) -> s
     must = "be a law, a vehicle, a road or another module"
     _checks.instance("module", module, eqx.Module, must, "Write for example `to_json(result.law, 'law.json')`.")
     kind = next(kind for kind, classes in KINDS.items() if isinstance(module, classes))
-    version = WITH_RANGES if has_fitted_range(module) else PLAIN
-    text = _layout({"format": f"jaxdamp {kind}", "version": version, kind: plain_module(module)}) + "\n"
+    text = _layout({"format": f"jaxdamp {kind}", "version": _version(module), kind: plain_module(module)}) + "\n"
     if path is not None:
         write_whole(path, text)
     return text.rstrip("\n")
@@ -103,17 +104,23 @@ def from_json(path_or_text: str | os.PathLike[str]) -> Any:
         formats = " or ".join(f'"{name}"' for name in FORMATS)
         _checks.refuse("path_or_text", f'begin with "format": {formats}', source, "Was it written by `to_json`?")
     version = document.get("version")
-    if version not in (PLAIN, WITH_RANGES):
+    if version not in (PLAIN, WITH_RANGES, WITH_ERRORS):
         remedy = "Another version of jaxdamp wrote it; read it with that one."
-        _checks.refuse("version", f"be {PLAIN} or {WITH_RANGES}", repr(version), remedy)
+        _checks.refuse("version", f"be {PLAIN}, {WITH_RANGES} or {WITH_ERRORS}", repr(version), remedy)
     if sorted(document) != sorted(["format", "version", kind]):
         _checks.refuse(f"the {kind} file", f"hold format, version, {kind}", f"of {', '.join(document)}")
     module = checked(rebuilt(document[kind], kind))
     _checks.instance(kind, module, KINDS[kind], f"be a {kind}", "The format of the file says so.")
-    if version == PLAIN and has_fitted_range(module):
-        remedy = f'Files that say what laws were fitted to are of "version": {WITH_RANGES}.'
-        _checks.refuse(f"the {kind} file", f"have no {FITTED_TO!r} in version {PLAIN}", "one that has", remedy)
+    if version < (needed := _version(module)):
+        entry = STANDARD_ERRORS if needed == WITH_ERRORS else FITTED_TO
+        remedy = f'Files with this entry are of "version": {needed}.'
+        _checks.refuse(f"the {kind} file", f"have no {entry!r} in version {version}", "one that has", remedy)
     return module
+
+
+def _version(module: eqx.Module) -> int:
+    """The first version of the format that can hold a module."""
+    return WITH_ERRORS if has_standard_errors(module) else WITH_RANGES if has_fitted_range(module) else PLAIN
 
 
 def _layout(value: object, indent: str = "") -> str:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+CHOICE = ("held_out", "group", "law", "fit_percent", "rmse")  # of a fold, for a law that was chosen
+
+
 class Fold(NamedTuple):
     """One law fitted without one record, or without two for a nested choice."""
 
@@ -37,16 +40,6 @@ class Fold(NamedTuple):
     rmse: float  # of the record held out, N
     result: Any
     also_out: str | None = None  # a second record without part in the fit, for which a law is chosen by this score
-
-
-class Choice(NamedTuple):
-    """The law that a record is predicted by, chosen without this record."""
-
-    held_out: str
-    group: Hashable
-    law: str
-    fit_percent: float  # of the record held out
-    rmse: float  # of the record held out, N
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -116,7 +109,7 @@ class CrossValidation(AbstractResult):
         return tuple(sentences)
 
     @property
-    def choices(self) -> tuple[Choice, ...]:
+    def choices(self) -> tuple[Fold, ...]:
         """For each record the law with the highest mean fit on all other records, and the score of this law on it.
 
         In the group of the record, the fits to choose by leave out the record itself besides the one they are scored
@@ -124,19 +117,19 @@ class CrossValidation(AbstractResult):
         """
         if not self.inner:
             raise ValueError("There are no fits to choose by: call `cross_validate(..., nested=True)`.")
-        chosen = []
-        for first in self._of(self.laws[0], None):
+        return tuple(self._chosen_without(fold) for fold in self._of(self.laws[0], None))
 
-            def score(law: str, first: Fold = first) -> float:
-                means = [self.fit_percent(law, group) for group in self.groups if group != first.group]
-                key = (law, first.group, first.held_out)
-                own = [f.fit_percent for f in self.inner if (f.law, f.group, f.also_out) == key]
-                return float(np.mean([*means, float(np.mean(own))]))
+    def _chosen_without(self, scored: Fold) -> Fold:
+        """Of the law with the highest mean fit on the other records, the fold of this record."""
+        out, group = scored.held_out, scored.group
 
-            law = max(self.laws, key=score)
-            (fold,) = (f for f in self._of(law, first.group) if f.held_out == first.held_out)
-            chosen.append(Choice(fold.held_out, fold.group, law, fold.fit_percent, fold.rmse))
-        return tuple(chosen)
+        def score(law: str) -> float:
+            means = [self.fit_percent(law, other) for other in self.groups if other != group]
+            same_group = [f.fit_percent for f in self.inner if (f.law, f.group, f.also_out) == (law, group, out)]
+            return float(np.mean([*means, float(np.mean(same_group))]))
+
+        (chosen,) = (f for f in self._of(max(self.laws, key=score), group) if f.held_out == out)
+        return chosen
 
     @property
     def chosen_fit_percent(self) -> float:
@@ -192,7 +185,9 @@ class CrossValidation(AbstractResult):
             for fold in self.folds
         ]
         return {"best": self.best, "verdict": list(self.verdict), "folds": folds} | (
-            {"choices": [plain(choice._asdict()) for choice in self.choices]} if self.inner else {}
+            {"choices": [plain({name: getattr(c, name) for name in CHOICE}) for c in self.choices]}
+            if self.inner
+            else {}
         )
 
     def __repr__(self) -> str:
@@ -238,33 +233,40 @@ def cross_validate(
     """
     call = "cross_validate(laws, runs)"
     check_starts(laws, call)
+    groups = _grouped(as_runs(runs, call=call), by, nested)
+    if method is fit or rig != OFFSET:
+        options["rig"] = rig
+    jobs = [(name, group, out) for name in laws for group, few in groups.items() for out in _left_out(few, nested)]
+    folds, inner = list[Fold](), list[Fold]()
+    with Progress("Cross-validating") as shown:
+        for number, (name, group, out) in enumerate(jobs, 1):
+            members, names = groups[group], [groups[group][i].name for i in out]
+            shown(f"{name} without {' and '.join(names)}, {number} of {len(jobs)}")
+            sigma = [np.inf if i in out else s for i, s in enumerate(weights(weighting, members))]
+            result = method(laws[name], members, weighting=sigma, **options)
+            scores = result.score(members)[2]
+            for i, other in zip(out, names[::-1] if len(out) > 1 else [None], strict=True):
+                fold = Fold(name, group, scores[i].name, scores[i].fit_percent, scores[i].rmse, result, other)
+                (folds if other is None else inner).append(fold)
+    return CrossValidation(tuple(folds), tuple(inner))
+
+
+def _grouped(
+    runs: Iterable[BenchRun], by: Callable[[BenchRun], Hashable] | None, nested: bool
+) -> dict[Hashable, list[BenchRun]]:
+    """The records of each group."""
     groups: dict[Hashable, list[BenchRun]] = {}
-    for run in as_runs(runs, call=call):
+    for run in runs:
         groups.setdefault(None if by is None else by(run), []).append(run)
     fewest, few = (3, "three") if nested else (2, "two")
     for group, members in groups.items():
         if len(members) < fewest:
             name, must = ("runs", "hold") if by is None else ("by", f"put into group {group}")
             _checks.refuse(name, f"{must} {few} records or more", [run.name for run in members])
-    if method is fit or rig != OFFSET:
-        options["rig"] = rig
-    jobs = [
-        (name, group, out)
-        for name in laws
-        for group, members in groups.items()
-        for out in itertools.chain(*(itertools.combinations(range(len(members)), k) for k in (1, 2)[: 1 + nested]))
-    ]
-    folds: list[Fold] = []
-    with Progress("Cross-validating") as shown:
-        for number, (name, group, out) in enumerate(jobs, 1):
-            members = groups[group]
-            left_out = [members[i].name for i in out]
-            shown(f"{name} without {' and '.join(left_out)}, {number} of {len(jobs)}")
-            sigma = [np.inf if i in out else s for i, s in enumerate(weights(weighting, members))]
-            result = method(laws[name], members, weighting=sigma, **options)
-            scores = result.score(members)[2]
-            for i, others in zip(out, (left_out[1:], left_out[:1]), strict=False):
-                held_out = scores[i]
-                folds.append(Fold(name, group, held_out.name, held_out.fit_percent, held_out.rmse, result, *others))
-    outer, inner = (tuple(fold for fold in folds if (fold.also_out is None) == whole) for whole in (True, False))
-    return CrossValidation(outer, inner)
+    return groups
+
+
+def _left_out(members: Sequence[BenchRun], nested: bool) -> list[tuple[int, ...]]:
+    """The numbers of the records without part in each fit: every record, for a nested choice every pair too."""
+    numbers = range(len(members))
+    return [*itertools.combinations(numbers, 1), *(itertools.combinations(numbers, 2) if nested else ())]

@@ -16,8 +16,8 @@ from jaxdamp.identify.fitting import solve
 from jaxdamp.identify.initial_states import moving_samples
 from jaxdamp.identify.judging import fitted_models
 from jaxdamp.identify.law_result import FitResult
-from jaxdamp.identify.model import Model, is_memoryless
-from jaxdamp.identify.predicting import Score, predict_by_record, score_of, used_samples
+from jaxdamp.identify.model import Model
+from jaxdamp.identify.predicting import Compared, Score, compared, errors
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.propagation import Evidence
 
@@ -71,20 +71,21 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     runs = [problem.runs[i] for i in fitted]
     groups = motions(runs)
     whole = len(groups) >= FEWEST_MOTIONS and not (in_time or problem.per_record)
-    errors = _Errors([], [], [])
+    samples: list[Compared] = []
     for number, part in enumerate(_by_record(runs, groups) if whole else _by_time(runs), 1):
         factor = _kept(problem, fitted, part)
         if np.all(factor) or not np.any(problem.used & (factor > 0)):
             continue
-        models, forces = _refitted(start, factor)
         known = np.concatenate([run.velocity[~left] for run, left in zip(runs, part, strict=True)])
-        for i, run, left in zip(fitted, runs, part, strict=True):
-            left &= (run.velocity >= known.min()) & (run.velocity <= known.max())
-            name = run.name if whole else f"{run.name}, part {number} of {PARTS}"
-            errors.add(name, models[i], run, forces[i], left, problem.initial_state)
+        reached = [(run.velocity >= known.min()) & (run.velocity <= known.max()) for run in runs]
+        names = [run.name if whole else f"{run.name}, part {number} of {PARTS}" for run in runs]
+        parts = zip(
+            map(int, fitted), names, (left & near for left, near in zip(part, reached, strict=True)), strict=True
+        )
+        samples += compared(_refitted(start, factor), problem.runs, problem.initial_state, parts)
     records = f"each of {len(runs)} records" if whole else f"each quarter of the record{'s' * (len(runs) > 1)}"
     same = ", all of one motion" * (len(groups) == 1)
-    return errors.together(f"{records} predicted by fits without it{same}")
+    return _together(samples, f"{records} predicted by fits without it{same}")
 
 
 def on_records(result: FitResult, runs: Sequence[BenchRun]) -> HeldOut | None:
@@ -94,47 +95,19 @@ def on_records(result: FitResult, runs: Sequence[BenchRun]) -> HeldOut | None:
         result: of `fit`.
         runs: records that were not fitted.
     """
-    errors, few = _Errors([], [], []), len(runs) < FEWEST_MOTIONS
-    models, forces = predict_by_record(result.model_of(runs), runs, result.initial_state)
-    for model, run, force in zip(models, runs, forces, strict=True):
-        for number, part in enumerate(in_time_parts(run) if few else [np.ones(len(run), bool)], 1):
-            name = f"{run.name}, part {number} of {PARTS}" if few else run.name
-            errors.add(name, model, run, force, part, result.initial_state)
-    return errors.together(f"{len(runs)} record{'s' * (len(runs) > 1)} held out")
+    few, parts = len(runs) < FEWEST_MOTIONS, []
+    for i, run in enumerate(runs):
+        if few:
+            parts += [(i, f"{run.name}, part {k} of {PARTS}", part) for k, part in enumerate(in_time_parts(run), 1)]
+        else:
+            parts.append((i, run.name, np.ones(len(run), bool)))
+    samples = compared(result.model_of(runs), runs, result.initial_state, parts)
+    return _together(samples, f"{len(runs)} record{'s' * (len(runs) > 1)} held out")
 
 
-class _Errors(NamedTuple):
-    """Measured and predicted forces, part by part."""
-
-    scores: list[Score]
-    measured: list[np.ndarray]
-    predicted: list[np.ndarray]
-
-    def add(
-        self,
-        name: str,
-        model: Model,
-        run: BenchRun,
-        force: np.ndarray,
-        part: Bool[np.ndarray, " samples"],
-        initial_state: str,
-    ) -> None:
-        """Compare the predicted force with the measured one over the samples of a part that count."""
-        compared = np.zeros(len(run), bool)
-        compared[used_samples(model, run, is_memoryless(model), initial_state)] = True
-        compared &= part
-        if np.any(compared):
-            self.measured.append(run.force[compared])
-            self.predicted.append(force[compared])
-            self.scores.append(score_of(name, self.measured[-1], self.predicted[-1]))
-
-    def together(self, words: str) -> HeldOut | None:
-        """All parts; None if nothing was compared."""
-        if not self.scores:
-            return None
-        both = np.concatenate(self.measured), np.concatenate(self.predicted)
-        all_of_them = score_of("", *both)
-        return HeldOut(all_of_them.fit_percent, all_of_them.rmse, tuple(self.scores), words)
+def _together(samples: Sequence[Compared], words: str) -> HeldOut | None:
+    """The errors over all parts; None if nothing was compared."""
+    return HeldOut(*errors(samples), words) if samples else None
 
 
 def motions(runs: Sequence[BenchRun]) -> list[list[int]]:
@@ -208,8 +181,8 @@ def _anchored_at(evidence: Evidence) -> Problem:
 
 
 @one_thread()
-def _refitted(problem: Problem, factor: Float[np.ndarray, " samples"]) -> tuple[list[Model], list[np.ndarray]]:
-    """The models of the records fitted with these weights, and their forces."""
+def _refitted(problem: Problem, factor: Float[np.ndarray, " samples"]) -> Model | list[Model]:
+    """The model, or that of each record, fitted with these weights."""
     solution = solve(problem.reweighted(factor), starts=1, max_steps=REFIT_STEPS)
     models, model = fitted_models(problem, solution.best.values)
-    return predict_by_record(models or model, problem.runs, problem.initial_state)
+    return models or model

@@ -12,7 +12,15 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
 from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
-from jaxdamp.dampers import AbstractDamper, coverage, drives_motion, laws_inside, takes_command
+from jaxdamp.dampers import (
+    AbstractDamper,
+    StandardError,
+    coverage,
+    drives_motion,
+    laws_inside,
+    takes_command,
+    with_standard_errors,
+)
 from jaxdamp.identify.blending import off_span
 from jaxdamp.identify.estimates import Estimate
 from jaxdamp.identify.estimating import Estimates, estimate, on_misfit
@@ -75,7 +83,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     main = (*notes, *on_records, *effects, *estimates.summary, *on_rest)
     notes += [*on_records, *estimates.notes, *on_rest, *effects]
     return FitResult(
-        law=law,
+        law=with_standard_errors(law, _errors_of_law(model, estimates.estimates)),
         runs=problem.runs,
         fit_percent=percent,
         rmse=rmse,
@@ -89,6 +97,16 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
         record_starts=starts_in(model),
         **fields_of_fit(problem, solution, noise, estimates),
     )
+
+
+def _errors_of_law(model: Model, estimates: Sequence[Estimate]) -> list[StandardError]:
+    """The standard errors of the numbers of the law, named as in the law without its machine."""
+    inside = "" if isinstance(model, AbstractDamper) else "law."
+    return [
+        StandardError(e.name.removeprefix(inside), e.standard_error, e.unit, e.note != "not identifiable")
+        for e in estimates
+        if e.name.startswith(inside)
+    ]
 
 
 def fields_of_fit(problem: Problem, solution: Solution, noise: Noise, estimates: Estimates) -> dict[str, Any]:

@@ -138,7 +138,7 @@ def started_on(law: Start, runs: Sequence[BenchRun], rig: Machine, named: Iterab
             stated |= any(float(get(begin, path)) != 0.0 for path in constants or ())
         if constants and not stated:
             begin = started(law, bare) if trained else begin
-            zero = with_values(begin, {path: jnp.zeros_like(get(begin, path)) for path in constants})
+            zero = with_values(begin, {path: np.zeros_like(get(begin, path)) for path in constants})
             return Beginning(zero, machine, tuple(f"law.{path}" for path in constants))
         left = dataclasses.replace(machine, force_offset=Rig().force_offset, gas_force=Rig().gas_force)
         machine = left if free_fields(left) else None

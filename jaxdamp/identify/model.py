@@ -7,13 +7,13 @@ from typing import Any, final
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from jaxdamp._types import Scalar, State, Vector
 from jaxdamp.bench import BenchRun
-from jaxdamp.dampers import AbstractDamper, FittedRange, with_fitted_range
+from jaxdamp.dampers import AbstractDamper, FittedRange, with_fitted_range, without_standard_errors
 from jaxdamp.identify.initial_states import Cycle, periodic_state
-from jaxdamp.parameters import Module, check_parameters, parameter, readable
+from jaxdamp.parameters import FreeParameters, Module, check_parameters, parameter, readable
 from jaxdamp.rig import Rig, Sensor, march
 from jaxdamp.vehicles import AbstractVehicle
 
@@ -116,6 +116,18 @@ def rig_of(model: Model) -> Rig | None:
     return model.rig if isinstance(model, OnRig) else None
 
 
+def of_law(free: FreeParameters) -> tuple[FreeParameters, Bool[np.ndarray, " free"]]:
+    """The free parameters of the law alone, and which of the numbers they are."""
+    law = law_of(free.tree)
+    if law is free.tree:
+        return free, np.ones(free.values.size, bool)
+    start = len("law.")
+    columns = np.array([p.path.startswith("law.") for p in free.owners], bool)
+    chosen = [dataclasses.replace(p, path=p.path[start:]) for p in free.chosen if p.path.startswith("law.")]
+    ties = [(path[start:], leader[start:]) for path, leader in free.ties if path.startswith("law.")]
+    return FreeParameters(law, tuple(chosen), tuple(ties)), columns
+
+
 def effects_of(model: Model) -> tuple[str, ...]:
     """What of the machine depends on more than the instant (`Rig.effects`); asked of known numbers, not traced ones."""
     rig = rig_of(model)
@@ -141,8 +153,8 @@ def initial_state_for(model: Model, initial_state: str) -> str:
 
 
 def with_range(model: Model, fitted_to: FittedRange) -> Model:
-    """The same with the range that the law was fitted to."""
-    return on_rig(with_fitted_range(law_of(model), fitted_to), rig_of(model), starts_in(model))
+    """The same with the range that the law was fitted to, and without standard errors of an earlier fit."""
+    return on_rig(with_fitted_range(without_standard_errors(law_of(model)), fitted_to), rig_of(model), starts_in(model))
 
 
 def blind_end(model: Model, dt: float) -> int:

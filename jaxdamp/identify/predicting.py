@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._tables import with_unit
@@ -152,11 +152,55 @@ def fit_percent(measured: Sequence[np.ndarray], predicted: Sequence[np.ndarray])
     return 100.0 * (1.0 - missed / spread) if spread > 0.0 else -np.inf
 
 
-def score_of(name: str, measured: np.ndarray, predicted: np.ndarray) -> Score:
-    """Errors of a predicted force [N] from a measured one."""
-    error = predicted - measured
-    rmse, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
-    return Score(name, rmse, fit_percent([measured], [predicted]), largest)
+class Compared(NamedTuple):
+    """The samples of a record, or of a part of one, over which a prediction is compared with the measurement.
+
+    Attributes:
+        name: of the record or part.
+        measured: forces [N].
+        predicted: forces at the same samples [N].
+    """
+
+    name: str
+    measured: Float[np.ndarray, " samples"]
+    predicted: Float[np.ndarray, " samples"]
+
+
+def compared(
+    model: Model | Sequence[Model],
+    runs: Sequence[BenchRun],
+    initial_state: str = "warm_up",
+    parts: Iterable[tuple[int, str, Bool[np.ndarray, " _"]]] | None = None,
+) -> list[Compared]:
+    """The samples that a model, or one for each record, is compared over: those that count, of records or their parts.
+
+    Arguments:
+        model: a law, or a law on a test machine.
+        runs: the records.
+        initial_state: how they start, as in `fit`.
+        parts: the number of the record, the name and the samples of each part; those without a sample that counts are
+            left out. None for all records.
+    """
+    models, forces = predict_by_record(model, runs, initial_state)
+    distinct = {id(each): each for each in models}.values()  # most often one model for all records
+    memoryless = {id(each): is_memoryless(each) for each in distinct}
+    used = [used_samples(own, run, memoryless[id(own)], initial_state) for own, run in zip(models, runs, strict=True)]
+    if parts is None:
+        return [Compared(run.name, run.force[k], f[k]) for run, f, k in zip(runs, forces, used, strict=True)]
+    chosen = [(i, name, np.flatnonzero(part[used[i]]) + (used[i].start or 0)) for i, name, part in parts]
+    return [Compared(name, runs[i].force[k], forces[i][k]) for i, name, k in chosen if k.size]
+
+
+def errors(samples: Sequence[Compared]) -> tuple[float, float, tuple[Score, ...]]:
+    """Fit percent and RMSE [N] over all samples together, and the errors of each record or part."""
+    rows = []
+    for name, measured, predicted in samples:
+        error = predicted - measured
+        rmse, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
+        rows.append(Score(name, rmse, fit_percent([measured], [predicted]), largest))
+    y, p = [each.measured for each in samples], [each.predicted for each in samples]
+    rmse = float(np.sqrt(np.mean((np.concatenate(p) - np.concatenate(y)) ** 2)))
+    return fit_percent(y, p), rmse, tuple(rows)
 
 
 def score(
@@ -166,19 +210,11 @@ def score(
     initial_state: str = "warm_up",
 ) -> tuple[float, float, tuple[Score, ...]]:
     """Fit percent and RMSE [N] of a model, or of one for each record, over the records that count, and for each."""
-    models, forces = predict_by_record(model, runs, initial_state)
-    memoryless = {
-        id(own): is_memoryless(own) for own in {id(own): own for own in models}.values()
-    }  # most often one model for all records
-    pairs = zip(models, runs, strict=True)
-    used = [used_samples(own, run, memoryless[id(own)], initial_state) for own, run in pairs]
-    measured = [run.force[k] for run, k in zip(runs, used, strict=True)]
-    predicted = [force[k] for force, k in zip(forces, used, strict=True)]
-    rows = [score_of(run.name, y, p) for run, y, p in zip(runs, measured, predicted, strict=True)]
-    chosen = [i for i in range(len(runs)) if counted is None or counted[i]]
-    y, p = [measured[i] for i in chosen], [predicted[i] for i in chosen]
-    errors = np.concatenate(p) - np.concatenate(y)
-    return fit_percent(y, p), float(np.sqrt(np.mean(errors**2))), tuple(rows)
+    samples = compared(model, runs, initial_state)
+    percent, rmse, rows = errors(samples)
+    if counted is not None:
+        percent, rmse, _ = errors([each for each, counts in zip(samples, counted, strict=True) if counts])
+    return percent, rmse, rows
 
 
 class ErrorShares(NamedTuple):

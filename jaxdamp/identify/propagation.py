@@ -1,6 +1,7 @@
 """The uncertainty of what follows from a fitted law: forces at velocities, or any function of the law."""
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,10 +18,12 @@ from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, keeps_conditions, laws_inside, without_fitted_ranges
-from jaxdamp.identify.model import fitted_part
+from jaxdamp.identify.model import fitted_part, of_law
 from jaxdamp.identify.noise import Noise
+from jaxdamp.identify.printed import evaluator
 from jaxdamp.identify.problem import Problem
 from jaxdamp.identify.search import SearchEnd
+from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import get, with_values
 from jaxdamp.rig import march, quasi_static
 
@@ -190,12 +193,42 @@ def band(evidence: Evidence, law: AbstractDamper, velocities: Float[np.ndarray, 
     velocity = np.asarray(velocities, float)
     force = np.asarray(quasi_static(law, velocity).force, float)
     steps = 1 if law.initial_state().size == 0 else round(HELD / STEP)
-
-    def curve(law: AbstractDamper) -> Array:
-        def held(v: Array) -> Array:
-            return march(law, jnp.asarray(STEP, v.dtype), jnp.zeros(steps + 1, v.dtype), jnp.full(steps + 1, v), 1)[-1]
-
-        return jax.vmap(held)(jnp.asarray(velocity, float))
-
-    width = evidence.quantile * propagate(evidence, curve).standard_error
+    slopes = _printed_slopes(evidence, velocity, steps)
+    if slopes is None:
+        error = propagate(evidence, functools.partial(_held, velocity=velocity, steps=steps)).standard_error
+    else:
+        error = standard_error(slopes, evidence.covariance)
+    width = evidence.quantile * np.asarray(error)
     return Band(law, velocity, force, force - width, force + width, tuple(evidence.problem.fitted_to))
+
+
+def _held(law: AbstractDamper, velocity: Float[np.ndarray, " points"], steps: int) -> Float[Array, " points"]:
+    """The forces [N] of a law after so many steps at constant velocities [m/s]."""
+
+    def held(v: Array) -> Array:
+        return march(law, jnp.asarray(STEP, v.dtype), jnp.zeros(steps + 1, v.dtype), jnp.full(steps + 1, v), 1)[-1]
+
+    return jax.vmap(held)(jnp.asarray(velocity, float))
+
+
+def _printed_slopes(
+    evidence: Evidence, velocity: Float[np.ndarray, " points"], steps: int
+) -> Float[np.ndarray, "points free"] | None:
+    """The derivatives of the same forces by the free numbers, from the C program of the fit; None without one."""
+    problem = evidence.problem
+    free, columns = of_law(problem.free)
+    values = np.asarray(evidence.minimum.values)
+    if problem.per_record or not columns.any() or values.dtype != np.float64:
+        return None
+    shape = velocity.size, steps + 1
+    last = np.zeros(shape)
+    last[:, -1] = 1.0
+    still, moving = np.zeros(shape), np.repeat(velocity[:, None], shape[1], axis=1)
+    signals = (np.full(velocity.size, STEP), still, moving, still, last, np.arange(velocity.size))
+    batch = Batch(*(jnp.asarray(a, a.dtype) for a in signals), fixed={}, per_record=(), substeps=1)
+    printed = evaluator(free, [batch])
+    if printed is None:
+        return None
+    slopes = np.zeros((velocity.size, values.size))
+    slopes[:, columns] = printed(values[columns])[1].reshape(*shape, -1)[:, -1]
+    return slopes

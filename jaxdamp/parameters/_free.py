@@ -140,8 +140,10 @@ class FreeParameters(eqx.Module):
     def split(self, vector: Array | np.ndarray) -> list[PyTree]:
         """A vector of numbers cut into the shapes of the parameters."""
         ends = np.cumsum([p.value.size for p in self.chosen])[:-1]
-        pieces = (np if isinstance(vector, np.ndarray) else jnp).split(vector, ends)
-        return [piece.reshape(p.value.shape) for piece, p in zip(pieces, self.chosen, strict=True)]
+        known = not isinstance(vector, Tracer)  # whose operations JAX would compile
+        pieces = (np if known else jnp).split(np.asarray(vector) if known else vector, ends)
+        shaped = [piece.reshape(p.value.shape) for piece, p in zip(pieces, self.chosen, strict=True)]
+        return shaped if not isinstance(vector, Array) or not known else [jnp.asarray(a, a.dtype) for a in shaped]
 
     def build(self, values: Float[Array, " free"]) -> PyTree:
         """The tree with these physical values, unchecked."""

@@ -1,5 +1,7 @@
 """Sections of a page on a fit: what the test machine adds, doubts in words, records predicted by fits without them."""
 
+import numpy as np
+
 from jaxdamp.identify import CrossValidation, FitResult, rounded
 from jaxdamp.parameters import parameters
 from jaxdamp.report.page import Report
@@ -12,7 +14,7 @@ def machine_sentences(result: FitResult) -> tuple[str, ...]:
     machine = {e.name.removeprefix("rig."): e for e in result.parameters if e.name.startswith("rig.")}
     texts = [(name, *rounded(e.value, e.standard_error), e.unit) for name, e in machine.items()]
     fitted = [f"{name.replace('_', ' ')} {value} ± {error} {unit}".rstrip() for name, value, error, unit in texts]
-    absent = [p.path.replace("_", " ") for p in parameters(result.rig) if not p.value.any()]
+    absent = [p.path.replace("_", " ") for p in parameters(result.rig) if not np.any(np.asarray(p.value))]
     return (
         f"Fitted together with the law, as effects of the test machine: {', '.join(fitted) or 'none that was free'}.",
         f"Taken as absent: {', '.join(absent)}. An absent effect that the residual shows is named below.",

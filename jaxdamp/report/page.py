@@ -11,6 +11,8 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from jaxdamp._display import display
 from jaxdamp._tables import Table
 from jaxdamp.report.attempts import Attempts
@@ -221,11 +223,19 @@ class Report:
 
 def _png(figure: "Figure") -> bytes:
     """A figure as a small PNG file."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
-    drawn, small = io.BytesIO(), io.BytesIO()
-    figure.savefig(drawn, dpi=DOTS, format="png")
-    few = Image.open(drawn).convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    small, canvas, dots = io.BytesIO(), figure.canvas, figure.dpi
+    try:  # `savefig` draws twice, once for the layout, and packs what is unpacked here
+        figure.dpi = DOTS
+        agg = FigureCanvasAgg(figure)
+        agg.draw()
+        drawn = Image.fromarray(np.asarray(agg.buffer_rgba()))
+    finally:
+        figure.set_canvas(canvas)
+        figure.dpi = dots
+    few = drawn.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     few.save(small, format="png", optimize=True)
     return small.getvalue()
 

@@ -1,8 +1,10 @@
 """The points of a sweep: a grid, a list, a random or a Sobol sample over named axes."""
 
 import dataclasses
+import functools
+import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -20,12 +22,10 @@ PARAMETER = "parameter"  # the dimension of derivatives
 class AbstractPoints(ABC):
     """Points in an order, as columns of numbers by the name of their axis."""
 
-    values: Columns
-
     @property
+    @abstractmethod
     def names(self) -> list[str]:
         """Names of the axes."""
-        return list(self.values)
 
     @property
     def count(self) -> int:
@@ -55,6 +55,11 @@ class Grid(AbstractPoints):
     values: Columns
 
     @property
+    def names(self) -> list[str]:
+        """Names of the axes."""
+        return list(self.values)
+
+    @property
     def shape(self) -> dict[str, int]:
         """One dimension for each axis."""
         return {name: len(values) for name, values in self.values.items()}
@@ -78,6 +83,11 @@ class Points(AbstractPoints):
     values: Columns
 
     @property
+    def names(self) -> list[str]:
+        """Names of the axes."""
+        return list(self.values)
+
+    @property
     def shape(self) -> dict[str, int]:
         """The one dimension."""
         return {POINT: len(next(iter(self.values.values())))}
@@ -92,25 +102,87 @@ class Points(AbstractPoints):
         return {name: (POINT, values) for name, values in self.values.items()}
 
 
-def points(values: Mapping[str, object]) -> Points:
-    """A list of points.
+@final
+@dataclasses.dataclass(frozen=True)
+class Computed(AbstractPoints):
+    """Points along the dimension `point` that are computed when they are needed, and never all held."""
+
+    axes: tuple[str, ...]
+    number: int
+    at: Callable[[np.ndarray], Columns]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the axes."""
+        return list(self.axes)
+
+    @property
+    def shape(self) -> dict[str, int]:
+        """The one dimension."""
+        return {POINT: self.number}
+
+    def columns(self, indices: np.ndarray) -> Columns:
+        """The coordinates of some of the points."""
+        return self.at(indices)
+
+    @property
+    def values(self) -> Columns:
+        """The values of every axis at all points."""
+        return self.at(np.arange(self.number))
+
+    @property
+    def coordinates(self) -> dict[str, tuple[str, np.ndarray]]:
+        """The values of every axis along the dimension of the points."""
+        return {name: (POINT, values) for name, values in self.values.items()}
+
+
+def points(
+    values: Mapping[str, object] | Callable[[np.ndarray], Mapping[str, object]], count: int | None = None
+) -> Points | Computed:
+    """A list of points, or a rule that computes them.
 
     Arguments:
-        values: numbers for each axis, equally many; the first of each make the first point.
+        values: numbers for each axis, equally many; the first of each make the first point. Or a function from the
+            numbers of points, an array of integers, to the numbers for each axis at these points: so a sweep of any
+            size holds only the points that it works on. A function at the top of a module can be sent to other
+            processes.
+        count: number of points, if a function is given.
 
     >>> points({"rate": [1000.0, 2000.0], "mass": [300.0, 250.0]}).count
     2
+    >>> points(lambda i: {"rate": 1000.0 + 0.1 * i}, count=1_000_000).count
+    1000000
     """
+    if callable(values):
+        if count is None:
+            _checks.refuse("count", "be given with a function", None, "Write `points(function, count=1_000_000)`.")
+        _check_count(count)
+        computed = functools.partial(_computed, values)
+        return Computed(tuple(computed(np.arange(1))), count, computed)
     listed = Points(_columns("values", values))
     lengths = {name: len(column) for name, column in listed.values.items()}
     if len(set(lengths.values())) > 1:
         _checks.refuse("values", "have equally many numbers for each axis", lengths, "A mapping by itself is a grid.")
+    if count is not None and count != listed.count:
+        _checks.refuse("count", "be left out with a list of points", count, f"The list has {listed.count}.")
     return listed
 
 
+def _computed(function: Callable[[np.ndarray], Mapping[str, object]], indices: np.ndarray) -> Columns:
+    """The points of a user's function, checked."""
+    columns = _columns("values", function(indices))
+    for name, column in columns.items():
+        if column.shape != indices.shape:
+            must = f"return one number for each of {indices.size} points"
+            _checks.refuse("values", must, f"one that returns {column.size} as {name!r}")
+    return columns
+
+
 @of_known_numbers
-def random(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str] = False) -> Points:
+def random(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str] = False) -> Computed:
     """Points drawn independently and uniformly between limits.
+
+    They are drawn when they are needed: a point depends on the seed and its number alone.
 
     Arguments:
         ranges: lower and upper limit for each axis.
@@ -121,15 +193,14 @@ def random(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[st
     >>> random({"rate": (1e3, 1e5)}, 100, log=True).count
     100
     """
-    _check_count(count)
-    return _stretch(ranges, np.random.default_rng(seed).random((count, len(ranges))), log)
+    return _drawn(ranges, count, log, functools.partial(_uniform, seed, len(ranges)))
 
 
 @of_known_numbers
-def sobol(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str] = False) -> Points:
+def sobol(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str] = False) -> Computed:
     """Points of a scrambled Sobol sequence, which fill the space between limits more evenly than random ones.
 
-    Its averages are best where the count is a power of two.
+    Its averages are best where the count is a power of two. They are computed when they are needed.
 
     Arguments:
         ranges: lower and upper limit for each axis.
@@ -140,13 +211,26 @@ def sobol(ranges: Ranges, count: int, *, seed: int = 0, log: bool | Sequence[str
     >>> sobol({"rate": (1000.0, 2000.0), "mass": (200.0, 400.0)}, 64).count
     64
     """
+    return _drawn(ranges, count, log, functools.partial(_sobol, seed, len(ranges)))
+
+
+def _uniform(seed: int, axes: int, first: int, count: int) -> np.ndarray:
+    """Consecutive points of the unit cube: a generator that draws one number for each axis, point after point."""
+    generator = np.random.PCG64(seed)
+    generator.advance(first * axes)
+    return np.random.Generator(generator).random((count, axes))
+
+
+def _sobol(seed: int, axes: int, first: int, count: int) -> np.ndarray:
+    """Consecutive points of the scrambled sequence."""
     from scipy.stats import qmc
 
-    _check_count(count)
-    _check_ranges(ranges)
     scrambling: Any = {"seed": np.random.default_rng(seed)}  # SciPy 1.15 calls it `rng`, and still takes this name
-    unit = qmc.Sobol(len(ranges), **scrambling).random_base2((count - 1).bit_length())[:count]
-    return _stretch(ranges, unit, log)
+    sequence = qmc.Sobol(axes, **scrambling)
+    if first:
+        sequence.fast_forward(first)
+    with warnings.catch_warnings(action="ignore"):  # that the number of points is no power of two
+        return sequence.random(count)
 
 
 def as_points(over: object) -> AbstractPoints:
@@ -198,15 +282,29 @@ def _check_ranges(ranges: Ranges) -> None:
             _checks.refuse(f"ranges[{name!r}]", "be two finite numbers in increasing order", pair)
 
 
-def _stretch(ranges: Ranges, unit: np.ndarray, log: bool | Sequence[str]) -> Points:
-    """Points of the unit cube between the limits."""
+def _drawn(ranges: Ranges, count: int, log: bool | Sequence[str], unit: Callable[[int, int], np.ndarray]) -> Computed:
+    """Points between limits from consecutive points of the unit cube."""
+    _check_count(count)
     _check_ranges(ranges)
     chosen = list(ranges) if log is True else [] if log is False else [log] if isinstance(log, str) else list(log)
     for name in chosen:
         _checks.one_of("log", name, ranges)
         _checks.positive(f"ranges[{name!r}]", ranges[name], "Zero and negative numbers have no logarithm.")
-    columns = {}
-    for (name, (low, high)), share in zip(ranges.items(), unit.T, strict=True):
-        spread = low * (high / low) ** share if name in chosen else low + (high - low) * share
+    for name in ranges:
+        _check_name("ranges", name)
+    spans = {name: (float(low), float(high), name in chosen) for name, (low, high) in ranges.items()}
+    return Computed(tuple(ranges), count, functools.partial(_between, spans, unit))
+
+
+def _between(
+    spans: Mapping[str, tuple[float, float, bool]], unit: Callable[[int, int], np.ndarray], indices: np.ndarray
+) -> Columns:
+    """The points of these numbers between the limits of their axes."""
+    if not indices.size:
+        return {name: np.zeros(0) for name in spans}
+    first, last = int(indices.min()), int(indices.max())
+    shares, columns = unit(first, last + 1 - first)[indices - first], {}
+    for (name, (low, high, log)), share in zip(spans.items(), shares.T, strict=True):
+        spread = low * (high / low) ** share if log else low + (high - low) * share
         columns[name] = np.clip(spread, low, high)
-    return Points(_columns("ranges", columns))
+    return columns

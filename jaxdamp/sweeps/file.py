@@ -14,7 +14,6 @@ import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._writing import whole
-from jaxdamp.sweeps.devices import is_first, largest, of_first, text_of_first
 from jaxdamp.sweeps.table import Table
 
 
@@ -36,7 +35,7 @@ class SweepFile:
     def __init__(self, path: str | os.PathLike[str], table: Table) -> None:
         self.path, self._table = Path(path).expanduser(), table
         if self.path.suffix != ".nc":
-            _checks.refuse("file", "end in '.nc', for netCDF", repr(str(path)))
+            _checks.refuse("file", "end in '.nc', for netCDF, or '.zarr', for Zarr", repr(str(path)))
         if not self.path.parent.is_dir():
             _checks.refuse("file", "lie in a folder that exists", self.path, "Make the folder first.")
         large = [name for name, values in table.values.items() if values.nbytes > LARGEST]
@@ -47,20 +46,11 @@ class SweepFile:
         self._next, self._pause = time.monotonic() + INTERVAL, INTERVAL
 
     def resume(self) -> None:
-        """Fill the table with what the file holds; all processes take it from the first."""
+        """Fill the table with what the file holds."""
         import xarray  # noqa: F401 so that no interrupt can hit it while it loads
 
-        refusal: Exception | None = None
-        if is_first() and self.path.exists():
-            try:
-                self._load()
-            except Exception as error:
-                refusal = error
-        if largest(refusal is not None)[0]:
-            raise refusal or ValueError(f"The first process refuses the file {self.path}: see its message.")
-        table = self._table
-        table.values, table.done, table.reason = of_first((table.values, table.done, table.reason))
-        table.reasons = json.loads(text_of_first(json.dumps(table.reasons)))
+        if self.path.exists():
+            self._load()
 
     def _load(self) -> None:
         import xarray
@@ -127,7 +117,7 @@ class SweepFile:
     def save(self, *, now: bool = False) -> None:
         """Write what is done if it is time, whole or not at all; what cannot be written stops no sweep."""
         start = time.monotonic()
-        if not is_first() or (start < self._next and not now):
+        if start < self._next and not now:
             return
         try:
             self._write()

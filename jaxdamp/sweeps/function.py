@@ -16,7 +16,12 @@ from jaxtyping import Array, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._jacobian import Mode, choose_mode, value_and_jacobian
+from jaxdamp._types import Scalar
 from jaxdamp.sweeps.axes import PARAMETER, POINT
+
+
+PointFunction = Callable[[dict[str, Scalar]], Mapping[str, Array]]
+Gradients = bool | Mode
 
 
 @runtime_checkable

@@ -15,7 +15,7 @@ from jaxtyping import Array
 
 from jaxdamp import _checks
 from jaxdamp.sweeps.axes import Columns
-from jaxdamp.sweeps.devices import choose_devices, fetch, free_memory, largest, put
+from jaxdamp.sweeps.devices import choose_devices, free_memory
 from jaxdamp.sweeps.function import Traced, evaluate, number_type
 
 
@@ -63,10 +63,10 @@ class Program:
             full = np.full((mesh.size, most * chunk), column[0], number_type())
             padded = np.concatenate([column, np.full(self.capacity(rounds) - size, column[0])])
             full[:, : rounds * chunk] = padded.reshape(mesh.size, -1)
-            return put(full.ravel(), spread)
+            return jax.device_put(full.ravel(), spread)
 
         point = {name: buffer(column) for name, column in columns.items()}
-        count = put(np.array(rounds, np.int32), NamedSharding(mesh, ALL))
+        count = jax.device_put(np.array(rounds, np.int32), NamedSharding(mesh, ALL))
         return jax.block_until_ready(self.run(self.arrays, point, count))
 
     def collect(self, found: dict[str, jax.Array], size: int) -> dict[str, np.ndarray]:
@@ -75,7 +75,7 @@ class Program:
         rounds = -(-size // self.capacity(1))
         collected = {}
         for name, values in found.items():
-            by_device = fetch(values).reshape(mesh.size, -1, *values.shape[1:])
+            by_device = np.asarray(values).reshape(mesh.size, -1, *values.shape[1:])
             collected[name] = by_device[:, : rounds * chunk].reshape(-1, *values.shape[1:])[:size]
         return collected
 
@@ -96,10 +96,9 @@ def prepare(traced: Traced, count: int, asked: int | None, devices: object, lane
             return program
         size = program.run.memory_analysis()
         need = size.temp_size_in_bytes + size.output_size_in_bytes + size.argument_size_in_bytes if size else 0
-        shrink = largest(need / free)[0]
-        if shrink <= SHARE:
+        if need / free <= SHARE:
             return program
-        chunk = 2 ** max(int(np.log2(chunk * SHARE / shrink)), 0)
+        chunk = 2 ** max(int(np.log2(chunk * SHARE * free / need)), 0)
 
 
 def _side_by_side(traced: Traced, mesh: Mesh, lanes: int | None) -> int:
@@ -120,7 +119,7 @@ def with_chunk(traced: Traced, mesh: Mesh, chunk: int) -> Program:
     each = sum(int(np.prod(r.shape)) * r.dtype.itemsize for r in traced.results.values())
     rounds = max(min(BUFFER_POINTS, BUFFER_BYTES // each) // chunk, 1)
     layout = Layout(mesh, chunk, rounds)
-    arrays = [put(array, NamedSharding(mesh, ALL)) for array in traced.arrays]
+    arrays = [jax.device_put(array, NamedSharding(mesh, ALL)) for array in traced.arrays]
     spread, everywhere = NamedSharding(mesh, POINTS), NamedSharding(mesh, ALL)
     total = (mesh.size * rounds * chunk,)
     point = dict.fromkeys(traced.axes, jax.ShapeDtypeStruct(total, number_type(), sharding=spread))
@@ -176,7 +175,7 @@ def forget_errors(mesh: Mesh) -> None:
         return jax.pure_callback(np.asarray, jax.ShapeDtypeStruct(zero.shape, zero.dtype), zero)
 
     specs: dict[str, Any] = {"in_specs": POINTS, "out_specs": POINTS, "check_vma": False}
-    zeros = put(np.zeros(mesh.size, np.float32), NamedSharding(mesh, POINTS))
+    zeros = jax.device_put(np.zeros(mesh.size, np.float32), NamedSharding(mesh, POINTS))
     jax.block_until_ready(jax.jit(jax.shard_map(unharmed, mesh=mesh, **specs))(zeros))
 
 

@@ -83,9 +83,9 @@ class Table:
             numbered = [f"{name}_{i}" for i in range(values.ndim - 1)]
             if name in self.traced.slopes.values():
                 numbered = [PARAMETER]
-            variables[name] = ([*dims, *numbered], values.reshape(*lengths, *values.shape[1:]), self._about(name))
+            variables[name] = ([*dims, *numbered], values.reshape(*lengths, *values.shape[1:]), self.about(name))
         coordinates: dict[str, Any] = {
-            name: (along, values, self._about(name)) for name, (along, values) in self.points.coordinates.items()
+            name: (along, values, self.about(name)) for name, (along, values) in self.points.coordinates.items()
         }
         coordinates["failed"] = (dims, self.failed.reshape(lengths))
         coordinates["reason"] = (dims, np.array(self.reasons, dtype=object)[self.reason].reshape(lengths))
@@ -93,7 +93,7 @@ class Table:
             coordinates[PARAMETER] = (PARAMETER, np.array(self.points.names))
         return xarray.Dataset(variables, coordinates, {"failed_points": int(self.failed.sum())})
 
-    def _about(self, name: str) -> dict[str, str]:
+    def about(self, name: str) -> dict[str, str]:
         """Unit, and for a derivative what it is."""
         for result, slope in self.traced.slopes.items():
             if name == slope:

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 
 from jaxdamp import _checks
 from jaxdamp._tables import with_tied
+from jaxdamp.dampers import not_identified
 from jaxdamp.parameters import (
     Coordinates,
     FreeParameters,
@@ -91,6 +92,7 @@ class SearchRange:
     upper: np.ndarray  # the largest allowed value of each number
     origin: tuple[tuple[str, str], ...]  # of the two bounds of each number: "default", "given" or "domain"
     choices: tuple[Choice | None, ...]  # the values allowed at the end; None for all between the bounds
+    undetermined: tuple[str, ...] = ()  # the parameters left alone because no record determined them
 
     @property
     def is_choice(self) -> Bool[np.ndarray, " free"]:
@@ -127,8 +129,8 @@ def search_range(
     bounds: Mapping[str, Any] | None,
     tie: Mapping[str, str] | None = None,
 ) -> SearchRange:
-    """The free parameters and their ranges: of all dampers what a workshop can change, if `over` is None."""
-    over = _adjustable(vehicle) if over is None else over
+    """The free parameters and their ranges: of all dampers what can be changed and is known, if `over` is None."""
+    over, undetermined = _adjustable(vehicle) if over is None else (over, ())
     in_over, names = (over, list(over)) if isinstance(over, Mapping) else ({}, over)
     free = free_parameters(vehicle, over=name_patterns("over", names), freeze=freeze, tie=tie)
     given, more = _given("over", in_over, free), _given("bounds", bounds or {}, free)
@@ -148,7 +150,7 @@ def search_range(
     if (count := sum(one is not None for one in choices)) > MOST_CHOICES:
         remedy = "Give bounds to the others, or tie numbers together."
         _checks.refuse("over", f"have choices for up to {MOST_CHOICES} numbers", count, remedy)
-    return SearchRange(coordinates, start, unit, np.array(lower), np.array(upper), origin, choices)
+    return SearchRange(coordinates, start, unit, np.array(lower), np.array(upper), origin, choices, undetermined)
 
 
 def start_points(space: SearchRange, count: int, seed: int) -> np.ndarray:
@@ -175,16 +177,19 @@ def start_points(space: SearchRange, count: int, seed: int) -> np.ndarray:
     return np.concatenate([space.start[None], points])
 
 
-def _adjustable(vehicle: Any) -> list[str]:
-    """The parameters of the dampers that a workshop can change."""
+def _adjustable(vehicle: Any) -> tuple[list[str], tuple[str, ...]]:
+    """The parameters of the dampers that a workshop can change, and apart those that no record determined."""
     by_path = {p.path: p for p in parameters(vehicle)}
     inside = match_paths(list(by_path), DAMPERS)
     adjustable = [path for path in inside if by_path[path].adjustable]
-    if not adjustable:
+    unknown = set(not_identified(vehicle))
+    undetermined = tuple(path for path in adjustable if path in unknown)
+    if len(undetermined) == len(adjustable):
         remedy = "Name parameters in `over` to move them nevertheless."
-        must = "be given where no workshop can change a parameter of the dampers"
+        records = " that the records of its fit determine" if undetermined else ""
+        must = f"be given where no workshop can change a parameter of the dampers{records}"
         _checks.refuse("over", must, f"None, for {', '.join(inside)}", remedy)
-    return adjustable
+    return [path for path in adjustable if path not in unknown], undetermined
 
 
 def _given(argument: str, bounds: Mapping[str, Any], free: FreeParameters) -> dict[str, Pair | Choice]:

@@ -23,7 +23,8 @@ class Design(Free, total=False):
 
     Arguments:
         over: the parameters to change, by path, last part or pattern; all of the dampers that a workshop can change
-            (`Parameter.adjustable`) if left out. A mapping `{parameter: (lower, upper)}` gives their bounds too, as
+            (`Parameter.adjustable`) and that the records of their fit determine (`law.standard_errors`) if left out. A
+            mapping `{parameter: (lower, upper)}` gives their bounds too, as
             `bounds` does; `{parameter: Choice(values)}` the values that can be built.
         freeze: parameters among these to hold at their start.
         bounds: bounds `{parameter: (lower, upper)}` in the unit of the parameter, instead of the default ones; the

@@ -308,9 +308,11 @@ def tightened_notes(limits: Sequence[Limit], searched: Sequence[Limit]) -> list[
 
 
 def workshop_notes(space: SearchRange) -> list[str]:
-    """A sentence on the free parameters that no workshop can change."""
+    """A sentence on the free parameters that no workshop can change, one on those that no record determined."""
     fixed = [p.path for p in space.free.chosen if not p.adjustable]
-    return [f"No workshop can change {', '.join(fixed)}: what was tuned cannot be built as it is."] if fixed else []
+    notes = [f"No workshop can change {', '.join(fixed)}: what was tuned cannot be built as it is."] if fixed else []
+    left = ", ".join(space.undetermined)
+    return [*notes, f"Not tuned, since the records of the fit do not determine it: {left}."] if left else notes
 
 
 def without_effect(space: SearchRange, sides: tuple[Evaluation, Evaluation], ended: np.ndarray) -> tuple[str, ...]:

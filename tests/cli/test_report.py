@@ -2,17 +2,13 @@
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
 from jaxdamp import bench
 from jaxdamp.bench import SineTest
-from jaxdamp.cli.chaining import not_identified
 from jaxdamp.dampers import Bilinear
 from jaxdamp.export import from_json
-from jaxdamp.identify import Estimate
 from jaxdamp.tune import Outcome
 
 from .invoking import jaxdamp, refused
@@ -47,16 +43,3 @@ def test_a_white_road_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("")
     words = ("report", tmp_path / "a.csv", "--road", "white:C")
     assert "Option --road must be one to ride on" in refused(tmp_path, *words)
-
-
-def test_what_the_records_do_not_determine_is_not_tuned() -> None:
-    def estimate(name: str, note: str = "") -> Estimate:
-        return Estimate(name, 1.0, "N s/m", 0.1, (0.8, 1.2), "", note)
-
-    fit: Any = SimpleNamespace(rig=None, record_starts=())
-    unknown = "not identifiable"
-    fit.parameters = [estimate("rate"), estimate("slopes[0]", unknown), estimate("slopes[1]"), estimate("n", unknown)]
-    assert not_identified(fit) == ["n"]
-    on_rig: Any = SimpleNamespace(rig=object(), record_starts=())
-    on_rig.parameters = [estimate("law.law.rate", unknown), estimate("law.lag_time"), estimate("rig.friction", unknown)]
-    assert not_identified(on_rig) == ["law.rate"]

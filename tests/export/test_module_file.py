@@ -163,7 +163,7 @@ def changed(change):
 READ_ERRORS = {
     "not JSON": ("{oops", "It must be written in JSON, but the text is not: Expecting property name"),
     "another file": ('{"format": "PDF"}', '`path_or_text` must begin with "format": "jaxdamp law"'),
-    "version": (changed(lambda d: d.update(version=3)), "`version` must be 1 or 2, but is 3"),
+    "version": (changed(lambda d: d.update(version=4)), "`version` must be 1, 2 or 3, but is 4"),
     "no law": (
         changed(lambda d: d.pop("law")),
         "must hold format, version, law, but is of format, version",

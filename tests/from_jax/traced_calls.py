@@ -365,6 +365,7 @@ SAMPLES: dict[str, dict[str, list[Call]]] = {
     },
     "sweeps": {
         "points": [lambda f, x: f({"a": x * np.ones(2)})],
+        "block_program": [lambda f, x: f(lambda point: {"y": point["a"]}, {"a": [1.0, x]})],
         "random": [lambda f, x: f({"a": (0.0, x)}, 2)],
         "sobol": [lambda f, x: f({"a": (0.0, x)}, 2)],
     },

@@ -103,6 +103,7 @@ def test_one_program_serves_records_of_any_number_and_length(runs) -> None:
 def test_without_a_compiler_xla_computes_it_and_the_log_says_so(runs, monkeypatch, caplog) -> None:
     monkeypatch.setattr(_native, "compiler", lambda: None)
     monkeypatch.setattr(_native, "_lasting_folder", lambda: None)  # nor one compiled earlier
+    _native.library.cache_clear()
     for memory in ("_laws", "_refused"):
         monkeypatch.setattr(printed_law, memory, {})
     printed_law.say.cache_clear()

@@ -1,6 +1,7 @@
 """Bands, functions of a fitted law and profiles: closed forms, other methods, and what they refuse."""
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from scipy.optimize import minimize_scalar
 
 from jaxdamp import Ride, plots, roads, vehicles
 from jaxdamp.dampers import Bilinear, Linear, Saturating, SeriesSpring, Table
-from jaxdamp.identify import FitResult, fit
+from jaxdamp.identify import FitResult, fit, propagation
 from jaxdamp.rig import Rig
 
 
@@ -110,3 +111,15 @@ def test_the_profile_of_a_banana(curved):
     for end in curve.interval:
         other = minimize_scalar(squares, bounds=(500.0, 5000.0), args=(end,), method="bounded", options={"xatol": 1e-6})
         assert (other.fun - least) / variance == pytest.approx(curve.level, rel=0.03)
+
+
+@pytest.mark.parametrize("rig", [None, "offset"])
+def test_a_band_from_the_printed_program_is_that_of_jax(sines, rig):
+    runs = sines(SeriesSpring(Bilinear(2000.0, 1200.0), 3e5), noise=5.0, tests=[(0.02, 0.5), (0.02, 3.0)])
+    result = fit(SeriesSpring(Bilinear(1500.0, 1500.0), 2e5), runs, rig=rig)
+    velocity, evidence = np.array([-0.3, 0.1, 0.3]), result._evidence
+    assert propagation._printed_slopes(evidence, velocity, 2000) is not None
+    expected = propagation.propagate(evidence, partial(propagation._held, velocity=velocity, steps=2000))
+    band = result.band(velocity)
+    width = 2.0 * evidence.quantile * expected.standard_error
+    np.testing.assert_allclose(band.upper - band.lower, width, rtol=1e-10)

@@ -1,4 +1,4 @@
-"""Sweeps in a process of its own: `python elsewhere.py port processes index devices folder` writes their results."""
+"""Sweeps in a process of its own: `python elsewhere.py devices folder` writes their results."""
 
 import sys
 import warnings
@@ -11,29 +11,25 @@ from cases import AXES, decay, failing
 import jaxdamp
 
 
-def main(folder: Path, processes: int, index: int) -> None:
+def main(folder: Path) -> None:
     warnings.simplefilter("error")
-    one = 1 if processes > 1 else [jax.local_devices()[-1]]  # of each process, or another one than before
+    one = [jax.local_devices()[-1]]  # another one than before
     for name, devices, chunk in (("all", None, 1), ("all", None, 7), ("all", None, 4096), ("one", one, None)):
         data = jaxdamp.sweep(decay(), AXES, chunk=chunk, devices=devices, gradients=True)
-        data.to_netcdf(folder / f"decay-{name}-{chunk}-{index}.nc", engine="scipy")
+        data.to_netcdf(folder / f"decay-{name}-{chunk}.nc", engine="scipy")
     for _ in range(2):  # the second time all is done
         data = jaxdamp.sweep(decay(), AXES, chunk=2, gradients=True, file=folder / "shared.nc")
-        data.to_netcdf(folder / f"decay-shared-2-{index}.nc", engine="scipy")
+        data.to_netcdf(folder / "decay-shared-2.nc", engine="scipy")
     try:
         jaxdamp.sweep(decay(), {**AXES, "a": [0.0]}, gradients=True, file=folder / "shared.nc")
     except ValueError as error:
-        (folder / f"refusal-{index}.txt").write_text(str(error), encoding="utf-8")
+        (folder / "refusal.txt").write_text(str(error), encoding="utf-8")
     warnings.simplefilter("ignore", UserWarning)
     data = jaxdamp.sweep(failing, {"a": np.linspace(0.0, 3.0, 7), "b": AXES["b"]}, chunk=4)
-    data.to_netcdf(folder / f"failing-{index}.nc", engine="scipy")
+    data.to_netcdf(folder / "failing.nc", engine="scipy")
 
 
 if __name__ == "__main__":
-    port, processes, index, devices = map(int, sys.argv[1:5])
     jax.config.update("jax_enable_x64", True)
-    jax.config.update("jax_num_cpu_devices", devices)
-    if processes > 1:
-        jax.distributed.initialize(f"127.0.0.1:{port}", num_processes=processes, process_id=index)
-        assert jax.device_count() == processes * devices
-    main(Path(sys.argv[5]), processes, index)
+    jax.config.update("jax_num_cpu_devices", int(sys.argv[1]))
+    main(Path(sys.argv[2]))

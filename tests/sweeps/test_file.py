@@ -108,7 +108,7 @@ def test_files_that_cannot_be_are_refused(tmp_path):
         return {"y": 2.0 * point["a"]}
 
     with pytest.raises(ValueError, match=r"end in '\.nc'"):
-        jaxdamp.sweep(product, {"a": [1.0]}, file=tmp_path / "s.zarr")
+        jaxdamp.sweep(product, {"a": [1.0]}, file=tmp_path / "s.csv")
     with pytest.raises(ValueError, match="lie in a folder that exists"):
         jaxdamp.sweep(product, {"a": [1.0]}, file=tmp_path / "none" / "s.nc")
     (tmp_path / "text.nc").write_text("nothing")

@@ -1,0 +1,95 @@
+"""What blocks in a store cost: beside one sweep in memory, by Dask workers, and the memory of the client.
+
+    python -m benchmarks.cluster
+
+Quarter cars with a Besinger damper, 10 s at 1 kHz: blocks of 32768 cars, processor time of all processes. Memory:
+the largest resident size of a process that sweeps a product over 1e5 to 1e8 points, which are drawn block by block.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import psutil
+from distributed import Client, LocalCluster
+
+import jaxdamp
+from benchmarks._timing import report
+from jaxdamp import Ride, roads, sweeps, vehicles
+from jaxdamp.blocks.layout import LARGEST
+from jaxdamp.dampers import Besinger
+
+
+BLOCKS = 4, 12  # of two sweeps, whose difference compiles nothing
+RANGES = {"compression_rate": (1e3, 4e3), "rebound_rate": (2e3, 9e3)}
+POINTS = [10**5, 10**6, 10**7, 10**8]
+
+
+def ride() -> Ride:
+    law = Besinger(1600.0, 4200.0, 900.0, limit_velocity=0.13, transition_velocity=0.35)
+    road = roads.iso8608("C", speed=20.0, seed=1)
+    return Ride(vehicles.presets.quarter_car_000(law), road, metrics=["rms_sprung_acceleration"], duration=10.0)
+
+
+def product(point):
+    return {"y": point["a"] * point["b"]}
+
+
+def processor_time(workers: list[int]) -> float:
+    """Seconds of this process and of others that still run."""
+    own = time.process_time()
+    return own + sum(sum(psutil.Process(pid).cpu_times()[:2]) for pid in workers)
+
+
+def blocks(folder: Path) -> list[list[object]]:
+    """Processor time of so many cars by who computes them, once each has compiled."""
+    car, rows = ride(), []
+    cars = {n: sweeps.random(RANGES, n * LARGEST, seed=n) for n in BLOCKS}
+
+    def measured(name: str, workers: list[int], **options) -> None:
+        seconds = {}
+        for turn, n in enumerate((BLOCKS[0], *BLOCKS)):  # the first turn compiles
+            points = cars[n]
+            stored = {"file": folder / f"{name}-{turn}.zarr"} if options or name == "store" else {}
+            before, begin = processor_time(workers), time.perf_counter()
+            jaxdamp.sweep(car, points, **stored, **options)
+            seconds[n] = processor_time(workers) - before, time.perf_counter() - begin
+        few, many = BLOCKS
+        each = [(seconds[many][i] - seconds[few][i]) / (many - few) for i in (0, 1)]
+        rows.append([name, *each, 100.0 * (each[0] / rows[0][1] - 1.0) if rows else 0.0])
+
+    measured("memory", [])
+    measured("store", [])
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local, Client(local) as client:
+        pids: dict[str, int] = client.run(os.getpid)  # pyright: ignore[reportAssignmentType]
+        workers = list(pids.values())
+        measured("dask, 2 workers", workers, cluster=client)
+    return rows
+
+
+def memory(count: int, folder: Path) -> float:
+    """Largest resident size [MB] of a process that fills a store."""
+    script = (
+        "import resource, sys; import jaxdamp; from jaxdamp import sweeps; from benchmarks.cluster import product\n"
+        f"points = sweeps.random({{'a': (0.0, 1.0), 'b': (0.0, 1.0)}}, {count})\n"
+        f"jaxdamp.sweep(product, points, file={str(folder / f'{count}.zarr')!r})\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return float(ended.stdout.split()[-1])
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        table = ["computed by", "processor s a block", "wall s a block", "more processor time %"]
+        report("cluster_blocks", "Blocks of a sweep", table, blocks(folder))
+        rows = [[count, memory(count, folder)] for count in POINTS]
+        report("cluster_memory", "Memory of a sweep into a store", ["points", "largest resident size MB"], rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,8 @@
+"""Independent work in blocks: a store on disk that says what is done, and the processes that compute the rest."""
+
+from jaxdamp.blocks.layout import Blocks as Blocks, block_size as block_size
+from jaxdamp.blocks.running import AbstractWork as AbstractWork, Cluster as Cluster, run_blocks as run_blocks
+from jaxdamp.blocks.store import BlockStore as BlockStore, Variable as Variable
+
+
+__all__: list[str] = []

@@ -1,0 +1,258 @@
+"""Blocks of work, computed here, by a part of an array job, or by the processes of an executor or a Dask cluster."""
+
+import importlib.metadata
+import itertools
+import os
+import pickle
+import platform
+import re
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from typing import NamedTuple, Protocol, final, runtime_checkable
+
+import jax
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp.blocks.store import BlockStore
+
+
+@runtime_checkable
+class HasExecutor(Protocol):
+    """A Dask `Client`, as far as it is needed."""
+
+    def get_executor(self, **options: object) -> Executor:
+        """Runs functions on the workers."""
+        ...
+
+
+Cluster = Executor | HasExecutor | str | None
+Results = Mapping[str, np.ndarray]
+WAITING = 3  # blocks that wait for each worker, so that none stands still
+LOOK, NO_WORKER = 5.0, 60.0  # s between two looks at the workers, and without any before it is given up
+
+
+class AbstractWork(ABC):
+    """Something to compute at many points. It is pickled, without what it compiled, and sent to the workers.
+
+    Results have the points along the first axis; "failed" and "reason", which is empty where a point can be computed,
+    are among them.
+    """
+
+    @abstractmethod
+    def compute(self, indices: np.ndarray) -> Results:
+        """The results at some points, by their numbers."""
+
+    @abstractmethod
+    def without_results(self, indices: np.ndarray, reason: str) -> Results:
+        """What stands in the store for points that cannot be computed."""
+
+
+class _Job(NamedTuple):
+    """Work as it travels."""
+
+    name: str  # of this job, by which a worker knows that it has it already
+    pickled: bytes
+    versions: dict[str, str]
+    double: bool  # precision
+
+
+def run_blocks(work: AbstractWork, store: BlockStore, cluster: Cluster, on_block: Callable[[int], None]) -> None:
+    """Compute and write the blocks that are not done.
+
+    Arguments:
+        work: computes the points.
+        store: takes the blocks.
+        cluster: a `concurrent.futures.Executor`, a Dask `Client`, "k/n" for the k-th of n parts of the blocks in this
+            process, or None for all of them in this process.
+        on_block: called with the number of points of every block that was written.
+    """
+    left = [int(number) for number in store.left()]
+    if cluster is not None and not isinstance(cluster, str):
+        if left:
+            _by_workers(work, store, _Workers(cluster, work), left, on_block)
+        return
+    for number in left if cluster is None else _part(cluster, left):
+        indices = store.blocks.indices(number)
+        store.write(number, work.compute(indices))
+        on_block(indices.size)
+
+
+@final
+class _Workers:
+    """The processes of a cluster, which have the work."""
+
+    def __init__(self, cluster: "Executor | HasExecutor", work: AbstractWork) -> None:
+        self._cluster, job = cluster, _packed(work)
+        executor = cluster.get_executor(pure=False) if isinstance(cluster, HasExecutor) else cluster
+        if not isinstance(executor, Executor):
+            must = "be a Dask client, an executor of `concurrent.futures`, or a part such as '1/4'"
+            _checks.refuse("cluster", must, _checks.described(cluster), "The call is `sweep(..., cluster=Client())`.")
+        if not self.count():
+            remedy = "Start some: `Client(n_workers=4, threads_per_worker=1)`."
+            _checks.refuse("cluster", "have workers", "one without", remedy)
+        self._executor, self.job = executor, job  # which goes with every block: no copy is lost with its worker
+
+    def count(self) -> int:
+        """How many blocks can be computed at a time."""
+        threads = getattr(self._cluster, "nthreads", None)
+        return os.cpu_count() or 1 if threads is None else sum(threads().values())
+
+    def block(self, store: BlockStore, number: int) -> "Future[int]":
+        """Compute and write a block; gives the number of its points."""
+        return self._executor.submit(_block, self.job, store, number)
+
+
+def _by_workers(
+    work: AbstractWork, store: BlockStore, workers: _Workers, left: list[int], on_block: Callable[[int], None]
+) -> None:
+    """Compute the blocks on workers; those that end workers last, by processes of this one, which only they can hit."""
+    fatal = []
+    for number, future in _in_turn(workers, store, left):
+        try:
+            on_block(future.result())
+        except BrokenExecutor as error:
+            raise RuntimeError(
+                f"A process of the pool ended while it computed block {number} or one of those beside it. What is "
+                f"done is in {store.path}, and the same call goes on from there. A Dask client replaces workers that "
+                "end, and leaves out points that end them."
+            ) from error
+        except Exception as error:
+            if type(error).__name__ != "KilledWorker":
+                raise
+            fatal.append(number)
+        del future  # Dask computes again what is asked for and was lost with a worker
+    for number in fatal:
+        indices = store.blocks.indices(number)
+        pieces = list(_survivors(workers.job, work, indices))
+        store.write(number, {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]})
+        on_block(indices.size)
+
+
+def _in_turn(workers: _Workers, store: BlockStore, left: list[int]) -> Iterator[tuple[int, Future[int]]]:
+    """The blocks as they end, few of them submitted at a time; whoever stops cancels the others."""
+    waiting, active = iter(left), {}
+    last_seen = time.monotonic()  # a worker
+    try:
+        while True:
+            count = workers.count()
+            last_seen = time.monotonic() if count else last_seen
+            room = max(WAITING * count - len(active), 0 if active else 1)
+            active |= {workers.block(store, number): number for number in itertools.islice(waiting, room)}
+            if not active:
+                return
+            done = wait(active, timeout=LOOK, return_when=FIRST_COMPLETED).done
+            if not done and time.monotonic() - last_seen > NO_WORKER:
+                blocks = ", ".join(map(str, sorted(active.values())))
+                raise RuntimeError(
+                    f"All workers of the cluster have ended, and none came in {NO_WORKER:g} s; blocks {blocks} were "
+                    f"asked for. What is done is in {store.path}, and the same call goes on from there."
+                )
+            for future in done:
+                yield active.pop(future), future
+    finally:
+        for future in active:
+            future.cancel()
+
+
+def _survivors(job: _Job, work: AbstractWork, indices: np.ndarray) -> Iterator[Results]:
+    """The results of a block that ends the process that computes it: by halves, without the points that do it."""
+    pending, child = [indices], _child()
+    try:
+        while pending:
+            part = pending.pop()
+            try:
+                yield child.submit(_points, job, part).result()
+            except BrokenExecutor:
+                child.shutdown()
+                child = _child()
+                if part.size > 1:
+                    pending += np.array_split(part, 2)[::-1]
+                else:
+                    yield work.without_results(part, "it ended the process that computed it")
+    finally:
+        child.shutdown(cancel_futures=True)
+
+
+def _child() -> Executor:
+    """One process of this one's own, which may end."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    return ProcessPoolExecutor(1, get_context("spawn"))
+
+
+def _part(text: str, left: list[int]) -> list[int]:
+    """The blocks of one part of so many, of those that are left."""
+    match = re.fullmatch(r"\s*(\d+)\s*/\s*(\d+)\s*", text)
+    part, parts = map(int, match.groups()) if match else (0, 0)
+    if not 1 <= part <= parts:
+        remedy = "Number the parts from 1: in an array job of 4, '1/4' to '4/4'."
+        _checks.refuse("cluster", "be a part such as '1/4'", repr(text), remedy)
+    return [number for number in left if number % parts == part - 1]
+
+
+def _versions() -> dict[str, str]:
+    return {name: importlib.metadata.version(name) for name in ("jaxdamp", "jax", "jaxlib", "numpy")}
+
+
+def _packed(work: AbstractWork) -> _Job:
+    """The work, pickled."""
+    try:
+        import cloudpickle  # comes with Dask; takes functions of notebooks along
+    except ImportError:
+        cloudpickle = pickle
+    try:
+        pickled = cloudpickle.dumps(work)
+    except Exception:
+        part = _cannot_travel(getattr(work, "function", work), "function") or _cannot_travel(work, "sweep")
+        remedy = "Write it as a function or class at the top of a module that the workers can import, with plain data."
+        _checks.refuse("function", "be one that can be sent to other processes", f"one in which {part}", remedy)
+    name = f"{os.getpid()}-{os.urandom(8).hex()}"
+    return _Job(name, pickled, _versions(), bool(jax.config.read("jax_enable_x64")))
+
+
+def _cannot_travel(thing: object, path: str) -> str:
+    """Which part cannot be pickled, and why."""
+    try:
+        pickle.dumps(thing)
+    except Exception as error:
+        why = f"{path} ({type(thing).__name__}) cannot be pickled: {error}"
+    else:
+        return ""
+    state = thing.__getstate__()
+    inside = thing if isinstance(thing, dict) else state if isinstance(state, dict) else {}
+    return next((said for name, part in inside.items() if (said := _cannot_travel(part, f"{path}.{name}"))), why)
+
+
+_jobs: dict[str, AbstractWork] = {}  # of this worker process
+_one_at_a_time = threading.Lock()  # threads of a worker share its devices
+
+
+def _unpacked(job: _Job) -> AbstractWork:
+    """The work of a job, made once in a process; refused where it would give other numbers."""
+    if job.name not in _jobs:
+        here = _versions()
+        different = [f"{name} {here[name]}, not {v}" for name, v in job.versions.items() if here[name] != v]
+        if different:
+            versions = "; ".join(different)
+            raise RuntimeError(f"A worker on {platform.node()} has {versions} as here. Install the same versions.")
+        _jobs.clear()
+        _jobs[job.name] = pickle.loads(job.pickled)
+    return _jobs[job.name]
+
+
+def _points(job: _Job, indices: np.ndarray) -> Results:
+    """The results at some points, in a worker."""
+    with _one_at_a_time, jax.enable_x64(job.double):
+        return _unpacked(job).compute(indices)
+
+
+def _block(job: _Job, store: BlockStore, number: int) -> int:
+    """Compute and write a block, in a worker; returns the number of its points."""
+    indices = store.blocks.indices(number)
+    store.write(number, _points(job, indices))
+    return indices.size

@@ -1,0 +1,65 @@
+"""Sweeps on a Dask cluster of this machine, in a process of its own: `python on_cluster.py folder kill`.
+
+`kill` is "worker", "client" or "nobody": who ends without warning after some blocks; or "point": one of the points ends
+whoever computes it.
+"""
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import jax
+from dask import config
+from distributed import Client, LocalCluster
+
+import jaxdamp
+from jaxdamp.sweeps import points, random
+
+
+POINTS = random({"a": (0.0, 3.0), "b": (-1.0, 1.0)}, 131_072, seed=2)
+BLOCK = 8192
+
+
+FATAL = 1234
+
+
+def at(indices):
+    return {"a": 1.0 * indices}
+
+
+def ending(point):
+    """Twice `a`; at one point it ends the process."""
+
+    def passed(a):
+        return a if a != FATAL else os._exit(1)
+
+    a = jax.pure_callback(passed, jax.ShapeDtypeStruct((), point["a"].dtype), point["a"], vmap_method="sequential")
+    return {"y": 2.0 * a}
+
+
+def main(folder: Path, kill: str) -> None:
+    from cases import decay
+
+    jax.config.update("jax_enable_x64", True)
+    config.set({"distributed.scheduler.active-memory-manager.start": False})
+    with (
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
+        Client(cluster) as client,
+    ):
+        pids: dict[str, int] = client.run(os.getpid)  # pyright: ignore[reportAssignmentType]
+        workers = list(pids.values())
+
+        def told(done: int, _: int) -> None:
+            if done == 4 * BLOCK and kill != "nobody":
+                os.kill(workers[0] if kill == "worker" else os.getpid(), signal.SIGKILL)
+
+        if kill == "point":
+            jaxdamp.sweep(ending, points(at, 2 * FATAL), file=folder / "point.zarr", cluster=client)
+            return
+        data = jaxdamp.sweep(decay(), POINTS, file=folder / f"{kill}.zarr", cluster=client, progress=told)
+        assert data.attrs["points_done"] == POINTS.count
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2])
