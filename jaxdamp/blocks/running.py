@@ -135,17 +135,17 @@ def _by_workers(
 def _in_turn(workers: _Workers, store: BlockStore, left: list[int]) -> Iterator[tuple[int, Future[int]]]:
     """The blocks as they end, few of them submitted at a time; whoever stops cancels the others."""
     waiting, active = iter(left), {}
-    last_seen = time.monotonic()  # a worker
+    missing_since = np.inf  # when no worker was there for the first time, of this absence
     try:
         while True:
             count = workers.count()
-            last_seen = time.monotonic() if count else last_seen
+            missing_since = np.inf if count else min(missing_since, time.monotonic())
             room = max(WAITING * count - len(active), 0 if active else 1)
             active |= {workers.block(store, number): number for number in itertools.islice(waiting, room)}
             if not active:
                 return
             done = wait(active, timeout=LOOK, return_when=FIRST_COMPLETED).done
-            if not done and time.monotonic() - last_seen > NO_WORKER:
+            if not done and time.monotonic() - missing_since > NO_WORKER:
                 blocks = ", ".join(map(str, sorted(active.values())))
                 raise RuntimeError(
                     f"All workers of the cluster have ended, and none came in {NO_WORKER:g} s; blocks {blocks} were "
@@ -247,8 +247,13 @@ def _unpacked(job: _Job) -> AbstractWork:
 
 def _points(job: _Job, indices: np.ndarray) -> Results:
     """The results at some points, in a worker."""
-    with _one_at_a_time, jax.enable_x64(job.double):
-        return _unpacked(job).compute(indices)
+    with _one_at_a_time:
+        before = bool(jax.config.read("jax_enable_x64"))
+        jax.config.update("jax_enable_x64", job.double)  # of all threads: JAX calls Python back from others, too
+        try:
+            return _unpacked(job).compute(indices)
+        finally:
+            jax.config.update("jax_enable_x64", before)
 
 
 def _block(job: _Job, store: BlockStore, number: int) -> int:
