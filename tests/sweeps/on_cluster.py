@@ -45,7 +45,7 @@ def main(folder: Path, kill: str) -> None:
 
     jax.config.update("jax_enable_x64", True)
     config.set({"distributed.scheduler.active-memory-manager.start": False})
-    config.set({"distributed.deploy.lost-worker-timeout": "5 min"})  # a busy machine starts workers again slowly
+    config.set({"distributed.deploy.lost-worker-timeout": "300 s"})  # a busy machine starts workers again slowly
     with (
         LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
         Client(cluster) as client,
