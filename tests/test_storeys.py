@@ -17,6 +17,7 @@ STOREYS = [
     {"parameters", "solve", "configuration", "codegen", "blocks"},  # and every private module `_*.py` at the top
     {"dampers", "roads", "metrics"},
     {"vehicles", "rig"},
+    {"control"},
     {"simulation", "bench"},
     {"identify", "tune", "sweeps"},
     {"plots", "export"},

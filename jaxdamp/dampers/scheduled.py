@@ -10,8 +10,8 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types
-from jaxdamp._limits import within
-from jaxdamp._types import Number, Vector
+from jaxdamp._limits import at_least, at_most, within
+from jaxdamp._types import Number, ScalarLike, Vector
 from jaxdamp.dampers.base import AbstractDamper
 from jaxdamp.dampers.contract import Traits, combined_traits
 from jaxdamp.dampers.fitted_range import without_fitted_ranges
@@ -91,6 +91,27 @@ class Scheduled(AbstractWrapper):
             for law in without_fitted_ranges(tuple(laws))
         }
         return len(structures) == 1
+
+    def at(self, command: ScalarLike) -> AbstractDamper:
+        """The law at another command, not checked, by sums of products, which a loop computes at every step.
+
+        Beyond the levels, where its value has no meaning, it goes straight on, so that slopes at the outer levels are
+        those inside.
+        """
+        count = len(self.laws) - 1
+        climbed = [(command - self.levels[i]) / (self.levels[i + 1] - self.levels[i]) for i in range(count)]
+        climbed = [at_least(share, 0.0) if i else share for i, share in enumerate(climbed)]
+        climbed = [at_most(share, 1.0) if i + 1 < count else share for i, share in enumerate(climbed)]
+        laws = without_fitted_ranges(self.laws)
+        if self.blend == "force":
+            shares = [a - b for a, b in zip((1.0, *climbed), (*climbed, 0.0), strict=True)]
+            return Sum(tuple(Scaled(law, jnp.asarray(share)) for law, share in zip(laws, shares, strict=True)))
+
+        def interpolated(first: Array, *others: Array) -> Array:
+            pairs = zip((first, *others), others, climbed, strict=False)
+            return first + sum(share * (after - before) for before, after, share in pairs)
+
+        return jax.tree.map(interpolated, *laws)
 
     def shares(self) -> Float[Array, " laws"]:
         """Weight of each law in the interpolation; the sum is one."""

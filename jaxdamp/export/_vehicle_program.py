@@ -17,7 +17,7 @@ from jaxdamp.codegen import Constant, Program, Symbols, lower, printing, symbols
 from jaxdamp.export._law_program import law_numbers
 from jaxdamp.parameters import with_values
 from jaxdamp.simulation import AbstractStepper, Equations, Exponential, RoadInput, settled
-from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind
+from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind, refuse_controller
 
 
 Numbers: TypeAlias = PyTree[Array]  # of a vehicle, in the order of `VehicleProgram.numbers`
@@ -74,6 +74,7 @@ class VehicleProgram:
     """
 
     def __init__(self, vehicle: AbstractVehicle, dtype: str = "float64", member: str = "->") -> None:
+        refuse_controller(vehicle, "C code and FMUs")
         self.vehicle, self.dtype, self.member = vehicle, dtype, member
         self.numbers = law_numbers(self.vehicle)
         self.layout, self.wheels = vehicle.layout, len(vehicle.wheel_names)

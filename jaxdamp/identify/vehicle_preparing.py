@@ -23,7 +23,7 @@ from jaxdamp.identify.vehicle_residuals import Drive, bench_parts, driven, finer
 from jaxdamp.parameters import FreeParameters, get, interval, match_paths, name_patterns, parameters, with_values
 from jaxdamp.rig import Rig, Sensor
 from jaxdamp.simulation import Exponential, RunCheck
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.vehicles import AbstractVehicle, refuse_controller
 
 
 FIRST_GUESS = 0.1  # noise of a channel at first, relative to its standard deviation
@@ -108,6 +108,7 @@ class VehicleData(NamedTuple):
 
 def checked_records(vehicle: AbstractVehicle, records: Any) -> tuple[RideRecord, ...]:
     """The records, after a check that the vehicle has their channels and wheels."""
+    refuse_controller(vehicle, "a fit")
     rides = tuple(records) if isinstance(records, Iterable) else (records,)
     if not rides:
         _checks.refuse("records", "hold at least one record", "empty", "Read some with `bench.read_rides`.")

@@ -123,6 +123,11 @@ class AbstractEngine(AbstractLawEngine):
         return 1
 
     @property
+    def runs_controllers(self) -> bool:
+        """Whether it can run a vehicle with a controller, which is sampled at instants."""
+        return False
+
+    @property
     def runs_printed(self) -> bool:
         """Whether the loop is printed as C and compiled by the machine's C compiler, for many cars side by side."""
         return False

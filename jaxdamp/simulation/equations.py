@@ -1,5 +1,6 @@
 """The equations of motion of a vehicle, which every engine integrates, and its state at an instant."""
 
+from collections.abc import Sequence
 from typing import NamedTuple, final
 
 import equinox as eqx
@@ -7,8 +8,9 @@ import jax.numpy as jnp
 from jax.ad_checkpoint import checkpoint_name
 from jaxtyping import Array, Float, PyTree
 
-from jaxdamp._types import ScalarLike
+from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp._vectors import Matrix, MemoryLayout, Vector, laid_out, minus, times
+from jaxdamp.control import ControlLoop, ControlState
 from jaxdamp.vehicles import Ports, States, System, rest_position
 
 
@@ -43,7 +45,7 @@ STRAIGHT = RoadEdges()  # as straight beyond the ends as beside them
 class StepState(NamedTuple):
     """A vehicle at an instant: motion (q, q̇) in SI units, states and forces [N] of its elements.
 
-    `memory` is what an engine of several steps remembers of the steps before.
+    `memory` is what an engine of several steps remembers of the steps before, `control` where the controller is.
 
     Attributes:
         motion: q and q̇ in SI units, shape (n,).
@@ -55,6 +57,7 @@ class StepState(NamedTuple):
     states: States
     force: Vector
     memory: PyTree = None
+    control: ControlState | None = None
 
 
 @final
@@ -74,7 +77,9 @@ class Equations(eqx.Module):
 
     def __init__(self, system: System, layout: MemoryLayout = MemoryLayout.ARRAY) -> None:
         form = system.form
-        self.system, self.layout, self.ports = system, layout, Ports(system.laws, layout)
+        control: ControlLoop | None = system.control
+        laws = system.laws if control is None else control.laws(system.laws, control.present(system.laws))
+        self.system, self.layout, self.ports = system, layout, Ports(laws, layout)
         self.deflection = laid_out(form.ports, layout)
         self.road_deflection = None if form.port_road is None else laid_out(form.port_road, layout)
 
@@ -90,6 +95,11 @@ class Equations(eqx.Module):
     def at(self, motion: Vector, states: States, road: RoadInput, memory: PyTree = None) -> StepState:
         """The vehicle in this motion, with the forces of its elements."""
         return StepState(motion, states, self.ports.force(*self.at_ports(motion, road), states), memory)
+
+    def at_commands(self, commands: Sequence[Scalar]) -> "Equations":
+        """The same with its dampers at these commands."""
+        laws = self.system.control.laws(self.system.laws, tuple(commands))
+        return eqx.tree_at(lambda equations: equations.ports, self, Ports(laws, self.layout))
 
     def at_rest(self, motion: Float[Array, " n"], road: RoadInput) -> StepState:
         """The beginning of a run, with elements at rest."""

@@ -8,6 +8,7 @@ and Ostermann, Exponential integrators, Acta Numerica 2010).
 """
 
 import dataclasses
+from collections.abc import Callable
 from typing import Literal, NamedTuple, final
 
 import equinox as eqx
@@ -32,6 +33,7 @@ from jaxdamp._vectors import (
     times,
 )
 from jaxdamp.configuration import target
+from jaxdamp.control import Commands
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.rig import march
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState
@@ -146,10 +148,38 @@ class ExponentialStepper(AbstractStepper):
         earlier = tuple(before(states, held, held) for states in now.memory.states)
         return again._replace(memory=StepBefore(before(now.memory.force, now.force, again.force), earlier))
 
+    def recommanded(self, now: StepState, road: RoadInput, commands: Commands, rises: Commands) -> StepState:
+        """The same instant under other commands, the memory as if their targets had always been the same.
+
+        The force a step before is that of the motion carried back by its acceleration, at the command carried back
+        along its slope: the step after a jump of the command then is of third order, too.
+        """
+        dt, n = self.dt, len(now.motion) // 2
+        equations = self.equations.at_commands(commands)
+        after = equations.at(now.motion, now.states, road)
+        rate = self.equations.system.motion
+        rate = rate if self.equations.layout is MemoryLayout.ARRAY else rate.scalars()
+        acceleration = rate(after.motion, after.force, road.height, road.rate)[n:]
+        (x, v), a = equations.at_ports(now.motion, road), times(self.equations.deflection, acceleration)
+        moved = _each(lambda x, v, a: x - dt * (v - 0.5 * dt * a), x, v, a), _each(lambda v, a: v - dt * a, v, a)
+
+        def force(commands: Commands) -> Vector:
+            return self.equations.at_commands(commands).ports.force(*moved, now.states)
+
+        before, change = jax.jvp(force, (commands,), (rises,))
+        return after._replace(memory=now.memory._replace(force=plus(before, change)))
+
     def _reached(self, motion: Vector, road: RoadInput) -> tuple[Vector, Vector]:
         deflection, rate = self.equations.at_ports(motion, road)
         one = self.opaque_one
         return materialise_derivatives_once(deflection, one), materialise_derivatives_once(rate, one)
+
+
+def _each(function: Callable[..., Scalar], *vectors: Vector) -> Vector:
+    """A function of the entries of vectors, one by one."""
+    if isinstance(vectors[0], tuple):
+        return tuple(function(*entries) for entries in zip(*vectors, strict=True))
+    return function(*vectors)
 
 
 @final

@@ -6,7 +6,7 @@ small arrays and carries no more than it must.
 """
 
 from abc import abstractmethod
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, final
 
 import equinox as eqx
 import jax
@@ -18,6 +18,7 @@ from jaxdamp._sharded import varying_as
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp._vectors import between, laid_out
 from jaxdamp.codegen import printed_scan
+from jaxdamp.control import Commands, ControlLoop, Flags, Signals
 from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome, RunState
 from jaxdamp.simulation.equations import FOR_REVERSE, STRAIGHT, Equations, RoadEdges, RoadInput, StepState
 
@@ -60,6 +61,23 @@ class AbstractStepper(eqx.Module):
         del ratio
         return self.equations.at(now.motion, now.states, road, now.memory)
 
+    def with_equations(self, equations: Equations) -> "AbstractStepper":
+        """The same stepper for a vehicle that differs in its laws alone."""
+        return eqx.tree_at(lambda stepper: stepper.equations, self, equations)
+
+    def recommanded(self, now: StepState, road: RoadInput, commands: Commands, rises: Commands) -> StepState:
+        """The same instant from which a run goes on with other commands; here with the memory as it is.
+
+        Arguments:
+            now: the vehicle under the old commands.
+            road: under the wheels.
+            commands: of the dampers from now on.
+            rises: how much greater they were a step before, had their targets always been the same.
+        """
+        del rises
+        after = self.with_equations(self.equations.at_commands(commands))
+        return after.resumed(now, road, jnp.ones_like(self.dt))
+
 
 class AbstractFixedStep(AbstractEngine):
     """An engine of equal steps: it has one method, `stepper`, and `step_count` where an interval takes several."""
@@ -68,6 +86,11 @@ class AbstractFixedStep(AbstractEngine):
     def derivatives(self) -> tuple[Mode, ...]:
         """Both: the loop has a fixed length. A step with a loop of its own may say otherwise."""
         return ("forward", "reverse")
+
+    @property
+    def runs_controllers(self) -> bool:
+        """Between its steps."""
+        return True
 
     @property
     def prints_arithmetic(self) -> bool:
@@ -89,6 +112,9 @@ class AbstractFixedStep(AbstractEngine):
     ) -> Outcome:
         """Step after step; of a long run reverse derivatives keep the beginnings of blocks only."""
         stepper = self.stepper(equations, jnp.asarray(dt / self.step_count, dtype=float))
+        controller = None if equations.system.control is None else Controller(stepper, dt)
+        if controller is not None:
+            stepper = ControlledStepper(stepper)
         heights, start, edges = varying_as((heights, start, edges), eqx.filter(stepper, eqx.is_array))
         half_rate, layout = jnp.asarray(0.5 / dt, dtype=heights.dtype), equations.layout
         rated = equations.road_deflection is not None or not observer.saves_motion
@@ -96,9 +122,11 @@ class AbstractFixedStep(AbstractEngine):
         def at(height: Array, rate: Array) -> RoadInput:
             return RoadInput(laid_out(height, layout), laid_out(rate, layout))
 
-        def step(carry: Carry, ahead: Array) -> Carry:
+        def step(carry: Carry, row: tuple[Array, Flags | None]) -> Carry:
             """To the next instant; where rates are needed, with the height of the one after it."""
-            now, gathered, begin, window = carry
+            (now, gathered, begin, window), (ahead, flags) = carry, row
+            if controller is not None and flags is not None:
+                now = controller.decided(now, begin, flags)
             if rated:
                 height, coming = window
                 end, window = at(coming, half_rate * (ahead - height)), (coming, ahead)
@@ -110,15 +138,15 @@ class AbstractFixedStep(AbstractEngine):
         policy = jax.checkpoint_policies.save_only_these_names(FOR_REVERSE)
         lean = step if observer.saves_motion else jax.checkpoint(step, policy=policy, prevent_cse=False)
 
-        def stride(carry: Carry, ahead: Array) -> tuple[Carry, PyTree]:
+        def stride(carry: Carry, row: PyTree) -> tuple[Carry, PyTree]:
             if observer.every == 1:
-                carry = lean(carry, ahead)
+                carry = lean(carry, row)
             else:
-                carry, _ = jax.lax.scan(lambda carry, ahead: (lean(carry, ahead), None), carry, ahead)
+                carry, _ = jax.lax.scan(lambda carry, row: (lean(carry, row), None), carry, row)
             return carry, observer.saved(carry[0], carry[1])
 
-        def drive(carry: Carry, road: Array) -> tuple[Carry, PyTree]:
-            return jax.lax.scan(stride, carry, road)
+        def drive(carry: Carry, rows: PyTree) -> tuple[Carry, PyTree]:
+            return jax.lax.scan(stride, carry, rows)
 
         first = RoadInput(laid_out(heights[0], layout), None)
         window, road = (), heights[1:]
@@ -132,19 +160,25 @@ class AbstractFixedStep(AbstractEngine):
             now = stepper.resumed(start.now, first, stepper.dt / start.step)
         else:
             now = stepper.start(start, first)
+        flags = None
+        if controller is not None:
+            now = now if isinstance(start, RunState) else controller.begin(now, first)
+            begins = jnp.round(start.time / dt) if isinstance(start, RunState) else 0
+            flags = equations.system.control.flags(road.shape[0], dt, begins)
+        rows = road, flags
         carry = varying_as((now, observer.begin(now, first), first, window))
         if self.runs_printed:
-            carry = self._printed(step, carry, road, observer)
+            carry = self._printed(step, carry, rows, observer)
             return self._outcome(carry, observer.saved(carry[0], carry[1]), equations)
         parts = [jax.tree.map(lambda y: y[None], observer.saved(now, carry[1]))]
         whole = 0 if observer.saves_motion or road.shape[0] <= BLOCK else road.shape[0] // BLOCK * BLOCK
         if whole:
-            blocks = road[:whole].reshape(-1, BLOCK, *road.shape[1:])
+            blocks = jax.tree.map(lambda y: y[:whole].reshape(-1, BLOCK, *y.shape[1:]), rows)
             carry, saved = jax.lax.scan(jax.checkpoint(drive), carry, blocks)
             parts.append(jax.tree.map(lambda y: y.reshape(-1, *y.shape[2:]), saved))
-        remaining = road[whole:]
+        remaining = jax.tree.map(lambda y: y[whole:], rows)
         if observer.every > 1:
-            remaining = remaining.reshape(-1, observer.every, *remaining.shape[1:])
+            remaining = jax.tree.map(lambda y: y.reshape(-1, observer.every, *y.shape[1:]), remaining)
         carry, saved = drive(carry, remaining)
         records = jax.tree.map(lambda *ys: jnp.concatenate(ys), *parts, saved)
         return self._outcome(carry, records, equations)
@@ -152,15 +186,87 @@ class AbstractFixedStep(AbstractEngine):
     def _outcome(self, carry: Carry, records: PyTree, equations: Equations) -> Outcome:
         return Outcome(carry[1], records, equations.ports.by_port(carry[0].states), last=carry[0])
 
-    def _printed(self, step: Any, carry: Carry, road: Array, observer: AbstractObserver) -> Carry:
+    def _printed(self, step: Any, carry: Carry, rows: PyTree, observer: AbstractObserver) -> Carry:
         """The carry at the end of a loop that is printed; refused where something of each instant is saved."""
         try:
             if jax.tree.leaves(observer.saved(carry[0], carry[1])):
                 raise NotImplementedError("Instants are saved, as `simulate` and metrics of a whole record need them.")
-            return printed_scan(step, carry, road, arithmetic=self.prints_arithmetic)
+            return printed_scan(step, carry, rows, arithmetic=self.prints_arithmetic)
         except NotImplementedError as error:
             message = f"{self} cannot print this run: {error} Leave `printed` out: XLA then compiles the loop."
             raise NotImplementedError(message) from error
+
+
+@final
+class Controller(eqx.Module):
+    """What a controller does at the instants of a run.
+
+    Arguments:
+        stepper: of the engine.
+        spacing: of the instants [s].
+    """
+
+    stepper: AbstractStepper
+    loop: ControlLoop
+    spacing: Scalar
+
+    def __init__(self, stepper: AbstractStepper, spacing: ScalarLike) -> None:
+        self.stepper, self.loop = stepper, stepper.equations.system.control
+        self.spacing = jnp.asarray(spacing, dtype=float)
+
+    def begin(self, now: StepState, road: RoadInput) -> StepState:
+        """The vehicle at the first instant, before the first sample."""
+        return now._replace(control=self.loop.begin(self.stepper.equations.system.laws, self._signals(now, road)))
+
+    def decided(self, now: StepState, road: RoadInput, flags: Flags) -> StepState:
+        """After an instant: sensed and decided; where commands are applied, with the forces under them."""
+        equations, loop, before = self.stepper.equations, self.loop, now.control
+        laws, states = equations.system.laws, equations.ports.by_port(now.states)
+        control = loop.sampled(before, self._signals(now, road), laws, states, self.spacing, flags)
+        commands, rises = loop.resumed(control, self.stepper.dt)
+        after = self.stepper.recommanded(now, road, commands, rises)
+        chosen = jax.tree.map(
+            lambda new, old: jnp.where(flags.apply > 0.0, new, old), after, now._replace(control=None)
+        )
+        return chosen._replace(control=control)
+
+    def _signals(self, now: StepState, road: RoadInput) -> tuple[Signals, ...]:
+        return self.loop.signals(now.motion, now.force, road, self.stepper.equations.at_ports(now.motion, road))
+
+
+@final
+class ControlledStepper(AbstractStepper):
+    """Steps of an engine with the commands that a vehicle has at their ends."""
+
+    inner: AbstractStepper
+
+    @property
+    def equations(self) -> Equations:
+        """Of the engine's stepper."""
+        return self.inner.equations
+
+    @property
+    def dt(self) -> Scalar:
+        """The step [s]."""
+        return self.inner.dt
+
+    def start(self, motion: Float[Array, " n"], road: RoadInput) -> StepState:
+        """The vehicle at the first instant."""
+        return self.inner.start(motion, road)
+
+    def resumed(self, now: StepState, road: RoadInput, ratio: Scalar) -> StepState:
+        """The same instant after another stepper."""
+        control = now.control
+        equations = self.equations if control is None else self.equations.at_commands(control.command)
+        return self.inner.with_equations(equations).resumed(now, road, ratio)._replace(control=control)
+
+    def __call__(self, now: StepState, begin: RoadInput, end: RoadInput) -> StepState:
+        """A step later, the actuators with it."""
+        control = now.control
+        assert control is not None
+        commands = self.equations.system.control.followed(control, self.dt)
+        after = self.inner.with_equations(self.equations.at_commands(commands))(now, begin, end)
+        return after._replace(control=control._replace(command=commands))
 
 
 def _over(stepper: AbstractStepper, now: StepState, begin: RoadInput, end: RoadInput, substeps: int) -> StepState:

@@ -22,7 +22,7 @@ from jaxdamp.simulation.notes import range_sentences, range_uses
 from jaxdamp.simulation.run import refuse_stacked
 from jaxdamp.simulation.stability import known_cars, known_system, step_need
 from jaxdamp.simulation.step_size import USUAL
-from jaxdamp.vehicles import AbstractVehicle, ChannelKind, Layout, delays_of, static_equilibrium
+from jaxdamp.vehicles import AbstractVehicle, ChannelKind, Layout, delays_of, static_equilibrium, refuse_controller
 
 
 if TYPE_CHECKING:
@@ -197,6 +197,7 @@ def harmonic_response(
     [5.22, 11.75]
     """
     check_module("vehicle", vehicle, (AbstractVehicle,), "harmonic_response(vehicle, frequency, amplitude)")
+    refuse_controller(vehicle, "a periodic response")
     refuse_stacked(vehicle)
     points, sizes = checked_points(frequency, amplitude)
     behind_front = jnp.stack([wheel.behind for wheel in vehicle.frame().wheels])

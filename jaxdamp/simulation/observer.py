@@ -27,6 +27,7 @@ class Saved(NamedTuple):
     road_rate: Float[Array, "time wheels"]
     final_state: list[Float[Array, " _state"]]
     last: StepState | None
+    commands: Float[Array, "time commands"] | None  # of the dampers, then the demanded forces; None without control
 
 
 @final
@@ -46,9 +47,9 @@ class Recorder(AbstractObserver):
         """Nothing is gathered."""
         return ()
 
-    def saved(self, now: StepState, gathered: tuple[()]) -> tuple[Vector, States]:
-        """Motion and states: forces follow from them, and a loop that does not save them has a small body."""
-        return now.motion, now.states
+    def saved(self, now: StepState, gathered: tuple[()]) -> tuple[Vector, States, Array | None]:
+        """Motion, states and commands: forces follow from them, and a loop that does not save them has a small body."""
+        return now.motion, now.states, None if now.control is None else jnp.stack(_of_control(now))
 
 
 @eqx.filter_jit
@@ -79,14 +80,20 @@ def recorded(
     start = settled(system, heights[0]) if start is None else start
     beyond = () if edges is None else (edges,)
     outcome = engine.run(equations, heights, dt, start, Recorder(every), *beyond)
-    motion, states = outcome.records
+    motion, states, commands = outcome.records
     heights, slopes = heights[::every], road_rate(heights, dt, *beyond)[::every]
 
-    def force(motion: Array, states: States, height: Array, slope: Array) -> Array:
-        return equations.at(motion, states, RoadInput(height, slope)).force
+    def force(motion: Array, states: States, height: Array, slope: Array, commands: Array | None) -> Array:
+        now = equations if commands is None else equations.at_commands(scalars(commands[: commands.size // 2]))
+        return now.at(motion, states, RoadInput(height, slope)).force
 
-    forces = jax.vmap(force)(motion, states, heights, slopes)
-    return Saved(motion, forces, heights, slopes, outcome.states, outcome.last), outcome.status
+    forces = jax.vmap(force)(motion, states, heights, slopes, commands)
+    return Saved(motion, forces, heights, slopes, outcome.states, outcome.last, commands), outcome.status
+
+
+def _of_control(now: StepState) -> tuple[Scalar, ...]:
+    """Commands and demanded forces at an instant, which stand behind the forces in the outputs of the vehicle."""
+    return () if now.control is None else (*now.control.command, *now.control.demand)
 
 
 class Filter(NamedTuple):
@@ -195,7 +202,10 @@ class MetricObserver(AbstractObserver):
 
     def _values(self, now: StepState, road: RoadInput) -> tuple[Scalar, ...]:
         """The channels."""
-        values = self.outputs(now.motion, now.force, road.height, road.rate)
+        force, more = now.force, _of_control(now)
+        if more:
+            force = (*force, *more) if isinstance(force, tuple) else jnp.concatenate([force, jnp.stack(more)])
+        values = self.outputs(now.motion, force, road.height, road.rate)
         return checkpoint_name(values if isinstance(values, tuple) else scalars(values), FOR_REVERSE)
 
     def _samples(

@@ -75,6 +75,7 @@ class Response(eqx.Module, AbstractResult):
         axle_timing: when each axle met the road.
         whole: the run that this response is a part of; None for a run.
         begin: number of the first instant of this part in the run.
+        commands: of the dampers, then the demanded forces [N], shape (time, commands); None without a controller.
     """
 
     vehicle: AbstractVehicle
@@ -88,6 +89,7 @@ class Response(eqx.Module, AbstractResult):
     axle_timing: AxleTiming
     whole: "Response | None" = None
     begin: Int[Array, ""] | None = None
+    commands: Float[Array, "time commands"] | None = None
     _computed: _Channels = eqx.field(init=False, repr=False, default_factory=_Channels)
 
     @property
@@ -148,7 +150,9 @@ class Response(eqx.Module, AbstractResult):
         if channel in self._computed:
             return self._computed[channel]
         number = jnp.asarray(numbers[channel])
-        values = _channel(self.system.outputs, number, self.motion, self.port_force, self.road, self.road_rate)
+        forces = [self.port_force] if self.commands is None else [self.port_force, self.commands]
+        force = jnp.concatenate(forces, axis=-1) if len(forces) > 1 else self.port_force
+        values = _channel(self.system.outputs, number, self.motion, force, self.road, self.road_rate)
         if _checks.concrete(values) is None:  # traced: it belongs to one program
             return values
         return self._computed.setdefault(channel, values)
@@ -191,7 +195,15 @@ class Response(eqx.Module, AbstractResult):
             _checks.refuse("start, stop", must, f"{start:g} and {stop:g}")
         part, last = slice(inside[0], inside[-1] + 1), inside[-1] + 1 == time.size
         states = [state if last else jnp.full_like(state, jnp.nan) for state in self.final_state]
-        arrays = {name: getattr(self, name)[part] for name in ("time", "motion", "port_force", "road", "road_rate")}
+        names = [
+            "time",
+            "motion",
+            "port_force",
+            "road",
+            "road_rate",
+            *(["commands"] if self.commands is not None else []),
+        ]
+        arrays = {name: getattr(self, name)[part] for name in names}
         begin = jnp.asarray(inside[0] + (0 if self.begin is None else self.begin))
         return dataclasses.replace(self, **arrays, final_state=states, whole=self.run, begin=begin)
 

@@ -29,10 +29,10 @@ from jaxdamp.simulation.equations import Equations, settled
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.notes import range_uses
 from jaxdamp.simulation.observer import MetricObserver, recorded
-from jaxdamp.simulation.run import refuse_stacked, run_check, sampled
+from jaxdamp.simulation.run import check_control, refuse_stacked, run_check, sampled
 from jaxdamp.simulation.stationary import in_motion, stationary_dampers, stationary_metrics, stationary_range_use
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
-from jaxdamp.vehicles import AbstractVehicle, EquivalentDamper, is_stationary
+from jaxdamp.vehicles import AbstractVehicle, EquivalentDamper, is_stationary, refuse_controller
 
 
 @final
@@ -106,6 +106,7 @@ class Ride(eqx.Module):
         white = isinstance(road, WhiteRoad)
         chosen, self.vehicle = vehicle.chosen_metrics(metrics, white=white), vehicle
         if isinstance(road, WhiteRoad):
+            refuse_controller(vehicle, "a ride on a white road")
             for name, value in (("duration", duration), ("substeps", substeps), ("engine", engine)):
                 _refuse_run(name, value)
             self.road, self.heights, self.dt = road, None, 1e-3 if dt is None else dt
@@ -113,6 +114,7 @@ class Ride(eqx.Module):
             self.metrics = _stationary(vehicle, chosen, all_of_them=metrics is None)
             return
         engine, self.dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
+        check_control(engine, vehicle.system(), self.dt)
         _, self.heights = sampled(vehicle, road, duration, self.dt)
         self.road = road if delays_by_itself(vehicle, road) else None
         self.engine = engine.prepared(run_check(vehicle, vehicle.system(), road, self.heights, self.dt))

@@ -14,12 +14,13 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types, check_module
 from jaxdamp._traced import at_compile_time, behind, is_traced
 from jaxdamp._types import Scalar, Signal
+from jaxdamp.control import ControlLoop
 from jaxdamp.dampers import coverage, warn_outside
 from jaxdamp.parameters import modules_inside
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.adaptive import Adaptive
 from jaxdamp.simulation.engine import AbstractEngine, RunState, chosen_engine
-from jaxdamp.simulation.equations import RoadEdges
+from jaxdamp.simulation.equations import Equations, RoadEdges
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.notes import range_sentences
 from jaxdamp.simulation.observer import recorded
@@ -27,7 +28,7 @@ from jaxdamp.simulation.response import Response
 from jaxdamp.simulation.stability import known_system, rounded_down
 from jaxdamp.simulation.step_size import RunCheck
 from jaxdamp.simulation.wheels import axle_timing, heights_under_wheels
-from jaxdamp.vehicles import AbstractVehicle, Ports, System, refuse_restless, static_equilibrium
+from jaxdamp.vehicles import AbstractVehicle, System, refuse_restless, static_equilibrium
 
 
 if TYPE_CHECKING:
@@ -141,6 +142,7 @@ def simulate(
         substeps = None
     engine, dt = chosen_engine(engine, Exponential(substeps=substeps), dt, substeps)
     system = vehicle.system()
+    check_control(engine, system, dt)
     if state is not None:
         _check_state(state, start, engine, system)
     begins = None if state is None else state.time
@@ -158,7 +160,7 @@ def simulate(
             refuse_restless(vehicle)
         remedy = " ".join([*filter(None, map(coverage, system.laws)), engine.remedy(status, dt)])
         _checks.refuse("vehicle", "have a finite response", f"at {last} (position, rate) at the end", remedy)
-    response = Response(vehicle, system, time[::every], *saved[:-1], axle_timing(vehicle, road))
+    response = Response(vehicle, system, time[::every], *saved[:5], axle_timing(vehicle, road), commands=saved.commands)
     warn_outside(range_sentences(response.range_use()))
     if not return_state:
         return response
@@ -177,7 +179,7 @@ def _check_state(state: RunState, start: Mapping[str, float] | None, engine: Abs
         _checks.refuse("start", "be left out of a run that goes on from a `state`", start)
     if state.engine != type(engine).__name__:
         _checks.refuse("state", f"be of a run by {type(engine).__name__}", f"of one by {state.engine}")
-    now, ports = state.now, Ports(system.laws)
+    now, ports = state.now, Equations(system).ports
     of_vehicle = [(2 * len(system.layout.coordinates),), *map(jnp.shape, jax.eval_shape(lambda: ports.initial()))]
     of_state = [*map(jnp.shape, (now.motion, *now.states))]
     if of_state != of_vehicle:
@@ -287,6 +289,23 @@ def _instants(duration: float, dt: float, begins: Scalar | None) -> Signal:
         steps = begins / dt
         time = time + jnp.where(jnp.abs(steps - jnp.round(steps)) < 1e-6, jnp.round(steps), steps)
     return time * dt
+
+
+def check_control(engine: AbstractEngine, system: System, dt: float) -> None:
+    """Refuse an engine that cannot run a controller, and times of it that are not whole steps."""
+    control: ControlLoop | None = system.control
+    if control is None:
+        return
+    if not engine.runs_controllers:
+        remedy = "Leave it out, or drive the vehicle inside, `vehicle.car`, with its dampers at fixed commands."
+        _checks.refuse("engine", "have fixed steps to run a controller", repr(engine), remedy)
+    for name in ("period", "delay"):
+        value: float = getattr(control, name)
+        steps = value / dt
+        if abs(steps - round(steps)) > 1e-6 or (name == "period" and steps < 0.5):
+            must = f"be a whole number of steps of {dt:g} s"
+            near = max(round(steps), 1) * dt
+            _checks.refuse(name, must, f"{value:g} s", f"Pass `{name}={near:g}`, or another `dt`.")
 
 
 def refuse_stacked(vehicle: AbstractVehicle) -> None:

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._traced import at_compile_time, is_batched, is_traced, known, row, rows
 from jaxdamp._types import Scalar
+from jaxdamp.control import ControlLoop
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.vehicles import AbstractVehicle, System
 
@@ -123,16 +124,35 @@ def known_cars(system: System, dt: float) -> list[KnownCar] | None:
 
 
 def _cars_of_batch(system: System, dt: float) -> list[KnownCar] | None:
-    both = system, [_samples(law, dt) for law in system.laws]
+    both = system, [[_samples(law, dt) for law in laws] for laws in _at_all_commands(system)]
     values = rows(both)
     if values is None:
         return None
     cars = []
     for index in range(len(values[0])):
         of_one, samples = row(both, values, index)
-        slopes = [Slopes(*map(sum, zip(*(term.largest() for term in terms), strict=True))) for terms in samples]
-        cars.append(KnownCar(of_one, slopes))
+        cars.append(KnownCar(of_one, [_steepest([_added(terms) for terms in laws]) for laws in samples]))
     return cars
+
+
+def _at_all_commands(system: System) -> list[list[AbstractDamper]]:
+    """The laws that each port may have: one, or those at all levels of a damper that is commanded."""
+    control: ControlLoop | None = system.control
+    commanded = () if control is None else control.ports
+    return [
+        control.laws_at_levels(system.laws, port) if control is not None and port in commanded else [law]
+        for port, law in enumerate(system.laws)
+    ]
+
+
+def _added(terms: Sequence[_Samples]) -> Slopes:
+    """The largest slopes of laws that act side by side."""
+    return Slopes(*map(sum, zip(*(term.largest() for term in terms), strict=True)))
+
+
+def _steepest(slopes: Sequence[Slopes]) -> Slopes:
+    """The largest of each slope."""
+    return Slopes(*map(max, zip(*slopes, strict=True)))
 
 
 def step_need(system: System, slopes: Sequence[Slopes], dt: float, *, most: int | float = MOST) -> Need:

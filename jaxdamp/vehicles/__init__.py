@@ -11,7 +11,7 @@ z is up, pitch positive nose up, roll positive left side up.
 
 from jaxdamp._guesses import answer_guesses
 from jaxdamp.vehicles import presets
-from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle
+from jaxdamp.vehicles.base import AbstractVehicle, LumpedVehicle, refuse_controller as refuse_controller
 from jaxdamp.vehicles.cars import FullCar, HalfCar, QuarterCar, RollCar
 from jaxdamp.vehicles.channels import (
     GOALS as GOALS,

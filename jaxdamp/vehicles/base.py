@@ -43,6 +43,11 @@ class AbstractVehicle(Module):
         return _assembled(self)
 
     @property
+    def has_controller(self) -> bool:
+        """Whether its dampers are commanded while it drives (`control.Controlled`)."""
+        return False
+
+    @property
     def layout(self) -> Layout:
         """Names of coordinates, ports, wheels, channels and metrics, independent of all parameter values."""
         leaves, structure = jax.tree.flatten(self)
@@ -136,6 +141,18 @@ class AbstractVehicle(Module):
         """Largest distance between left and right wheels [m]; zero where a wheel stands for both sides."""
         offsets = jnp.stack([wheel.left for wheel in self.frame().wheels])
         return jnp.max(offsets) - jnp.min(offsets)
+
+
+def refuse_controller(vehicle: AbstractVehicle, asker: str) -> None:
+    """Refuse a vehicle with a controller, where its laws alone count.
+
+    Arguments:
+        vehicle: any vehicle.
+        asker: what is asked for, in words.
+    """
+    if vehicle.has_controller:
+        remedy = "Pass the vehicle inside, `vehicle.car`, whose dampers have fixed commands."
+        _checks.refuse("vehicle", f"be without a controller for {asker}", type(vehicle).__name__, remedy)
 
 
 @functools.lru_cache(maxsize=256)

@@ -27,6 +27,7 @@ class ChannelKind(enum.Enum):
     STROKE = "deflection between two points, extension positive", "m"
     DAMPER_VELOCITY = "rate of a deflection", "m/s"
     FORCE = "force of one law", "N"
+    COMMAND = "command of a damper", ""
     ROAD_HEIGHT = "height of the road under a wheel", "m"
     TYRE_LOAD = "load of a wheel minus the static load", "N"
     RELATIVE_TYRE_LOAD = "load of a wheel minus the static load, divided by the static load", ""

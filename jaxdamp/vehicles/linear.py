@@ -17,7 +17,7 @@ from jaxdamp._matrices import solve
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp.dampers import coverage
 from jaxdamp.metrics import weighting_state_space
-from jaxdamp.vehicles.base import AbstractVehicle
+from jaxdamp.vehicles.base import AbstractVehicle, refuse_controller
 from jaxdamp.vehicles.equilibrium import refuse_restless, rest_position
 from jaxdamp.vehicles.port_form import Ports, States
 from jaxdamp.vehicles.statistical import NoiseAtLaw, statistical_laws
@@ -204,6 +204,7 @@ def _on_random_road(
 def _linearise_statistically(
     vehicle: AbstractVehicle, velocity_psd: Array, delays: Float[Array, " wheels"]
 ) -> tuple[LinearVehicle, Scalar]:
+    refuse_controller(vehicle, "a statistically equivalent linear vehicle")
     system, frame = vehicle.system(), vehicle.frame()
     at_road = {name for wheel in frame.wheels for name in wheel.element_names}
     on_road = [name in at_road for name in system.layout.ports]
@@ -217,6 +218,7 @@ def _linearise_statistically(
 
 @eqx.filter_jit
 def _linearise(vehicle: AbstractVehicle, amplitude: Array | None, frequency: Array | None) -> LinearVehicle:
+    refuse_controller(vehicle, "a linear vehicle")
     system = vehicle.system()
     form, ports, count = system.form, Ports(system.laws), len(system.laws)
     level = jnp.zeros(form.road_stiffness.shape[1])

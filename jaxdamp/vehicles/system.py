@@ -9,7 +9,7 @@ from typing import NamedTuple, final
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp.dampers import AbstractDamper
@@ -104,7 +104,9 @@ class System(eqx.Module):
         laws: the law at each port.
         static_loads: loads of the wheels at rest on level ground [N].
         motion: the rate ẋ of the motion x = (q, q̇).
-        outputs: the channels of the layout.
+        outputs: the channels of the layout; of a controlled vehicle they also take its commands and demands, which
+            stand behind the forces.
+        control: what commands its dampers (`control.ControlLoop`); None of a passive vehicle.
     """
 
     layout: Layout = eqx.field(static=True)
@@ -113,6 +115,7 @@ class System(eqx.Module):
     static_loads: Float[Array, " wheels"]
     motion: LinearMap
     outputs: LinearMap
+    control: PyTree = None
 
     def channels(self, names: Sequence[str]) -> LinearMap:
         """The outputs of these channels."""

@@ -1,0 +1,158 @@
+"""A vehicle whose dampers are commanded while it drives."""
+
+import dataclasses
+from typing import final
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jaxdamp import _checks
+from jaxdamp._types import Number
+from jaxdamp.control.loop import ControlLoop, at_command, scheduled_in
+from jaxdamp.control.policies import AbstractPolicy
+from jaxdamp.dampers import AbstractDamper
+from jaxdamp.parameters import nonnegative, parameter, positive, setting
+from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind, Frame, Layout, LinearMap, System
+
+
+@final
+class Controlled(AbstractVehicle):
+    """A vehicle with a controller: its dampers that take a command are set to a policy's demands, sample by sample.
+
+    Every `period` the sensors are read and the policy of each damper demands a force; the command whose force comes
+    nearest, at the present motion and state of the law, is applied after `delay` and held, and the actuator follows it
+    with a first-order lag:
+
+        u' = (u_target − u)/actuator_lag,    filtered signals y' = (signal − y)/sensor_lag
+
+    Between two levels of a `Scheduled` law its force is taken as straight in the command, which it is where the law is
+    linear in its parameters or its forces are blended; else the force misses the demand a little. Demand and command
+    are channels, `{damper}_demand` [N] and `{damper}_command`: what the damper could not do is their difference from
+    `{damper}_force`. Limits are rounded over a tenth of the range, and the quotient of force and velocity below the
+    velocity `still`: sharper ones gain nothing, and make runs chaotic, so that their derivatives are useless.
+
+    A run begins with the commands that the laws have. The order at an instant: the sensors see the vehicle just before,
+    with forces under the old command; then the policy decides; then forces are those of the new command. With fixed
+    steps the run stays of third order through the jumps. Simulations, rides, sweeps and tunings take it as any
+    vehicle; its parameters are those of the vehicle behind `car.`, and of the controller, such as `policy.gain`. What
+    needs a law without a memory of the controller refuses it: white roads, linearisation, `Adaptive`, export.
+
+    Arguments:
+        car: any vehicle, with one or more dampers whose law is or holds a `Scheduled` law.
+        policy: of every such damper, each with its own states; or a mapping from the names of dampers
+            (`front_damper`) to policies, and those without one keep their commands.
+        period: between two samples [s], a whole number of steps of a run.
+        delay: from a sample to its command [s], a whole number of steps.
+
+    Raises:
+        ValueError: no damper that takes a command, a name of no damper, a law whose force does not change at once with
+            its command, such as one behind a lag.
+
+    >>> from jaxdamp import Ride, roads
+    >>> from jaxdamp.control import Skyhook
+    >>> from jaxdamp.dampers import Linear, Scheduled
+    >>> from jaxdamp.vehicles import QuarterCar
+    >>> damper = Scheduled((Linear(300.0), Linear(3900.0)), levels=[0.0, 1.0], command=0.2)
+    >>> car = QuarterCar(400.0, 50.0, 20e3, 250e3, damper)
+    >>> ride = Ride(Controlled(car, Skyhook(3000.0)), roads.iso8608("C", speed=20.0, seed=1), duration=2.0)
+    >>> values = ride({"policy.gain": 2000.0})
+    """
+
+    car: AbstractVehicle
+    policy: AbstractPolicy | dict[str, AbstractPolicy]
+    actuator_lag: Number = parameter("s", "time constant of the actuator", nonnegative, default=0.0, adjustable=False)
+    sensor_lag: Number = parameter("s", "time constant of the sensors", nonnegative, default=0.0, adjustable=False)
+    still: Number = setting("m/s", "velocity below which force over velocity is rounded", positive, default=0.1)
+    period: float = eqx.field(static=True, default=5e-3)
+    delay: float = eqx.field(static=True, default=0.0)
+
+    def __check_init__(self) -> None:
+        _checks.positive("period", self.period)
+        if not self.delay >= 0.0:
+            _checks.refuse("delay", "not be negative", self.delay)
+        by_name = dict(zip(self.car.layout.ports, self.car.elements(), strict=True))
+        for name in self._commanded():
+            _refuse_without_effect(name, by_name[name], self.still)
+
+    def _commanded(self) -> dict[str, AbstractPolicy]:
+        """The policy of each damper that has one."""
+        laws = dict(zip(self.car.layout.ports, self.car.elements(), strict=True))
+        taking = [name for name, law in laws.items() if len(scheduled_in(law)) == 1]
+        if not taking:
+            remedy = "Make its damper `dampers.Scheduled((soft, hard), levels=[0.0, 1.0], command=0.0)`."
+            _checks.refuse("car", "have a damper with one `Scheduled` law, which takes a command", list(laws), remedy)
+        if isinstance(self.policy, AbstractPolicy):
+            return dict.fromkeys(taking, self.policy)
+        for name, policy in self.policy.items():
+            _checks.one_of("policy", name, taking)
+            _checks.instance(f"policy[{name!r}]", policy, AbstractPolicy, "be a policy", "Such as `control.Skyhook()`.")
+        return {name: self.policy[name] for name in taking if name in self.policy}
+
+    @property
+    def has_controller(self) -> bool:
+        """It has."""
+        return True
+
+    def frame(self) -> Frame:
+        """The parts of the vehicle."""
+        return self.car.frame()
+
+    @property
+    def layout(self) -> Layout:
+        """That of the vehicle, with the channels of command and demand of each damper."""
+        layout = self.car.layout
+        return dataclasses.replace(layout, channels=(*layout.channels, *_channels(list(self._commanded()))))
+
+    def system(self) -> System:
+        """The assembled vehicle with its controller."""
+        return _controlled_system(self, self.layout)
+
+
+def _channels(dampers: list[str]) -> list[Channel]:
+    """The channels of control, commands before demands."""
+    commands = [Channel(f"{d}_command", ChannelKind.COMMAND, d, f"command of {d}, in its unit") for d in dampers]
+    words = "force that the controller demands of {}, positive where it resists extension"
+    return commands + [Channel(f"{d}_demand", ChannelKind.FORCE, d, words.format(d)) for d in dampers]
+
+
+@eqx.filter_jit
+def _controlled_system(vehicle: Controlled, layout: Layout) -> System:
+    policies, system, frame = vehicle._commanded(), vehicle.car.system(), vehicle.car.frame()
+    ports = tuple(system.layout.ports.index(name) for name in policies)
+    wheels = {name for wheel in frame.wheels for name in wheel.point.terms}
+    sprung = np.array([name not in wheels for name in system.layout.coordinates])
+    n, motion, outputs = sprung.size, system.motion, system.outputs
+    body = system.form.ports[np.array(ports)] * sprung
+    rates = (getattr(motion, name)[n:] for name in ("motion", "force", "road", "road_rate"))
+    loop = ControlLoop(
+        tuple(policies.values()),
+        body,
+        LinearMap(*(body @ rate for rate in rates)),
+        vehicle.actuator_lag,
+        vehicle.sensor_lag,
+        vehicle.still,
+        ports,
+        vehicle.period,
+        vehicle.delay,
+    )
+    more = 2 * len(ports)  # commands and demands stand behind the forces
+    wide = LinearMap(
+        *(jnp.pad(a, ((0, more), (0, 0))) for a in (outputs.motion, outputs.force, outputs.road, outputs.road_rate))
+    )
+    count, forces = outputs.force.shape
+    force = jnp.pad(wide.force, ((0, 0), (0, more))).at[count:, forces:].set(jnp.eye(more))
+    outputs = dataclasses.replace(wide, force=force)
+    return dataclasses.replace(system, layout=layout, outputs=outputs, control=loop)
+
+
+def _refuse_without_effect(name: str, law: AbstractDamper, still: Number) -> None:
+    """Refuse a law whose force at an instant is the same at all levels of its command."""
+    levels = scheduled_in(law)[0].levels
+    forces = [at_command(law, u).force(jnp.zeros_like(still), still, law.initial_state()) for u in levels]
+    known = [_checks.concrete(force) for force in forces]
+    values = [float(force) for force in known if force is not None]
+    if len(values) == len(forces) and np.ptp(values) == 0.0:
+        must = "have a force that changes at once with its command"
+        remedy = "Put the delay of the damper into `actuator_lag`, and its law without one into the car."
+        _checks.refuse(name, must, f"{law}, whose force at {float(still):g} m/s does not", remedy)

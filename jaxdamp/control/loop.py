@@ -1,0 +1,224 @@
+"""The loop of control: sense, demand, command, wait, follow.
+
+At a sampling instant the sensors see the vehicle just before, under the old command, and the policy demands a force.
+The command whose force comes nearest waits for the delay and becomes the target, which the actuator follows with its
+lag, exactly over each step.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple, final
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PyTree
+
+from jaxdamp._types import Scalar, ScalarLike
+from jaxdamp._vectors import MemoryLayout, Vector, laid_out, times
+from jaxdamp.control.policies import AbstractPolicy, Signals
+from jaxdamp.dampers import AbstractDamper, Scheduled
+from jaxdamp.vehicles import LinearMap
+
+
+Commands = tuple[Scalar, ...]
+
+
+class ControlState(NamedTuple):
+    """Where the control is at an instant, with an entry for each damper.
+
+    Attributes:
+        seen: the signals after the sensors' filter.
+        policies: states of the policies.
+        demand: demanded force of the last sample [N].
+        waiting: commands that wait for the delay, the oldest first.
+        target: what the actuator follows.
+        command: what the damper has.
+    """
+
+    seen: tuple[Signals, ...]
+    policies: tuple[PyTree, ...]
+    demand: tuple[Scalar, ...]
+    waiting: tuple[Commands, ...]
+    target: Commands
+    command: Commands
+
+
+class Flags(NamedTuple):
+    """1.0 at instants of sampling, and at those at which a command becomes the target; else 0.0."""
+
+    sample: Float[Array, " time"]
+    apply: Float[Array, " time"]
+
+
+def at_command(law: AbstractDamper, command: Scalar) -> AbstractDamper:
+    """The law of an element with the parameters, or forces, of its `Scheduled` law at a command."""
+    return jax.tree.map(lambda node: node.at(command) if _scheduled(node) else node, law, is_leaf=_scheduled)
+
+
+def scheduled_in(law: AbstractDamper) -> list[Scheduled]:
+    """The `Scheduled` laws in the law of an element."""
+    return [node for node in jax.tree.leaves(law, is_leaf=_scheduled) if _scheduled(node)]
+
+
+def _scheduled(node: object) -> bool:
+    return isinstance(node, Scheduled)
+
+
+@final
+class ControlLoop(eqx.Module):
+    """A controller assembled for the equations of a vehicle.
+
+    Attributes:
+        policies: of each damper.
+        body: velocity of the body above each damper from the rates of the coordinates, shape (dampers, q).
+        acceleration: acceleration of the body above each damper.
+        actuator_lag: [s].
+        sensor_lag: [s].
+        still: velocity below which the quotient of a demanded force and a velocity is rounded [m/s].
+        ports: of the dampers.
+        period: [s].
+        delay: [s].
+    """
+
+    policies: tuple[AbstractPolicy, ...]
+    body: Float[Array, "dampers q"]
+    acceleration: LinearMap
+    actuator_lag: Scalar
+    sensor_lag: Scalar
+    still: Scalar
+    ports: tuple[int, ...] = eqx.field(static=True)
+    period: float = eqx.field(static=True)
+    delay: float = eqx.field(static=True)
+
+    def laws(self, laws: Sequence[AbstractDamper], command: Commands) -> tuple[AbstractDamper, ...]:
+        """The law at each port, the dampers at their commands."""
+        changed = list(laws)
+        for port, u in zip(self.ports, command, strict=True):
+            changed[port] = at_command(laws[port], u)
+        return tuple(changed)
+
+    def present(self, laws: Sequence[AbstractDamper]) -> Commands:
+        """The commands that the laws have, with which a run begins."""
+        return tuple(scheduled_in(laws[port])[0].command for port in self.ports)
+
+    def laws_at_levels(self, laws: Sequence[AbstractDamper], port: int) -> list[AbstractDamper]:
+        """The law of a port at each level of its commands."""
+        return [at_command(laws[port], level) for level in scheduled_in(laws[port])[0].levels]
+
+    def flags(self, count: int, dt: ScalarLike, first: Array | int) -> Flags:
+        """Of so many instants, of which the first has a number in the whole run."""
+        number = first + jnp.arange(count)
+        every, late = jnp.round(self.period / dt), jnp.round(self.delay / dt)
+        return Flags(*(((number - start) % every == 0).astype(float) for start in (0, late)))
+
+    @property
+    def waiting(self) -> int:
+        """How many commands wait at a time: those of the present sample, and of those within the delay."""
+        return math.floor(self.delay / self.period * (1 + 1e-9)) + 1
+
+    def begin(self, laws: Sequence[AbstractDamper], signals: tuple[Signals, ...]) -> ControlState:
+        """Before the first sample, which the first instant takes."""
+        zero = jnp.zeros_like(signals[0].stroke)
+        command = tuple(u + zero for u in self.present(laws))
+        states = tuple(jax.tree.map(jnp.asarray, policy.initial_state()) for policy in self.policies)
+        return ControlState(signals, states, (zero,) * len(command), (command,) * self.waiting, command, command)
+
+    def signals(
+        self, motion: Vector, force: Vector, road: tuple[Vector, Vector | None], at_ports: tuple[Vector, Vector]
+    ) -> tuple[Signals, ...]:
+        """What the sensors see of each damper."""
+        layout = MemoryLayout.SCALARS if isinstance(motion, tuple) else MemoryLayout.ARRAY
+        outputs = self.acceleration if layout is MemoryLayout.ARRAY else self.acceleration.scalars()
+        velocity = times(laid_out(self.body, layout), motion[len(motion) // 2 :])
+        acceleration, (stroke, rate) = outputs(motion, force, *road), at_ports
+        return tuple(
+            Signals(velocity[i], velocity[i] - rate[port], acceleration[i], stroke[port], rate[port])
+            for i, port in enumerate(self.ports)
+        )
+
+    def sampled(
+        self,
+        state: ControlState,
+        signals: tuple[Signals, ...],
+        laws: Sequence[AbstractDamper],
+        states: Sequence[Array],
+        dt: Scalar,
+        flags: Flags,
+    ) -> ControlState:
+        """After an instant: the sensors follow the signals; at a sample a new command waits, at its time it is applied.
+
+        Arguments:
+            state: before.
+            signals: at the instant.
+            laws: of the ports.
+            states: of these laws.
+            dt: since the instant before [s].
+            flags: of this instant.
+        """
+        share = 1.0 - _decay(dt, self.sensor_lag)
+        seen = jax.tree.map(lambda old, new: old + share * (new - old), state.seen, signals)
+        pairs = [policy(*of_one) for policy, *of_one in zip(self.policies, seen, state.policies, strict=True)]
+        demand = tuple(force + jnp.zeros_like(old) for (force, _), old in zip(pairs, state.demand, strict=True))
+        wanted = tuple(
+            self._nearest(laws, port, force, one, states[port])
+            for port, force, one in zip(self.ports, demand, seen, strict=True)
+        )
+        decided = (tuple(after for _, after in pairs), demand, (*state.waiting[1:], wanted))
+        before = (state.policies, state.demand, state.waiting)
+        policies, demand, waiting = jax.tree.map(
+            lambda new, old: jnp.where(flags.sample > 0.0, new, old), decided, before
+        )
+        target = tuple(
+            jnp.where(flags.apply > 0.0, new, old) for new, old in zip(waiting[0], state.target, strict=True)
+        )
+        return ControlState(seen, policies, demand, waiting, target, state.command)
+
+    def _nearest(
+        self, laws: Sequence[AbstractDamper], port: int, demand: Scalar, seen: Signals, state: Array
+    ) -> Scalar:
+        """The command whose force comes nearest to the demanded one, at the present motion and states of the law.
+
+        Between two levels the force is taken as straight in the command. Each share is rounded where the levels' forces
+        differ little, as much as they differ at the velocity `still`, and at both ends: it has derivatives everywhere,
+        and never leaves the levels.
+        """
+        levels, at_levels = scheduled_in(laws[port])[0].levels, self.laws_at_levels(laws, port)
+        forces = [law.force(seen.stroke, seen.velocity, state) for law in at_levels]
+        still = [law.force(jnp.zeros_like(self.still), self.still, law.initial_state()) for law in at_levels]
+        command = levels[0]
+        for i in range(len(at_levels) - 1):
+            rise, small = forces[i + 1] - forces[i], still[i + 1] - still[i]
+            share = (demand - forces[i]) * rise / (rise * rise + small * small)
+            command = command + (levels[i + 1] - levels[i]) * _rounded_limits(share)
+        return command
+
+    def followed(self, state: ControlState, dt: Scalar) -> Commands:
+        """The commands a step of dt [s] later."""
+        decay = _decay(dt, self.actuator_lag)
+        return tuple(t + decay * (u - t) for t, u in zip(state.target, state.command, strict=True))
+
+    def resumed(self, state: ControlState, dt: Scalar) -> tuple[Commands, Commands]:
+        """Commands at an instant under its target; and how much they were greater a step of dt [s] before.
+
+        As if the actuator had always followed this target; without a lag the command is the target.
+        """
+        has_lag = self.actuator_lag > 0.0
+        rise = 1.0 / jnp.where(has_lag, _decay(dt, self.actuator_lag), 1.0) - 1.0
+        pairs = list(zip(state.target, state.command, strict=True))
+        return tuple(jnp.where(has_lag, u, t) for t, u in pairs), tuple(rise * (u - t) for t, u in pairs)
+
+
+ROUNDED = 0.1  # share of the range over which its limits are rounded
+
+
+def _rounded_limits(share: Scalar) -> Scalar:
+    """A share between zero and one, smooth: (1 + √(s² + w²) − √((s − 1)² + w²))/2."""
+    above = share - 1.0
+    return 0.5 * (1.0 + jnp.sqrt(share * share + ROUNDED**2) - jnp.sqrt(above * above + ROUNDED**2))
+
+
+def _decay(dt: Scalar, lag: Scalar) -> Scalar:
+    """exp(−dt/lag), zero without a lag."""
+    has_lag = lag > 0.0
+    return jnp.where(has_lag, jnp.exp(-dt / jnp.where(has_lag, lag, 1.0)), 0.0)
