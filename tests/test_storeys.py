@@ -26,7 +26,7 @@ STOREYS = [
 ]
 TOP = len(STOREYS) - 1
 # A result draws itself: `.plot()` loads the plots when it is called.
-DRAWS_ITSELF = {(own, "plots") for own in ("metrics", "rig", "roads", "vehicles", *STOREYS[3], *STOREYS[4])}
+DRAWS_ITSELF = {(own, "plots") for own in ("metrics", "rig", "roads", "vehicles", *STOREYS[4], *STOREYS[5])}
 DRAWS_ITSELF |= {("_results", "plots"), ("_results", "report")}  # and writes itself: `.report(path)`
 # Known only to someone who asks for them: importing the package loads none.
 LATE = ["matplotlib", "xarray", "pint", "typer", "rich", "pandas", "scipy.optimize", "scipy.signal", "scipy.io"]

@@ -11,6 +11,8 @@ from jaxdamp.control.loop import (
     ControlLoop as ControlLoop,
     ControlState as ControlState,
     Flags as Flags,
+    Sampler as Sampler,
+    laws_at_levels as laws_at_levels,
 )
 from jaxdamp.control.policies import (
     AbstractPolicy,

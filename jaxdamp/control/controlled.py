@@ -1,17 +1,18 @@
 """A vehicle whose dampers are commanded while it drives."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from jaxdamp import _checks
-from jaxdamp._types import Number
-from jaxdamp.control.loop import ControlLoop, at_command, scheduled_in
+from jaxdamp._types import Number, Scalar
+from jaxdamp.control.loop import ControlLoop, laws_at_levels, scheduled_in
 from jaxdamp.control.policies import AbstractPolicy
-from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import nonnegative, parameter, positive, setting
 from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind, Frame, Layout, LinearMap, System
 
@@ -71,23 +72,28 @@ class Controlled(AbstractVehicle):
         _checks.positive("period", self.period)
         if not self.delay >= 0.0:
             _checks.refuse("delay", "not be negative", self.delay)
-        by_name = dict(zip(self.car.layout.ports, self.car.elements(), strict=True))
-        for name in self._commanded():
-            _refuse_without_effect(name, by_name[name], self.still)
-
-    def _commanded(self) -> dict[str, AbstractPolicy]:
-        """The policy of each damper that has one."""
-        laws = dict(zip(self.car.layout.ports, self.car.elements(), strict=True))
-        taking = [name for name, law in laws.items() if len(scheduled_in(law)) == 1]
-        if not taking:
+        forces = _forces_at_levels(self.car, self.still)
+        if not forces:
             remedy = "Make its damper `dampers.Scheduled((soft, hard), levels=[0.0, 1.0], command=0.0)`."
-            _checks.refuse("car", "have a damper with one `Scheduled` law, which takes a command", list(laws), remedy)
+            must = "have a damper with one `Scheduled` law, which takes a command"
+            _checks.refuse("car", must, ", ".join(self.car.layout.ports), remedy)
+        if not isinstance(self.policy, AbstractPolicy):
+            for name, policy in self.policy.items():
+                _checks.one_of("policy", name, forces)
+                must, remedy = "be a policy", "Such as `control.Skyhook()`."
+                _checks.instance(f"policy[{name!r}]", policy, AbstractPolicy, must, remedy)
+        for name in self.policies(list(forces)):
+            known = _checks.concrete(forces[name])
+            if known is not None and np.ptp(known) == 0.0:
+                must = "have a force that changes at once with its command"
+                remedy = "Put the lag of the damper into `actuator_lag`, and its law without one into the car."
+                _checks.refuse(name, must, f"one that is {known[0]:g} N at {float(self.still):g} m/s always", remedy)
+
+    def policies(self, dampers: Sequence[str]) -> dict[str, AbstractPolicy]:
+        """The policy of each of these dampers that has one."""
         if isinstance(self.policy, AbstractPolicy):
-            return dict.fromkeys(taking, self.policy)
-        for name, policy in self.policy.items():
-            _checks.one_of("policy", name, taking)
-            _checks.instance(f"policy[{name!r}]", policy, AbstractPolicy, "be a policy", "Such as `control.Skyhook()`.")
-        return {name: self.policy[name] for name in taking if name in self.policy}
+            return dict.fromkeys(dampers, self.policy)
+        return {name: self.policy[name] for name in dampers if name in self.policy}
 
     @property
     def has_controller(self) -> bool:
@@ -102,7 +108,8 @@ class Controlled(AbstractVehicle):
     def layout(self) -> Layout:
         """That of the vehicle, with the channels of command and demand of each damper."""
         layout = self.car.layout
-        return dataclasses.replace(layout, channels=(*layout.channels, *_channels(list(self._commanded()))))
+        dampers = list(self.policies(list(_forces_at_levels(self.car, self.still))))
+        return dataclasses.replace(layout, channels=(*layout.channels, *_channels(dampers)))
 
     def system(self) -> System:
         """The assembled vehicle with its controller."""
@@ -117,13 +124,28 @@ def _channels(dampers: list[str]) -> list[Channel]:
 
 
 @eqx.filter_jit
+def _forces_at_levels(car: AbstractVehicle, velocity: Scalar) -> dict[str, Float[Array, " levels"]]:
+    """Of each damper that takes a command, its force at a velocity at rest, at all levels."""
+    forces = {}
+    for name, law in zip(car.layout.ports, car.elements(), strict=True):
+        if len(scheduled_in(law)) == 1:
+            laws = laws_at_levels(law)
+            forces[name] = jnp.stack(
+                [law.force(jnp.zeros_like(velocity), velocity, law.initial_state()) for law in laws]
+            )
+    return forces
+
+
+@eqx.filter_jit
 def _controlled_system(vehicle: Controlled, layout: Layout) -> System:
-    policies, system, frame = vehicle._commanded(), vehicle.car.system(), vehicle.car.frame()
+    system, frame = vehicle.car.system(), vehicle.car.frame()
+    takes = [name for name, law in zip(system.layout.ports, system.laws, strict=True) if len(scheduled_in(law)) == 1]
+    policies = vehicle.policies(takes)
     ports = tuple(system.layout.ports.index(name) for name in policies)
     wheels = {name for wheel in frame.wheels for name in wheel.point.terms}
-    sprung = np.array([name not in wheels for name in system.layout.coordinates])
+    sprung = jnp.array([0.0 if name in wheels else 1.0 for name in system.layout.coordinates])
     n, motion, outputs = sprung.size, system.motion, system.outputs
-    body = system.form.ports[np.array(ports)] * sprung
+    body = system.form.ports[np.array(ports)] * sprung[None, :]
     rates = (getattr(motion, name)[n:] for name in ("motion", "force", "road", "road_rate"))
     loop = ControlLoop(
         tuple(policies.values()),
@@ -144,15 +166,3 @@ def _controlled_system(vehicle: Controlled, layout: Layout) -> System:
     force = jnp.pad(wide.force, ((0, 0), (0, more))).at[count:, forces:].set(jnp.eye(more))
     outputs = dataclasses.replace(wide, force=force)
     return dataclasses.replace(system, layout=layout, outputs=outputs, control=loop)
-
-
-def _refuse_without_effect(name: str, law: AbstractDamper, still: Number) -> None:
-    """Refuse a law whose force at an instant is the same at all levels of its command."""
-    levels = scheduled_in(law)[0].levels
-    forces = [at_command(law, u).force(jnp.zeros_like(still), still, law.initial_state()) for u in levels]
-    known = [_checks.concrete(force) for force in forces]
-    values = [float(force) for force in known if force is not None]
-    if len(values) == len(forces) and np.ptp(values) == 0.0:
-        must = "have a force that changes at once with its command"
-        remedy = "Put the delay of the damper into `actuator_lag`, and its law without one into the car."
-        _checks.refuse(name, must, f"{law}, whose force at {float(still):g} m/s does not", remedy)

@@ -5,8 +5,9 @@ The command whose force comes nearest waits for the delay and becomes the target
 lag, exactly over each step.
 """
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, final
 
 import equinox as eqx
@@ -15,7 +16,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
 from jaxdamp._types import Scalar, ScalarLike
-from jaxdamp._vectors import MemoryLayout, Vector, laid_out, times
+from jaxdamp._vectors import MemoryLayout, Vector, laid_out, scalars, times
 from jaxdamp.control.policies import AbstractPolicy, Signals
 from jaxdamp.dampers import AbstractDamper, Scheduled
 from jaxdamp.vehicles import LinearMap
@@ -45,7 +46,12 @@ class ControlState(NamedTuple):
 
 
 class Flags(NamedTuple):
-    """1.0 at instants of sampling, and at those at which a command becomes the target; else 0.0."""
+    """What a controller does at the instants of a run.
+
+    Attributes:
+        sample: 1.0 where the sensors are read, else 0.0.
+        apply: 1.0 where a command becomes the target, else 0.0.
+    """
 
     sample: Float[Array, " time"]
     apply: Float[Array, " time"]
@@ -53,12 +59,23 @@ class Flags(NamedTuple):
 
 def at_command(law: AbstractDamper, command: Scalar) -> AbstractDamper:
     """The law of an element with the parameters, or forces, of its `Scheduled` law at a command."""
-    return jax.tree.map(lambda node: node.at(command) if _scheduled(node) else node, law, is_leaf=_scheduled)
+    return _replaced(law, lambda scheduled: scheduled.at(command))
 
 
 def scheduled_in(law: AbstractDamper) -> list[Scheduled]:
     """The `Scheduled` laws in the law of an element."""
     return [node for node in jax.tree.leaves(law, is_leaf=_scheduled) if _scheduled(node)]
+
+
+def laws_at_levels(law: AbstractDamper) -> list[AbstractDamper]:
+    """The law of an element at each level of its `Scheduled` law."""
+    count = len(scheduled_in(law)[0].laws)
+    return [_replaced(law, lambda scheduled, number=number: scheduled.at_level(number)) for number in range(count)]
+
+
+def _replaced(law: AbstractDamper, by: Callable[[Scheduled], AbstractDamper]) -> AbstractDamper:
+    """The law of an element with another law in place of its `Scheduled` law."""
+    return jax.tree.map(lambda node: by(node) if _scheduled(node) else node, law, is_leaf=_scheduled)
 
 
 def _scheduled(node: object) -> bool:
@@ -102,96 +119,16 @@ class ControlLoop(eqx.Module):
         """The commands that the laws have, with which a run begins."""
         return tuple(scheduled_in(laws[port])[0].command for port in self.ports)
 
-    def laws_at_levels(self, laws: Sequence[AbstractDamper], port: int) -> list[AbstractDamper]:
-        """The law of a port at each level of its commands."""
-        return [at_command(laws[port], level) for level in scheduled_in(laws[port])[0].levels]
-
-    def flags(self, count: int, dt: ScalarLike, first: Array | int) -> Flags:
+    def flags(self, count: int, dt: Scalar, first: ScalarLike) -> Flags:
         """Of so many instants, of which the first has a number in the whole run."""
-        number = first + jnp.arange(count)
+        number = first + jnp.arange(count, dtype=dt.dtype)
         every, late = jnp.round(self.period / dt), jnp.round(self.delay / dt)
-        return Flags(*(((number - start) % every == 0).astype(float) for start in (0, late)))
+        return Flags(*((jnp.mod(number - start, every) == 0.0).astype(dt.dtype) for start in (0.0, late)))
 
     @property
     def waiting(self) -> int:
         """How many commands wait at a time: those of the present sample, and of those within the delay."""
         return math.floor(self.delay / self.period * (1 + 1e-9)) + 1
-
-    def begin(self, laws: Sequence[AbstractDamper], signals: tuple[Signals, ...]) -> ControlState:
-        """Before the first sample, which the first instant takes."""
-        zero = jnp.zeros_like(signals[0].stroke)
-        command = tuple(u + zero for u in self.present(laws))
-        states = tuple(jax.tree.map(jnp.asarray, policy.initial_state()) for policy in self.policies)
-        return ControlState(signals, states, (zero,) * len(command), (command,) * self.waiting, command, command)
-
-    def signals(
-        self, motion: Vector, force: Vector, road: tuple[Vector, Vector | None], at_ports: tuple[Vector, Vector]
-    ) -> tuple[Signals, ...]:
-        """What the sensors see of each damper."""
-        layout = MemoryLayout.SCALARS if isinstance(motion, tuple) else MemoryLayout.ARRAY
-        outputs = self.acceleration if layout is MemoryLayout.ARRAY else self.acceleration.scalars()
-        velocity = times(laid_out(self.body, layout), motion[len(motion) // 2 :])
-        acceleration, (stroke, rate) = outputs(motion, force, *road), at_ports
-        return tuple(
-            Signals(velocity[i], velocity[i] - rate[port], acceleration[i], stroke[port], rate[port])
-            for i, port in enumerate(self.ports)
-        )
-
-    def sampled(
-        self,
-        state: ControlState,
-        signals: tuple[Signals, ...],
-        laws: Sequence[AbstractDamper],
-        states: Sequence[Array],
-        dt: Scalar,
-        flags: Flags,
-    ) -> ControlState:
-        """After an instant: the sensors follow the signals; at a sample a new command waits, at its time it is applied.
-
-        Arguments:
-            state: before.
-            signals: at the instant.
-            laws: of the ports.
-            states: of these laws.
-            dt: since the instant before [s].
-            flags: of this instant.
-        """
-        share = 1.0 - _decay(dt, self.sensor_lag)
-        seen = jax.tree.map(lambda old, new: old + share * (new - old), state.seen, signals)
-        pairs = [policy(*of_one) for policy, *of_one in zip(self.policies, seen, state.policies, strict=True)]
-        demand = tuple(force + jnp.zeros_like(old) for (force, _), old in zip(pairs, state.demand, strict=True))
-        wanted = tuple(
-            self._nearest(laws, port, force, one, states[port])
-            for port, force, one in zip(self.ports, demand, seen, strict=True)
-        )
-        decided = (tuple(after for _, after in pairs), demand, (*state.waiting[1:], wanted))
-        before = (state.policies, state.demand, state.waiting)
-        policies, demand, waiting = jax.tree.map(
-            lambda new, old: jnp.where(flags.sample > 0.0, new, old), decided, before
-        )
-        target = tuple(
-            jnp.where(flags.apply > 0.0, new, old) for new, old in zip(waiting[0], state.target, strict=True)
-        )
-        return ControlState(seen, policies, demand, waiting, target, state.command)
-
-    def _nearest(
-        self, laws: Sequence[AbstractDamper], port: int, demand: Scalar, seen: Signals, state: Array
-    ) -> Scalar:
-        """The command whose force comes nearest to the demanded one, at the present motion and states of the law.
-
-        Between two levels the force is taken as straight in the command. Each share is rounded where the levels' forces
-        differ little, as much as they differ at the velocity `still`, and at both ends: it has derivatives everywhere,
-        and never leaves the levels.
-        """
-        levels, at_levels = scheduled_in(laws[port])[0].levels, self.laws_at_levels(laws, port)
-        forces = [law.force(seen.stroke, seen.velocity, state) for law in at_levels]
-        still = [law.force(jnp.zeros_like(self.still), self.still, law.initial_state()) for law in at_levels]
-        command = levels[0]
-        for i in range(len(at_levels) - 1):
-            rise, small = forces[i + 1] - forces[i], still[i + 1] - still[i]
-            share = (demand - forces[i]) * rise / (rise * rise + small * small)
-            command = command + (levels[i + 1] - levels[i]) * _rounded_limits(share)
-        return command
 
     def followed(self, state: ControlState, dt: Scalar) -> Commands:
         """The commands a step of dt [s] later."""
@@ -207,6 +144,94 @@ class ControlLoop(eqx.Module):
         rise = 1.0 / jnp.where(has_lag, _decay(dt, self.actuator_lag), 1.0) - 1.0
         pairs = list(zip(state.target, state.command, strict=True))
         return tuple(jnp.where(has_lag, u, t) for t, u in pairs), tuple(rise * (u - t) for t, u in pairs)
+
+
+@final
+class Sampler:
+    """The part of a controller that runs at the instants, with what is the same at all of them computed once.
+
+    Arguments:
+        loop: the controller.
+        laws: of the ports of the vehicle.
+        layout: of its vectors.
+        dt: spacing of the instants [s].
+    """
+
+    def __init__(self, loop: ControlLoop, laws: Sequence[AbstractDamper], layout: MemoryLayout, dt: Scalar) -> None:
+        self._loop, self._present = loop, loop.present(laws)
+        self._body = laid_out(loop.body, layout)
+        self._acceleration = loop.acceleration if layout is MemoryLayout.ARRAY else loop.acceleration.scalars()
+        self._share = 1.0 - _decay(dt, loop.sensor_lag)
+        self._levels = [scalars(scheduled_in(laws[port])[0].levels) for port in loop.ports]
+        self._laws = [laws_at_levels(laws[port]) for port in loop.ports]
+        self._small = [[_difference_at(*pair, loop.still) for pair in itertools.pairwise(laws)] for laws in self._laws]
+
+    def begin(self, signals: tuple[Signals, ...]) -> ControlState:
+        """Before the first sample, which the first instant takes."""
+        zero = jnp.zeros_like(signals[0].stroke)
+        command = tuple(u + zero for u in self._present)
+        states = tuple(jax.tree.map(jnp.asarray, policy.initial_state()) for policy in self._loop.policies)
+        return ControlState(signals, states, (zero,) * len(command), (command,) * self._loop.waiting, command, command)
+
+    def signals(
+        self, motion: Vector, force: Vector, road: tuple[Vector, Vector | None], at_ports: tuple[Vector, Vector]
+    ) -> tuple[Signals, ...]:
+        """What the sensors see of each damper."""
+        velocity = times(self._body, motion[len(motion) // 2 :])
+        acceleration, (stroke, rate) = self._acceleration(motion, force, *road), at_ports
+        return tuple(
+            Signals(velocity[i], velocity[i] - rate[port], acceleration[i], stroke[port], rate[port])
+            for i, port in enumerate(self._loop.ports)
+        )
+
+    def sampled(
+        self, state: ControlState, signals: tuple[Signals, ...], states: Sequence[Array], flags: Flags
+    ) -> ControlState:
+        """After an instant: the sensors follow the signals; at a sample a new command waits, at its time it is applied.
+
+        Arguments:
+            state: before.
+            signals: at the instant.
+            states: of the laws of the ports.
+            flags: of this instant.
+        """
+        seen = jax.tree.map(lambda old, new: old + self._share * (new - old), state.seen, signals)
+        pairs = [policy(*of_one) for policy, *of_one in zip(self._loop.policies, seen, state.policies, strict=True)]
+        demand = tuple(force + jnp.zeros_like(old) for (force, _), old in zip(pairs, state.demand, strict=True))
+        wanted = tuple(
+            self._nearest(i, demand[i], one, states[port])
+            for i, (port, one) in enumerate(zip(self._loop.ports, seen, strict=True))
+        )
+        decided = (tuple(after for _, after in pairs), demand, (*state.waiting[1:], wanted))
+        before = (state.policies, state.demand, state.waiting)
+        policies, demand, waiting = jax.tree.map(
+            lambda new, old: jnp.where(flags.sample > 0.0, new, old), decided, before
+        )
+        target = tuple(
+            jnp.where(flags.apply > 0.0, new, old) for new, old in zip(waiting[0], state.target, strict=True)
+        )
+        return ControlState(seen, policies, demand, waiting, target, state.command)
+
+    def _nearest(self, damper: int, demand: Scalar, seen: Signals, state: Array) -> Scalar:
+        """The command whose force comes nearest to the demanded one, at the present motion and states of the law.
+
+        Between two levels the force is taken as straight in the command. Each share is rounded where the levels' forces
+        differ little, as much as they differ at the velocity `still`, and at both ends: it has derivatives everywhere,
+        and never leaves the levels.
+        """
+        forces = [law.force(seen.stroke, seen.velocity, state) for law in self._laws[damper]]
+        levels, command = self._levels[damper], self._levels[damper][0]
+        for i, small in enumerate(self._small[damper]):
+            rise = forces[i + 1] - forces[i]
+            share = (demand - forces[i]) * rise / (rise * rise + small * small)
+            command = command + (levels[i + 1] - levels[i]) * _rounded_limits(share)
+        return command
+
+
+def _difference_at(soft: AbstractDamper, hard: AbstractDamper, velocity: Scalar) -> Scalar:
+    """By how much the forces of two laws at rest differ at a velocity."""
+    one, other = (law.force(jnp.zeros_like(velocity), velocity, law.initial_state()) for law in (soft, hard))
+    return other - one
 
 
 ROUNDED = 0.1  # share of the range over which its limits are rounded

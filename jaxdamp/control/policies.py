@@ -13,7 +13,7 @@ from typing import NamedTuple, final
 from jaxtyping import PyTree
 
 from jaxdamp._types import Number, Scalar
-from jaxdamp.parameters import Module, nonnegative, parameter, real
+from jaxdamp.parameters import Module, check_parameters, nonnegative, parameter, readable, real
 
 
 class Signals(NamedTuple):
@@ -39,6 +39,12 @@ class AbstractPolicy(Module):
 
     It may hold any equinox module, such as a network, and may have states that it carries from sample to sample.
     """
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
+
+    def __repr__(self) -> str:
+        return readable(self)
 
     def initial_state(self) -> PyTree:
         """What it remembers before the first sample: arrays, or nothing."""
@@ -126,7 +132,7 @@ class PowerDriven(AbstractPolicy):
 
 @final
 class StateFeedback(AbstractPolicy):
-    """F = g_b ż_b + g_w ż_w + g_x x + g_v v + g_a z̈_b: any linear feedback, such as a clipped LQR or output feedback."""
+    """F = g_b ż_b + g_w ż_w + g_x x + g_v v + g_a z̈_b: linear feedback, such as a clipped LQR."""
 
     body_velocity: Number = parameter("N s/m", "force per velocity of the body", real, default=0.0)
     wheel_velocity: Number = parameter("N s/m", "force per velocity of the wheel", real, default=0.0)

@@ -102,16 +102,26 @@ class Scheduled(AbstractWrapper):
         climbed = [(command - self.levels[i]) / (self.levels[i + 1] - self.levels[i]) for i in range(count)]
         climbed = [at_least(share, 0.0) if i else share for i, share in enumerate(climbed)]
         climbed = [at_most(share, 1.0) if i + 1 < count else share for i, share in enumerate(climbed)]
-        laws = without_fitted_ranges(self.laws)
         if self.blend == "force":
-            shares = [a - b for a, b in zip((1.0, *climbed), (*climbed, 0.0), strict=True)]
-            return Sum(tuple(Scaled(law, jnp.asarray(share)) for law, share in zip(laws, shares, strict=True)))
+            return self._blended([a - b for a, b in zip((1.0, *climbed), (*climbed, 0.0), strict=True)])
+        laws = without_fitted_ranges(self.laws)
 
         def interpolated(first: Array, *others: Array) -> Array:
             pairs = zip((first, *others), others, climbed, strict=False)
             return first + sum(share * (after - before) for before, after, share in pairs)
 
         return jax.tree.map(interpolated, *laws)
+
+    def at_level(self, number: int) -> AbstractDamper:
+        """The law at one of the levels; of blended forces with the states of all."""
+        if self.blend == "force":
+            return self._blended(list(jnp.eye(len(self.laws))[number]))
+        return without_fitted_ranges(self.laws)[number]
+
+    def _blended(self, shares: Sequence[ScalarLike]) -> AbstractDamper:
+        """The sum of the laws' forces by shares."""
+        laws = without_fitted_ranges(self.laws)
+        return Sum(tuple(Scaled(law, jnp.asarray(share)) for law, share in zip(laws, shares, strict=True)))
 
     def shares(self) -> Float[Array, " laws"]:
         """Weight of each law in the interpolation; the sum is one."""
@@ -121,9 +131,10 @@ class Scheduled(AbstractWrapper):
 
     def at_command(self) -> AbstractDamper:
         """The law at the command: with the interpolated parameters, or the weighted sum of the laws."""
-        shares, laws = self.shares(), without_fitted_ranges(self.laws)
+        shares = self.shares()
         if self.blend == "force":
-            return Sum(tuple(Scaled(law, share) for law, share in zip(laws, shares, strict=True)))
+            return self._blended([shares[i] for i in range(len(self.laws))])
+        laws = without_fitted_ranges(self.laws)
         return jax.tree.map(lambda *leaves: jnp.tensordot(shares, jnp.stack(leaves), 1), *laws)
 
     def inner_law(self) -> AbstractDamper:

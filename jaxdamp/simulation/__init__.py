@@ -8,7 +8,7 @@ from jaxdamp.simulation.energy import absorbed_by as absorbed_by, energy_balance
 from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver as AbstractObserver, Outcome as Outcome
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState as StepState, settled
 from jaxdamp.simulation.exponential import Exponential
-from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
+from jaxdamp.simulation.fixed_step import AbstractFixedStep
 from jaxdamp.simulation.harmonic import HarmonicResponse as HarmonicResponse, harmonic_response
 from jaxdamp.simulation.notes import (
     far_outside as far_outside,
@@ -29,6 +29,7 @@ from jaxdamp.simulation.run import simulate
 from jaxdamp.simulation.stability import substeps_needed
 from jaxdamp.simulation.stationary import DEVIATIONS as DEVIATIONS, stationary_notes as stationary_notes
 from jaxdamp.simulation.step_size import CoarseStepWarning, RunCheck as RunCheck, TracedStepWarning
+from jaxdamp.simulation.stepper import AbstractStepper
 from jaxdamp.simulation.wheels import AxleTiming as AxleTiming, moves_axles as moves_axles
 
 

@@ -37,8 +37,9 @@ from jaxdamp.control import Commands
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.rig import march
 from jaxdamp.simulation.equations import Equations, RoadInput, StepState
-from jaxdamp.simulation.fixed_step import AbstractFixedStep, AbstractStepper
+from jaxdamp.simulation.fixed_step import AbstractFixedStep
 from jaxdamp.simulation.step_size import RunCheck
+from jaxdamp.simulation.stepper import AbstractStepper
 from jaxdamp.vehicles import Earlier, LinearMap
 
 

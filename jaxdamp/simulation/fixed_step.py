@@ -6,6 +6,7 @@ small arrays and carries no more than it must.
 """
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import Any, TypeAlias, final
 
 import equinox as eqx
@@ -16,67 +17,17 @@ from jaxtyping import Array, ArrayLike, Float, PyTree
 from jaxdamp._jacobian import Mode
 from jaxdamp._sharded import varying_as
 from jaxdamp._types import Scalar, ScalarLike
-from jaxdamp._vectors import between, laid_out
+from jaxdamp._vectors import MemoryLayout, between, laid_out
 from jaxdamp.codegen import printed_scan
-from jaxdamp.control import Commands, ControlLoop, Flags, Signals
+from jaxdamp.control import Flags
 from jaxdamp.simulation.engine import AbstractEngine, AbstractObserver, Outcome, RunState
 from jaxdamp.simulation.equations import FOR_REVERSE, STRAIGHT, Equations, RoadEdges, RoadInput, StepState
+from jaxdamp.simulation.stepper import AbstractStepper, ControlledStepper, Controller
 
 
 Carry: TypeAlias = tuple[StepState, PyTree, RoadInput, tuple[Array, ...]]
+Row: TypeAlias = tuple[Array, Flags | None]  # the road ahead, and what a controller does
 BLOCK = 16_384  # instants, of which reverse derivatives keep what they need; longer runs are driven twice
-
-
-class AbstractStepper(eqx.Module):
-    """What carries a vehicle over one step.
-
-    Attributes:
-        equations: of the vehicle.
-        dt: the step [s].
-    """
-
-    equations: eqx.AbstractVar[Equations]
-    dt: eqx.AbstractVar[Scalar]
-
-    @abstractmethod
-    def __call__(self, now: StepState, begin: RoadInput, end: RoadInput) -> StepState:
-        """The vehicle a step later, while the road goes straight from `begin` to `end`.
-
-        The rates in `begin` and `end` are means of the slopes before and after these instants, for elements that stand
-        on the road; None where there are none.
-        """
-
-    def start(self, motion: Float[Array, " n"], road: RoadInput) -> StepState:
-        """The vehicle at the first instant, its elements at rest."""
-        return self.equations.at_rest(motion, road)
-
-    def resumed(self, now: StepState, road: RoadInput, ratio: Scalar) -> StepState:
-        """The same instant for this stepper after another, from which a run goes on; here with the memory as it is.
-
-        Arguments:
-            now: the vehicle at the last instant of the other.
-            road: under the wheels.
-            ratio: this step to that of the other.
-        """
-        del ratio
-        return self.equations.at(now.motion, now.states, road, now.memory)
-
-    def with_equations(self, equations: Equations) -> "AbstractStepper":
-        """The same stepper for a vehicle that differs in its laws alone."""
-        return eqx.tree_at(lambda stepper: stepper.equations, self, equations)
-
-    def recommanded(self, now: StepState, road: RoadInput, commands: Commands, rises: Commands) -> StepState:
-        """The same instant from which a run goes on with other commands; here with the memory as it is.
-
-        Arguments:
-            now: the vehicle under the old commands.
-            road: under the wheels.
-            commands: of the dampers from now on.
-            rises: how much greater they were a step before, had their targets always been the same.
-        """
-        del rises
-        after = self.with_equations(self.equations.at_commands(commands))
-        return after.resumed(now, road, jnp.ones_like(self.dt))
 
 
 class AbstractFixedStep(AbstractEngine):
@@ -112,81 +63,42 @@ class AbstractFixedStep(AbstractEngine):
     ) -> Outcome:
         """Step after step; of a long run reverse derivatives keep the beginnings of blocks only."""
         stepper = self.stepper(equations, jnp.asarray(dt / self.step_count, dtype=float))
-        controller = None if equations.system.control is None else Controller(stepper, dt)
-        if controller is not None:
-            stepper = ControlledStepper(stepper)
+        controller = None
+        if equations.system.control is not None:
+            controller, stepper = Controller(stepper, dt), ControlledStepper(stepper)
         heights, start, edges = varying_as((heights, start, edges), eqx.filter(stepper, eqx.is_array))
-        half_rate, layout = jnp.asarray(0.5 / dt, dtype=heights.dtype), equations.layout
         rated = equations.road_deflection is not None or not observer.saves_motion
+        road = _RoadRows(heights, jnp.asarray(0.5 / dt, dtype=heights.dtype), equations.layout, edges, rated=rated)
 
-        def at(height: Array, rate: Array) -> RoadInput:
-            return RoadInput(laid_out(height, layout), laid_out(rate, layout))
-
-        def step(carry: Carry, row: tuple[Array, Flags | None]) -> Carry:
+        def step(carry: Carry, row: Row) -> Carry:
             """To the next instant; where rates are needed, with the height of the one after it."""
             (now, gathered, begin, window), (ahead, flags) = carry, row
             if controller is not None and flags is not None:
                 now = controller.decided(now, begin, flags)
-            if rated:
-                height, coming = window
-                end, window = at(coming, half_rate * (ahead - height)), (coming, ahead)
-            else:
-                end = RoadInput(laid_out(ahead, layout), None)
+            end, window = road.reached(window, ahead)
             after = _over(stepper, now, begin, end, self.step_count)
             return after, observer.add(gathered, after, end), end, window
 
-        policy = jax.checkpoint_policies.save_only_these_names(FOR_REVERSE)
-        lean = step if observer.saves_motion else jax.checkpoint(step, policy=policy, prevent_cse=False)
-
-        def stride(carry: Carry, row: PyTree) -> tuple[Carry, PyTree]:
-            if observer.every == 1:
-                carry = lean(carry, row)
-            else:
-                carry, _ = jax.lax.scan(lambda carry, row: (lean(carry, row), None), carry, row)
-            return carry, observer.saved(carry[0], carry[1])
-
-        def drive(carry: Carry, rows: PyTree) -> tuple[Carry, PyTree]:
-            return jax.lax.scan(stride, carry, rows)
-
-        first = RoadInput(laid_out(heights[0], layout), None)
-        window, road = (), heights[1:]
-        if rated:
-            rise = heights[1] - heights[0]
-            first = at(heights[0], half_rate * (2.0 * rise if edges.before is None else heights[1] - edges.before))
-            window = heights[0], heights[1]
-            ahead = 2.0 * heights[-1] - heights[-2] if edges.after is None else edges.after  # as straight as it came
-            road = jnp.concatenate([heights[2:], ahead[None]])
+        goes_on = isinstance(start, RunState)
         if isinstance(start, RunState):
-            now = stepper.resumed(start.now, first, stepper.dt / start.step)
+            now = stepper.resumed(start.now, road.first, stepper.dt / start.step)
         else:
-            now = stepper.start(start, first)
+            now = stepper.start(start, road.first)
         flags = None
         if controller is not None:
-            now = now if isinstance(start, RunState) else controller.begin(now, first)
-            begins = jnp.round(start.time / dt) if isinstance(start, RunState) else 0
-            flags = equations.system.control.flags(road.shape[0], dt, begins)
-        rows = road, flags
-        carry = varying_as((now, observer.begin(now, first), first, window))
+            now = now if goes_on else controller.begin(now, road.first)
+            flags = controller.flags(road.ahead.shape[0], start.time if isinstance(start, RunState) else 0.0)
+        carry = varying_as((now, observer.begin(now, road.first), road.first, road.window))
         if self.runs_printed:
-            carry = self._printed(step, carry, rows, observer)
+            carry = self._printed(step, carry, (road.ahead, flags), observer)
             return self._outcome(carry, observer.saved(carry[0], carry[1]), equations)
-        parts = [jax.tree.map(lambda y: y[None], observer.saved(now, carry[1]))]
-        whole = 0 if observer.saves_motion or road.shape[0] <= BLOCK else road.shape[0] // BLOCK * BLOCK
-        if whole:
-            blocks = jax.tree.map(lambda y: y[:whole].reshape(-1, BLOCK, *y.shape[1:]), rows)
-            carry, saved = jax.lax.scan(jax.checkpoint(drive), carry, blocks)
-            parts.append(jax.tree.map(lambda y: y.reshape(-1, *y.shape[2:]), saved))
-        remaining = jax.tree.map(lambda y: y[whole:], rows)
-        if observer.every > 1:
-            remaining = jax.tree.map(lambda y: y.reshape(-1, observer.every, *y.shape[1:]), remaining)
-        carry, saved = drive(carry, remaining)
-        records = jax.tree.map(lambda *ys: jnp.concatenate(ys), *parts, saved)
+        carry, records = _driven(step, carry, (road.ahead, flags), observer)
         return self._outcome(carry, records, equations)
 
     def _outcome(self, carry: Carry, records: PyTree, equations: Equations) -> Outcome:
         return Outcome(carry[1], records, equations.ports.by_port(carry[0].states), last=carry[0])
 
-    def _printed(self, step: Any, carry: Carry, rows: PyTree, observer: AbstractObserver) -> Carry:
+    def _printed(self, step: Any, carry: Carry, rows: Row, observer: AbstractObserver) -> Carry:
         """The carry at the end of a loop that is printed; refused where something of each instant is saved."""
         try:
             if jax.tree.leaves(observer.saved(carry[0], carry[1])):
@@ -198,75 +110,69 @@ class AbstractFixedStep(AbstractEngine):
 
 
 @final
-class Controller(eqx.Module):
-    """What a controller does at the instants of a run.
+class _RoadRows:
+    """The road as the loop takes it: under the first instant, what stands before the next, and the rows.
 
     Arguments:
-        stepper: of the engine.
-        spacing: of the instants [s].
+        heights: at the instants [m], shape (time, wheels).
+        half_rate: one over two spacings of the instants [1/s].
+        layout: of the vehicle's vectors.
+        edges: the road beyond both ends.
+        rated: whether rates are needed.
     """
 
-    stepper: AbstractStepper
-    loop: ControlLoop
-    spacing: Scalar
+    def __init__(
+        self, heights: Array, half_rate: Array, layout: MemoryLayout, edges: RoadEdges, *, rated: bool
+    ) -> None:
+        self._half_rate, self._layout, self._rated = half_rate, layout, rated
+        self.first, self.window, self.ahead = RoadInput(laid_out(heights[0], layout), None), (), heights[1:]
+        if rated:
+            rise = heights[1] - heights[0]
+            self.first = self._at(heights[0], 2.0 * rise if edges.before is None else heights[1] - edges.before)
+            self.window = heights[0], heights[1]
+            last = 2.0 * heights[-1] - heights[-2] if edges.after is None else edges.after  # as straight as it came
+            self.ahead = jnp.concatenate([heights[2:], last[None]])
 
-    def __init__(self, stepper: AbstractStepper, spacing: ScalarLike) -> None:
-        self.stepper, self.loop = stepper, stepper.equations.system.control
-        self.spacing = jnp.asarray(spacing, dtype=float)
+    def reached(self, window: tuple[Array, ...], ahead: Array) -> tuple[RoadInput, tuple[Array, ...]]:
+        """The road at the end of a step, and what stands before the next."""
+        if not self._rated:
+            return RoadInput(laid_out(ahead, self._layout), None), ()
+        height, coming = window
+        return self._at(coming, ahead - height), (coming, ahead)
 
-    def begin(self, now: StepState, road: RoadInput) -> StepState:
-        """The vehicle at the first instant, before the first sample."""
-        return now._replace(control=self.loop.begin(self.stepper.equations.system.laws, self._signals(now, road)))
-
-    def decided(self, now: StepState, road: RoadInput, flags: Flags) -> StepState:
-        """After an instant: sensed and decided; where commands are applied, with the forces under them."""
-        equations, loop, before = self.stepper.equations, self.loop, now.control
-        laws, states = equations.system.laws, equations.ports.by_port(now.states)
-        control = loop.sampled(before, self._signals(now, road), laws, states, self.spacing, flags)
-        commands, rises = loop.resumed(control, self.stepper.dt)
-        after = self.stepper.recommanded(now, road, commands, rises)
-        chosen = jax.tree.map(
-            lambda new, old: jnp.where(flags.apply > 0.0, new, old), after, now._replace(control=None)
-        )
-        return chosen._replace(control=control)
-
-    def _signals(self, now: StepState, road: RoadInput) -> tuple[Signals, ...]:
-        return self.loop.signals(now.motion, now.force, road, self.stepper.equations.at_ports(now.motion, road))
+    def _at(self, height: Array, rise: Array) -> RoadInput:
+        return RoadInput(laid_out(height, self._layout), laid_out(self._half_rate * rise, self._layout))
 
 
-@final
-class ControlledStepper(AbstractStepper):
-    """Steps of an engine with the commands that a vehicle has at their ends."""
+def _driven(
+    step: Callable[[Carry, Row], Carry], carry: Carry, rows: Row, observer: AbstractObserver
+) -> tuple[Carry, PyTree]:
+    """The carry after all rows, and what the observer saved; reverse derivatives keep what they need of a block."""
+    policy = jax.checkpoint_policies.save_only_these_names(FOR_REVERSE)
+    lean = step if observer.saves_motion else jax.checkpoint(step, policy=policy, prevent_cse=False)
 
-    inner: AbstractStepper
+    def stride(carry: Carry, row: Row) -> tuple[Carry, PyTree]:
+        if observer.every == 1:
+            carry = lean(carry, row)
+        else:
+            carry, _ = jax.lax.scan(lambda carry, row: (lean(carry, row), None), carry, row)
+        return carry, observer.saved(carry[0], carry[1])
 
-    @property
-    def equations(self) -> Equations:
-        """Of the engine's stepper."""
-        return self.inner.equations
+    def drive(carry: Carry, rows: Row) -> tuple[Carry, PyTree]:
+        return jax.lax.scan(stride, carry, rows)
 
-    @property
-    def dt(self) -> Scalar:
-        """The step [s]."""
-        return self.inner.dt
-
-    def start(self, motion: Float[Array, " n"], road: RoadInput) -> StepState:
-        """The vehicle at the first instant."""
-        return self.inner.start(motion, road)
-
-    def resumed(self, now: StepState, road: RoadInput, ratio: Scalar) -> StepState:
-        """The same instant after another stepper."""
-        control = now.control
-        equations = self.equations if control is None else self.equations.at_commands(control.command)
-        return self.inner.with_equations(equations).resumed(now, road, ratio)._replace(control=control)
-
-    def __call__(self, now: StepState, begin: RoadInput, end: RoadInput) -> StepState:
-        """A step later, the actuators with it."""
-        control = now.control
-        assert control is not None
-        commands = self.equations.system.control.followed(control, self.dt)
-        after = self.inner.with_equations(self.equations.at_commands(commands))(now, begin, end)
-        return after._replace(control=control._replace(command=commands))
+    count = rows[0].shape[0]
+    parts = [jax.tree.map(lambda y: y[None], observer.saved(carry[0], carry[1]))]
+    whole = 0 if observer.saves_motion or count <= BLOCK else count // BLOCK * BLOCK
+    if whole:
+        blocks = jax.tree.map(lambda y: y[:whole].reshape(-1, BLOCK, *y.shape[1:]), rows)
+        carry, saved = jax.lax.scan(jax.checkpoint(drive), carry, blocks)
+        parts.append(jax.tree.map(lambda y: y.reshape(-1, *y.shape[2:]), saved))
+    remaining = jax.tree.map(lambda y: y[whole:], rows)
+    if observer.every > 1:
+        remaining = jax.tree.map(lambda y: y.reshape(-1, observer.every, *y.shape[1:]), remaining)
+    carry, saved = drive(carry, remaining)
+    return carry, jax.tree.map(lambda *ys: jnp.concatenate(ys), *parts, saved)
 
 
 def _over(stepper: AbstractStepper, now: StepState, begin: RoadInput, end: RoadInput, substeps: int) -> StepState:

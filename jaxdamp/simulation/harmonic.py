@@ -22,7 +22,7 @@ from jaxdamp.simulation.notes import range_sentences, range_uses
 from jaxdamp.simulation.run import refuse_stacked
 from jaxdamp.simulation.stability import known_cars, known_system, step_need
 from jaxdamp.simulation.step_size import USUAL
-from jaxdamp.vehicles import AbstractVehicle, ChannelKind, Layout, delays_of, static_equilibrium, refuse_controller
+from jaxdamp.vehicles import AbstractVehicle, ChannelKind, Layout, delays_of, refuse_controller, static_equilibrium
 
 
 if TYPE_CHECKING:

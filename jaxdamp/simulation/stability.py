@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from jaxdamp import _checks
 from jaxdamp._traced import at_compile_time, is_batched, is_traced, known, row, rows
 from jaxdamp._types import Scalar
-from jaxdamp.control import ControlLoop
+from jaxdamp.control import ControlLoop, laws_at_levels
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.vehicles import AbstractVehicle, System
 
@@ -139,10 +139,7 @@ def _at_all_commands(system: System) -> list[list[AbstractDamper]]:
     """The laws that each port may have: one, or those at all levels of a damper that is commanded."""
     control: ControlLoop | None = system.control
     commanded = () if control is None else control.ports
-    return [
-        control.laws_at_levels(system.laws, port) if control is not None and port in commanded else [law]
-        for port, law in enumerate(system.laws)
-    ]
+    return [laws_at_levels(law) if port in commanded else [law] for port, law in enumerate(system.laws)]
 
 
 def _added(terms: Sequence[_Samples]) -> Slopes:

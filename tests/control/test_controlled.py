@@ -1,0 +1,214 @@
+"""A controlled vehicle in simulations, rides, sweeps and derivatives, and what is refused."""
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxdamp
+from jaxdamp import Ride, roads, simulate, simulation, vehicles
+from jaxdamp.control import AbstractPolicy, Controlled, Groundhook, PowerDriven, Skyhook, StateFeedback
+from jaxdamp.dampers import AbstractDamper, Bilinear, Lag, Linear, MotionRatio, Scheduled
+from jaxdamp.export import to_c
+from jaxdamp.vehicles import Corner, HalfCar, QuarterCar
+
+
+METRICS = ["rms_sprung_acceleration", "rms_dynamic_tyre_load"]
+DAMPER = Scheduled((Linear(300.0), Linear(3900.0)), levels=[0.0, 1.0], command=0.25)
+ROAD = roads.iso8608("C", speed=20.0, seed=1, duration=4.0)
+
+
+def quarter(damper: AbstractDamper = DAMPER):
+    return QuarterCar(400.0, 50.0, 20e3, 250e3, damper)
+
+
+@pytest.fixture(scope="module")
+def car():
+    return Controlled(quarter(), Skyhook(3000.0, 0.01), actuator_lag=4e-3, sensor_lag=2e-3, delay=3e-3)
+
+
+@pytest.fixture(scope="module")
+def ride(car):
+    return Ride(car, ROAD, metrics=METRICS, duration=2.0)
+
+
+@pytest.fixture(scope="module")
+def response(car):
+    return simulate(car, ROAD, duration=2.0)
+
+
+def test_simulation_ride_sweep_and_printed_loop_give_the_same_numbers(car, ride, response):
+    gains = np.array([3000.0, 1500.0])
+    printed = Ride(car, ROAD, metrics=METRICS, duration=2.0, engine=simulation.Exponential(printed=True))
+    one, swept = ride({"policy.gain": 3000.0}), jaxdamp.sweep(ride, {"policy.gain": gains})
+    in_c = jax.vmap(lambda gain: printed({"policy.gain": gain}))(gains)
+    of_response = response.metrics(METRICS)
+    for name in METRICS:
+        np.testing.assert_allclose(one[name], of_response[name], rtol=1e-11)
+        np.testing.assert_allclose(swept[name][0], one[name], rtol=1e-11)
+        np.testing.assert_allclose(swept[name], in_c[name], rtol=1e-11)
+        assert swept[name][0] != swept[name][1]
+
+
+def test_a_run_goes_on_where_it_stopped_with_what_the_controller_knew(car, response):
+    first, state = simulate(car, ROAD, duration=1.002, return_state=True)  # 1002 steps, no whole number of periods
+    second = simulate(car, ROAD, duration=0.998, state=state)
+    np.testing.assert_allclose(second.motion[-1], response.motion[-1], rtol=1e-12)
+    np.testing.assert_array_equal(first["damper_command"], response["damper_command"][:1003])
+    np.testing.assert_allclose(second["damper_command"], response["damper_command"][1002:], rtol=1e-12)
+
+
+def test_derivatives_are_those_of_differences(ride):
+    start = {"policy.gain": 3000.0, "policy.lead": 0.01, "actuator_lag": 4e-3, "car.damper.laws.1.rate": 3900.0}
+
+    def cost(point):
+        return ride(point)["rms_sprung_acceleration"]
+
+    reverse = jax.grad(cost)(start)
+    forward = jax.jacfwd(cost)(start)
+    for name, value in start.items():
+        step = 1e-4 * value
+        slope = (cost(start | {name: value + step}) - cost(start | {name: value - step})) / (2.0 * step)
+        np.testing.assert_allclose(reverse[name], forward[name], rtol=1e-9)
+        np.testing.assert_allclose(reverse[name], slope, rtol=1e-5)
+
+
+def test_the_energy_of_a_controlled_run_is_that_of_its_forces(response):
+    balance = response.energy_balance()
+    assert abs(balance["error"]) < 3e-3 * balance["road_work"]  # trapezoids over jumps of the force
+    rate = 300.0 + 3600.0 * np.asarray(response["damper_command"])
+    np.testing.assert_allclose(response["damper_force"], rate * response["damper_velocity"], rtol=1e-10)
+
+
+def test_without_lag_a_command_is_held_from_its_time_to_the_next(car):
+    held = Controlled(car.car, Skyhook(3000.0), delay=2e-3)
+    command = np.asarray(simulate(held, ROAD, duration=0.5)["damper_command"])
+    assert np.all(command[:3] == 0.25)  # up to and with the instant at which the first is applied
+    changes = np.flatnonzero(np.diff(command)) + 1
+    assert changes.size > 80 and np.all(changes % 5 == 3)  # the first instant under a new command
+
+
+@pytest.mark.parametrize(
+    "damper",
+    [
+        Scheduled((Linear(300.0), Linear(900.0), Linear(3900.0)), levels=[-1.0, 0.0, 2.0], command=0.0),
+        Scheduled((Linear(300.0), Bilinear(3900.0, 3900.0)), levels=[0.0, 1.0], command=0.0, blend="force"),
+        MotionRatio(Scheduled((Linear(600.0), Linear(7800.0)), levels=[0.0, 1.0], command=0.0), 0.5**0.5),
+        3.0 * Scheduled((Linear(100.0), Linear(1300.0)), levels=[0.0, 1.0], command=0.0) + Linear(1e-3),
+    ],
+    ids=["three levels", "forces", "motion ratio", "scaled, in a sum"],
+)
+def test_a_demanded_force_is_given_where_the_damper_can(damper):
+    run = simulate(
+        Controlled(quarter(damper), StateFeedback(velocity=1500.0), still=1e-3, period=1e-3), ROAD, duration=1.0
+    )
+    force, velocity = run["damper_force"], run["damper_velocity"]
+    fast = np.abs(velocity) > 0.05
+    assert np.count_nonzero(fast) > 300
+    np.testing.assert_allclose(force[fast] / velocity[fast], 1500.0, rtol=0.03)  # limits are rounded
+
+
+def test_beyond_its_limits_a_damper_gives_what_comes_nearest():
+    on_off = simulate(Controlled(quarter(), Skyhook(1e9), period=1e-3), ROAD, duration=1.0)
+    command, demand = np.asarray(on_off["damper_command"])[1:], np.asarray(on_off["damper_demand"])[1:]
+    moves = np.abs(np.asarray(on_off["damper_velocity"])[:-1]) > 0.01
+    hard = demand * np.asarray(on_off["damper_velocity"])[:-1] > 0.0
+    assert np.all(command[moves & hard] > 0.99) and np.all(command[moves & ~hard] < 0.01)
+    assert 0.2 < np.mean(hard) < 0.8
+
+
+def test_dampers_have_policies_and_states_of_their_own():
+    half = HalfCar(700.0, 1200.0, 1.2, 1.5, Corner(40.0, 18e3, 200e3, DAMPER), Corner(45.0, 22e3, 200e3, DAMPER))
+    front = Controlled(half, {"front_damper": Skyhook(3000.0)})
+    run = simulate(front, ROAD, duration=1.0)
+    assert {"front_damper_command", "front_damper_demand"} <= set(run.units) and "rear_damper_command" not in run.units
+    assert run.units["front_damper_demand"] == "N"
+    rear = np.asarray(run["rear_damper_force"] / run["rear_damper_velocity"])[50:]
+    np.testing.assert_allclose(rear, 1200.0, rtol=1e-6)  # keeps its command
+    both = simulate(Controlled(half, Skyhook(3000.0)), ROAD, duration=1.0)
+    assert np.any(both["front_damper_command"] != both["rear_damper_command"])
+    part = both.between(0.5, 1.0)
+    np.testing.assert_array_equal(part["rear_damper_command"], both["rear_damper_command"][500:])
+
+
+class Network(AbstractPolicy):
+    """A network with a memory of the last body velocity."""
+
+    layers: eqx.nn.MLP
+
+    def initial_state(self):
+        return jnp.zeros(())
+
+    def __call__(self, seen, state):
+        inputs = jnp.stack([seen.body_velocity, seen.body_velocity - state, seen.velocity])
+        return 1e3 * self.layers(inputs), seen.body_velocity
+
+
+def test_a_network_is_trained_through_the_ride():
+    network = Network(eqx.nn.MLP(3, "scalar", 8, 1, jnp.tanh, key=jax.random.key(0)))
+    ride = Ride(Controlled(quarter(), network), ROAD, metrics=METRICS, duration=1.0)
+
+    @eqx.filter_jit
+    @eqx.filter_value_and_grad
+    def cost(network):
+        return eqx.tree_at(lambda ride: ride.vehicle.policy, ride, network)()["rms_sprung_acceleration"]
+
+    before, slope = cost(network)
+    downhill = jax.tree.map(lambda w, s: w - 0.1 * s if eqx.is_inexact_array(w) else w, network, slope)
+    assert 0.0 < float(cost(downhill)[0]) < float(before)
+
+
+def test_a_law_with_states_is_commanded():
+    laws = tuple(
+        BoucWen(c, 1e3, 4e4, 8e3, 8e3, 1.0, 2.0) if False else Linear(c) + Lag(Linear(c), 0.01) for c in (300.0, 1500.0)
+    )
+    run = simulate(Controlled(quarter(Scheduled(laws, levels=[0.0, 1.0], command=0.0)), Skyhook()), ROAD, duration=1.0)
+    assert np.ptp(run["damper_command"]) > 0.8 and np.all(np.isfinite(run["damper_force"]))
+
+
+def test_steps_are_short_enough_for_all_commands():
+    steep = quarter(Scheduled((Linear(300.0), Linear(2e5)), levels=[0.0, 1.0], command=0.0))
+    ride = Ride(Controlled(steep, Skyhook(1e9)), ROAD, metrics=METRICS, duration=1.0)
+    assert ride.substeps > Ride(steep, ROAD, metrics=METRICS, duration=1.0).substeps == 1
+    assert float(ride()["rms_sprung_acceleration"]) < 10.0
+
+
+def test_single_precision_drives_too(car):
+    with jax.enable_x64(False):
+        single = Controlled(quarter(Scheduled((Linear(300.0), Linear(3900.0)), [0.0, 1.0], 0.25)), Groundhook())
+        values = Ride(single, roads.iso8608("C", speed=20.0, seed=1), metrics=METRICS, duration=1.0)()
+    assert values[METRICS[0]].dtype == jnp.float32 and 0.5 < float(values[METRICS[0]]) < 5.0
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Controlled(quarter(Linear(1500.0)), Skyhook()), "`car` must have a damper with one `Scheduled` law"),
+        (lambda: Controlled(quarter(Lag(DAMPER, 0.01)), Skyhook()), "`damper` must have a force that changes at once"),
+        (lambda: Controlled(quarter(), {"rear_damper": Skyhook()}), "`policy` must be one of 'damper'"),
+        (lambda: Controlled(quarter(), dict.fromkeys(["damper"], 3000.0)), r"`policy\['damper'\]` must be a policy"),
+        (lambda: Controlled(quarter(), Skyhook(), period=0.0), "`period` must"),
+        (lambda: Controlled(quarter(), Skyhook(), delay=-1e-3), "`delay` must not be negative"),
+        (lambda: Controlled(quarter(), Skyhook(gain=-1.0)), "gain"),
+        (lambda: simulate(_period(7.5e-4), ROAD, duration=1.0), "`period` must be a whole number of steps of 0.001 s"),
+        (lambda: Ride(_period(5e-3, 5e-4), ROAD, duration=1.0), "`delay` must be a whole number of steps"),
+        (lambda: Ride(_period(5e-3), roads.white("C", speed=20.0)), "without a controller for a ride on a white road"),
+        (lambda: vehicles.linearise(_period(5e-3)), "without a controller for a linear vehicle"),
+        (
+            lambda: simulate(_period(5e-3), ROAD, duration=1.0, engine=simulation.Adaptive(diffrax.Tsit5())),
+            "fixed steps",
+        ),
+        (lambda: simulation.harmonic_response(_period(5e-3), [1.0], 0.01), "for a periodic response"),
+        (lambda: to_c(_period(5e-3), "car.c"), "for C code and FMUs"),
+    ],
+)
+def test_what_cannot_be_controlled_is_refused(make, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def _period(period, delay=0.0):
+    return Controlled(quarter(), PowerDriven(20e3), period=period, delay=delay)
