@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from jaxdamp import (
         bench,
+        control,
         dampers,
         export,
         identify,
@@ -40,6 +41,7 @@ __all__ = [
     "__version__",
     "bench",
     "configure",
+    "control",
     "dampers",
     "export",
     "identify",
