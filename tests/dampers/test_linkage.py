@@ -57,7 +57,7 @@ def test_the_damper_travel_is_the_integral_of_the_ratio():
     np.testing.assert_allclose(travel[2], quad(ratio_by_hand, 0.0, at[2], points=[-0.03])[0], rtol=1e-12)
     assert float(law.lever(0.0)[0]) == 0.0
     np.testing.assert_allclose(jax.vmap(jax.grad(lambda x: law.lever(x)[0]))(at), ratio, rtol=1e-13)
-    np.testing.assert_allclose(jax.vmap(law.wheel_travel)(travel), at, rtol=1e-13)
+    np.testing.assert_allclose(jax.vmap(law.wheel_travel)(jnp.asarray(travel)), at, rtol=1e-13)
 
 
 def test_all_points_on_one_side_of_zero():
