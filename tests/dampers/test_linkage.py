@@ -23,6 +23,7 @@ from jaxdamp.dampers import (
 )
 from jaxdamp.dampers.fitted_range import Motion
 from jaxdamp.parameters import replace
+from jaxdamp.simulation import substeps_needed
 from jaxdamp.vehicles import Axle, Corner, FullCar, HalfCar, QuarterCar, linearise
 
 
@@ -157,6 +158,20 @@ def test_a_force_at_rest_moves_with_the_ratio():
     rest = simulate(QuarterCar(300.0, 40.0, 20e3, 180e3, law), FLAT, duration=0.01)
     x = float(rest["stroke"][0])
     np.testing.assert_allclose(20e3 * x, 300.0 * ratio_by_hand(x), rtol=1e-9)
+
+
+def test_a_step_is_divided_for_the_largest_ratio():
+    inner, largest = Lag(Linear(4e3), 0.004) + Linear(60e3), 1.5
+
+    def car(law):
+        return QuarterCar(300.0, 40.0, 20e3, 180e3, law)
+
+    steep = 2.0 * Linkage(inner, [-0.06, 0.0, 0.06], [largest, 0.3, largest])
+    assert substeps_needed(car(2.0 * MotionRatio(inner, 0.3)), 1e-3) == 1
+    needed = substeps_needed(car(steep), 1e-3)
+    assert needed == substeps_needed(car(2.0 * MotionRatio(inner, largest)), 1e-3) > 1
+    runs = [simulate(car(steep), FLAT, duration=0.3, dt=dt, start={"z_sprung": 0.07})["stroke"] for dt in (1e-3, 1e-4)]
+    np.testing.assert_allclose(runs[0], runs[1][::10], atol=1e-4)
 
 
 def test_half_and_full_cars_that_only_heave_are_quarter_cars():
