@@ -68,6 +68,25 @@ def test_all_points_on_one_side_of_zero():
     np.testing.assert_allclose(ratio, [0.5, 0.5, 0.5, 1.0, 1.5], rtol=1e-14)
 
 
+def test_a_table_of_a_trailing_arm_has_the_length_of_its_damper():
+    # Project Chrono, M113_TranslationalDamperSuspension_Left.json, forward and up from the wheel [m]
+    pivot, on_hull, on_arm = np.array([0.288, 0.134]), np.array([-0.3, 0.3]), np.array([0.184, -0.106])
+
+    def turned(point, angle):
+        turn = np.moveaxis(np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]), 2, 0)
+        return pivot + turn @ (point - pivot)
+
+    def travel_and_length(angle):
+        return -turned(np.zeros(2), angle)[:, 1], np.linalg.norm(turned(on_arm, angle) - on_hull, axis=1)
+
+    travel, length = travel_and_length(np.radians(np.linspace(25.0, -25.0, 51)))
+    law = Linkage(Linear(1.0), travel, np.gradient(length, travel, edge_order=2))
+    assert float(law.lever(0.0)[1]) == pytest.approx(0.25071181204 / 0.288, rel=1e-4)  # the arms of both forces
+    between, exact = travel_and_length(np.radians(np.linspace(24.3, -24.3, 77)))
+    (designed,) = travel_and_length(np.zeros(1))[1]
+    np.testing.assert_allclose(levered(law, between)[0], exact - designed, atol=2e-5)
+
+
 def test_equal_ratios_are_a_motion_ratio():
     inner = SeriesSpring(PowerLaw(1800.0, 0.6, 900.0, 0.6, knee_width=0.01), 4e5) + Spring(2e4, -300.0)
     constant, curve = MotionRatio(inner, 0.8), Linkage(inner, TRAVEL, np.full(4, 0.8))
