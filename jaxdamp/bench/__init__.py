@@ -33,6 +33,7 @@ from jaxdamp.bench.evaluation import (
     separate_gas_and_friction,
 )
 from jaxdamp.bench.force_velocity import ForceVelocityTable as ForceVelocityTable, are_tables as are_tables, read_table
+from jaxdamp.bench.kinematics import Kinematics as Kinematics, read_kinematics
 from jaxdamp.bench.preflight import (
     Finding as Finding,
     Preflight as Preflight,
@@ -81,6 +82,7 @@ __all__ = [
     "preflight",
     "programmes",
     "read",
+    "read_kinematics",
     "read_limits",
     "read_rides",
     "read_table",

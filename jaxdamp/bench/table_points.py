@@ -136,12 +136,12 @@ def sides_of(table: RawTable, how: How) -> tuple[list[Side], list[str]]:
     clicks = _column_of_words(table, _SETTING, [at])
     forces = [index for index in forces if index != clicks]
     words = _column_of_words(table, _DIRECTION, [at, *forces])
-    velocity, unit = _values(table, at, "velocity", how)
+    velocity, unit = in_si(table, at, "velocity", how.choice)
     units, found, problems, missing = {"velocity": unit}, [], Problems(), 0
     name = f"{table.file.stem} {table.record}"
     for index in forces:
         with problems.collected():
-            force, units["force"] = _values(table, index, "force", how)
+            force, units["force"] = in_si(table, index, "force", how.choice)
             there = np.isfinite(velocity) & np.isfinite(force)
             missing += int(np.sum(~there))
             direction = np.full(len(velocity), _direction(table.names[index]) or _direction(name), dtype=float)
@@ -164,17 +164,35 @@ def _cell(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _values(table: RawTable, index: int, role: str, how: How) -> tuple[Points, str]:
-    """A column in SI, NaN where a cell is empty; and its unit."""
+def numbers_of(table: RawTable, index: int) -> Points:
+    """A column as it stands, NaN where a cell is empty; text in it is refused.
+
+    Arguments:
+        table: of a file.
+        index: number of the column.
+    """
     raw = table.columns[index]
     wrong = {row: text for row, text in raw.faults.items() if text}
     if wrong:
         row, text = min(wrong.items())
         where = f"{table.where}, {table.place(row)}, column {table.names[index]!r}"
         raise ValueError(f"{where}: {text!r} is not a number. Mend or remove the line.")
-    column = column_of(table, role, index, how.choice)
+    return np.asarray(raw.values, np.float64)
+
+
+def in_si(table: RawTable, index: int, role: str, choice: Choice) -> tuple[Points, str]:
+    """A column in SI, NaN where a cell is empty; and its unit.
+
+    Arguments:
+        table: of a file.
+        index: number of the column.
+        role: its quantity.
+        choice: what the caller says about the columns.
+    """
+    numbers = numbers_of(table, index)
+    column = column_of(table, role, index, choice)
     assert column.conversion is not None
-    return column.conversion(np.asarray(raw.values, np.float64)), column.unit
+    return column.conversion(numbers), column.unit
 
 
 def curves_of(sides: Sequence[Side], how: How) -> tuple[tuple[Curve, ...], list[str]]:

@@ -1,7 +1,7 @@
 """Damper laws: force from stroke, velocity and states, one law a file, all under one contract.
 
 Velocity is positive in extension (rebound), force is positive when it resists extension. Laws compose:
-`law + law`, `2.0 * law`, `SeriesSpring(law, ...)`, `Lag(law, ...)`, `MotionRatio(law, ...)`.
+`law + law`, `2.0 * law`, `SeriesSpring(law, ...)`, `Lag(law, ...)`, `MotionRatio(law, ...)`, `Linkage(law, ...)`.
 """
 
 from jaxdamp._guesses import answer_guesses
@@ -53,6 +53,7 @@ from jaxdamp.dampers.inside import (
 from jaxdamp.dampers.karadayi_masada import KaradayiMasada
 from jaxdamp.dampers.lag import Lag
 from jaxdamp.dampers.linear import Linear
+from jaxdamp.dampers.linkage import Linkage
 from jaxdamp.dampers.lugre import LuGre
 from jaxdamp.dampers.modified_bouc_wen import ModifiedBoucWen
 from jaxdamp.dampers.mono_tube import MonoTube
@@ -115,6 +116,7 @@ __all__ = [
     "KaradayiMasada",
     "Lag",
     "Linear",
+    "Linkage",
     "LuGre",
     "ModifiedBoucWen",
     "MonoTube",

@@ -242,6 +242,11 @@ class Motion:
         stroke, velocity = (None if a is None else float(ratio) * a for a in (self.stroke, self.velocity))
         return dataclasses.replace(self, stroke=stroke, velocity=velocity)
 
+    def levered(self, stroke: Samples, ratio: Samples) -> "Motion":
+        """Another stroke [m], the velocity times a ratio of each sample, the force divided by it."""
+        velocity, force = (None if a is None else a * b for a, b in ((self.velocity, ratio), (self.force, 1.0 / ratio)))
+        return dataclasses.replace(self, stroke=stroke, velocity=velocity, force=force)
+
     def divided(self, factor: ScalarLike) -> "Motion":
         """The force divided by a factor (unknown if the factor is zero)."""
         return self.with_force(None if self.force is None or float(factor) == 0.0 else self.force / float(factor))

@@ -94,8 +94,9 @@ def range_use(law: AbstractDamper, motion: Motion) -> list[RangeUse]:
 
     Velocity and force are compared always, the stroke of laws that depend on it (a law of the velocity alone is no
     worse at another stroke), temperature and command where the law knows them. A law inside is judged by its own
-    motion: behind a `MotionRatio` by the damper's stroke and velocity, in a `Scaled` law by the force before scaling.
-    Inside a `SeriesSpring`, a `Bushing` or a `Lag` the motion of the whole stands for it, which is mostly more.
+    motion: behind a `MotionRatio` or a `Linkage` by the damper's stroke and velocity, in a `Scaled` law by the force
+    before scaling. Inside a `SeriesSpring`, a `Bushing` or a `Lag` the motion of the whole stands for it, which is
+    mostly more.
 
     Empty where no law has a range, or while JAX traces the law or its motion.
     """

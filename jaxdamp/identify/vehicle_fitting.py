@@ -94,8 +94,8 @@ def fit_vehicle(
         records: one or more, of the same vehicle.
         sensors: by channel, what the sensor adds; the numbers given are free: `{"stroke": Sensor(offset=0.0)}`.
         bench: bench records of laws of the vehicle, by the path of the law: `{"damper": runs}`, or "damper.law" inside
-            a `MotionRatio`. They are fitted together with the records of the vehicle; dampers that share a law are
-            tied by `tie`.
+            a `MotionRatio` or a `Linkage`. They are fitted together with the records of the vehicle; dampers that
+            share a law are tied by `tie`.
         rig: test machine of the bench records, as in `fit`: a `Rig`, or names such as "gas,friction".
         over: parameters of the vehicle to fit, by path, last part or pattern; all if left out.
         freeze: parameters to hold at their start, also of sensors.

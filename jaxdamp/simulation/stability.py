@@ -8,13 +8,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
 from jaxdamp._traced import at_compile_time, is_batched, is_traced, known, row, rows
 from jaxdamp._types import Scalar
 from jaxdamp.control import ControlLoop, laws_at_levels
-from jaxdamp.dampers import AbstractDamper
+from jaxdamp.dampers import AbstractDamper, Linkage, MotionRatio
 from jaxdamp.vehicles import AbstractVehicle, System
 
 
@@ -203,7 +203,16 @@ def rounded_down(value: float) -> float:
 
 def _samples(law: AbstractDamper, dt: float) -> list[_Samples]:
     """The slopes of each of the laws that act side by side in a law."""
-    return [_of_term(term, dt) for term in law.side_by_side()]
+    return [_of_term(term, dt) for term in _at_largest_ratio(law).side_by_side()]
+
+
+def _at_largest_ratio(law: AbstractDamper) -> AbstractDamper:
+    """The law with the largest ratio of each linkage inside, at which the slopes of its force are steepest."""
+
+    def steepest(part: PyTree) -> PyTree:
+        return MotionRatio(_at_largest_ratio(part.law), jnp.max(part.ratio)) if isinstance(part, Linkage) else part
+
+    return jax.tree.map(steepest, law, is_leaf=lambda part: isinstance(part, Linkage))
 
 
 def _of_term(law: AbstractDamper, dt: float) -> _Samples:

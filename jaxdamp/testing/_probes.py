@@ -171,7 +171,7 @@ def random_motions() -> tuple[float, np.ndarray, np.ndarray]:
 def knees(law: AbstractDamper) -> np.ndarray:
     """Zero and all velocities [m/s] among the numbers of a law and of the laws inside, and divided by motion ratios."""
     found, modules = [0.0], [law]
-    ratios = [float(p.value) for p in parameters(law) if p.path.endswith("ratio")]
+    ratios = [float(r) for p in parameters(law) if p.path.endswith("ratio") for r in np.ravel(p.value)]
     while modules:
         module = modules.pop()
         if isinstance(module, tuple):

@@ -114,7 +114,8 @@ class QuarterCar(AbstractCorner, _SprungMass):  # in this order, the sprung mass
     z_r).
 
     Arguments:
-        damper: law at the wheel; `dampers.MotionRatio(law, ratio)` if the damper has another travel than the wheel.
+        damper: law at the wheel; `dampers.MotionRatio(law, ratio)` if the damper has another travel than the wheel,
+            `dampers.Linkage(law, travel, ratio)` if their ratio changes with the stroke.
         extra_spring: law parallel to the linear spring, such as `CubicSpring` or `dampers.GasSpring`.
         bump_stop: law such as `dampers.BumpStop`.
         friction: law such as `dampers.CoulombFriction`.

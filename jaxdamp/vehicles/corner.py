@@ -63,7 +63,8 @@ class Corner(AbstractCorner, AbstractPart):
         unsprung_mass: mass of wheel and hub [kg].
         spring_rate: linear suspension spring at the wheel [N/m].
         tyre_stiffness: vertical tyre stiffness [N/m].
-        damper: law at the wheel; `dampers.MotionRatio(law, ratio)` if the damper has another travel than the wheel.
+        damper: law at the wheel; `dampers.MotionRatio(law, ratio)` if the damper has another travel than the wheel,
+            `dampers.Linkage(law, travel, ratio)` if their ratio changes with the stroke.
         tyre_damping: vertical tyre damping [N s/m].
         extra_spring: law parallel to the linear spring, such as `CubicSpring` or `dampers.GasSpring`.
         bump_stop: law such as `dampers.BumpStop`.

@@ -214,9 +214,9 @@ class Element(AbstractPart):
 class Link(AbstractPart):
     """A linear spring, a dashpot and any laws in parallel; the extension is the upper point minus the lower point.
 
-    A link with laws has the channels `stroke` [m], `damper_velocity` [m/s] (of the extension: with a `MotionRatio` the
-    damper's own is ratio times that) and the force [N] of each law, after the name of the link. Across an angle, as in
-    an anti-roll bar, the units are N m/rad, N m s/rad, rad and N m.
+    A link with laws has the channels `stroke` [m], `damper_velocity` [m/s] (of the extension: with a `MotionRatio` or a
+    `Linkage` the damper's own is ratio times that) and the force [N] of each law, after the name of the link. Across an
+    angle, as in an anti-roll bar, the units are N m/rad, N m s/rad, rad and N m.
 
     Arguments:
         name: name of the link, may be empty.

@@ -42,7 +42,8 @@ class Suspension(AbstractPart):
 
     Arguments:
         spring_rate: rate of the linear spring [N/m].
-        damper: law; `dampers.MotionRatio(law, ratio)` if the damper has another travel than the suspension.
+        damper: law; `dampers.MotionRatio(law, ratio)` if the damper has another travel than the suspension,
+            `dampers.Linkage(law, travel, ratio)` if their ratio changes with the stroke.
         extra_spring: law parallel to the linear spring, such as `CubicSpring` or `dampers.GasSpring`.
         bump_stop: law such as `dampers.BumpStop`.
         friction: law such as `dampers.CoulombFriction`.

@@ -30,6 +30,7 @@ from jaxdamp.dampers import (
     KaradayiMasada,
     Lag,
     Linear,
+    Linkage,
     LuGre,
     ModifiedBoucWen,
     MonoTube,
@@ -87,6 +88,11 @@ def network(elements=2):
     )
 
 
+def stopped():
+    return Bilinear(2600.0, 1200.0) + BoucWen(800.0, 0.0, 300.0, 1e-3) + BumpStop(0.006, 60e3, end="both")
+
+
+LEVER = [-0.02, -0.004, 0.003, 0.03], [0.9, 0.8, 0.65, 0.6]
 LAWS = {
     "linear": lambda: Linear(2500.0),
     "bilinear, sharp": lambda: Bilinear(2600.0, 1200.0),
@@ -120,6 +126,9 @@ LAWS = {
     "lag of lag": lambda: Lag(Lag(Linear(2000.0), 0.002), 0.004),
     "motion ratio": lambda: MotionRatio(slopes(), 0.7),
     "motion ratio of series spring": lambda: MotionRatio(SeriesSpring(Bilinear(2600.0, 1200.0), 4e5), 0.8),
+    "linkage": lambda: Linkage(slopes(), *LEVER),
+    "linkage of friction and a stop": lambda: Linkage(stopped(), *LEVER),
+    "linkage of a lag": lambda: Linkage(Lag(slopes(0.02), 0.003), *LEVER),
     "scaled": lambda: 1.3 * Besinger(900.0, 2800.0, 700.0, 0.25, 0.05),
     "sum": lambda: Linear(900.0) + 0.5 * slopes(0.01) + CoulombFriction(30.0, 0.01),
     "sum of lags": lambda: Lag(Linear(900.0), 0.01) + Linear(300.0) + MotionRatio(Lag(slopes(0.02), 0.003), 0.9),
@@ -212,6 +221,8 @@ FURTHER = {
     "lag of lag",
     "lag of a schedule",
     "motion ratio of series spring",
+    "linkage of friction and a stop",
+    "linkage of a lag",
     "sum of lags",
     "Bouc and Wen, tight",
     "Dahl, stiff",
