@@ -32,7 +32,7 @@ class Reading:
         steps: as in `bench.Steps`.
         cycles: full cycles to keep: 3 or last:3, or skip:2.
         keep_rest: keep the rest before and after the motion, which is cut off otherwise.
-        keep_bad: use records with an error as they are.
+        keep_bad: use records with an error as they are, and fit those that contradict each other together.
         side: of a force-velocity table with one direction only: rebound, compression, or symmetric for both alike.
     """
 

@@ -124,6 +124,11 @@ def test_settings_in_names_are_not_pooled(tmp_path: Path) -> None:
     other = [tmp_path / f"{letter}.csv" for letter in "abcd"]
     flat = " ".join(jaxdamp("bench", *other, "--out", tmp_path / "other").output.split())
     assert "they are not pooled but stand one by one" in flat
+    said = refused(tmp_path, "fit", *other, "--law", "bilinear", "--out", tmp_path / "pooled")
+    assert "Records of the same motion differ in force" in said and "a and c by" in said and "--keep-bad" in said
+    assert "Records of the same motion differ" in refused(tmp_path, "report", *other, "--law", "bilinear")
+    jaxdamp("fit", *other, "--law", "bilinear", "--keep-bad", "--out", tmp_path / "pooled")
+    assert 1500.0 < from_json(tmp_path / "pooled" / "best_law.json").rebound_rate < 2500.0
 
 
 def test_settings_stated_on_the_command_line(folder: Path, tmp_path: Path) -> None:
