@@ -20,6 +20,7 @@ from jaxdamp.bench.contradictions import (
     Contradiction as Contradiction,
     contradictions,
     contradictions_in_words as contradictions_in_words,
+    pairs_in_words as pairs_in_words,
 )
 from jaxdamp.bench.evaluation import (
     OEM_VELOCITIES as OEM_VELOCITIES,

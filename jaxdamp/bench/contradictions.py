@@ -45,7 +45,7 @@ class _Cycle(NamedTuple):
     scatter: float  # standard error of the mean force, RMS over the bins [N]
 
 
-def contradictions(runs: Sequence[BenchRun]) -> list[Contradiction]:
+def contradictions(runs: Sequence[BenchRun], *, same_command: bool = False) -> list[Contradiction]:
     """Pairs of records with the same motion and forces that no one law can both give, the worst first.
 
     The same motion: amplitude and frequency within 5 %, and strokes over a cycle that agree within 10 % of the
@@ -56,6 +56,7 @@ def contradictions(runs: Sequence[BenchRun]) -> list[Contradiction]:
 
     Arguments:
         runs: the records.
+        same_command: whether only records that state the same command, or none, are compared.
 
     >>> from jaxdamp.bench import SineTest, VirtualDyno
     >>> from jaxdamp.dampers import Linear
@@ -64,7 +65,8 @@ def contradictions(runs: Sequence[BenchRun]) -> list[Contradiction]:
     >>> [round(found.share, 2) for found in contradictions([soft, hard])]
     [0.39]
     """
-    pairs = [pair for pair in itertools.combinations(runs, 2) if same_motion(*pair)]
+    pairs = itertools.combinations(runs, 2)
+    pairs = [(a, b) for a, b in pairs if not (same_command and a.command != b.command) and same_motion(a, b)]
     cycles = {id(run): _mean_cycle(run) for run in {id(run): run for pair in pairs for run in pair}.values()}
     pairs_apart = []
     for a, b in pairs:
@@ -86,16 +88,26 @@ def contradictions_in_words(found: Sequence[Contradiction]) -> list[str]:
     """
     if not found:
         return []
+    pairs = pairs_in_words(found)
+    return [
+        f"Records of the same motion differ in force, so no law of the motion follows them all: {pairs}. Fit them"
+        " apart, or state what was set on the damper (`command`) and fit a law that takes it."
+    ]
+
+
+def pairs_in_words(found: Sequence[Contradiction]) -> str:
+    """The worst pairs of records that contradict each other, with their differences.
+
+    Arguments:
+        found: of `contradictions`, at least one.
+    """
     pairs = "; ".join(
-        f"{pair.first} and {pair.second} by {pair.difference:.3g} N ({100 * pair.share:.0f} % of their RMS force"
+        (f"two records {pair.first}" if pair.first == pair.second else f"{pair.first} and {pair.second}")
+        + f" by {pair.difference:.3g} N ({100 * pair.share:.0f} % of their RMS force"
         + (f", where the mean cycle of one is known to {pair.scatter:.2g} N)" if pair.scatter else ")")
         for pair in found[:_NAMED]
     )
-    more = f"; and {len(found) - _NAMED} pairs more" if len(found) > _NAMED else ""
-    return [
-        f"Records of the same motion differ in force, so no law of the motion follows them all: {pairs}{more}. Fit them"
-        " apart, or state what was set on the damper (`command`) and fit a law that takes it."
-    ]
+    return pairs + (f"; and {len(found) - _NAMED} pairs more" if len(found) > _NAMED else "")
 
 
 def same_motion(a: BenchRun, b: BenchRun) -> bool:

@@ -63,7 +63,7 @@ def report(
         screen.table(records_table(tuple(runs)))
         screen.points(remarks)
         car = make(None)
-        fits = fit_laws(screen, names, runs, BenchSet())
+        fits = fit_laws(screen, names, runs, BenchSet(), keep_bad=reading.keep_bad)
         show(screen, fits)
         with work.saving("Laws and tables", "the rides, the tuning and the report") as draft:
             write_fits(draft, fits.comparison, runs, work.attempts)

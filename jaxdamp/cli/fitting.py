@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from jaxdamp import _checks, export, identify
+from jaxdamp import _checks, bench, export, identify
 from jaxdamp.bench import BenchSet, Preflight
 from jaxdamp.cli import interrupt
 from jaxdamp.cli.console import Screen
@@ -99,6 +99,7 @@ def fit(
         remarks = [*decisions(runs), *filter(None, [divided])]
         screen.table(records_table(tuple(runs), tuple(held)))
         screen.points(remarks)
+        options["keep_bad"] = reading.keep_bad
         options["scheduled"] = group_by is None and len({run.command for run in runs}) > 1
         if options["scheduled"] and cross_validate:
             remedy = "Records at each inner command are predicted without them anyway; --group-by command fits apart."
@@ -193,6 +194,7 @@ def fit_laws(
     held_out: BenchSet,
     *,
     rig: Sequence[str] = (identify.OFFSET,),
+    keep_bad: bool = False,
     **options: Any,
 ) -> Fitted:
     """Fit the laws of these names on a test machine, one after the other. Ctrl-C keeps those that are finished.
@@ -203,11 +205,16 @@ def fit_laws(
         runs: records to fit.
         held_out: records to score on.
         rig: effects of the test machine.
+        keep_bad: fit records that contradict each other together.
         options: as in `identify.fit_each`.
 
     Raises:
-        ValueError: not one law could be fitted.
+        ValueError: records that contradict each other; not one law could be fitted.
     """
+    apart = [] if keep_bad else bench.contradictions(tuple(runs), same_command=options.get("scheduled", False))
+    if apart:
+        words = " ".join(bench.contradictions_in_words(apart))
+        raise ValueError(in_command_line(f"{words} With --keep-bad, they are fitted together."))
     names = names or identify.suited_laws(runs)
     title = f"Fitting {len(names)} law{'s' * (len(names) > 1)} to {len(runs)} record{'s' * (len(runs) > 1)}"
     outcomes: list[Rung | Failure] = []

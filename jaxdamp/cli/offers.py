@@ -21,7 +21,7 @@ NOT_OFFERED = {  # arguments of library functions, and why
     "bench.evaluate": {"by": "--group-by"},
     "identify.fit": {
         "solver": "an object of Python",
-        "bad_records": "the preflight refuses them, --skip-bad leaves them out",
+        "bad_records": "the preflight refuses them, --skip-bad leaves them out, --keep-bad keeps them",
     },
     "identify.fit_vehicle": {"solver": "an object of Python"},
     "simulation.simulate": {

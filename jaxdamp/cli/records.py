@@ -32,6 +32,7 @@ class Reading:
         steps: as in `bench.Steps`.
         cycles: full cycles to keep: 3 or last:3, or skip:2.
         keep_rest: keep the rest before and after the motion, which is cut off otherwise.
+        keep_bad: use records with an error as they are, and fit those that contradict each other together.
         side: of a force-velocity table with one direction only: rebound, compression, or symmetric for both alike.
     """
 
@@ -39,6 +40,7 @@ class Reading:
     steps: Annotated[Call, "bench.Steps"]
     cycles: str | None = None
     keep_rest: bool = False
+    keep_bad: bool = False
     side: str | None = None
 
     def raw(self, files: Sequence[Path]) -> BenchSet:
@@ -80,7 +82,7 @@ class Reading:
         Arguments:
             screen: where the worst findings are printed; with `--verbose` all.
             runs: the records as they were read.
-            refuse: refuse a record with an error unless bad ones are to be left out.
+            refuse: refuse a record with an error unless bad ones are to be left out or kept.
 
         Raises:
             ValueError: every record has an error, or one has and errors are refused.
@@ -88,14 +90,17 @@ class Reading:
         with screen.stage("Checking the records"):
             found = bench.preflight(runs).without(() if self.keep_rest else _CUT_OFF)
         self._show(screen, found)
+        if self.keep_bad:
+            return runs, found
         wrong = {name for finding in found.of("error") for name in finding.records}
         sound = BenchSet((run for run in runs if run.name not in wrong), runs.left_out)
+        keeping = "With --keep-bad, they are used as they are."
         if not len(sound):
-            raise ValueError(" ".join(in_command_line(f"{finding}") for finding in found.of("error")))
+            raise ValueError(" ".join([*(in_command_line(f"{finding}") for finding in found.of("error")), keeping]))
         names = ", ".join(sorted(wrong))
         if wrong and refuse and not self.read.given.get("skip_bad"):
             first = in_command_line(f"{found.of('error')[0]}")
-            raise ValueError(f"{first} With --skip-bad, records with an error are left out: {names}.")
+            raise ValueError(f"{first} With --skip-bad, records with an error are left out: {names}. {keeping}")
         if wrong:
             screen.points([f"left out, with an error: {names}"], style="red")
         return sound, found

@@ -43,6 +43,7 @@ CALLS = {
     r"`dt=([^`]*)`": r"`--dt \1`",
     r"Pass `tyre_lifts=True` to the vehicle": "Write tyre_lifts = true into a vehicle file, as for --vehicle car.toml,",
     r"`process\(delay=[^)]*\)`": "fit with --rig delay",
+    r'`units=\{"(\w+)": "(\w+)"\}`': r"--units \1=\2",
 }
 """Calls of Python in the sentences of the library, as patterns, and what the command line says instead."""
 

@@ -220,7 +220,7 @@ def compare(
             number += 1
             shown(f"{name}, {number} of {len(laws)}")
 
-        how = {"rig": rig, "scheduled": scheduled, "progress": progress or counted, "bad_records": "keep"}
+        how = {"rig": rig, "scheduled": scheduled, "progress": progress or counted, "bad_records": bad_records}
         comparison = Comparison.of(fit_each(laws, runs, held_out, **how, **options), held_out)
     _ = comparison.verdict  # which leaves out settings if there are any: that is part of this work
     return comparison

@@ -16,6 +16,7 @@ from jaxdamp._traced import of_known_numbers
 from jaxdamp._triangles import triangle
 from jaxdamp.bench import BenchRun, RideRecord, as_runs, usable
 from jaxdamp.dampers import AbstractDamper
+from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
 from jaxdamp.identify.criteria import LOSSES, criterion_in_words, solve_by
 from jaxdamp.identify.judging import MOST_WARNINGS, input_noise_bias, judge, on_bias
 from jaxdamp.identify.law_result import FitResult
@@ -170,6 +171,8 @@ def fit(
         max_steps: largest number of steps of each search.
         bad_records: what is done with records in which the preflight finds an error, such as a clipped or lost force:
             "refuse" the fit, "leave_out" these records, or "keep" them. Spikes are no error for a robust `loss`.
+            Records of the same motion with different forces, such as those of two settings, are refused too unless
+            "keep" pools them, or each record has numbers of its own.
         solver: any least-squares solver or minimiser of optimistix, such as `optimistix.Dogleg(rtol=1e-8, atol=1e-8)`,
             in place of `jaxdamp.solve.BoundedLevenbergMarquardt()`. It searches in coordinates without bounds, in which
             an edge of a domain is approached only slowly; a violated condition between parameters is an infinite
@@ -180,8 +183,8 @@ def fit(
         warnings; `status` and `warnings` report a search that failed.
 
     Raises:
-        ValueError: no records; a record with an error; names that fit no parameter; a start outside its bounds or
-            without finite forces; a constant force.
+        ValueError: no records; a record with an error; records that contradict each other; names that fit no
+            parameter; a start outside its bounds or without finite forces; a constant force.
 
     >>> from jaxdamp import bench, dampers
     >>> dyno = bench.VirtualDyno(dampers.Bilinear(2600.0, 1200.0), force_noise=5.0, seed=1)
@@ -208,6 +211,8 @@ def fit(
         initial_state=initial_state,
         samples_per_cycle=samples_per_cycle,
     )
+    if bad_records != "keep" and not per_record and initial_state != "estimated":
+        refuse_contradicting(contradicting(problem.free.tree, problem.fitted_to))
 
     def by_squares(problem: Problem, starts: int | None) -> Solution:
         return solve(problem, starts=starts, max_steps=max_steps, solver=solver)

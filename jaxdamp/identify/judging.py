@@ -11,17 +11,17 @@ from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._one_thread import one_thread
-from jaxdamp.bench import BenchRun, contradictions, contradictions_in_words
+from jaxdamp.bench import BenchRun, contradictions_in_words
 from jaxdamp.dampers import (
     AbstractDamper,
     StandardError,
     coverage,
     drives_motion,
     laws_inside,
-    takes_command,
     with_standard_errors,
 )
 from jaxdamp.identify.blending import off_span
+from jaxdamp.identify.contradicting import contradicting
 from jaxdamp.identify.estimates import Estimate
 from jaxdamp.identify.estimating import Estimates, estimate, on_misfit
 from jaxdamp.identify.law_result import FitResult
@@ -77,7 +77,7 @@ def judge(problem: Problem, solution: Solution, *, force_noise: float | None = N
     fitted = np.isfinite(problem.sigma)
     percent, rmse, scores = score(models or model, problem.runs, fitted, problem.initial_state)
     notes = on_status(best, _REMEDY)
-    on_records = (*notes_on(law, problem.fitted_to), *off_span(model, problem.fitted_to, problem.initial_state))
+    on_records = (*notes_on(model, problem.fitted_to), *off_span(model, problem.fitted_to, problem.initial_state))
     effects = left_out(problem, best)
     on_rest = on_misfit(noise, estimates.estimates, bool(effects))
     main = (*notes, *on_records, *effects, *estimates.summary, *on_rest)
@@ -144,9 +144,10 @@ def fitted_models(problem: Problem, values: np.ndarray) -> tuple[list[Model], Mo
     return models, with_values(built, {path: jnp.mean(v) for path, v in own.items()})
 
 
-def notes_on(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
+def notes_on(model: Model, runs: Sequence[BenchRun]) -> list[str]:
     """Sentences on numbers left as they were, records that contradict, strokes without place, a curve adding energy."""
-    return _undeclared(law) + _contradicting(law, runs) + _without_place(law, runs) + _driving(law, runs)
+    law, apart = law_of(model), contradictions_in_words(contradicting(model, runs))
+    return _undeclared(law) + apart + _without_place(law, runs) + _driving(law, runs)
 
 
 def _undeclared(law: AbstractDamper) -> list[str]:
@@ -167,15 +168,6 @@ def _undeclared(law: AbstractDamper) -> list[str]:
         f"The fit left {held} as it was: only numbers that are declared by `parameter` are fitted. Train a network by "
         "optax before the fit, or use `NeuralHysteresis`."
     ]
-
-
-def _contradicting(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:
-    """A sentence on records with the same motion, and the same command if the law has one, but different forces."""
-    follows = takes_command(law) and all(run.command is not None for run in runs)
-    groups: dict[float | None, list[BenchRun]] = {}
-    for run in runs:
-        groups.setdefault(run.command if follows else None, []).append(run)
-    return contradictions_in_words([pair for group in groups.values() for pair in contradictions(group)])
 
 
 def _without_place(law: AbstractDamper, runs: Sequence[BenchRun]) -> list[str]:

@@ -16,6 +16,7 @@ from jaxdamp._one_thread import one_thread
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.dampers import AbstractDamper, Reach
+from jaxdamp.identify.contradicting import contradicting, refuse_contradicting
 from jaxdamp.identify.criteria import FIRST_NOISE, LOSSES, Priors, priors_on
 from jaxdamp.identify.dependence import OWN, Dependence, dependence
 from jaxdamp.identify.initial_states import INITIAL_STATES
@@ -94,8 +95,8 @@ def fit_many(
         by their error or their parameters are named in `remarks`.
 
     Raises:
-        ValueError: no dampers; a record with an error; names that fit no parameter; settings or degrees that do not
-            suit the dampers.
+        ValueError: no dampers; a record with an error; records of one damper that contradict each other; names
+            that fit no parameter; settings or degrees that do not suit the dampers.
 
     >>> from jaxdamp import bench
     >>> from jaxdamp.dampers import Bilinear
@@ -115,6 +116,9 @@ def fit_many(
     some = [run for runs in records[:: -(-len(records) // STARTED_FROM)] for run in runs]
     begun, machine, held = started_on(law, some, rig, [*(bounds or ()), *(priors or ()), *(tie or ()), *shared])
     model = on_rig(begun, machine)
+    if bad_records != "keep" and initial_state != "estimated":
+        for name, runs in zip(names, records, strict=True):
+            refuse_contradicting(contradicting(model, runs), f"dampers[{name!r}]")
     free = free_parameters(model, freeze=[*freeze, *absent_paths(machine), *held], bounds=bounds, tie=tie)
     _checks.finite("law", free.values)
     depends = dependence(free, shared, stated, len(names))

@@ -14,9 +14,10 @@ from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, Derived
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp._traced import of_known_numbers
-from jaxdamp.bench import BenchRun, as_runs, usable
+from jaxdamp.bench import BenchRun, as_runs, contradictions, usable
 from jaxdamp.dampers import AbstractDamper, Scheduled, takes_command
 from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
+from jaxdamp.identify.contradicting import refuse_contradicting
 from jaxdamp.identify.estimating import undetermined
 from jaxdamp.identify.fitting import fit, solve
 from jaxdamp.identify.law_result import FitResult
@@ -184,7 +185,8 @@ def fit_scheduled(
         options: passed on to `fit`.
 
     Raises:
-        ValueError: records without a command, or of one command only; a law that takes a command itself.
+        ValueError: records without a command, or of one command only; records of one command that contradict
+            each other; a law that takes a command itself.
 
     >>> from jaxdamp import bench, dampers, identify
     >>> runs = []
@@ -195,7 +197,10 @@ def fit_scheduled(
     True
     """
     robust = options.get("loss", "squares") != "squares"
-    runs = usable(settings_stated(as_runs(runs, call=CALL)), options.get("bad_records", "refuse"), robust=robust)
+    bad_records = options.get("bad_records", "refuse")
+    runs = usable(settings_stated(as_runs(runs, call=CALL)), bad_records, robust=robust)
+    if bad_records != "keep":
+        refuse_contradicting(contradictions(runs, same_command=True))
     _checks.one_of("weighting", weighting, ("samples", "runs"))
     if blend is not None:
         _checks.one_of("blend", blend, ("parameters", "force"))

@@ -192,7 +192,7 @@ def train(
         held_out_fit_percent=held_percent,
         held_out_rmse=held_rmse,
         scores=scores + held_scores,
-        warnings=tuple(notes_on(law_of(trained), problem.fitted_to)),
+        warnings=tuple(notes_on(trained, problem.fitted_to)),
         status=Status.STOPPED_EARLY if taken[-1] < steps else Status.ALL_STEPS,
         steps=np.array(taken, dtype=float),
         history=np.array(history),

@@ -136,3 +136,7 @@ def of_time(run: BenchRun, factor: float) -> BenchRun:
 
 def of_stroke(run: BenchRun, factor: float) -> BenchRun:
     return replace(run, stroke=factor * run.stroke, velocity=factor * run.velocity)
+
+
+def of_force(run: BenchRun, factor: float) -> BenchRun:
+    return replace(run, force=factor * run.force)

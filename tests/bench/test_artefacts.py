@@ -43,8 +43,6 @@ ARTEFACTS: dict[str, tuple[tuple[str, ...], Callable[[BenchRun, Random], BenchRu
     "spike 1e30": (("force spikes",), lambda run, rng: made.spike(run, rng, 2, 1e30)),
     "jump": (("force jump", "force level changes"), lambda run, rng: made.jump(run, 100.0)),
     "late from 2 s": (("delay changes",), lambda run, rng: made.late(run, 0.02, 2.0)),
-    "time in ms": (("unusual sampling rate",), lambda run, rng: made.of_time(run, 1e3)),
-    "stroke in m": (("unusual amplitude",), lambda run, rng: made.of_stroke(run, 1e-3)),
     "exchanged": (("channels exchanged",), lambda run, rng: made.exchanged(run)),
     "jitter": (("clock jitter",), lambda run, rng: made.jittered(run, rng, 2e-3)),
     "hum 50": (("force ripple",), lambda run, rng: made.hum(run, 50.0, (10.0,))),

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jaxdamp.bench import RandomTest, SineTest, VirtualDyno, contradictions, contradictions_in_words, read
-from jaxdamp.dampers import Linear, Scheduled
-from jaxdamp.identify import compare, fit
+from jaxdamp.bench import RandomTest, SineTest, VirtualDyno, contradictions, contradictions_in_words, preflight, read
+from jaxdamp.dampers import Heated, Linear, Scheduled
+from jaxdamp.identify import compare, fit, fit_many, fit_scheduled
+from jaxdamp.parameters import get
 
 
 def record(name, rate=1500.0, *, amplitude=0.02, frequency=2.0, seed=0, noise=10.0, **more):
@@ -26,6 +27,13 @@ def test_another_setting_is_named_with_its_size():
     assert 0.0 < found.scatter < 10.0
     (sentence,) = contradictions_in_words([found])
     assert "soft and hard by 177 N (49 % of their RMS force" in sentence
+
+
+def test_records_of_one_name_are_named_once():
+    runs = [record("20mm_2Hz"), record("20mm_2Hz", 2500.0, seed=1)]
+    (sentence,) = contradictions_in_words(contradictions(runs))
+    assert ": two records 20mm_2Hz by 17" in sentence
+    assert preflight(runs).named("contradiction")[0].record == "20mm_2Hz"
 
 
 def test_a_gas_force_contradicts_too():
@@ -61,14 +69,54 @@ def test_motions_that_do_not_repeat_are_not_compared():
     assert contradictions(runs) == []
 
 
-def test_a_fit_and_a_comparison_say_it():
+REFUSED = (
+    "must be records that one law can follow, .* soft and hard by 177 N .*`command`.*fit_scheduled.*fit_many.*keep"
+)
+
+
+@pytest.mark.parametrize("bad_records", ["refuse", "leave_out"])
+def test_one_law_is_not_fitted_to_records_that_contradict_each_other(bad_records):
+    runs = [record("soft"), record("hard", 2500.0, seed=1)]
+    with pytest.raises(ValueError, match=REFUSED):
+        fit(Linear, runs, bad_records=bad_records)
+    with pytest.raises(ValueError, match=f"None of 2 laws could be fitted. Argument `runs` {REFUSED}"):
+        compare({"linear": Linear, "again": Linear(1.0)}, runs, progress=lambda _: None, bad_records=bad_records)
+    with pytest.raises(ValueError, match=r"Argument `dampers\['mixed'\]` " + REFUSED):
+        fit_many(Linear, {"one": [record("one")], "mixed": runs}, bad_records=bad_records)
+    settings = [replace(run, command=1.0) for run in runs]
+    with pytest.raises(ValueError, match=REFUSED):
+        fit_scheduled(Linear, [replace(record("other"), command=0.0), *settings], bad_records=bad_records)
+
+
+def test_records_that_contradict_each_other_are_pooled_when_told():
     runs = [record("soft"), record("hard", 2500.0, seed=1)]
     words = "Records of the same motion differ in force"
-    assert any(words in w and "soft and hard" in w for w in fit(Linear, runs).warnings)
-    ladder = compare({"linear": Linear, "again": Linear(1.0)}, runs, progress=lambda _: None)
+    pooled = fit(Linear, runs, bad_records="keep")
+    assert pooled["rate"].value == pytest.approx(2000.0, rel=0.01)
+    assert any(words in w and "soft and hard" in w for w in pooled.warnings)
+    ladder = compare({"linear": Linear, "again": Linear(1.0)}, runs, progress=lambda _: None, bad_records="keep")
     assert any(words in w for w in ladder.warnings) and words in repr(ladder)
-    # a record that is left out contradicts nothing
-    assert not any(words in w for w in fit(Linear, runs, weighting=[1.0, np.inf]).warnings)
+    assert fit_many(Linear, {"mixed": runs}, bad_records="keep").values[0, 0] == pytest.approx(2000.0, rel=0.01)
+
+
+def test_what_differs_from_record_to_record_does_not_contradict():
+    """A record that is left out, numbers of each record, and a temperature that the law follows."""
+    runs = [record("soft"), record("hard", 2500.0, seed=1)]
+    assert not any("same motion" in w for w in fit(Linear, runs, weighting=[1.0, np.inf]).warnings)
+    each = fit(Linear, runs, per_record=["rate"])
+    np.testing.assert_allclose([get(law, "rate") for law in each.record_laws], [1500.0, 2500.0], rtol=0.01)
+    warm = [replace(run, temperature=np.full(len(run), at)) for run, at in zip(runs, (330.0, 290.0), strict=True)]
+    follows = fit(Heated(Linear(1500.0), reference_temperature=290.0), warm, freeze=["static_force_slope"])
+    assert follows["rate"].value == pytest.approx(2500.0, rel=0.01)
+    assert not any("same motion" in w for w in follows.warnings)
+
+
+def test_a_comparison_keeps_the_laws_that_follow_the_command():
+    runs = [replace(record("soft"), command=0.0), replace(record("hard", 2500.0, seed=1), command=1.0)]
+    follows = Scheduled((Linear(1000.0), Linear(1000.0)), levels=[0.0, 1.0], command=0.0)
+    ladder = compare({"linear": Linear, "scheduled": follows}, runs, progress=lambda _: None)
+    assert ladder.best.name == "scheduled"
+    assert [(f.name, "one law can follow" in f.reason) for f in ladder.failed] == [("linear", True)]
 
 
 def test_a_law_that_follows_the_command_is_not_contradicted():

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
@@ -81,6 +82,25 @@ def test_fit_refuses_records_with_an_error_or_leaves_them_out(folder: Path, tmp_
     assert "the force is clipped at 150 N" in only
 
 
+def test_fit_refuses_a_wrong_unit_unless_it_is_said_or_told_to_keep_it(tmp_path: Path) -> None:
+    run = VirtualDyno(Bilinear(2600.0, 1200.0), force_noise=2.0, sampling_rate=500.0).run(SineTest(0.01, 2.0))[0]
+    np.savetxt(
+        tmp_path / "run.csv",
+        np.stack([run.time, 1e3 * run.stroke, run.force], axis=1),
+        delimiter=",",
+        header="t_s,x_m,F_N",
+        comments="",
+    )
+    words = ["fit", tmp_path / "run.csv", "--law", "bilinear", "--out", tmp_path / "out"]
+    said = refused(tmp_path, *words)
+    assert "the stroke looks 1000 times too large, mm taken for m" in said and "amplitude 10 m" in said
+    assert "--units stroke=mm" in said and "With --keep-bad" in said
+    jaxdamp(*words, "--units", "stroke=mm")
+    assert from_json(tmp_path / "out/best_law.json").rebound_rate == pytest.approx(2600.0, rel=0.01)
+    jaxdamp(*words, "--keep-bad", "--replace")
+    assert from_json(tmp_path / "out/best_law.json").rebound_rate == pytest.approx(2.6, rel=0.01)
+
+
 def test_settings_in_names_are_not_pooled(tmp_path: Path) -> None:
     """Two settings in the names of four records: a column each, the last word of the name as its heading."""
     runs = []
@@ -104,6 +124,11 @@ def test_settings_in_names_are_not_pooled(tmp_path: Path) -> None:
     other = [tmp_path / f"{letter}.csv" for letter in "abcd"]
     flat = " ".join(jaxdamp("bench", *other, "--out", tmp_path / "other").output.split())
     assert "they are not pooled but stand one by one" in flat
+    said = refused(tmp_path, "fit", *other, "--law", "bilinear", "--out", tmp_path / "pooled")
+    assert "Records of the same motion differ in force" in said and "a and c by" in said and "--keep-bad" in said
+    assert "Records of the same motion differ" in refused(tmp_path, "report", *other, "--law", "bilinear")
+    jaxdamp("fit", *other, "--law", "bilinear", "--keep-bad", "--out", tmp_path / "pooled")
+    assert 1500.0 < from_json(tmp_path / "pooled" / "best_law.json").rebound_rate < 2500.0
 
 
 def test_settings_stated_on_the_command_line(folder: Path, tmp_path: Path) -> None:

@@ -69,6 +69,7 @@ def test_verdict_object_file_and_page_never_disagree(situation: str, tmp_path: P
             "--rig gas",
         ),
         ("Laws with memory and means suffer: `process(moving=True)` cuts it off.", "--keep-rest"),
+        ('If it is mm, read the file with `units={"stroke": "mm"}`.', "--units stroke=mm"),
     ],
 )
 def test_the_command_line_names_options_instead_of_calls(said: str, option: str) -> None:

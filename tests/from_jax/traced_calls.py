@@ -32,7 +32,15 @@ PACKAGES += ["simulation", "sweeps", "tune", "vehicles"]
 # They take names, texts, files, functions or results, which JAX cannot trace.
 NO_NUMBERS = {
     "": {"configure"},
-    "bench": {"read", "read_kinematics", "read_limits", "read_rides", "read_table", "contradictions_in_words"},
+    "bench": {
+        "read",
+        "read_kinematics",
+        "read_limits",
+        "read_rides",
+        "read_table",
+        "contradictions_in_words",
+        "pairs_in_words",
+    },
     "codegen": {"compiler", "is_printing", "lower", "printed_scan", "printing", "symbols"},
     "dampers": {"from_samples", "own_states", "sentence", "warn_outside", "drives_motion"},
     "export": {"from_json"},

@@ -18,16 +18,13 @@ _ALIKE = 1.25  # factor between peak velocities whose forces can be compared
 
 def mixed_settings(runs: Sequence[BenchRun]) -> list[Finding]:
     """Records of one command, or of none, with the same motion but another force."""
-    groups: dict[float | None, list[BenchRun]] = {}
-    for run in runs:
-        groups.setdefault(run.command, []).append(run)
     findings = []
-    for pair in (pair for group in groups.values() for pair in contradictions(group)):
+    for pair in contradictions(runs, same_command=True):
         message = (
             f"the same motion, but forces differ by {pair.difference:.3g} N, {100 * pair.share:.0f} % of their RMS"
         )
         remedy = "Were settings mixed (clicks, current, temperature)? State them as `command`, or fit apart."
-        names = (pair.first, pair.second)
+        names = tuple(dict.fromkeys((pair.first, pair.second)))
         findings.append(Finding("warning", "contradiction", names, message, pair.difference, "N", None, remedy))
     return findings
 

@@ -43,7 +43,10 @@ ERRORS = (
     consistency.sign,
 )
 # What is in the names of warnings, by what it does to results; all others come behind.
-CONSEQUENCE = ("unusual", "changes", "jump", "dropout", "held", "spikes", "velocity", "contradiction", "sign", "delay")
+CONSEQUENCE = (
+    *("unit of", "unusual", "changes", "jump", "dropout", "held", "spikes", "velocity", "contradiction", "sign"),
+    "delay",
+)
 BAD_RECORDS = ("refuse", "leave_out", "keep")
 BENCH = ((bench_checks.turned_by_the_reader, bench_checks.turned_motion), (bench_checks.mixed_settings,))
 

@@ -20,23 +20,33 @@ _HARMONICS = 9
 
 
 def sign(e: Examined) -> list[Finding]:
-    """A force that drives the motion, since the work of a cycle is negative, or that is the stroke.
+    """A force that drives the motion, since the work of a cycle is negative, or that is the stroke."""
+    if exchanged(e):
+        message = "stroke and force look exchanged: the force moves as smoothly as a machine, the stroke has corners"
+        remedy = 'Name the columns: `read(columns={"stroke": ..., "force": ...})`.'
+        return e.finding("error", "channels exchanged", message, None, "", None, remedy)
+    if not _drives(e):
+        return []
+    work = e.run.work_per_cycle
+    message = f"the force drives the motion: work per cycle {work:+.3g} J, but a damper takes in energy"
+    remedy = 'The force counts the other way: read the file with force_sign="opposite".'
+    return e.finding("error", "force sign", message, work, "J", None, remedy)
+
+
+def exchanged(e: Examined) -> bool:
+    """Whether the stroke looks like a force and the force like a stroke.
 
     A machine moves smoothly and a damper answers with corners, so that the stroke is the smoother one of the two. Where
     it is the other way round and the work is negative, or the force small as of no damper, they are exchanged.
     """
-    work, force, stroke = e.run.work_per_cycle, e.run.force[e.moving], e.run.stroke[e.moving]
-    drives = work < -LEAST_LOSS * 2 * np.pi * float(np.std(force) * np.std(stroke))
-    small = float(np.std(force)) < _NO_DAMPER * float(np.std(e.run.velocity[e.moving]))
-    if (drives or small) and _rate(e, e.run.force) < _SMOOTHER * _rate(e, e.run.stroke):
-        message = "stroke and force look exchanged: the force moves as smoothly as a machine, the stroke has corners"
-        remedy = 'Name the columns: `read(columns={"stroke": ..., "force": ...})`.'
-        return e.finding("error", "channels exchanged", message, None, "", None, remedy)
-    if not drives:
-        return []
-    message = f"the force drives the motion: work per cycle {work:+.3g} J, but a damper takes in energy"
-    remedy = 'The force counts the other way: read the file with force_sign="opposite".'
-    return e.finding("error", "force sign", message, work, "J", None, remedy)
+    small = float(np.std(e.run.force[e.moving])) < _NO_DAMPER * float(np.std(e.run.velocity[e.moving]))
+    return (small or _drives(e)) and _rate(e, e.run.force) < _SMOOTHER * _rate(e, e.run.stroke)
+
+
+def _drives(e: Examined) -> bool:
+    """Whether the work of a cycle is negative."""
+    force, stroke = e.run.force[e.moving], e.run.stroke[e.moving]
+    return e.run.work_per_cycle < -LEAST_LOSS * 2 * np.pi * float(np.std(force) * np.std(stroke))
 
 
 def _rate(e: Examined, values: Samples) -> float:

@@ -1,8 +1,10 @@
 """Checks of the motion: rest, run-up and run-down, cycles, samples, clock, magnitudes."""
 
 import numpy as np
+from jaxtyping import Float
 
 from jaxdamp.bench.analysis import steady_cycles
+from jaxdamp.bench.preflight.consistency import exchanged
 from jaxdamp.bench.preflight.finding import FEWEST_CYCLES, Examined, Finding
 
 
@@ -17,8 +19,24 @@ _USUAL = (
     ("largest force", "N", 1.0, 2e5, "Is the force in kN, or stroke and force exchanged?"),
     ("ratio of force and velocity", "N s/m", 20.0, 1e6, "Is one of the units of time, stroke and force another one?"),
 )
+_POWERS = {  # by which each of them grows with the numbers of a channel
+    "time": (-1, -1, 0, -1, 0, 1),
+    "stroke": (0, 1, 1, 0, 0, -1),
+    "force": (0, 0, 0, 0, 1, 1),
+}
+_MISTAKEN = (  # the unit of the numbers, the one they were taken for, and how many times too large they are then
+    ("time", "ms", "s", 1e3),
+    ("time", "s", "ms", 1e-3),
+    ("time", "us", "s", 1e6),
+    ("stroke", "mm", "m", 1e3),
+    ("stroke", "m", "mm", 1e-3),
+    ("stroke", "um", "m", 1e6),
+    ("force", "N", "kN", 1e3),
+    ("force", "kN", "N", 1e-3),
+)
+_CLEARLY = 2.0  # times beyond what is usual, the factors of all six multiplied, from which one unit is said to be wrong
 _IMPOSSIBLE = 10.0  # times the usual upper end of these two, from which a unit is wrong
-_BOUNDED = ("peak velocity", "amplitude")  # a spike may be the largest force
+_BOUNDED = ("peak velocity", "amplitude")
 
 
 def rest(e: Examined) -> list[Finding]:
@@ -84,17 +102,13 @@ def few_samples(e: Examined) -> list[Finding]:
 
 
 def magnitudes(e: Examined) -> list[Finding]:
-    """Numbers that no damper test has; an error where one is so large that a unit must be wrong."""
-    run = e.run
-    ratio = float(np.std(run.force) / np.std(run.velocity))
-    values = (
-        run.sampling_rate,
-        run.peak_velocity,
-        run.amplitude,
-        run.frequency,
-        float(np.max(np.abs(run.force))),
-        ratio,
-    )
+    """Numbers that no damper test has; an error where another unit of one channel makes all of them usual."""
+    values = _magnitudes(e)
+    beyond = _times_beyond(values)
+    if np.all(beyond == 1.0):
+        return []
+    if np.prod(beyond) >= _CLEARLY and not exchanged(e) and (found := _mistaken_unit(e, values, beyond)):
+        return found
     findings = []
     for value, (what, unit, low, high, question) in zip(values, _USUAL, strict=True):
         if not low <= value <= high:
@@ -102,6 +116,39 @@ def magnitudes(e: Examined) -> list[Finding]:
             severity = "error" if what in _BOUNDED and value > _IMPOSSIBLE * high else "warning"
             findings += e.finding(severity, f"unusual {what}", message, value, unit, None, question)
     return findings
+
+
+def _magnitudes(e: Examined) -> Float[np.ndarray, " magnitudes"]:
+    """The numbers of a record in the order of `_USUAL`; a hundredth of the forces at each end may be spikes."""
+    run = e.run
+    force = np.clip(run.force, *np.quantile(run.force, (0.01, 0.99)))
+    largest, ratio = float(np.max(np.abs(force))), float(np.std(force) / np.std(run.velocity))
+    return np.array([run.sampling_rate, run.peak_velocity, run.amplitude, run.frequency, largest, ratio])
+
+
+def _times_beyond(values: Float[np.ndarray, " magnitudes"]) -> Float[np.ndarray, " magnitudes"]:
+    """How many times each number is below or above what is usual; 1 within."""
+    low, high = (np.array([row[i] for row in _USUAL]) for i in (2, 3))
+    return np.maximum(np.maximum(low / np.maximum(values, np.finfo(float).tiny), values / high), 1.0)
+
+
+def _mistaken_unit(
+    e: Examined, values: Float[np.ndarray, " magnitudes"], beyond: Float[np.ndarray, " magnitudes"]
+) -> list[Finding]:
+    """The channel whose numbers in another unit make all magnitudes usual, if there is one."""
+    for channel, true, taken, factor in _MISTAKEN:
+        if np.all(_times_beyond(values / factor ** np.array(_POWERS[channel], float)) == 1.0):
+            odd = [
+                f"{what} {value:.3g} {unit}"
+                for value, times, (what, unit, *_) in zip(values, beyond, _USUAL, strict=True)
+                if times > 1.0
+            ]
+            worst = int(np.argmax(beyond))
+            size = f"{factor:.0f} times too large" if factor > 1.0 else f"{1 / factor:.0f} times too small"
+            message = f"the {channel} looks {size}, {true} taken for {taken}: {', '.join(odd)}"
+            remedy = f'If it is {true}, read the file with `units={{"{channel}": "{true}"}}`.'
+            return e.finding("error", f"unit of {channel}", message, values[worst], _USUAL[worst][1], None, remedy)
+    return []
 
 
 def jitter(e: Examined) -> list[Finding]:

@@ -1,0 +1,44 @@
+"""Records that no one law can follow: the same motion, but another force."""
+
+from collections.abc import Sequence
+
+from jaxdamp import _checks
+from jaxdamp.bench import BenchRun, Contradiction, contradictions, pairs_in_words
+from jaxdamp.dampers import takes_command
+from jaxdamp.identify.model import Model, law_of, rig_of
+
+
+def contradicting(model: Model, runs: Sequence[BenchRun]) -> list[Contradiction]:
+    """Records with the same motion but different forces, where the records state nothing else that the model follows.
+
+    A law may take a command; a law or a machine may depend on the temperature. Both count if all records state them.
+
+    Arguments:
+        model: the law, on its machine if there is one.
+        runs: the records.
+    """
+    law, rig = law_of(model), rig_of(model)
+    warms = law.traits().temperature_dependent or (rig is not None and "heat" in rig.effects())
+    if warms and all(run.temperature is not None for run in runs):
+        return []
+    return contradictions(runs, same_command=takes_command(law) and all(run.command is not None for run in runs))
+
+
+def refuse_contradicting(found: Sequence[Contradiction], argument: str = "runs") -> None:
+    """Refuse to fit one law to records that contradict each other, if there are any.
+
+    Arguments:
+        found: what contradicts.
+        argument: what the caller calls the records.
+
+    Raises:
+        ValueError: records of the same motion with different forces.
+    """
+    if not found:
+        return
+    remedy = (
+        "If settings were mixed, state them as the `command` of the records and use `fit_scheduled`, or give each to "
+        '`fit_many` as a damper of its own; `bad_records="keep"` pools them.'
+    )
+    is_ = f"of the same motion with different forces: {pairs_in_words(found)}"
+    _checks.refuse(argument, "be records that one law can follow", is_, remedy)

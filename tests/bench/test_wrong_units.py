@@ -1,0 +1,98 @@
+"""Records with one channel in a wrong unit are refused, by channel, value and probable unit; true records are not."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from jaxdamp import bench, dampers, identify
+from jaxdamp.bench import BenchRun, SineTest, VirtualDyno, preflight
+
+from . import plain_records as made
+
+
+# unit of the numbers and the one they were taken for: the channel, what is done to a record, the remedy
+WRONG: dict[str, tuple[str, Callable[[BenchRun], BenchRun], str]] = {
+    "ms taken for s": ("time", lambda run: made.of_time(run, 1e3), 'units={"time": "ms"}'),
+    "s taken for ms": ("time", lambda run: made.of_time(run, 1e-3), 'units={"time": "s"}'),
+    "us taken for s": ("time", lambda run: made.of_time(run, 1e6), 'units={"time": "us"}'),
+    "mm taken for m": ("stroke", lambda run: made.of_stroke(run, 1e3), 'units={"stroke": "mm"}'),
+    "m taken for mm": ("stroke", lambda run: made.of_stroke(run, 1e-3), 'units={"stroke": "m"}'),
+    "um taken for m": ("stroke", lambda run: made.of_stroke(run, 1e6), 'units={"stroke": "um"}'),
+    "N taken for kN": ("force", lambda run: made.of_force(run, 1e3), 'units={"force": "N"}'),
+    "kN taken for N": ("force", lambda run: made.of_force(run, 1e-3), 'units={"force": "kN"}'),
+}
+LBF = 4.4482216
+
+
+def is_refused(name: str, run: BenchRun) -> bool:
+    """Whether the only error of a record in this wrong unit names it."""
+    channel, wrong, remedy = WRONG[name]
+    errors = preflight(wrong(run)).of("error")
+    return [(f.name, name in f.message, remedy in f.remedy) for f in errors] == [(f"unit of {channel}", True, True)]
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_unit_is_an_error_that_names_it(name: str) -> None:
+    assert all(is_refused(name, made.clean(seed)) for seed in range(7))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_unit_is_found_in_95_of_100_records_of_all_kinds(name: str) -> None:
+    found = [is_refused(name, made.clean(seed)) for seed in range(210)]
+    assert np.mean(found) >= 0.95, made.clean(found.index(False)).name
+
+
+def test_the_error_names_what_is_odd_with_its_value() -> None:
+    run = VirtualDyno(dampers.Linear(1500.0), force_noise=5.0).run(SineTest(0.004, 1.0, cycles=5))[0]
+    (finding,) = preflight(made.of_stroke(run, 1e3)).findings
+    assert finding.message == (
+        "the stroke looks 1000 times too large, mm taken for m: "
+        "peak velocity 25.1 m/s, amplitude 4 m, ratio of force and velocity 1.52 N s/m"
+    )
+    assert (finding.size, finding.unit) == (pytest.approx(1.52, abs=0.01), "N s/m")
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_fit_refuses_a_wrong_unit_unless_told_otherwise(name: str) -> None:
+    wrong = WRONG[name][1](made.clean(7, "qct"))
+    with pytest.raises(ValueError, match=f"{name}.*bad_records="):
+        identify.fit(dampers.Bilinear, wrong)
+    with pytest.raises(ValueError, match=name):
+        identify.compare({"bilinear": dampers.Bilinear}, [wrong])
+    assert bench.usable([wrong], "keep") == (wrong,)
+
+
+@pytest.mark.parametrize("factor", [1 / LBF, LBF, 1 / 25.4, 10.0])
+def test_a_smaller_factor_is_never_guessed(factor: float) -> None:
+    """Pounds for newtons, inches for millimetres, kilograms: no magnitude tells them."""
+    runs = [make(made.clean(seed), factor) for seed in range(14) for make in (made.of_force, made.of_stroke)]
+    assert not [f.message for run in runs for f in preflight(run).findings if f.name.startswith("unit of")]
+
+
+def test_a_spike_is_no_unit() -> None:
+    run = made.clean(5, "qct")
+    force = np.array(run.force)
+    force[len(run) // 2 : len(run) // 2 + 2] = 1e6
+    assert {f.name for f in preflight(replace(run, force=force)).of("error")} == {"force spikes"}
+
+
+def test_measured_records_and_small_and_large_dampers_are_not_refused(data) -> None:
+    """Seals of a bicycle damper, a bus, a yaw damper of a train, a shaker at 0.3 mm, gas at 0.5 mm/s."""
+    runs = list(bench.read(data / "mr_damper" / "*.csv", sign="rebound-positive"))
+    true = {
+        "bicycle": (50.0, SineTest(0.01, 0.5)),
+        "bus": (50000.0, SineTest(0.05, 1.67)),
+        "yaw": (1.5e6 / 4, SineTest(0.012, 0.5)),
+        "shaker": (3000.0, SineTest(0.0003, 50.0)),
+        "static": (2e5, SineTest(0.02, 0.004)),
+    }
+    runs += [
+        VirtualDyno(dampers.Linear(rate), force_noise=1.0, sampling_rate=max(100 * test.frequency, 10.0)).run(
+            replace(test, name=name)
+        )[0]
+        for name, (rate, test) in true.items()
+    ]
+    assert [f"{f}" for f in preflight(runs).findings if f.name.startswith("unit of")] == []
