@@ -3,13 +3,14 @@
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
 from jaxdamp._tables import Column as TableColumn, Table
+from jaxdamp._types import Figure
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice
 from jaxdamp.bench.problems import Problems
@@ -18,10 +19,6 @@ from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.table_points import SIDES, Curve, How, Points, curves_of, is_force_velocity, sides_of, with_headers
 from jaxdamp.dampers import AbstractDamper, FittedRange, Scheduled, SplineTable, Table as TableLaw, with_fitted_range
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 _CYCLES, _SAMPLES = 3, 400  # of the motion of `runs`, samples in each cycle
@@ -104,7 +101,7 @@ class ForceVelocityTable:
         rows = ((v, *(of.get(v) for of in cells)) for v in grid.tolist())
         return Table(f"Forces of {self.name} (velocity positive in rebound)", columns, tuple(rows))
 
-    def plot(self, kind: str = "family") -> "matplotlib.figure.Figure":
+    def plot(self, kind: str = "family") -> Figure:
         """Force over velocity of all settings.
 
         Arguments:

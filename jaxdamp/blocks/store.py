@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple, final
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._types import Dataset
 from jaxdamp.blocks.layout import Blocks
 
 
 if TYPE_CHECKING:
-    import xarray
     import zarr
 
 
@@ -191,7 +191,7 @@ class BlockStore:
             words = f"Block {number} cannot be written to {self.path}: {error.strerror or error}. What is done is there"
             raise OSError(error.errno, f"{words}, and the same call goes on once this is mended.") from error
 
-    def dataset(self, coordinates: tuple[str, ...] = ()) -> "xarray.Dataset":
+    def dataset(self, coordinates: tuple[str, ...] = ()) -> Dataset:
         """The results, read when they are asked for; `attrs` say how many points failed and how many are done."""
         import xarray
 

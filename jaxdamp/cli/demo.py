@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from jaxdamp import bench, export, plots, roads, simulate, tune, vehicles
 from jaxdamp._tables import Table
+from jaxdamp._types import Figure
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.demo_words import (
@@ -38,10 +38,6 @@ from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
 from jaxdamp.tune import TuneResult
 from jaxdamp.vehicles import AbstractVehicle
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _true_law() -> AbstractDamper:
@@ -310,7 +306,7 @@ def _report_truth(truth: FitResult | None, scenario: Scenario, report: Report) -
 
 
 def _report_tuning(tuned: TuneResult, before: Response, scenario: Scenario, report: Report) -> None:
-    def rides() -> "Figure":
+    def rides() -> Figure:
         with without_range_warnings():
             after = simulate(tuned.vehicle, _roads(scenario)[ISO], duration=scenario.duration)
             return plots.ride({"before": before, "after": after})

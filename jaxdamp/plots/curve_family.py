@@ -1,24 +1,18 @@
 """Force over velocity of all settings of a table."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._display import display
+from jaxdamp._types import Axes, Figure
 from jaxdamp.bench import ForceVelocityTable
 from jaxdamp.plots import _style
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
 
 
 A4 = (8.27, 11.69)  # inch
 
 
-def force_velocity_family(table: ForceVelocityTable, *, page: bool = False) -> "matplotlib.figure.Figure":
+def force_velocity_family(table: ForceVelocityTable, *, page: bool = False) -> Figure:
     """Force over velocity of every setting of a force-velocity table, dark to light in the order of the settings.
 
     Arguments:
@@ -47,7 +41,7 @@ def force_velocity_family(table: ForceVelocityTable, *, page: bool = False) -> "
     return figure
 
 
-def _write_table(axes: "matplotlib.axes.Axes", table: ForceVelocityTable) -> None:
+def _write_table(axes: Axes, table: ForceVelocityTable) -> None:
     """The forces as a printed table, in the units that are shown."""
     forces = table.table()
     axes.set_axis_off()

@@ -3,24 +3,18 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
 from jaxdamp._traced import of_known_numbers
-from jaxdamp._types import VectorLike
+from jaxdamp._types import Axes, Figure, VectorLike
 from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle, peak_velocity_points
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Band
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.rig import quasi_static
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
 
 
 @of_known_numbers
@@ -34,7 +28,7 @@ def force_velocity(
     title: str = "",
     bands: Band | Mapping[str, Band] | None = None,
     static_force: float = 0.0,
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """Force over velocity of one law or several, over the samples and the peak-velocity points of records.
 
     The first law is blue, others have other colours, the baseline is black and dashed.
@@ -96,7 +90,7 @@ def _title(law: str, runs: Sequence[BenchRun]) -> str:
 
 
 def draw_laws(
-    axes: "matplotlib.axes.Axes",
+    axes: Axes,
     laws: Mapping[str, AbstractDamper],
     velocities: Float[np.ndarray, " points"],
     baseline: str | None,
@@ -126,7 +120,7 @@ def _range(runs: Sequence[BenchRun]) -> tuple[float, float]:
     return 1.05 * float(min(lower, 0.0)), 1.05 * float(max(upper, 0.0))
 
 
-def _measured(axes: "matplotlib.axes.Axes", runs: Sequence[BenchRun]) -> list:
+def _measured(axes: Axes, runs: Sequence[BenchRun]) -> list:
     """Samples as a cloud and peak-velocity points as rings; the handles for the legend."""
     if not runs:
         return []

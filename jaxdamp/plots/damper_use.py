@@ -1,28 +1,22 @@
 """The use of a damper during a ride: force over velocity, and the share of time at each velocity."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jaxdamp import _checks, metrics
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Figure
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.rig import quasi_static
 from jaxdamp.simulation import Response
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 _BINS, _POINTS, _SHADE_POINTS = 41, 81, 2001
 
 
 @of_known_numbers
-def damper_use(
-    responses: Response | Mapping[str, Response], *, damper: str | None = None
-) -> "matplotlib.figure.Figure":
+def damper_use(responses: Response | Mapping[str, Response], *, damper: str | None = None) -> Figure:
     """Force over velocity during rides, with the quasi-static curve of the law, and histograms of the velocity.
 
     The histograms are the share of time and the share of dissipated energy in ranges of equal width; they show which

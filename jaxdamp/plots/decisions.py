@@ -1,19 +1,14 @@
 """The differences between dampers in ride metrics, with their uncertainty."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._types import Figure
 from jaxdamp.plots import _style
 from jaxdamp.tune import DamperComparison
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
-def damper_comparison(comparison: DamperComparison) -> "matplotlib.figure.Figure":
+def damper_comparison(comparison: DamperComparison) -> Figure:
     """The change of each metric from the first damper, with its 95 % interval; hollow where it may be none.
 
     Thick lines are the standard error from the fitted parameters alone.

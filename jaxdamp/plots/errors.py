@@ -1,18 +1,13 @@
 """The errors of several laws."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from jaxdamp._types import Figure
 from jaxdamp.identify import Comparison
 from jaxdamp.plots import _style
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
-def ladder(comparison: Comparison) -> "matplotlib.figure.Figure":
+def ladder(comparison: Comparison) -> Figure:
     """Bars of the RMSE of each law, on the fitted records and on motion that was held out.
 
     Arguments:

@@ -1,19 +1,15 @@
 """Records without a law: mean loops, forces over velocity with limits and a baseline, gas force and friction."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._types import Axes, Figure
 from jaxdamp.bench import Evaluation, FoldedCycles, GasAndFriction, LimitCheck
 from jaxdamp.plots import _style
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
 
 
 _REMEDY = "Take what `bench.evaluate(runs)` gives."
@@ -21,9 +17,7 @@ _MOST_LABELLED = 14  # records in a legend
 _DISTINCT = 0.02  # difference of peak velocities, relative to the largest, below which records are repeats
 
 
-def evaluation(
-    evaluation: Evaluation, baseline: Evaluation | None = None, limits: LimitCheck | None = None
-) -> "matplotlib.figure.Figure":
+def evaluation(evaluation: Evaluation, baseline: Evaluation | None = None, limits: LimitCheck | None = None) -> Figure:
     """Mean cycles of records over velocity, stroke, acceleration and time, and forces over velocity.
 
     One setting: a colour for each record, from slow to fast. Several: a colour for each setting. Bands show the
@@ -67,7 +61,7 @@ def evaluation(
     return figure
 
 
-def gas_and_friction(found: GasAndFriction) -> "matplotlib.figure.Figure":
+def gas_and_friction(found: GasAndFriction) -> Figure:
     """Force over stroke in both directions, its even part with the gas force, and its odd part with the friction.
 
     Arguments:
@@ -104,7 +98,7 @@ def _colours(evaluation: Evaluation) -> tuple[_style.Look, list[tuple[str, Any]]
     return colours, [(f"{run.name} ({run.peak_velocity:.2g} m/s)", colours[run.name]) for run in shown]
 
 
-def _draw_cycle(panels: Mapping[str, "matplotlib.axes.Axes"], cycles: FoldedCycles, style: Mapping[str, Any]) -> None:
+def _draw_cycle(panels: Mapping[str, Axes], cycles: FoldedCycles, style: Mapping[str, Any]) -> None:
     """The mean cycle of a record, closed, in a band of one standard deviation of the force over its cycles."""
     stroke, velocity, force = (
         _closed(values.mean(axis=0)) for values in (cycles.stroke, cycles.velocity, cycles.force)
@@ -120,7 +114,7 @@ def _draw_cycle(panels: Mapping[str, "matplotlib.axes.Axes"], cycles: FoldedCycl
 
 
 def _draw_band(
-    axes: "matplotlib.axes.Axes",
+    axes: Axes,
     values: Float[np.ndarray, " points"],
     force: Float[np.ndarray, " points"],
     scatter: Float[np.ndarray, " points"],
@@ -138,7 +132,7 @@ def _closed(values: Float[np.ndarray, " points"]) -> Float[np.ndarray, " more"]:
     return np.append(values, values[0])
 
 
-def _draw_forces(axes: "matplotlib.axes.Axes", evaluation: Evaluation, styles: Mapping[str, Mapping[str, Any]]) -> None:
+def _draw_forces(axes: Axes, evaluation: Evaluation, styles: Mapping[str, Mapping[str, Any]]) -> None:
     """Forces at peak velocity of each setting, and those at stated velocities.
 
     Lines join the peaks of a setting whose velocities differ clearly; repeats of one velocity stand beside each other.
@@ -160,7 +154,7 @@ def _draw_forces(axes: "matplotlib.axes.Axes", evaluation: Evaluation, styles: M
             axes.plot(*np.array(stated).T, "D", markersize=4.5, color=styles[setting]["color"], zorder=3)
 
 
-def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list:
+def _draw_limits(axes: Axes, limits: LimitCheck) -> list:
     """Bars from the least to the largest force at stated velocities; one-sided limits end at the measured value."""
     from matplotlib.lines import Line2D
 
@@ -181,7 +175,7 @@ def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list:
     ]
 
 
-def _dress(panels: Mapping[str, "matplotlib.axes.Axes"]) -> None:
+def _dress(panels: Mapping[str, Axes]) -> None:
     _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Continuous plot (CVP): mean cycles")
     _style.dress(
         panels["peaks"], _style.VELOCITY, _style.FORCE, "Peak-velocity plot (PVP), and forces at stated velocities"
@@ -194,7 +188,7 @@ def _dress(panels: Mapping[str, "matplotlib.axes.Axes"]) -> None:
         axes.locator_params(axis="x", nbins=6)
 
 
-def limit_check(check: LimitCheck) -> "matplotlib.figure.Figure":
+def limit_check(check: LimitCheck) -> Figure:
     """A row for each limit: its range as a bar, and the measured value, all divided by the largest of the row.
 
     Arguments:

@@ -1,18 +1,13 @@
 """A design of an experiment: its runs, and what they are expected to tell."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from jaxdamp._types import Figure
 from jaxdamp.identify import ExperimentDesign, extent
 from jaxdamp.plots import _style
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
-def experiment(design: ExperimentDesign) -> "matplotlib.figure.Figure":
+def experiment(design: ExperimentDesign) -> Figure:
     """The runs over stroke and velocity, and the relative standard errors beside those of the programme.
 
     Arguments:

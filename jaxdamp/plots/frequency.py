@@ -1,25 +1,22 @@
 """Responses over frequency: of a vehicle to a sine of its road, and of a law on the test machine."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from jaxdamp._steady_cycles import AbstractSteadyCycles
+from jaxdamp._types import Figure
 from jaxdamp.plots import _style
 from jaxdamp.rig import DynamicStiffness
 from jaxdamp.simulation import HarmonicResponse
 from jaxdamp.vehicles import ChannelKind
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
 DRAWN = (ChannelKind.ACCELERATION, ChannelKind.STROKE, ChannelKind.TYRE_LOAD)
 
 
-def harmonic_response(result: HarmonicResponse, channels: Sequence[str] | None = None) -> "matplotlib.figure.Figure":
+def harmonic_response(result: HarmonicResponse, channels: Sequence[str] | None = None) -> Figure:
     """First harmonic per metre of road over frequency, one curve for each amplitude; unstable motions are circles.
 
     Arguments:
@@ -41,7 +38,7 @@ def harmonic_response(result: HarmonicResponse, channels: Sequence[str] | None =
     return _over_frequency(result, result.amplitude, panels, "road amplitude")
 
 
-def dynamic_stiffness(result: DynamicStiffness) -> "matplotlib.figure.Figure":
+def dynamic_stiffness(result: DynamicStiffness) -> Figure:
     """Stiffness, loss angle and equivalent damping over frequency, one curve for each amplitude.
 
     Arguments:
@@ -57,7 +54,7 @@ def dynamic_stiffness(result: DynamicStiffness) -> "matplotlib.figure.Figure":
 
 def _over_frequency(
     result: AbstractSteadyCycles, amplitude: Any, panels: Sequence[tuple[str, str, np.ndarray]], legend: str
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """A panel for each title, label and values, with a curve for each amplitude."""
     frequency = np.asarray(result.frequency)
     sizes = 1e3 * np.asarray(amplitude).reshape(-1, frequency.size)

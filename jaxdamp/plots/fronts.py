@@ -1,23 +1,18 @@
 """A front of ride metrics, with the damper laws along it."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
-from jaxdamp._types import VectorLike
+from jaxdamp._types import Axes, Figure, VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style
 from jaxdamp.rig import quasi_static
 from jaxdamp.tune import ParetoFront, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
 
 
 MOST_CURVES = 9
@@ -27,7 +22,7 @@ MARKS = ("s", "D", "^", "v", "P", "X")
 
 def pareto(
     front: ParetoFront, baselines: Mapping[str, AbstractVehicle] | None = None, velocities: VectorLike | None = None
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """The front, with its knee, the start and other vehicles; and force over velocity of the dampers along it.
 
     Points and curves have the colour of their first objective. Of three objectives each pair has axes of its own.
@@ -62,9 +57,7 @@ def pareto(
     return figure
 
 
-def _points(
-    axes: "matplotlib.axes.Axes", front: ParetoFront, x: str, y: str, marked: Mapping[str, Mapping[str, float]]
-) -> list[Any]:
+def _points(axes: Axes, front: ParetoFront, x: str, y: str, marked: Mapping[str, Mapping[str, float]]) -> list[Any]:
     """One pair of objectives: the points of the front, its knee, and vehicles to compare with."""
     across, up, shades = front.values[x], front.values[y], front.shares[:, 0]
     if len(front.names) == 2:
@@ -84,7 +77,7 @@ def _points(
     return handles
 
 
-def _limits(axes: "matplotlib.axes.Axes", front: ParetoFront, x: str, y: str) -> list[Any]:
+def _limits(axes: Axes, front: ParetoFront, x: str, y: str) -> list[Any]:
     """Dashed lines at the limits of the two objectives, and marks at points where another metric is at its limit."""
     colour, handles = _style.BAD, []
     for name, (lower, upper) in limit_spans(front.limits, list(front.values)).items():
@@ -127,7 +120,7 @@ def _all_equal(laws: tuple[AbstractDamper, ...]) -> bool:
 
 
 def _curves(
-    axes: "matplotlib.axes.Axes",
+    axes: Axes,
     front: ParetoFront,
     laws: list[AbstractDamper],
     title: str,

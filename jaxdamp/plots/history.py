@@ -1,16 +1,11 @@
 """The course of a training."""
 
-from typing import TYPE_CHECKING
-
+from jaxdamp._types import Figure
 from jaxdamp.identify import Training
 from jaxdamp.plots import _style
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
-def training_history(training: Training) -> "matplotlib.figure.Figure":
+def training_history(training: Training) -> Figure:
     """Errors over the steps of a training, on its records and on those held out, and the step of the result.
 
     Arguments:

@@ -1,27 +1,21 @@
 """A fit and its records: loops of force over velocity and over stroke, and the residual."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle
 from jaxdamp.identify import FitResult
 from jaxdamp.plots import _style
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
 _MOST_POINTS = 300  # of a residual
 
 
-def fit_loops(
-    result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = None, *, most: int = 6
-) -> "matplotlib.figure.Figure":
+def fit_loops(result: FitResult, runs: BenchRun | Sequence[BenchRun] | None = None, *, most: int = 6) -> Figure:
     """Loops of force over velocity and over stroke, measured and fitted, with the residual.
 
     For each record the last full cycle is drawn. Of many records only some are drawn, spread evenly over the peak

@@ -1,24 +1,18 @@
 """Numbers with their spread: one law fitted to many dampers, posteriors, targets, a tuning on other roads."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from jaxdamp._types import Axes, Figure
 from jaxdamp.identify import ManyFits, Posterior, TargetFit
 from jaxdamp.plots import _style
 from jaxdamp.tune import Rescore
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
 
 
 _COLUMNS = 3  # of panels
 _BINS = 30
 
 
-def many_fits(result: ManyFits) -> "matplotlib.figure.Figure":
+def many_fits(result: ManyFits) -> Figure:
     """The parameters of each damper with their 95 % intervals, and the error of each damper.
 
     Over the setting of the dampers, if it is stated, otherwise in their order. Intervals without an end are left out.
@@ -46,7 +40,7 @@ def many_fits(result: ManyFits) -> "matplotlib.figure.Figure":
     return figure
 
 
-def posterior(result: Posterior) -> "matplotlib.figure.Figure":
+def posterior(result: Posterior) -> Figure:
     """Histograms of the samples of every number, with the mean and the 95 % interval.
 
     Arguments:
@@ -63,7 +57,7 @@ def posterior(result: Posterior) -> "matplotlib.figure.Figure":
     return figure
 
 
-def targets(result: TargetFit) -> "matplotlib.figure.Figure":
+def targets(result: TargetFit) -> Figure:
     """The distance of each value from its target, in tolerances; the shaded values meet it.
 
     Arguments:
@@ -81,7 +75,7 @@ def targets(result: TargetFit) -> "matplotlib.figure.Figure":
     return figure
 
 
-def rescore(result: Rescore) -> "matplotlib.figure.Figure":
+def rescore(result: Rescore) -> Figure:
     """The change of each ride metric by the tuning on each of the other roads, and its mean.
 
     Metrics that are zero or negative on a road are left out, since they have no change in percent.
@@ -104,7 +98,7 @@ def rescore(result: Rescore) -> "matplotlib.figure.Figure":
     return figure
 
 
-def _panels(count: int) -> tuple["matplotlib.figure.Figure", list["matplotlib.axes.Axes"]]:
+def _panels(count: int) -> tuple[Figure, list[Axes]]:
     """So many panels, three in a row."""
     rows = -(-count // _COLUMNS)
     figure = _style.new_figure(12.0, 0.6 + 2.8 * rows)

@@ -1,18 +1,13 @@
 """Natural modes: frequency, damping ratio and shape."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from jaxdamp._types import Figure
 from jaxdamp.plots import _style
 from jaxdamp.vehicles import Modes
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
-def modes(result: Modes) -> "matplotlib.figure.Figure":
+def modes(result: Modes) -> Figure:
     """The amplitude of every coordinate in each damped oscillation, signed as in the undamped motion.
 
     Heights [m] and angles [rad] are compared as numbers, the largest of a mode is 1.

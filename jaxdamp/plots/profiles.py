@@ -1,18 +1,13 @@
 """The cost of other values of one parameter."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from jaxdamp._types import Figure
 from jaxdamp.identify import ProfileCurve
 from jaxdamp.plots import _style
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
-def profile(curve: ProfileCurve) -> "matplotlib.figure.Figure":
+def profile(curve: ProfileCurve) -> Figure:
     """Cost over value, with the 95 % interval and the parabola that the standard error stands for.
 
     Arguments:

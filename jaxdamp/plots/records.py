@@ -1,19 +1,15 @@
 """Bench records as they are: force over velocity and over stroke, and the channels over time."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from jaxdamp import _checks
+from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle
 from jaxdamp.plots import _style
 from jaxdamp.plots.loops import spread
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
-def records(runs: BenchRun | Iterable[BenchRun], *, most: int = 12) -> "matplotlib.figure.Figure":
+def records(runs: BenchRun | Iterable[BenchRun], *, most: int = 12) -> Figure:
     """The last full cycle over velocity and over stroke, and stroke and force of the whole records over time.
 
     Arguments:

@@ -1,7 +1,6 @@
 """Rides: time histories and the spectrum of the body acceleration."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -9,13 +8,10 @@ from jaxtyping import Float
 from jaxdamp import _checks, metrics
 from jaxdamp._tables import typeset_unit
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Figure
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.simulation import Response
 from jaxdamp.vehicles import ChannelKind, Layout
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 WINDOW = 3.0  # s, drawn over time: in more, wheel oscillations at 10 Hz cannot be distinguished
@@ -36,7 +32,7 @@ def ride(
     reference: str | None = None,
     frequencies: tuple[float | int, float | int] = (0.3, 30.0),
     title: str = "",
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """Channels over time and the power spectral density of the first of them, overlaid for several responses.
 
     The legend gives the RMS of the first channel over the whole run. Dampers used outside the fitted range of their

@@ -1,24 +1,18 @@
 """Sensitivities: damper curves coloured by their effect on a metric, and the effects of parameters."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._types import Axes, Figure
 from jaxdamp.identify import RecordSensitivity
 from jaxdamp.plots import _style
 from jaxdamp.tune import Sensitivity
 
 
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
-
-
 MOST = 12  # parameters that are drawn
 
 
-def sensitivity(result: Sensitivity, *, most: int = MOST) -> "matplotlib.figure.Figure":
+def sensitivity(result: Sensitivity, *, most: int = MOST) -> Figure:
     """The curve of each damper as a band coloured by its effect on each metric, above the effects of the parameters.
 
     Red: more force at this velocity, or more of this parameter, raises the metric; blue: lowers it.
@@ -49,7 +43,7 @@ def sensitivity(result: Sensitivity, *, most: int = MOST) -> "matplotlib.figure.
     return figure
 
 
-def record_sensitivity(result: RecordSensitivity) -> "matplotlib.figure.Figure":
+def record_sensitivity(result: RecordSensitivity) -> Figure:
     """The change of functions of a fitted law for 10 N more measured force at each sample, over the velocity.
 
     Arguments:
@@ -71,8 +65,8 @@ def record_sensitivity(result: RecordSensitivity) -> "matplotlib.figure.Figure":
 
 
 def _band(
-    figure: "matplotlib.figure.Figure",
-    axes: "matplotlib.axes.Axes",
+    figure: Figure,
+    axes: Axes,
     result: Sensitivity,
     damper: str,
     metric: str,

@@ -1,18 +1,13 @@
 """How well laws predict records that they were not fitted to."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from jaxdamp._types import Figure
 from jaxdamp.identify import CrossValidation
 from jaxdamp.plots import _style
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
-def cross_validation(result: CrossValidation) -> "matplotlib.figure.Figure":
+def cross_validation(result: CrossValidation) -> Figure:
     """Fit percent of every held-out record, a row for each law, a colour for each group; black bars are the means.
 
     Arguments:

@@ -1,20 +1,16 @@
 """A choice of valving: wanted and reached force."""
 
 import itertools
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._types import Figure
 from jaxdamp.plots import _style
 from jaxdamp.tune import ValvingResult
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
-def valving(result: ValvingResult) -> "matplotlib.figure.Figure":
+def valving(result: ValvingResult) -> Figure:
     """Wanted and reached force over velocity, the parts out of reach shaded, and the error below.
 
     Arguments:

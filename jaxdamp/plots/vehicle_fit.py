@@ -1,18 +1,13 @@
 """A fit of a vehicle as a picture: measured and fitted channels over time, and the residual."""
 
-from typing import TYPE_CHECKING
-
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
+from jaxdamp._types import Figure
 from jaxdamp.identify import VehicleFit
 from jaxdamp.plots import _style
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
-def vehicle_fit(result: VehicleFit, record: str | None = None) -> "matplotlib.figure.Figure":
+def vehicle_fit(result: VehicleFit, record: str | None = None) -> Figure:
     """Each channel of a record, measured and fitted, with the residual beside it.
 
     Arguments:
