@@ -96,7 +96,8 @@ class ForceVelocityTable:
     def table(self) -> Table:
         """The forces, a row for each velocity and a column for each setting."""
         grid = np.unique(np.concatenate([curve.velocity for curve in self.curves]))
-        columns = (TableColumn("velocity", "m/s", ".4g"), *(TableColumn(_heading(c), "N", ".4g") for c in self.curves))
+        headings = [f"force at {name}" if name else "force" for name in self.settings]
+        columns = (TableColumn("velocity", "m/s", ".4g"), *(TableColumn(name, "N", ".4g") for name in headings))
         cells = [dict(zip(curve.velocity.tolist(), curve.force.tolist(), strict=True)) for curve in self.curves]
         rows = ((v, *(of.get(v) for of in cells)) for v in grid.tolist())
         return Table(f"Forces of {self.name} (velocity positive in rebound)", columns, tuple(rows))
@@ -114,10 +115,6 @@ class ForceVelocityTable:
 
     def __repr__(self) -> str:
         return "\n".join([f"{self.table()}", *self.notes])
-
-
-def _heading(curve: Curve) -> str:
-    return f"force at {curve.setting}" if curve.setting else "force"
 
 
 def _on(curve: Curve, grid: Points) -> Points:

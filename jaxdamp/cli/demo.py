@@ -175,13 +175,10 @@ def record(screen: Screen, scenario: Scenario, folder: Path) -> BenchSet:
         return bench.read([folder / "records" / f"{name}.csv" for name in records.names])
 
 
-def _iso_road(seed: int) -> AbstractRoad:
-    return roads.iso8608("C", speed=20.0, seed=seed)
-
-
 def _roads(scenario: Scenario) -> dict[str, AbstractRoad]:
     """A random road and an event."""
-    return {ISO: _iso_road(scenario.seed), BUMP: roads.cosine_bump(0.06, start=0.5, duration=0.2)}
+    random = roads.iso8608("C", speed=20.0, seed=scenario.seed)
+    return {ISO: random, BUMP: roads.cosine_bump(0.06, start=0.5, duration=0.2)}
 
 
 def _car(law: AbstractDamper) -> AbstractVehicle:

@@ -73,12 +73,12 @@ def _laws(curves: Axes, pairs: dict[str, tuple[AbstractDamper, AbstractDamper]],
 
 def _changed(result: TuneResult) -> dict[str, tuple[AbstractDamper, AbstractDamper]]:
     """The laws of both vehicles by a name to put before "before" and "after": those that differ, or the first."""
-    pairs = list(zip(*(_own_laws(vehicle) for vehicle in (result.start, result.vehicle)), strict=True))
+    pairs = list(zip(*(own_laws(vehicle) for vehicle in (result.start, result.vehicle)), strict=True))
     differing = [i for i, (old, new) in enumerate(pairs) if not eqx.tree_equal(old, new)] or [0]
     return {f"damper {i + 1} " if len(differing) > 1 else "": pairs[i] for i in differing}
 
 
-def _own_laws(vehicle: AbstractVehicle) -> list[AbstractDamper]:
+def own_laws(vehicle: AbstractVehicle) -> list[AbstractDamper]:
     """The laws of a vehicle, one of several equal ones, without those of tyre lift-off."""
     frame = vehicle.frame()
     return [element.law for part in (*frame.links, *frame.wheels) for element in part.elements]

@@ -10,6 +10,7 @@ from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes, Figure, VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style
+from jaxdamp.plots.changes import own_laws
 from jaxdamp.rig import quasi_static
 from jaxdamp.tune import ParetoFront, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
@@ -103,12 +104,7 @@ def _label(front: ParetoFront, name: str) -> str:
 
 def _laws_along(front: ParetoFront) -> dict[str, list[AbstractDamper]]:
     """The laws that differ along the front, by a title: each at every point."""
-
-    def laws(vehicle: AbstractVehicle) -> list[AbstractDamper]:
-        frame = vehicle.frame()
-        return [element.law for part in (*frame.links, *frame.wheels) for element in part.elements]
-
-    along = list(zip(*(laws(front.point(i)) for i in range(len(front))), strict=True))
+    along = list(zip(*(own_laws(front.point(i)) for i in range(len(front))), strict=True))
     places = [i for i, group in enumerate(along) if not _all_equal(group)]
     return {f"Damper {i + 1}" if len(along) > 1 else "Damper": list(along[i]) for i in places}
 

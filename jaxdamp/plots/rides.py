@@ -107,17 +107,12 @@ def ride(
 def _chosen_channels(response: Response, channels: Sequence[str] | None) -> Sequence[str]:
     """The channels to draw, checked; the default ones if left out."""
     if channels is None:
-        return ride_channels(response)
+        return default_channels(response.system.layout)
     if not channels:
         _checks.refuse("channels", "hold at least one channel to draw", "empty")
     for channel in channels:
         _checks.one_of("channels", channel, response.units)
     return channels
-
-
-def ride_channels(response: Response) -> tuple[str, ...]:
-    """The default channels: body acceleration, first stroke, first dynamic tyre load."""
-    return default_channels(response.system.layout)
 
 
 def default_channels(layout: Layout) -> tuple[str, ...]:
