@@ -1,4 +1,4 @@
-"""The bench as a program: records of a law as a real machine with its faults would write them."""
+"""The bench as a program: records of a law as a real machine with its faults would write them, channel by channel."""
 
 import zlib
 from collections.abc import Callable, Iterable

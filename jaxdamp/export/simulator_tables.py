@@ -1,4 +1,4 @@
-"""A law as the table of a vehicle simulator, in its units and with its sign."""
+"""A law as a force-velocity table, and as the table of a vehicle simulator, in its units and with its sign."""
 
 import os
 import warnings

@@ -1,4 +1,4 @@
-"""The errors of several laws."""
+"""The errors of several laws, on the records fitted and on others."""
 
 import numpy as np
 

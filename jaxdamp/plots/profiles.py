@@ -1,4 +1,4 @@
-"""The cost of other values of one parameter."""
+"""How a fit was reached and what it could be: the course of a training, the cost of other values, a design of tests."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Sensitivities: damper curves coloured by their effect on a metric, and the effects of parameters."""
+"""Sensitivities as coloured curves and effects of parameters; a choice of valving: wanted and reached force."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""A page on laws fitted to records: errors, parameters, loops and curves."""
+"""A page on laws fitted to records: errors, parameters, loops and curves, what the machine adds, doubts."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,8 +14,7 @@ from jaxdamp.identify import Band, Comparison, CrossValidation, FitResult, Rung,
 from jaxdamp.parameters import parameters
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
-from jaxdamp.report.ranges import fitted_range_table
-from jaxdamp.report.records import add_records
+from jaxdamp.report.records import add_records, fitted_range_table
 
 
 def machine_sentences(result: FitResult) -> tuple[str, ...]:
