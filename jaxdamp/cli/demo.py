@@ -109,7 +109,7 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
         runs = record(screen, scenario, work.results.draft)
         held = runs.select(scenario.held_out)
         fits = fit_laws(screen, scenario.laws, runs.without(scenario.held_out), held)
-        truth = _fit_of_truth(fits, scenario)
+        truth = next((rung.result for rung in fits.comparison.rungs if rung.name == scenario.true_name), None)
         show_fits(screen, fits, truth, scenario)
         with work.saving("Laws and tables", f"the rides, the tuning, {fits.missing}") as draft:
             write_fits(draft, fits.comparison, runs, work.attempts)
@@ -215,11 +215,6 @@ def improve(screen: Screen, truth: FitResult, scenario: Scenario) -> TuneResult:
 
 
 # ---- what they say
-
-
-def _fit_of_truth(fits: Fitted, scenario: Scenario) -> FitResult | None:
-    """The fit of the law with the true parameters, if there is one."""
-    return next((rung.result for rung in fits.comparison.rungs if rung.name == scenario.true_name), None)
 
 
 def show_fits(screen: Screen, fits: Fitted, truth: FitResult | None, scenario: Scenario) -> None:

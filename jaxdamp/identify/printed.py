@@ -157,9 +157,8 @@ def evaluator(free: FreeParameters, residuals: Sequence[AbstractResiduals]) -> E
     """The residuals of records as printed C; None where XLA computes them."""
     batches = [part for part in residuals if isinstance(part, Batch)]
     reason = _refusal(residuals, free.tree)
-    if not reason and any(batch.per_record for batch in batches):
-        conditions = any(law.has_conditions() for _, law in laws_inside(free.tree))
-        reason = "a value for each record beside conditions" if conditions else reason
+    if not reason and free_has_conditions(free) and any(batch.per_record for batch in batches):
+        reason = "a value for each record beside conditions"
     if reason:
         say(f"Computed by XLA: {reason}.")
         return None
@@ -193,3 +192,8 @@ def _taken(free: FreeParameters) -> PyTree:
 def _marked(taken: PyTree, batch: Batch) -> PyTree:
     """Values that the records state take no free number."""
     return with_values(taken, {path: np.asarray(-1.0) for path in batch.fixed})
+
+
+def free_has_conditions(free: FreeParameters) -> bool:
+    """Whether a law has conditions between its parameters."""
+    return any(law.has_conditions() for _, law in laws_inside(free.tree))

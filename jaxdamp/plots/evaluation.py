@@ -145,23 +145,15 @@ def _draw_cycle(panels: Mapping[str, Axes], cycles: FoldedCycles, style: Mapping
     scatter = _closed(cycles.force.std(axis=0, ddof=1)) if len(cycles.periods) > 1 else None
     for name, values in (("v", velocity), ("x", 1e3 * stroke), ("a", acceleration), ("t", phase)):
         panels[name].plot(values, force, **style)
-        if scatter is not None:
-            _draw_band(panels[name], values, force, scatter, style["color"])
-
-
-def _draw_band(
-    axes: Axes,
-    values: Float[np.ndarray, " points"],
-    force: Float[np.ndarray, " points"],
-    scatter: Float[np.ndarray, " points"],
-    colour: object,
-) -> None:
-    """A band about a loop, drawn from the smallest value to the largest and back, so that it does not cover itself."""
-    first, last = sorted((int(np.argmin(values)), int(np.argmax(values))))
-    there, back = np.arange(first, last + 1), np.r_[last : len(values), 0 : first + 1]
-    for part in (there, back) if len(there) < len(values) else (there,):  # time does not come back
-        low, high = force[part] - scatter[part], force[part] + scatter[part]
-        axes.fill_between(values[part], low, high, color=colour, alpha=0.25, linewidth=0.0, zorder=1.2)
+        if scatter is None:
+            continue
+        # The band is drawn from the smallest value to the largest and back, so that it does not cover itself.
+        first, last = sorted((int(np.argmin(values)), int(np.argmax(values))))
+        there, back = np.arange(first, last + 1), np.r_[last : len(values), 0 : first + 1]
+        for part in (there, back) if len(there) < len(values) else (there,):  # time does not come back
+            low, high = force[part] - scatter[part], force[part] + scatter[part]
+            look = {"color": style["color"], "alpha": 0.25, "linewidth": 0.0, "zorder": 1.2}
+            panels[name].fill_between(values[part], low, high, **look)
 
 
 def _closed(values: Float[np.ndarray, " points"]) -> Float[np.ndarray, " more"]:

@@ -48,7 +48,9 @@ def bench_report(
         baseline = law_evaluation(baseline, evaluation)
     sentences = bench_verdict(evaluation, preflight, limits)
     report.verdict(*sentences)
-    add_bench_sheet(report, evaluation, sentences[0] if sentences else "", preflight, limits)
+    doubts = evaluation.notes if preflight is None else [*preflight.sentences(), *evaluation.notes]
+    more = {"sentence": sentences[0] if sentences else "", "warnings": doubts, "limits": limits}
+    report.sheet(lambda: evaluation.plot("sheet", **more), more["sentence"], "damper_sheet")
     add_records(report, evaluation.runs, (), remarks, preflight)
     if preflight is not None and preflight.findings:
         report.table(preflight.table())
@@ -57,23 +59,6 @@ def bench_report(
         report.table(limits.table())
     add_evaluation(report, evaluation, baseline, limits)
     return report
-
-
-def add_bench_sheet(
-    report: Report, evaluation: Evaluation, sentence: str, preflight: Preflight | None, limits: LimitCheck | None = None
-) -> None:
-    """The sheet of records without a law, with what the preflight says.
-
-    Arguments:
-        report: the page.
-        evaluation: of `bench.evaluate`.
-        sentence: at the top.
-        preflight: of `bench.preflight`.
-        limits: of `evaluation.check`.
-    """
-    doubts = evaluation.notes if preflight is None else [*preflight.sentences(), *evaluation.notes]
-    more = {"sentence": sentence, "warnings": doubts, "limits": limits}
-    report.sheet(lambda: evaluation.plot("sheet", **more), sentence, "damper_sheet")
 
 
 def add_evaluation(

@@ -123,7 +123,7 @@ def known_cars(system: System, dt: float) -> list[KnownCar] | None:
 
 
 def _cars_of_batch(system: System, dt: float) -> list[KnownCar] | None:
-    both = system, [_samples(law, dt) for law in system.laws]
+    both = system, [[_of_term(term, dt) for term in law.side_by_side()] for law in system.laws]
     values = rows(both)
     if values is None:
         return None
@@ -182,11 +182,6 @@ def rounded_down(value: float) -> float:
     """To one digit."""
     unit = 10.0 ** math.floor(math.log10(value))
     return math.floor(value / unit * (1.0 + 1e-12)) * unit
-
-
-def _samples(law: AbstractDamper, dt: float) -> list[_Samples]:
-    """The slopes of each of the laws that act side by side in a law."""
-    return [_of_term(term, dt) for term in law.side_by_side()]
 
 
 def _of_term(law: AbstractDamper, dt: float) -> _Samples:
