@@ -147,11 +147,6 @@ class Display:
                 order[first], order[second] = second, first
         return order
 
-    def amount(self, value: float, unit: str, spec: str = ".4g", *, signed: bool = False) -> str:
-        """A number with its unit: "125 lbf"."""
-        shown = self.of(unit, signed=signed)
-        return f"{format(shown(value), spec)} {shown.unit}".rstrip()
-
     def text(self, label: str) -> str:
         """The label of an axis or a table, with the unit in brackets and the words on the sign that are shown."""
         return self._turned(re.sub(r"\[([^\[\]]+)\]", lambda found: f"[{self.of(found[1]).unit}]", label))

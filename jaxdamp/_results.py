@@ -1,20 +1,16 @@
 """What every result has: status, warnings, summary, table, plot, plain data, report."""
 
+import os
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jaxdamp import _checks
 from jaxdamp._status import Status
 from jaxdamp._tables import Contents, Table, plain, with_unit
-
-
-if TYPE_CHECKING:
-    import os
-
-    import matplotlib.figure
+from jaxdamp._types import Figure
 
 
 class Derived:
@@ -36,7 +32,7 @@ class Derived:
         return self.function(instance)
 
 
-def drawn_by(name: str, text: str) -> "Callable[..., matplotlib.figure.Figure]":
+def drawn_by(name: str, text: str) -> Callable[..., Figure]:
     """The method `plot` of a result.
 
     Arguments:
@@ -44,7 +40,7 @@ def drawn_by(name: str, text: str) -> "Callable[..., matplotlib.figure.Figure]":
         text: what it shows.
     """
 
-    def plot(self: "AbstractResult", *values: object, **options: object) -> "matplotlib.figure.Figure":
+    def plot(self: "AbstractResult", *values: object, **options: object) -> Figure:
         from jaxdamp import plots
 
         return getattr(plots, name)(self, *values, **options)
@@ -81,7 +77,7 @@ class AbstractResult(ABC):
         """The numbers of the result with their units."""
 
     @abstractmethod
-    def plot(self) -> "matplotlib.figure.Figure":
+    def plot(self) -> Figure:
         """A picture of the result."""
 
     def tables(self) -> dict[str, Table]:
@@ -103,7 +99,7 @@ class AbstractResult(ABC):
         head = {"summary": self.summary, "status": status, "converged": self.converged, "warnings": [*self.warnings]}
         return head | self.content()
 
-    def report(self, path: "str | os.PathLike[str]", title: str = "") -> Path:
+    def report(self, path: str | os.PathLike[str], title: str = "") -> Path:
         """Write the result as one HTML page: summary, warnings, tables, pictures.
 
         Arguments:
@@ -120,11 +116,11 @@ class AbstractResult(ABC):
 
 def plotted(
     kind: object,
-    kinds: "Mapping[str, Callable[..., matplotlib.figure.Figure]]",
+    kinds: Mapping[str, Callable[..., Figure]],
     result: "AbstractResult",
     before: str = "",
     **options: object,
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """The picture of a result of the kind that `result.plot(kind)` names.
 
     Arguments:

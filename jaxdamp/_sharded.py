@@ -15,7 +15,12 @@ def varying_as(tree: Tree, *others: object) -> Tree:
     A loop whose beginning is a constant, and whose end is not, is refused there otherwise.
     """
     axes = frozenset().union(*map(_axes, jax.tree.leaves((tree, others))))
-    return jax.tree.map(lambda leaf: _cast(leaf, axes - _axes(leaf)), tree) if axes else tree
+
+    def varying(leaf: object) -> PyTree:
+        more = axes - _axes(leaf)
+        return jax.lax.pcast(leaf, tuple(more), to="varying") if more else leaf
+
+    return jax.tree.map(varying, tree) if axes else tree
 
 
 def _axes(leaf: object) -> frozenset[Any]:
@@ -23,7 +28,3 @@ def _axes(leaf: object) -> frozenset[Any]:
         return frozenset()
     kind: Any = jax.typeof(leaf)
     return kind.mat.varying if hasattr(kind, "mat") else kind.vma  # the latter before jax 0.10
-
-
-def _cast(leaf: object, axes: frozenset[object]) -> PyTree:
-    return jax.lax.pcast(leaf, tuple(axes), to="varying") if axes else leaf

@@ -15,7 +15,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jax.extend.core import unsafe_am_i_under_a_jit_DO_NOT_USE  # pyright: ignore[reportPrivateImportUsage]
+from jax.extend.core import (
+    Var,
+    unsafe_am_i_under_a_jit_DO_NOT_USE,  # pyright: ignore[reportPrivateImportUsage]
+)
 from jaxtyping import PyTree
 
 
@@ -130,3 +133,18 @@ def of_known_numbers(function: Function) -> Function:
             return function(*args, **kwargs)
 
     return cast(Function, call)
+
+
+def depends(function: Callable[[PyTree], PyTree], values: PyTree) -> bool:
+    """Whether the result of a function depends on its argument; a call inside counts as depending on all of its inputs.
+
+    Arguments:
+        function: of one argument, a tree of arrays.
+        values: an argument of this structure.
+    """
+    traced = jax.make_jaxpr(function)(values).jaxpr
+    reached = set(traced.invars)
+    for equation in traced.eqns:
+        if any(isinstance(variable, Var) and variable in reached for variable in equation.invars):
+            reached.update(equation.outvars)
+    return any(isinstance(variable, Var) and variable in reached for variable in traced.outvars)

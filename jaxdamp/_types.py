@@ -8,11 +8,22 @@ from jax import Array
 from jaxtyping import ArrayLike, Float
 
 
+if TYPE_CHECKING:
+    import matplotlib.axes
+    import matplotlib.figure
+    import xarray
+
 Scalar = Float[Array, ""]
 State = Float[Array, " state"]
 Signal = Float[Array, " time"]
 VectorLike = Float[Array, " _"] | Float[np.ndarray, " _"] | Sequence[float]
 SignalLike = Float[Array, " time"] | Float[np.ndarray, " time"]
+
+# Names of packages that are imported late, for annotations: texts at run time.
+Axes: TypeAlias = "matplotlib.axes.Axes"
+Figure: TypeAlias = "matplotlib.figure.Figure"
+DataArray: TypeAlias = "xarray.DataArray"
+Dataset: TypeAlias = "xarray.Dataset"
 
 # Any number goes in as a scalar. Fields of modules: the constructor takes numbers and sequences, the converter of the
 # field makes arrays of them, which is what type checkers read from the descriptors.

@@ -70,7 +70,8 @@ def configure(
         ValueError: a number of devices below one.
         RuntimeError: devices or loops would change, but JAX has started.
     """
-    devices = _cores() if cpu_devices is None else cpu_devices
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    devices = usable if cpu_devices is None else cpu_devices
     if devices < 1:
         _checks.refuse("cpu_devices", "be one or more", devices)
     if _started():
@@ -133,11 +134,6 @@ def _this_process() -> Target:
 def _fuses_loops() -> bool:
     """Whether XLA has been told to compile loops over time as one function."""
     return _FUSED in os.environ.get("XLA_FLAGS", "")
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _devices() -> int:

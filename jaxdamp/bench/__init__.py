@@ -50,11 +50,10 @@ from jaxdamp.bench.read import read, read_rides
 from jaxdamp.bench.readers import READERS
 from jaxdamp.bench.ride_record import RideRecord
 from jaxdamp.bench.runs import BenchRun
-from jaxdamp.bench.sensors import Sensors
 from jaxdamp.bench.sets import BenchSet, as_runs as as_runs
 from jaxdamp.bench.settings import by_number as by_number, settings_apart as settings_apart
 from jaxdamp.bench.velocity import estimate_velocity
-from jaxdamp.bench.virtual_dyno import VirtualDyno
+from jaxdamp.bench.virtual_dyno import Sensors, VirtualDyno
 from jaxdamp.bench.waveforms import MultiSineTest, TriangleTest
 
 

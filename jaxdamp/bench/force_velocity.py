@@ -3,13 +3,14 @@
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._files import FOLDER_SUFFIXES, find_files
 from jaxdamp._tables import Column as TableColumn, Table
+from jaxdamp._types import Figure
 from jaxdamp.bench import sign as signs
 from jaxdamp.bench.columns import Choice
 from jaxdamp.bench.problems import Problems
@@ -18,10 +19,6 @@ from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.sets import BenchSet
 from jaxdamp.bench.table_points import SIDES, Curve, How, Points, curves_of, is_force_velocity, sides_of, with_headers
 from jaxdamp.dampers import AbstractDamper, FittedRange, Scheduled, SplineTable, Table as TableLaw, with_fitted_range
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 _CYCLES, _SAMPLES = 3, 400  # of the motion of `runs`, samples in each cycle
@@ -99,12 +96,13 @@ class ForceVelocityTable:
     def table(self) -> Table:
         """The forces, a row for each velocity and a column for each setting."""
         grid = np.unique(np.concatenate([curve.velocity for curve in self.curves]))
-        columns = (TableColumn("velocity", "m/s", ".4g"), *(TableColumn(_heading(c), "N", ".4g") for c in self.curves))
+        headings = [f"force at {name}" if name else "force" for name in self.settings]
+        columns = (TableColumn("velocity", "m/s", ".4g"), *(TableColumn(name, "N", ".4g") for name in headings))
         cells = [dict(zip(curve.velocity.tolist(), curve.force.tolist(), strict=True)) for curve in self.curves]
         rows = ((v, *(of.get(v) for of in cells)) for v in grid.tolist())
         return Table(f"Forces of {self.name} (velocity positive in rebound)", columns, tuple(rows))
 
-    def plot(self, kind: str = "family") -> "matplotlib.figure.Figure":
+    def plot(self, kind: str = "family") -> Figure:
         """Force over velocity of all settings.
 
         Arguments:
@@ -117,10 +115,6 @@ class ForceVelocityTable:
 
     def __repr__(self) -> str:
         return "\n".join([f"{self.table()}", *self.notes])
-
-
-def _heading(curve: Curve) -> str:
-    return f"force at {curve.setting}" if curve.setting else "force"
 
 
 def _on(curve: Curve, grid: Points) -> Points:

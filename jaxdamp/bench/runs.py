@@ -6,20 +6,17 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from jaxdamp import _checks
+from jaxdamp._types import Figure
 from jaxdamp.bench import clock
 from jaxdamp.bench.motion import cycle_instants, cycle_works, dominant_frequency, motion_amplitude
 from jaxdamp.bench.processing import Steps, choose_cycles, cut_between, processed
 from jaxdamp.bench.velocity import estimate_velocity
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 FILE_MARK = "# jaxdamp bench record: stroke and velocity positive in extension, force positive resisting it"
@@ -278,7 +275,7 @@ class BenchRun:
             f"{self.force.min():.4g} … {self.force.max():.4g} N)"
         )
 
-    def plot(self) -> "matplotlib.figure.Figure":
+    def plot(self) -> Figure:
         """Loops over velocity and stroke, and the channels over time (`plots.records`)."""
         from jaxdamp import plots
 

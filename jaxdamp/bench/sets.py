@@ -6,14 +6,11 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final, overload
+from typing import Any, final, overload
 
 from jaxdamp import _checks
+from jaxdamp._types import Figure
 from jaxdamp.bench.runs import BenchRun
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 Selection = str | Iterable[str] | Callable[[BenchRun], bool]
@@ -120,7 +117,7 @@ class BenchSet:
         """Every record with further steps of processing, see `BenchRun.process`."""
         return BenchSet((run.process(**steps) for run in self.runs), self.left_out)
 
-    def plot(self) -> "matplotlib.figure.Figure":
+    def plot(self) -> Figure:
         """Loops of the records over velocity and stroke, and their channels over time (`plots.records`)."""
         from jaxdamp import plots
 

@@ -1,8 +1,12 @@
 """Independent work in blocks: a store on disk that says what is done, and the processes that compute the rest."""
 
-from jaxdamp.blocks.layout import Blocks as Blocks, block_size as block_size
 from jaxdamp.blocks.running import AbstractWork as AbstractWork, Cluster as Cluster, run_blocks as run_blocks
-from jaxdamp.blocks.store import BlockStore as BlockStore, Variable as Variable
+from jaxdamp.blocks.store import (
+    Blocks as Blocks,
+    BlockStore as BlockStore,
+    Variable as Variable,
+    block_size as block_size,
+)
 
 
 __all__: list[str] = []

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from jaxdamp import bench, export, plots, roads, simulate, tune, vehicles
 from jaxdamp._tables import Table
+from jaxdamp._types import Figure
 from jaxdamp.bench import BenchSet, SineTest, VirtualDyno
 from jaxdamp.cli.console import Screen
 from jaxdamp.cli.demo_words import (
@@ -38,10 +38,6 @@ from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation import Response
 from jaxdamp.tune import TuneResult
 from jaxdamp.vehicles import AbstractVehicle
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _true_law() -> AbstractDamper:
@@ -113,7 +109,7 @@ def run_demo(screen: Screen, scenario: Scenario, output: Output) -> None:
         runs = record(screen, scenario, work.results.draft)
         held = runs.select(scenario.held_out)
         fits = fit_laws(screen, scenario.laws, runs.without(scenario.held_out), held)
-        truth = _fit_of_truth(fits, scenario)
+        truth = next((rung.result for rung in fits.comparison.rungs if rung.name == scenario.true_name), None)
         show_fits(screen, fits, truth, scenario)
         with work.saving("Laws and tables", f"the rides, the tuning, {fits.missing}") as draft:
             write_fits(draft, fits.comparison, runs, work.attempts)
@@ -179,13 +175,10 @@ def record(screen: Screen, scenario: Scenario, folder: Path) -> BenchSet:
         return bench.read([folder / "records" / f"{name}.csv" for name in records.names])
 
 
-def _iso_road(seed: int) -> AbstractRoad:
-    return roads.iso8608("C", speed=20.0, seed=seed)
-
-
 def _roads(scenario: Scenario) -> dict[str, AbstractRoad]:
     """A random road and an event."""
-    return {ISO: _iso_road(scenario.seed), BUMP: roads.cosine_bump(0.06, start=0.5, duration=0.2)}
+    random = roads.iso8608("C", speed=20.0, seed=scenario.seed)
+    return {ISO: random, BUMP: roads.cosine_bump(0.06, start=0.5, duration=0.2)}
 
 
 def _car(law: AbstractDamper) -> AbstractVehicle:
@@ -222,11 +215,6 @@ def improve(screen: Screen, truth: FitResult, scenario: Scenario) -> TuneResult:
 
 
 # ---- what they say
-
-
-def _fit_of_truth(fits: Fitted, scenario: Scenario) -> FitResult | None:
-    """The fit of the law with the true parameters, if there is one."""
-    return next((rung.result for rung in fits.comparison.rungs if rung.name == scenario.true_name), None)
 
 
 def show_fits(screen: Screen, fits: Fitted, truth: FitResult | None, scenario: Scenario) -> None:
@@ -310,7 +298,7 @@ def _report_truth(truth: FitResult | None, scenario: Scenario, report: Report) -
 
 
 def _report_tuning(tuned: TuneResult, before: Response, scenario: Scenario, report: Report) -> None:
-    def rides() -> "Figure":
+    def rides() -> Figure:
         with without_range_warnings():
             after = simulate(tuned.vehicle, _roads(scenario)[ISO], duration=scenario.duration)
             return plots.ride({"before": before, "after": after})

@@ -14,23 +14,17 @@ from jaxdamp.parameters import interval, parameter
 UNLOADED = 1e-4  # share of the largest deflection below which creep is as slow as there
 
 
-def creep_periods(load: ScalarLike, periods: ScalarLike, exponent: ScalarLike) -> Scalar:
-    """ln(1 + m |u|ᵐ p)/m, the logarithm of the ratio in which a deflection falls over p creep times at rest.
-
-    Arguments:
-        load: u, share of the largest deflection.
-        periods: p, time over the creep time τ.
-        exponent: m > 0, of u̇ = −u |u|ᵐ/τ.
-    """
-    return logarithm(1.0 + exponent * periods * power(load * load + UNLOADED**2, 0.5 * exponent)) / exponent
-
-
 def creep_step(
     deflection: ScalarLike, travel: ScalarLike, periods: ScalarLike, limit: ScalarLike, exponent: ScalarLike
 ) -> Scalar:
-    """Deflection [m] after a travel [m] in one direction over so many creep times, within ± the limit [m]."""
-    middle = within(deflection + 0.5 * travel, -limit, limit)
-    return element_step(deflection, travel, creep_periods(middle / limit, periods, exponent), limit)
+    """Deflection [m] after a travel [m] in one direction over so many creep times, within ± the limit [m].
+
+    At rest u̇ = −u |u|ᵐ/τ, u the share of the limit and m the exponent: over p creep times a deflection falls in a ratio
+    whose logarithm is ln(1 + m |u|ᵐ p)/m.
+    """
+    load = within(deflection + 0.5 * travel, -limit, limit) / limit
+    fallen = logarithm(1.0 + exponent * periods * power(load * load + UNLOADED**2, 0.5 * exponent)) / exponent
+    return element_step(deflection, travel, fallen, limit)
 
 
 @final

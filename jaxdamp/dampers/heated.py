@@ -12,14 +12,6 @@ from jaxdamp.dampers.wrapper import AbstractWrapper
 from jaxdamp.parameters import parameter, positive, setting
 
 
-def temperature_step(
-    rise: ScalarLike, heating: ScalarLike, heat_capacity: ScalarLike, cooling_time: ScalarLike, dt: ScalarLike
-) -> Scalar:
-    """ϑ [K] after a step with a constant heating power [W]: ϑ tends to P τ/C."""
-    final_rise = heating * cooling_time / heat_capacity
-    return final_rise + (rise - final_rise) * jnp.exp(-dt / cooling_time)
-
-
 def fade(rise: ScalarLike, sensitivity: ScalarLike) -> Scalar:
     """exp(−κ ϑ), the share of the damping force that is left."""
     return jnp.exp(-sensitivity * rise)
@@ -130,7 +122,8 @@ class Heated(AbstractWrapper):
         (rise,), inner = self.split(state)
 
         def warmed(power: ScalarLike) -> Scalar:
-            return temperature_step(rise, power, self.heat_capacity, self.cooling_time, dt)
+            final_rise = power * self.cooling_time / self.heat_capacity
+            return final_rise + (rise - final_rise) * jnp.exp(-dt / self.cooling_time)
 
         before = self.damping_force(x0, v0, state) * v0
         after = jnp.concatenate([warmed(before)[None], self.law.advance(x0, v0, x1, v1, inner, dt)])

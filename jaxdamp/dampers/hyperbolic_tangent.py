@@ -12,16 +12,6 @@ from jaxdamp.dampers.contract import Traits
 from jaxdamp.parameters import nonnegative, parameter, positive, real, setting
 
 
-def two_branches(
-    x: ScalarLike, v: ScalarLike, steepness: ScalarLike, branch_offset: ScalarLike, stroke_width: ScalarLike
-) -> Scalar:
-    """tanh(β v + δ tanh(x/w)), from −1 to 1: a step over v, shifted in opposite directions for x > 0 and x < 0.
-
-    β [s/m], δ without unit, w [m].
-    """
-    return jnp.tanh(steepness * v + branch_offset * jnp.tanh(x / stroke_width))
-
-
 @final
 class HyperbolicTangent(AbstractStateless):
     """F = c v + k x + α tanh(β v + δ sgn x) + f₀ (Kwok et al. 2006; formula quoted from memory).
@@ -55,7 +45,7 @@ class HyperbolicTangent(AbstractStateless):
 
     def force_stroke_velocity(self, x: ScalarLike, v: ScalarLike) -> Scalar:
         """Force [N] at stroke x [m] and velocity v [m/s]."""
-        branches = two_branches(x, v, self.steepness, self.branch_offset, self.stroke_width)
+        branches = jnp.tanh(self.steepness * v + self.branch_offset * jnp.tanh(x / self.stroke_width))
         return self.viscous_rate * v + self.stiffness * x + self.yield_force * branches + self.static_force
 
     @classmethod

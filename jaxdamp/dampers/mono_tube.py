@@ -25,13 +25,6 @@ def oil_stiffness(x: ScalarLike, bulk_modulus: ScalarLike, area: ScalarLike, vol
     return bulk_modulus * area / at_least(volume - area * x, LEAST_SHARE * volume)
 
 
-def stroke_within(
-    share: float, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, dt: ScalarLike
-) -> ScalarLike:
-    """Stroke [m] at a fraction of a step over which the velocity is linear from v₀ to v₁."""
-    return x0 + share * (x1 - x0) - 0.5 * share * dt * (1.0 - share) * (v1 - v0)
-
-
 EXPONENT, ATMOSPHERE, BULK_MODULUS = 1.3, 101_325.0, 1e9  # n, Pa and Pa where nothing is known
 STEP_ANGLE = 0.0055  # rad, of a fit: at 0.015 the gas volume is wrong by a standard error, at 0.06 others by two
 LEAK_SHARE = 0.01  # of the flow through the bleed when a valve opens
@@ -213,7 +206,8 @@ class MonoTube(AbstractDamper):
 
         def stage(share: float, now: _Oil) -> _Oil:
             v, duration = v0 + share * (v1 - v0), GAMMA * dt
-            x = x1 if share == 1.0 else stroke_within(share, x0, v0, x1, v1, dt)
+            # the velocity is linear over the step
+            x = x1 if share == 1.0 else x0 + share * (x1 - x0) - 0.5 * share * dt * (1.0 - share) * (v1 - v0)
             flow, root = self._flow(x, now.deflection + duration * v, duration, now.root, search=search)
             return _Oil(v - flow, root)
 

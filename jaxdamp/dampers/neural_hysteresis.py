@@ -25,11 +25,6 @@ def relaxed_forces(forces: State, rates: State, stiffness: State, v: ScalarLike,
     return jnp.exp(-decay) * forces + stiffness * v * dt * (-jnp.expm1(-decay) / at_least(decay, tiny))
 
 
-def rounded_speed(v: ScalarLike, width: ScalarLike) -> Scalar:
-    """√(v² + w²) − w [m/s]: |v|, rounded at zero over a width w [m/s]."""
-    return jnp.sqrt(v * v + width * width) - width
-
-
 @final
 class NeuralHysteresis(AbstractDamper):
     """F = Σ zᵢ, żᵢ = kᵢ v − ρᵢ(v, z) zᵢ: springs that relax at rates ρᵢ ≥ 0 given by a neural network.
@@ -84,7 +79,8 @@ class NeuralHysteresis(AbstractDamper):
         inputs = jnp.concatenate([jnp.asarray(v / self.velocity_scale)[None], forces / self.force_scale])
         hidden = jnp.tanh(self.hidden_weights @ inputs + self.hidden_biases)
         with_travel, with_time = jnp.split(jax.nn.softplus(self.output_weights @ hidden + self.output_biases), 2)
-        speed = rounded_speed(v, _ROUNDING * self.velocity_scale)
+        width = _ROUNDING * self.velocity_scale
+        speed = jnp.sqrt(v * v + width * width) - width
         return self.stiffness / self.force_scale * (with_travel * speed + with_time * self.velocity_scale)
 
     def initial_state(self) -> State:

@@ -30,13 +30,6 @@ def _algebraic(u: Numbers) -> Numbers:
 SHAPES: dict[str, Callable[[Numbers], Numbers]] = {"tanh": jnp.tanh, "arctan": _arctan, "algebraic": _algebraic}
 
 
-def saturating_force(
-    v: ScalarLike, level: ScalarLike, rate: ScalarLike, high_rate: ScalarLike, shape: str = "tanh"
-) -> Scalar:
-    """F_s g(c₀ v/F_s) + c_∞ v [N] with the level F_s [N], the slopes c₀ and c_∞ [N s/m], and g by its name."""
-    return level * SHAPES[shape](jnp.asarray(rate * v / level)) + high_rate * v
-
-
 @final
 class Saturating(AbstractMemoryless):
     """F = F_s g(c₀ v/F_s) + c_∞ v, with F_s, c₀ and c_∞ of its own for each direction.
@@ -83,7 +76,7 @@ class Saturating(AbstractMemoryless):
         level = jnp.where(extends, self.rebound_force, self.compression_force)
         rate = jnp.where(extends, self.rebound_rate, self.compression_rate)
         high_rate = jnp.where(extends, self.rebound_high_rate, self.compression_high_rate)
-        return saturating_force(v, level, rate, high_rate, self.shape)
+        return level * SHAPES[self.shape](jnp.asarray(rate * v / level)) + high_rate * v
 
     @classmethod
     def guess(cls, velocity: np.ndarray, force: np.ndarray, shape: str = "tanh") -> "Saturating":

@@ -86,41 +86,36 @@ class Sum(AbstractDamper):
 
     def force(self, x: ScalarLike, v: ScalarLike, state: State) -> Scalar:
         """Sum of the forces [N]."""
-        pairs = zip(self.terms, self._split(state), strict=True)
-        return jnp.sum(jnp.stack([term.force(x, v, s) for term, s in pairs]), axis=0)
+        return jnp.sum(jnp.stack([term.force(x, v, s) for term, s in self._with_states(state)]), axis=0)
 
     def state_rate(self, x: ScalarLike, v: ScalarLike, state: State) -> State:
         """Rates of all terms."""
-        pairs = zip(self.terms, self._split(state), strict=True)
-        return jnp.concatenate([term.state_rate(x, v, s) for term, s in pairs])
+        return jnp.concatenate([term.state_rate(x, v, s) for term, s in self._with_states(state)])
 
     def advance(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
     ) -> State:
         """Every term takes its own step."""
-        pairs = zip(self.terms, self._split(state), strict=True)
-        return jnp.concatenate([term.advance(x0, v0, x1, v1, s, dt) for term, s in pairs])
+        return jnp.concatenate([term.advance(x0, v0, x1, v1, s, dt) for term, s in self._with_states(state)])
 
     def predict(
         self, x0: ScalarLike, v0: ScalarLike, x1: ScalarLike, v1: ScalarLike, state: State, dt: ScalarLike
     ) -> State:
         """The predictions of all terms."""
-        pairs = zip(self.terms, self._split(state), strict=True)
-        return jnp.concatenate([term.predict(x0, v0, x1, v1, s, dt) for term, s in pairs])
+        return jnp.concatenate([term.predict(x0, v0, x1, v1, s, dt) for term, s in self._with_states(state)])
 
     def implicit_stage(self, x: ScalarLike, v: ScalarLike, state: State, duration: ScalarLike) -> State:
         """The stages of all terms."""
-        pairs = zip(self.terms, self._split(state), strict=True)
-        return jnp.concatenate([term.implicit_stage(x, v, s, duration) for term, s in pairs])
+        return jnp.concatenate([term.implicit_stage(x, v, s, duration) for term, s in self._with_states(state)])
 
-    def _split(self, state: State) -> list[Array]:
-        """The concatenated states cut into those of each term."""
+    def _with_states(self, state: State) -> list[tuple[AbstractDamper, Array]]:
+        """The terms, each with its own states, cut out of the concatenated ones."""
         sizes = [term.initial_state().size for term in self.terms]
         ends = [sum(sizes[: i + 1]) for i in range(len(sizes))]
         if state.size != ends[-1]:
             must = f"hold {ends[-1]} numbers for the terms of the sum"
             _checks.refuse("state", must, f"of shape {state.shape}", START)
-        return [state[end - size : end] for size, end in zip(sizes, ends, strict=True)]
+        return [(term, state[end - size : end]) for term, size, end in zip(self.terms, sizes, ends, strict=True)]
 
 
 def terms_of(law: AbstractDamper) -> tuple[AbstractDamper, ...]:

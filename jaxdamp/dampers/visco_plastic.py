@@ -19,13 +19,6 @@ from jaxdamp.dampers.play import dead_zone
 from jaxdamp.parameters import interval, nonnegative, parameter, positive
 
 
-def herschel_bulkley_force(
-    v: ScalarLike, yield_force: ScalarLike, viscous_force: ScalarLike, exponent: ScalarLike, width: ScalarLike
-) -> Scalar:
-    """F_y tanh(v/v_f) + K v (v² + v_f²)^((n−1)/2) [N], K at 1 m/s: F_y + K vⁿ once it flows, concave for n < 1."""
-    return yield_force * jnp.tanh(v / width) + viscous_force * v * power(v * v + width * width, 0.5 * (exponent - 1.0))
-
-
 def element_force(
     deflection: ScalarLike, sliding_force: ScalarLike, travel: ScalarLike, clearance: ScalarLike
 ) -> Scalar:
@@ -84,7 +77,9 @@ class AbstractViscoPlastic(AbstractDamper):
         """Force [N]."""
         del x
         deflections = self._deflections(state)
-        flow = herschel_bulkley_force(v, self.yield_force, self.viscous_force, self.exponent, self.flow_velocity)
+        width = self.flow_velocity  # over which |v| is rounded: K v (v² + v_f²)^((n−1)/2)
+        viscous = self.viscous_force * v * power(v * v + width * width, 0.5 * (self.exponent - 1.0))
+        flow = self.yield_force * jnp.tanh(v / width) + viscous
         elements = jax.vmap(element_force)(deflections, self.sliding_forces, self.elastic_travels, self.clearances)
         return self._sided(v, flow) + jnp.sum(jax.vmap(self._sided)(deflections, elements))
 

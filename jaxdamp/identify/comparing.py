@@ -5,7 +5,7 @@ import functools
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +15,7 @@ from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Table, with_unit
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, usable
 from jaxdamp.identify.fitting import NUMERICAL, fit
 from jaxdamp.identify.held_out import HeldOut, on_records, without_parts
@@ -23,10 +24,6 @@ from jaxdamp.identify.machine import OFFSET, Machine
 from jaxdamp.identify.rungs import Failure, Recommendation, Rung, ladder_table, recommendation, verdict
 from jaxdamp.identify.scheduling import fit_scheduled, settings_stated
 from jaxdamp.identify.starting import AbstractTrainedStart, Start, check_starts
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 MOST_THREADS = 4  # fits side by side: more of them wait for Python's lock
@@ -137,7 +134,7 @@ class Comparison(AbstractResult):
             "failed": {failure.name: failure.reason for failure in self.failed},
         }
 
-    def plot(self, kind: str = "ladder", **options: Any) -> "Figure":
+    def plot(self, kind: str = "ladder", **options: Any) -> Figure:
         """The errors of the laws side by side (`plots.ladder`), or the sheet of the recommended law.
 
         Arguments:

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from jaxdamp._results import AbstractResult, worst_status
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Table, plain, with_unit
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.identify.fitting import fit
 from jaxdamp.identify.law_result import AbstractFitted
@@ -21,10 +22,6 @@ from jaxdamp.identify.preparing import weights
 from jaxdamp.identify.rungs import cannot_choose
 from jaxdamp.identify.starting import Start, check_starts
 from jaxdamp.parameters import parameters
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 CHOICE = ("held_out", "group", "law", "fit_percent", "rmse")  # of a fold, for a law that was chosen
@@ -145,7 +142,7 @@ class CrossValidation(AbstractResult):
     def __add__(self, other: "CrossValidation") -> "CrossValidation":
         return CrossValidation(self.folds + other.folds, self.inner + other.inner)
 
-    def plot(self, **options: Any) -> "Figure":
+    def plot(self, **options: Any) -> Figure:
         """The fit of every held-out record, law by law."""
         from jaxdamp.plots import cross_validation
 

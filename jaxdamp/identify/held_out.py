@@ -72,7 +72,8 @@ def without_parts(result: FitResult, *, in_time: bool = False) -> HeldOut | None
     groups = motions(runs)
     whole = len(groups) >= FEWEST_MOTIONS and not (in_time or problem.per_record)
     samples: list[Compared] = []
-    for number, part in enumerate(_by_record(runs, groups) if whole else _by_time(runs), 1):
+    left_out = _by_record(runs, groups) if whole else zip(*map(in_time_parts, runs), strict=True)
+    for number, part in enumerate(left_out, 1):
         factor = _kept(problem, fitted, part)
         if np.all(factor) or not np.any(problem.used & (factor > 0)):
             continue
@@ -151,10 +152,6 @@ def _by_record(runs: Sequence[BenchRun], groups: Sequence[Sequence[int]]) -> lis
     count = min(PARTS, len(groups))
     part_of = {i: k % count for k, group in enumerate(groups) for i in group}
     return [tuple(np.full(len(run), part_of[i] == k) for i, run in enumerate(runs)) for k in range(count)]
-
-
-def _by_time(runs: Sequence[BenchRun]) -> list[Part]:
-    return list(zip(*(in_time_parts(run) for run in runs), strict=True))
 
 
 def _kept(problem: Problem, fitted: Sequence[int] | np.ndarray, part: Part) -> Float[np.ndarray, " samples"]:

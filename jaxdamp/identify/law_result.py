@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 import numpy as np
 from jaxtyping import Float
@@ -12,7 +12,7 @@ from jaxtyping import Float
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Table, plain, with_unit
-from jaxdamp._types import VectorLike
+from jaxdamp._types import Figure, VectorLike
 from jaxdamp.bench import BenchRun, as_runs
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify.estimates import parameter_table
@@ -22,10 +22,6 @@ from jaxdamp.identify.propagation import Band, band
 from jaxdamp.identify.record_sensitivity import RecordSensitivity, sensitivity_to_records
 from jaxdamp.identify.result import Fit
 from jaxdamp.rig import Rig
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -183,7 +179,7 @@ class FitResult(AbstractFitted, Fit):
         """Law, errors, scores and parameters as plain data."""
         return AbstractFitted.content(self) | Fit.content(self) | {"error_shares": plain(self.error_shares._asdict())}
 
-    def plot(self, kind: str | Iterable[BenchRun] = "loops", **options: object) -> "Figure":
+    def plot(self, kind: str | Iterable[BenchRun] = "loops", **options: object) -> Figure:
         """Loops of force over velocity and over stroke, measured and fitted, with residuals; or the damper's sheet.
 
         Arguments:

@@ -236,9 +236,6 @@ def covered_range(runs: Sequence[BenchRun]) -> FittedRange:
     channels["frequency"] = [np.array([run.frequency]) for run in runs]
     channels["temperature"] = [run.temperature for run in runs if run.temperature is not None]
     channels["command"] = [np.array([run.command]) for run in runs if run.command is not None]
-    limits = {name: _ends(np.concatenate(values)) for name, values in channels.items() if values}
+    joined = {name: np.concatenate(values) for name, values in channels.items() if values}
+    limits = {name: (float(values.min()), float(values.max())) for name, values in joined.items()}
     return FittedRange(**limits)
-
-
-def _ends(values: np.ndarray) -> tuple[float, float]:
-    return float(values.min()), float(values.max())

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -16,6 +16,7 @@ from jaxdamp import _checks
 from jaxdamp._jacobian import with_jacobian
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain
+from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun
 from jaxdamp.dampers import AbstractDamper, keeps_conditions, laws_inside, without_fitted_ranges
 from jaxdamp.identify.model import fitted_part, of_law
@@ -26,10 +27,6 @@ from jaxdamp.identify.search import SearchEnd
 from jaxdamp.identify.traces import Batch
 from jaxdamp.parameters import get, with_values
 from jaxdamp.rig import march, quasi_static
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 HELD = 2.0  # s at constant velocity, for the derivatives of a law with states
@@ -181,7 +178,7 @@ class Band(AbstractResult):
         rows = zip(*map(plain, (self.velocity, self.force, self.lower, self.upper)), strict=True)
         return Table("Force at constant velocity with its 95 % interval", columns, tuple(rows))
 
-    def plot(self) -> "Figure":
+    def plot(self) -> Figure:
         """The curve with its band, over the records."""
         from jaxdamp.plots import force_velocity
 

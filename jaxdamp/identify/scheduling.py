@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import itertools
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -14,6 +14,7 @@ from jaxdamp._progress import Progress
 from jaxdamp._results import AbstractResult, Derived
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Figure
 from jaxdamp.bench import BenchRun, as_runs, contradictions, usable
 from jaxdamp.dampers import AbstractDamper, Scheduled, takes_command
 from jaxdamp.identify.blending import AtSetting, Choice, choose_blend, with_blended_forces
@@ -28,10 +29,6 @@ from jaxdamp.identify.preparing import prepare
 from jaxdamp.identify.starting import Start, frozen_by
 from jaxdamp.parameters import get, match_paths, name_patterns, parameters, with_values
 from jaxdamp.rig import Rig
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 CALL = "fit_scheduled(law, runs)"
@@ -70,7 +67,7 @@ class LeftOutSetting(NamedTuple):
             f" ({self.own_rmse:.1f} N, {self.own_fit_percent:.1f} %)."
         )
 
-    def plot(self) -> "Figure":
+    def plot(self) -> Figure:
         """Loops at the setting left out, measured and interpolated, with residuals."""
         return self.result.plot(runs=self.runs)
 
@@ -140,7 +137,7 @@ class ScheduledFit(AbstractResult):
             "settings": plain(self.table().records()),
         }
 
-    def plot(self) -> "Figure":
+    def plot(self) -> Figure:
         """Loops at the first setting left out, interpolated; without one, those of the common fit."""
         return self.between[0].plot() if self.between else self.result.plot()
 

@@ -1,7 +1,7 @@
 """The international roughness index of a road profile, for the whole profile and by segment."""
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,12 +10,8 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._tables import Column, Contents, Table
-from jaxdamp._types import Scalar, ScalarLike, Signal, SignalLike
+from jaxdamp._types import Figure, Scalar, ScalarLike, Signal, SignalLike
 from jaxdamp.metrics._signals import as_signal
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 # The golden car, per unit of sprung mass: damper [1/s], spring and tyre [1/s^2], unsprung mass [-].
@@ -123,7 +119,7 @@ class RoughnessBySegment(NamedTuple):
     def __str__(self) -> str:
         return self.table().to_text()
 
-    def plot(self) -> "matplotlib.figure.Figure":
+    def plot(self) -> Figure:
         """The index over the distance (`plots.roughness_by_segment`)."""
         from jaxdamp import plots
 

@@ -6,39 +6,39 @@ touches pyplot or its global state, and matplotlib is loaded by the first call o
 
 from jaxdamp.plots.cards import law_card
 from jaxdamp.plots.changes import tuning
-from jaxdamp.plots.curve_family import force_velocity_family as force_velocity_family
-from jaxdamp.plots.curves import force_velocity
+from jaxdamp.plots.curves import force_velocity, force_velocity_family as force_velocity_family
 from jaxdamp.plots.damper_sheet import damper_sheet as damper_sheet
-from jaxdamp.plots.damper_use import damper_use
-from jaxdamp.plots.decisions import damper_comparison as damper_comparison
-from jaxdamp.plots.errors import ladder
-from jaxdamp.plots.evaluation import evaluation, gas_and_friction as gas_and_friction, limit_check as limit_check
-from jaxdamp.plots.experiments import experiment as experiment
-from jaxdamp.plots.frequency import dynamic_stiffness as dynamic_stiffness, harmonic_response as harmonic_response
+from jaxdamp.plots.errors import cross_validation as cross_validation, ladder
+from jaxdamp.plots.evaluation import (
+    evaluation,
+    gas_and_friction as gas_and_friction,
+    limit_check as limit_check,
+    records,
+)
+from jaxdamp.plots.frequency import (
+    dynamic_stiffness as dynamic_stiffness,
+    harmonic_response as harmonic_response,
+    modes,
+)
 from jaxdamp.plots.fronts import pareto
-from jaxdamp.plots.history import training_history as training_history
-from jaxdamp.plots.loops import fit_loops as fit_loops
+from jaxdamp.plots.loops import fit_loops as fit_loops, vehicle_fit as vehicle_fit
 from jaxdamp.plots.many_values import (
+    damper_comparison as damper_comparison,
     many_fits as many_fits,
     posterior as posterior,
     rescore as rescore,
     targets as targets,
 )
-from jaxdamp.plots.modes import modes
 from jaxdamp.plots.preflight import preflight
-from jaxdamp.plots.profiles import profile as profile
-from jaxdamp.plots.records import records
+from jaxdamp.plots.profiles import experiment as experiment, profile as profile, training_history as training_history
 from jaxdamp.plots.ride_sheet import ride_sheet as ride_sheet
-from jaxdamp.plots.rides import ride
+from jaxdamp.plots.rides import damper_use, ride
 from jaxdamp.plots.roughness import (
     roughness_by_segment as roughness_by_segment,
     roughness_spectrum as roughness_spectrum,
 )
-from jaxdamp.plots.sensitivities import record_sensitivity as record_sensitivity, sensitivity
+from jaxdamp.plots.sensitivities import record_sensitivity as record_sensitivity, sensitivity, valving
 from jaxdamp.plots.sweeps import sweep
-from jaxdamp.plots.validation import cross_validation as cross_validation
-from jaxdamp.plots.valve_choice import valving
-from jaxdamp.plots.vehicle_fit import vehicle_fit as vehicle_fit
 
 
 __all__ = [

@@ -2,12 +2,12 @@
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jaxdamp import metrics
 from jaxdamp._tables import typeset_unit
+from jaxdamp._types import Axes
 from jaxdamp.parameters import get
 from jaxdamp.plots import _rides, _sheet, _style, fitted_range
 from jaxdamp.plots.rides import default_channels
@@ -16,16 +16,11 @@ from jaxdamp.roads import assess_roughness, class_limits, road_class
 from jaxdamp.vehicles import modes
 
 
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
-
-
 _MM, _BINS, _MOST_BARS = 1e3, 31, 6
 SETTLED = 0.05  # share of the peak below which the motion over a bump has settled
 
 
-def vehicle(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+def vehicle(axes: Axes, shown: _rides.Rides) -> None:
     """Bodies on springs and dampers on wheels, with masses and rates."""
     from matplotlib.patches import Rectangle
 
@@ -53,7 +48,7 @@ def vehicle(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
     axes.set_title(f"Natural frequencies {', '.join(frequencies[:6])} Hz", loc="left")
 
 
-def road(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+def road(axes: Axes, shown: _rides.Rides) -> None:
     """The spectrum of a random road among the classes of ISO 8608, or the heights of a bump."""
     if shown.road is None:
         _sheet.remarks(axes, "Road", ["Several roads or conditions; see the page."], width=40)
@@ -88,7 +83,7 @@ def road(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
     _style.dress(axes, "spatial frequency [cycle/m]", "height PSD [m³]", title)
 
 
-def plane(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+def plane(axes: Axes, shown: _rides.Rides) -> None:
     """Comfort over grip: present and new, the curve of constant damping, limits."""
     comfort, grip = shown.goal("comfort"), shown.goal("grip")
     if not comfort or not grip or shown.road is None:
@@ -125,7 +120,7 @@ def _mean(values: Mapping[str, float], names: Sequence[str]) -> float:
     return float(np.mean([values[name] for name in names]))
 
 
-def _limits(axes: "matplotlib.axes.Axes", shown: _rides.Rides, comfort: Sequence[str], grip: Sequence[str]) -> None:
+def _limits(axes: Axes, shown: _rides.Rides, comfort: Sequence[str], grip: Sequence[str]) -> None:
     """The limits of the plane: of metrics that are alone on their axis."""
     bottom, top = axes.get_ylim()
     for names, line in ((comfort, axes.axvline), (grip, axes.axhline)):
@@ -143,7 +138,7 @@ def _main_metrics(shown: _rides.Rides) -> list[str]:
     return list(dict.fromkeys(names))[:_MOST_BARS]
 
 
-def bars(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+def bars(axes: Axes, shown: _rides.Rides) -> None:
     """The main metrics: change with whiskers over unseen roads and marks at limits, or their values for one ride."""
     names = _main_metrics(shown)
     if shown.single:
@@ -162,7 +157,7 @@ def bars(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
     axes.margins(x=0.08)
 
 
-def _bar(axes: "matplotlib.axes.Axes", shown: _rides.Rides, row: int, name: str) -> None:
+def _bar(axes: Axes, shown: _rides.Rides, row: int, name: str) -> None:
     """The change of one metric."""
     before, after = (side[name] for side in shown.values)
     change = 100.0 * (after / before - 1.0) if before else 0.0
@@ -179,7 +174,7 @@ def _bar(axes: "matplotlib.axes.Axes", shown: _rides.Rides, row: int, name: str)
     axes.text(0.01, row - 0.3, text, transform=axes.get_yaxis_transform(), fontsize=6.5, va="center", zorder=5)
 
 
-def damper(curves: "matplotlib.axes.Axes", shares: "matplotlib.axes.Axes", shown: _rides.Rides, path: str) -> None:
+def damper(curves: Axes, shares: Axes, shown: _rides.Rides, path: str) -> None:
     """A damper before and after over mm/s, and the share of time at each velocity with its four quadrants."""
     laws = [get(car, path) for car in shown.cars]
     velocities = [_rides.damper_velocity(shown, path, number) for number in (0, 1)]
@@ -205,7 +200,7 @@ def damper(curves: "matplotlib.axes.Axes", shares: "matplotlib.axes.Axes", shown
         curves.legend(frameon=False, loc="upper left")
 
 
-def _thousandths(*panels: "matplotlib.axes.Axes") -> None:
+def _thousandths(*panels: Axes) -> None:
     """Ticks of axes over m/s in mm/s."""
     from matplotlib.ticker import FuncFormatter
 
@@ -213,7 +208,7 @@ def _thousandths(*panels: "matplotlib.axes.Axes") -> None:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _style.short(_MM * value)))
 
 
-def spectrum(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+def spectrum(axes: Axes, shown: _rides.Rides) -> None:
     """The spectrum of the body acceleration before and after, smoothed, with the bands of body and wheels."""
     channel = default_channels(shown.cars[0].layout)[0]
     pair = _rides.body_spectra(shown, channel)
@@ -242,7 +237,7 @@ def spectrum(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
         axes.legend(frameon=False, loc="lower left")
 
 
-def event(axes: "matplotlib.axes.Axes", shown: _rides.Rides) -> None:
+def event(axes: Axes, shown: _rides.Rides) -> None:
     """The motion of the body over a bump, with its peaks, overshoot and settling time."""
     assert shown.responses is not None
     channel = next((n for n in ("sprung_displacement", "chassis_displacement") if n in shown.responses[0].units), "")

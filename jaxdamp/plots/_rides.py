@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -20,10 +20,6 @@ from jaxdamp.roads import WhiteRoad, from_profile
 from jaxdamp.simulation import Response, Ride, simulate
 from jaxdamp.tune import Rescore, TuneResult, damper_paths, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
-
-
-if TYPE_CHECKING:
-    pass
 
 
 GOALS = {"comfort": "body acceleration", "travel": "suspension travel", "grip": "tyre load variation"}

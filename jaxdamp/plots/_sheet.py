@@ -3,14 +3,10 @@
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from jaxdamp._types import Axes, Figure
 from jaxdamp.plots import _style
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
 
 
 A4 = (8.27, 11.69)  # inch
@@ -18,7 +14,7 @@ SMALL = 7.5  # pt, of tables
 _TEXT: _style.Look = {"va": "top", "linespacing": 1.35}
 
 
-def page() -> "matplotlib.figure.Figure":
+def page() -> Figure:
     """An empty page with margins."""
     figure = _style.new_figure(*A4)
     figure.set_layout_engine("constrained", rect=(0.05, 0.03, 0.91, 0.94))
@@ -36,9 +32,7 @@ def lettering() -> Iterator[None]:
         yield
 
 
-def head(
-    axes: "matplotlib.axes.Axes", name: str, sentence: str, facts: str, *, answer: str = "", colour: str = _style.BLACK
-) -> None:
+def head(axes: Axes, name: str, sentence: str, facts: str, *, answer: str = "", colour: str = _style.BLACK) -> None:
     """The head of a sheet: its name, the sentence that says what to do, and what was measured or driven.
 
     Arguments:
@@ -61,7 +55,7 @@ def head(
     axes.text(0.0, top, "\n".join(lines), **look, **_TEXT)
 
 
-def blank(axes: "matplotlib.axes.Axes") -> None:
+def blank(axes: Axes) -> None:
     """Axes that only hold text."""
     axes.set_axis_off()
     axes.set_xlim(0.0, 1.0)
@@ -69,7 +63,7 @@ def blank(axes: "matplotlib.axes.Axes") -> None:
 
 
 def table(
-    axes: "matplotlib.axes.Axes",
+    axes: Axes,
     title: str,
     headings: Sequence[str],
     rows: Sequence[Sequence[str]],
@@ -99,9 +93,7 @@ def table(
             axes.text(place, y, cell, fontsize=SMALL, color=colour, ha=side, va="center")
 
 
-def remarks(
-    axes: "matplotlib.axes.Axes", title: str, sentences: Sequence[str], *, width: int, none: str = "", most: int = 3
-) -> None:
+def remarks(axes: Axes, title: str, sentences: Sequence[str], *, width: int, none: str = "", most: int = 3) -> None:
     """At most so many sentences under a title; the others are counted.
 
     Arguments:

@@ -10,13 +10,12 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._display import display
 from jaxdamp._tables import typeset_unit
+from jaxdamp._types import Axes, Figure
 from jaxdamp.dampers import AbstractDamper, Sum
 
 
 if TYPE_CHECKING:
-    import matplotlib.axes
     import matplotlib.axis
-    import matplotlib.figure
     import matplotlib.lines
 
 
@@ -62,7 +61,7 @@ _METRICS = (  # patterns in the names of ride metrics, and how people say them
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def new_figure(width: float, height: float) -> "matplotlib.figure.Figure":
+def new_figure(width: float, height: float) -> Figure:
     """An empty figure [inch] with automatic margins."""
     from matplotlib.figure import Figure
 
@@ -177,7 +176,7 @@ def frequency_axis(axis: "matplotlib.axis.Axis") -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def label_ends(axes: "matplotlib.axes.Axes", lines: Sequence["matplotlib.lines.Line2D"], gap: float = 0.05) -> None:
+def label_ends(axes: Axes, lines: Sequence["matplotlib.lines.Line2D"], gap: float = 0.05) -> None:
     """The label of each line at its right end, in its colour, moved apart where labels would meet: no legend.
 
     Arguments:
@@ -200,7 +199,7 @@ def label_ends(axes: "matplotlib.axes.Axes", lines: Sequence["matplotlib.lines.L
         axes.annotate(str(line.get_label()), to, xycoords="axes fraction", **look)
 
 
-def dress(axes: "matplotlib.axes.Axes", x: str, y: str, title: str = "") -> None:
+def dress(axes: Axes, x: str, y: str, title: str = "") -> None:
     """Labels, a light grid, and no frame above and to the right; ticks in the units and the sign that are shown.
 
     The numbers drawn are those of the library: where the labels name a unit that is shown otherwise, the ticks are
@@ -239,7 +238,7 @@ def _rescale(axis: "matplotlib.axis.Axis", label: str) -> None:
         axis.axes.callbacks.connect(change, lambda _: None if axis.get_inverted() else axis.set_inverted(True))
 
 
-def cross(axes: "matplotlib.axes.Axes", horizontal: bool = True, vertical: bool = True) -> None:
+def cross(axes: Axes, horizontal: bool = True, vertical: bool = True) -> None:
     """Lines through zero."""
     if horizontal:
         axes.axhline(0.0, color="0.6", linewidth=0.8, zorder=1)
@@ -248,7 +247,7 @@ def cross(axes: "matplotlib.axes.Axes", horizontal: bool = True, vertical: bool 
 
 
 def legend_beside(
-    figure: "matplotlib.figure.Figure",
+    figure: Figure,
     handles: Sequence[object],
     title: str = "",
     place: Literal["upper", "lower"] = "upper",
@@ -259,7 +258,7 @@ def legend_beside(
     figure.legend(handles=list(handles), loc=where, frameon=False, title=title or None, alignment="left")
 
 
-def legend_above(figure: "matplotlib.figure.Figure", handles: Sequence[object], columns: int = 3) -> None:
+def legend_above(figure: Figure, handles: Sequence[object], columns: int = 3) -> None:
     """A legend above all axes, for pictures that need their width."""
     _in_words(handles)
     figure.legend(
@@ -296,7 +295,7 @@ def by_name(argument: str, given: object, kind: type, words: str, remedy: str, a
     return items
 
 
-def note_below(figure: "matplotlib.figure.Figure", sentences: Sequence[str]) -> None:
+def note_below(figure: Figure, sentences: Sequence[str]) -> None:
     """Remarks in small print under all axes; nothing if there are none."""
     lines = [
         line

@@ -1,7 +1,7 @@
 """A summary of a law: its loops, and the effect of each parameter."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -11,14 +11,11 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Figure
 from jaxdamp.dampers import AbstractDamper, without_fitted_ranges
 from jaxdamp.parameters import FreeParameters, free_parameters
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.rig import march
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 _CYCLES, _SAMPLES = 3, 400  # to settle, and in a cycle
@@ -62,7 +59,7 @@ def law_card(
     amplitude: float = 0.02,
     frequencies: Sequence[float] = (0.5, 1.0, 2.0, 4.0),
     title: str = "",
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """Loops of a law over velocity and stroke at several frequencies, and the effect of each of its parameters.
 
     The effect is p ∂F/∂p, by automatic differentiation through the law and its states: the change of the force [N] for

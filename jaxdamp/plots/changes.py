@@ -1,14 +1,14 @@
 """A tuning: laws and spectra before and after, the change of every ride metric, and the course of the search."""
 
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import equinox as eqx
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import percent_change, typeset_unit
-from jaxdamp._types import VectorLike
+from jaxdamp._types import Axes, Figure, VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.plots.rides import default_channels
@@ -17,12 +17,7 @@ from jaxdamp.tune import TuneResult
 from jaxdamp.vehicles import AbstractVehicle
 
 
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
-
-
-def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplotlib.figure.Figure":
+def tuning(result: TuneResult, velocities: VectorLike | None = None) -> Figure:
     """Force over velocity and response spectra before and after, the change of each ride metric, and the search.
 
     Arguments:
@@ -58,9 +53,7 @@ def tuning(result: TuneResult, velocities: VectorLike | None = None) -> "matplot
     return figure
 
 
-def _laws(
-    curves: "matplotlib.axes.Axes", pairs: dict[str, tuple[AbstractDamper, AbstractDamper]], points: np.ndarray
-) -> list[str]:
+def _laws(curves: Axes, pairs: dict[str, tuple[AbstractDamper, AbstractDamper]], points: np.ndarray) -> list[str]:
     """The laws before and after over the velocity; a sentence for each that has no settled force somewhere."""
     gaps = []
     for number, (name, pair) in enumerate(pairs.items()):
@@ -80,18 +73,18 @@ def _laws(
 
 def _changed(result: TuneResult) -> dict[str, tuple[AbstractDamper, AbstractDamper]]:
     """The laws of both vehicles by a name to put before "before" and "after": those that differ, or the first."""
-    pairs = list(zip(*(_own_laws(vehicle) for vehicle in (result.start, result.vehicle)), strict=True))
+    pairs = list(zip(*(own_laws(vehicle) for vehicle in (result.start, result.vehicle)), strict=True))
     differing = [i for i, (old, new) in enumerate(pairs) if not eqx.tree_equal(old, new)] or [0]
     return {f"damper {i + 1} " if len(differing) > 1 else "": pairs[i] for i in differing}
 
 
-def _own_laws(vehicle: AbstractVehicle) -> list[AbstractDamper]:
+def own_laws(vehicle: AbstractVehicle) -> list[AbstractDamper]:
     """The laws of a vehicle, one of several equal ones, without those of tyre lift-off."""
     frame = vehicle.frame()
     return [element.law for part in (*frame.links, *frame.wheels) for element in part.elements]
 
 
-def _bars(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
+def _bars(axes: Axes, result: TuneResult) -> None:
     """Relative change of each metric, with its values."""
     names = list(result.before)
     rows = np.arange(len(names), dtype=float)
@@ -123,7 +116,7 @@ def _bars(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
     _style.cross(axes, horizontal=False)
 
 
-def _spectrum(axes: "matplotlib.axes.Axes", channel: str, unit: str, pair: tuple[Any, Any]) -> None:
+def _spectrum(axes: Axes, channel: str, unit: str, pair: tuple[Any, Any]) -> None:
     """The power spectral density of a channel before and after."""
     for spectrum, style, label in zip(pair, (_style.BEFORE, _style.AFTER), ("before", "after"), strict=True):
         axes.loglog(spectrum.frequency, spectrum.density, label=label, **style)
@@ -134,7 +127,7 @@ def _spectrum(axes: "matplotlib.axes.Axes", channel: str, unit: str, pair: tuple
     axes.legend(frameon=False)
 
 
-def _search(axes: "matplotlib.axes.Axes", result: TuneResult) -> None:
+def _search(axes: Axes, result: TuneResult) -> None:
     from matplotlib.ticker import MaxNLocator
 
     history = np.array([result.before[result.metric], *result.history])

@@ -1,26 +1,21 @@
-"""Laws as curves of force over velocity."""
+"""Laws as curves of force over velocity, and all settings of a table."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
+from jaxdamp._display import display
 from jaxdamp._traced import of_known_numbers
-from jaxdamp._types import VectorLike
-from jaxdamp.bench import BenchRun, as_runs, last_steady_cycle, peak_velocity_points
+from jaxdamp._types import Axes, Figure, VectorLike
+from jaxdamp.bench import BenchRun, ForceVelocityTable, as_runs, last_steady_cycle, peak_velocity_points
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Band
 from jaxdamp.plots import _style, fitted_range
 from jaxdamp.rig import quasi_static
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
 
 
 @of_known_numbers
@@ -34,7 +29,7 @@ def force_velocity(
     title: str = "",
     bands: Band | Mapping[str, Band] | None = None,
     static_force: float = 0.0,
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """Force over velocity of one law or several, over the samples and the peak-velocity points of records.
 
     The first law is blue, others have other colours, the baseline is black and dashed.
@@ -96,7 +91,7 @@ def _title(law: str, runs: Sequence[BenchRun]) -> str:
 
 
 def draw_laws(
-    axes: "matplotlib.axes.Axes",
+    axes: Axes,
     laws: Mapping[str, AbstractDamper],
     velocities: Float[np.ndarray, " points"],
     baseline: str | None,
@@ -126,7 +121,7 @@ def _range(runs: Sequence[BenchRun]) -> tuple[float, float]:
     return 1.05 * float(min(lower, 0.0)), 1.05 * float(max(upper, 0.0))
 
 
-def _measured(axes: "matplotlib.axes.Axes", runs: Sequence[BenchRun]) -> list:
+def _measured(axes: Axes, runs: Sequence[BenchRun]) -> list:
     """Samples as a cloud and peak-velocity points as rings; the handles for the legend."""
     if not runs:
         return []
@@ -145,3 +140,49 @@ def _measured(axes: "matplotlib.axes.Axes", runs: Sequence[BenchRun]) -> list:
         zorder=3,
     )
     return [*cloud, *rings]
+
+
+A4 = (8.27, 11.69)  # inch
+
+
+def force_velocity_family(table: ForceVelocityTable, *, page: bool = False) -> Figure:
+    """Force over velocity of every setting of a force-velocity table, dark to light in the order of the settings.
+
+    Arguments:
+        table: of `bench.read_table`.
+        page: an A4 page to print, with the forces in a table and what was decided below the curves.
+
+    Raises:
+        ValueError: something else.
+    """
+    _checks.instance("table", table, ForceVelocityTable, "be a force-velocity table", "Take `bench.read_table(path)`.")
+    figure = _style.new_figure(*(A4 if page else (9.5, 5.5)))
+    axes, below = figure.subplots(2, height_ratios=(3, 2)) if page else (figure.subplots(), None)
+    handles = []
+    for index, curve in enumerate(table.curves):
+        look = {"color": _style.graded(index, len(table.curves)), "label": curve.setting or table.name}
+        handles += axes.plot(np.asarray(curve.velocity), np.asarray(curve.force), "o-", markersize=4.0, **look)
+    _style.dress(axes, _style.VELOCITY, _style.FORCE, f"Force over velocity: {table.name}")
+    _style.cross(axes)
+    if below is None:
+        _style.legend_beside(figure, handles, "setting" if len(handles) > 1 else "")
+        return figure
+    if len(handles) > 1:
+        axes.legend(handles=handles, title="setting", frameon=False, fontsize="small")
+    _write_table(below, table)
+    _style.note_below(figure, table.notes)
+    return figure
+
+
+def _write_table(axes: Axes, table: ForceVelocityTable) -> None:
+    """The forces as a printed table, in the units that are shown."""
+    forces = table.table()
+    axes.set_axis_off()
+    axes.set_title(display().text(forces.title), loc="left", fontsize="medium")
+    headings = [heading.replace(" at ", "\n").replace(" [", "\n[") for heading in forces.headings()]
+    drawn = axes.table(cellText=forces.texts(), colLabels=headings, loc="upper center", edges="horizontal")
+    drawn.auto_set_font_size(False)
+    drawn.set_fontsize(7.0)
+    for (row, _), cell in drawn.get_celld().items():
+        cell.set_height(0.15 if row == 0 else min(0.055, 0.85 / max(len(forces.rows), 1)))
+        cell.set_edgecolor("0.85")

@@ -3,24 +3,20 @@
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import rounded, typeset_unit
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Axes, Figure
 from jaxdamp.bench import BenchRun, Evaluation, LimitCheck, evaluate, last_steady_cycle, peak_velocity_points
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import Band, Comparison, FitResult, Rung
 from jaxdamp.plots import _sheet, _style, fitted_range
 from jaxdamp.plots.loops import spread
 from jaxdamp.rig import quasi_static
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
 
 
 VELOCITIES = (25, 50, 100, 200, 300, 500, 700, 1000, 1500, 2000)  # mm/s, of the table of forces
@@ -84,7 +80,7 @@ def damper_sheet(
     baseline: AbstractDamper | None = None,
     band: Band | None = None,
     limits: LimitCheck | None = None,
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """One A4 page of a damper, to print or to send: `result.plot("sheet")`.
 
     Force over velocity with the points at peak velocity, the loops and the law; forces at stated velocities; loops over
@@ -141,7 +137,7 @@ def _facts(damper: _Damper) -> str:
 
 
 def _force_velocity(
-    axes: "matplotlib.axes.Axes",
+    axes: Axes,
     damper: _Damper,
     baseline: AbstractDamper | None,
     band: Band | None,
@@ -171,7 +167,7 @@ def _force_velocity(
         axes.legend(loc="best", frameon=False)
 
 
-def _records(axes: "matplotlib.axes.Axes", damper: _Damper) -> list:
+def _records(axes: Axes, damper: _Damper) -> list:
     """Loops and peak-velocity points of each setting; the lines through the points."""
     lines: list = []
     for setting, runs in damper.evaluation.settings.items():
@@ -197,7 +193,7 @@ def _force_title(damper: _Damper) -> str:
     return f"Force over velocity{off}"
 
 
-def _curve(axes: "matplotlib.axes.Axes", law: AbstractDamper, reach: float, label: str, style: Mapping) -> None:
+def _curve(axes: Axes, law: AbstractDamper, reach: float, label: str, style: Mapping) -> None:
     """A settled law over velocities in mm/s, dotted where it is extrapolated."""
     points = np.linspace(-1.05 * reach, 1.05 * reach, 401) / _MM
     force = np.asarray(quasi_static(law, points).force)
@@ -207,7 +203,7 @@ def _curve(axes: "matplotlib.axes.Axes", law: AbstractDamper, reach: float, labe
             line.set_xdata(_MM * points)
 
 
-def _tolerances(axes: "matplotlib.axes.Axes", limits: LimitCheck, static: float) -> None:
+def _tolerances(axes: Axes, limits: LimitCheck, static: float) -> None:
     """Bars from the least to the largest force at stated velocities, red where the measured force is outside."""
     for limit, measured in limits.results:
         if limit.velocity is not None and measured is not None and measured.unit == "N":
@@ -217,7 +213,7 @@ def _tolerances(axes: "matplotlib.axes.Axes", limits: LimitCheck, static: float)
             axes.plot([at, at], [end - static for end in ends], color=colour, linewidth=6.0, alpha=0.6, zorder=1.0)
 
 
-def _forces(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
+def _forces(axes: Axes, damper: _Damper) -> None:
     """Rebound and compression at stated velocities: of the law where there is one, otherwise measured."""
     if damper.laws:
         reach = _MM * max(run.peak_velocity for run in damper.runs)
@@ -251,7 +247,7 @@ def _measured_forces(damper: _Damper) -> tuple[np.ndarray, dict[str, np.ndarray]
     return np.append(speeds, -speeds), both
 
 
-def _loops(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
+def _loops(axes: Axes, damper: _Damper) -> None:
     """Force over stroke by speed: measured broad, the fit thin over it."""
     shown = spread(damper.runs, _MOST_LOOPS)
     fitted = damper.expected
@@ -273,7 +269,7 @@ def _loops(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
     _style.cross(axes)
 
 
-def _errors(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
+def _errors(axes: Axes, damper: _Damper) -> None:
     """The error of each record over its frequency; without a law, the scatter of its cycles."""
     frequency = {run.name: run.frequency for run in damper.runs}
     if damper.fit is not None:
@@ -298,7 +294,7 @@ def _errors(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
         axes.legend(frameon=False)
 
 
-def _gas_and_friction(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
+def _gas_and_friction(axes: Axes, damper: _Damper) -> None:
     """The slowest record in both directions, with gas force and friction in numbers."""
     separated = next(iter(damper.evaluation.gas_and_friction.values()), None)
     if separated is None:
@@ -326,7 +322,7 @@ def _pair(measurement: Any) -> tuple[str, ...]:
     return tuple(text.replace("-", "−") for text in rounded(measurement.value, measurement.uncertainty))
 
 
-def _parameters(axes: "matplotlib.axes.Axes", damper: _Damper) -> None:
+def _parameters(axes: Axes, damper: _Damper) -> None:
     """The numbers of the law with half their 95 % intervals; of records alone, rates, knees, gas force and friction."""
     if damper.fit is not None:
         rows, colours = [], []

@@ -1,19 +1,51 @@
-"""Records without a law: mean loops, forces over velocity with limits and a baseline, gas force and friction."""
+"""Records without a law: as they are, mean loops, forces over velocity with limits and a baseline, gas and friction."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from jaxdamp import _checks
-from jaxdamp.bench import Evaluation, FoldedCycles, GasAndFriction, LimitCheck
+from jaxdamp._types import Axes, Figure
+from jaxdamp.bench import BenchRun, Evaluation, FoldedCycles, GasAndFriction, LimitCheck, as_runs, last_steady_cycle
 from jaxdamp.plots import _style
+from jaxdamp.plots.loops import spread
 
 
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
+def records(runs: BenchRun | Iterable[BenchRun], *, most: int = 12) -> Figure:
+    """The last full cycle over velocity and over stroke, and stroke and force of the whole records over time.
+
+    Arguments:
+        runs: a record, or several; a colour for each, from slow to fast.
+        most: the largest number of records to draw, spread evenly over the peak velocities.
+
+    Raises:
+        ValueError: no record.
+    """
+    runs = as_runs(runs)
+    if not runs:
+        _checks.refuse("runs", "hold at least one record", "empty")
+    shown = spread(runs, most)
+    figure = _style.new_figure(12.0, 7.5)
+    panels = figure.subplot_mosaic([["v", "x"], ["stroke", "stroke"], ["force", "force"]], height_ratios=(2, 1, 1))
+    handles = []
+    for number, run in enumerate(shown):
+        look = {"color": _style.graded(number, len(shown)), "linewidth": 1.1}
+        part = last_steady_cycle(run)
+        panels["v"].plot(run.velocity[part], run.force[part], **look)
+        panels["x"].plot(1e3 * run.stroke[part], run.force[part], **look)
+        panels["stroke"].plot(run.time - run.time[0], 1e3 * run.stroke, **look)
+        label = f"{run.name} ({run.peak_velocity:.2g} m/s)"
+        handles += panels["force"].plot(run.time - run.time[0], run.force, label=label, **look)
+    _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Last full cycle: force over velocity")
+    _style.dress(panels["x"], _style.STROKE, _style.FORCE, "Force over stroke")
+    _style.dress(panels["stroke"], "", "stroke [mm]\n(+ rebound)", "Whole records")
+    _style.dress(panels["force"], "time [s]", "force [N]\n(+ resists extension)")
+    for name, axes in panels.items():
+        _style.cross(axes, vertical=name in "vx")
+    _style.legend_beside(figure, handles, f"{len(shown)} of {len(runs)} records" if len(shown) < len(runs) else "")
+    return figure
 
 
 _REMEDY = "Take what `bench.evaluate(runs)` gives."
@@ -21,9 +53,7 @@ _MOST_LABELLED = 14  # records in a legend
 _DISTINCT = 0.02  # difference of peak velocities, relative to the largest, below which records are repeats
 
 
-def evaluation(
-    evaluation: Evaluation, baseline: Evaluation | None = None, limits: LimitCheck | None = None
-) -> "matplotlib.figure.Figure":
+def evaluation(evaluation: Evaluation, baseline: Evaluation | None = None, limits: LimitCheck | None = None) -> Figure:
     """Mean cycles of records over velocity, stroke, acceleration and time, and forces over velocity.
 
     One setting: a colour for each record, from slow to fast. Several: a colour for each setting. Bands show the
@@ -67,7 +97,7 @@ def evaluation(
     return figure
 
 
-def gas_and_friction(found: GasAndFriction) -> "matplotlib.figure.Figure":
+def gas_and_friction(found: GasAndFriction) -> Figure:
     """Force over stroke in both directions, its even part with the gas force, and its odd part with the friction.
 
     Arguments:
@@ -104,7 +134,7 @@ def _colours(evaluation: Evaluation) -> tuple[_style.Look, list[tuple[str, Any]]
     return colours, [(f"{run.name} ({run.peak_velocity:.2g} m/s)", colours[run.name]) for run in shown]
 
 
-def _draw_cycle(panels: Mapping[str, "matplotlib.axes.Axes"], cycles: FoldedCycles, style: Mapping[str, Any]) -> None:
+def _draw_cycle(panels: Mapping[str, Axes], cycles: FoldedCycles, style: Mapping[str, Any]) -> None:
     """The mean cycle of a record, closed, in a band of one standard deviation of the force over its cycles."""
     stroke, velocity, force = (
         _closed(values.mean(axis=0)) for values in (cycles.stroke, cycles.velocity, cycles.force)
@@ -115,30 +145,22 @@ def _draw_cycle(panels: Mapping[str, "matplotlib.axes.Axes"], cycles: FoldedCycl
     scatter = _closed(cycles.force.std(axis=0, ddof=1)) if len(cycles.periods) > 1 else None
     for name, values in (("v", velocity), ("x", 1e3 * stroke), ("a", acceleration), ("t", phase)):
         panels[name].plot(values, force, **style)
-        if scatter is not None:
-            _draw_band(panels[name], values, force, scatter, style["color"])
-
-
-def _draw_band(
-    axes: "matplotlib.axes.Axes",
-    values: Float[np.ndarray, " points"],
-    force: Float[np.ndarray, " points"],
-    scatter: Float[np.ndarray, " points"],
-    colour: object,
-) -> None:
-    """A band about a loop, drawn from the smallest value to the largest and back, so that it does not cover itself."""
-    first, last = sorted((int(np.argmin(values)), int(np.argmax(values))))
-    there, back = np.arange(first, last + 1), np.r_[last : len(values), 0 : first + 1]
-    for part in (there, back) if len(there) < len(values) else (there,):  # time does not come back
-        low, high = force[part] - scatter[part], force[part] + scatter[part]
-        axes.fill_between(values[part], low, high, color=colour, alpha=0.25, linewidth=0.0, zorder=1.2)
+        if scatter is None:
+            continue
+        # The band is drawn from the smallest value to the largest and back, so that it does not cover itself.
+        first, last = sorted((int(np.argmin(values)), int(np.argmax(values))))
+        there, back = np.arange(first, last + 1), np.r_[last : len(values), 0 : first + 1]
+        for part in (there, back) if len(there) < len(values) else (there,):  # time does not come back
+            low, high = force[part] - scatter[part], force[part] + scatter[part]
+            look = {"color": style["color"], "alpha": 0.25, "linewidth": 0.0, "zorder": 1.2}
+            panels[name].fill_between(values[part], low, high, **look)
 
 
 def _closed(values: Float[np.ndarray, " points"]) -> Float[np.ndarray, " more"]:
     return np.append(values, values[0])
 
 
-def _draw_forces(axes: "matplotlib.axes.Axes", evaluation: Evaluation, styles: Mapping[str, Mapping[str, Any]]) -> None:
+def _draw_forces(axes: Axes, evaluation: Evaluation, styles: Mapping[str, Mapping[str, Any]]) -> None:
     """Forces at peak velocity of each setting, and those at stated velocities.
 
     Lines join the peaks of a setting whose velocities differ clearly; repeats of one velocity stand beside each other.
@@ -160,7 +182,7 @@ def _draw_forces(axes: "matplotlib.axes.Axes", evaluation: Evaluation, styles: M
             axes.plot(*np.array(stated).T, "D", markersize=4.5, color=styles[setting]["color"], zorder=3)
 
 
-def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list:
+def _draw_limits(axes: Axes, limits: LimitCheck) -> list:
     """Bars from the least to the largest force at stated velocities; one-sided limits end at the measured value."""
     from matplotlib.lines import Line2D
 
@@ -181,7 +203,7 @@ def _draw_limits(axes: "matplotlib.axes.Axes", limits: LimitCheck) -> list:
     ]
 
 
-def _dress(panels: Mapping[str, "matplotlib.axes.Axes"]) -> None:
+def _dress(panels: Mapping[str, Axes]) -> None:
     _style.dress(panels["v"], _style.VELOCITY, _style.FORCE, "Continuous plot (CVP): mean cycles")
     _style.dress(
         panels["peaks"], _style.VELOCITY, _style.FORCE, "Peak-velocity plot (PVP), and forces at stated velocities"
@@ -194,7 +216,7 @@ def _dress(panels: Mapping[str, "matplotlib.axes.Axes"]) -> None:
         axes.locator_params(axis="x", nbins=6)
 
 
-def limit_check(check: LimitCheck) -> "matplotlib.figure.Figure":
+def limit_check(check: LimitCheck) -> Figure:
     """A row for each limit: its range as a bar, and the measured value, all divided by the largest of the row.
 
     Arguments:

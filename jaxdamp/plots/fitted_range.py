@@ -2,19 +2,15 @@
 
 import textwrap
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jaxdamp._types import Axes, Figure
 from jaxdamp.dampers import AbstractDamper, extrapolated
 from jaxdamp.plots import _style
 from jaxdamp.simulation import Response, range_sentences
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
 
 
 LABEL = "extrapolated: beyond the fitted records"
@@ -22,7 +18,7 @@ _MOST_LINES, _LINE_LENGTH = 4, 170  # of footnotes
 Points = Float[np.ndarray, " points"]
 
 
-def curve(axes: "matplotlib.axes.Axes", law: AbstractDamper, velocities: Points, force: Points, **style: Any) -> list:
+def curve(axes: Axes, law: AbstractDamper, velocities: Points, force: Points, **style: Any) -> list:
     """A curve of force over velocity, lighter and dotted where it is extrapolated; the handles of what was measured."""
     outside = extrapolated(law, velocities)
     handles = axes.plot(velocities, np.where(outside, np.nan, force), **style)
@@ -32,7 +28,7 @@ def curve(axes: "matplotlib.axes.Axes", law: AbstractDamper, velocities: Points,
     return handles
 
 
-def shade(axes: "matplotlib.axes.Axes", laws: Iterable[AbstractDamper], velocities: Points, label: str = LABEL) -> list:
+def shade(axes: Axes, laws: Iterable[AbstractDamper], velocities: Points, label: str = LABEL) -> list:
     """Shade the velocities at which all laws are extrapolated; returns the handle for a legend.
 
     Arguments:
@@ -51,7 +47,7 @@ def shade(axes: "matplotlib.axes.Axes", laws: Iterable[AbstractDamper], velociti
     return spans[:1]
 
 
-def shade_channel(axes: "matplotlib.axes.Axes", responses: Iterable[Response], channel: str) -> None:
+def shade_channel(axes: Axes, responses: Iterable[Response], channel: str) -> None:
     """Shade velocities outside those of the records, if the channel is the velocity of a damper."""
     laws = [law for law in (_law_of(response, channel) for response in responses) if law is not None]
     if not laws:
@@ -71,7 +67,7 @@ def _law_of(response: Response, channel: str) -> AbstractDamper | None:
     return response.vehicle.elements()[at[0]] if at else None
 
 
-def footnotes(figure: "matplotlib.figure.Figure", responses: Mapping[str, Response]) -> None:
+def footnotes(figure: Figure, responses: Mapping[str, Response]) -> None:
     """Footnotes on the dampers used outside the range of their records, and by how much."""
     lines = [
         f"{name + ': ' if name else ''}{text}"

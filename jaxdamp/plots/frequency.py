@@ -1,25 +1,45 @@
-"""Responses over frequency: of a vehicle to a sine of its road, and of a law on the test machine."""
+"""Natural modes, and responses over frequency: of a vehicle to a sine of its road, of a law on the test machine."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from jaxdamp._steady_cycles import AbstractSteadyCycles
+from jaxdamp._types import Figure
 from jaxdamp.plots import _style
 from jaxdamp.rig import DynamicStiffness
 from jaxdamp.simulation import HarmonicResponse
-from jaxdamp.vehicles import ChannelKind
+from jaxdamp.vehicles import ChannelKind, Modes
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
+def modes(result: Modes) -> Figure:
+    """The amplitude of every coordinate in each damped oscillation, signed as in the undamped motion.
+
+    Heights [m] and angles [rad] are compared as numbers, the largest of a mode is 1.
+
+    Arguments:
+        result: of `vehicles.modes`.
+    """
+    shapes = result.damped_shapes.T  # one row for each oscillation
+    count, rows = len(shapes), np.arange(len(result.coordinates), dtype=float)
+    figure = _style.new_figure(max(2.4 * count + 1.5, 5.0), 1.6 + 0.35 * len(rows))
+    panels = np.atleast_1d(figure.subplots(1, max(count, 1), sharey=True))
+    for axes, shape, frequency, ratio in zip(panels, shapes, result.frequency, result.damping_ratio, strict=False):
+        amplitude = np.abs(shape) * np.where(np.real(shape) < 0, -1.0, 1.0)
+        axes.barh(rows, amplitude, 0.6, color=[_style.COLOURS[1 if a < 0 else 0] for a in amplitude])
+        axes.set_xlim(-1.1, 1.1)
+        _style.dress(axes, "amplitude [–]", "", f"{frequency:.3g} Hz, damping ratio {ratio:.2g}")
+        _style.cross(axes, horizontal=False)
+    panels[0].set_yticks(rows, result.coordinates)
+    panels[0].invert_yaxis()
+    return figure
 
 
 DRAWN = (ChannelKind.ACCELERATION, ChannelKind.STROKE, ChannelKind.TYRE_LOAD)
 
 
-def harmonic_response(result: HarmonicResponse, channels: Sequence[str] | None = None) -> "matplotlib.figure.Figure":
+def harmonic_response(result: HarmonicResponse, channels: Sequence[str] | None = None) -> Figure:
     """First harmonic per metre of road over frequency, one curve for each amplitude; unstable motions are circles.
 
     Arguments:
@@ -41,7 +61,7 @@ def harmonic_response(result: HarmonicResponse, channels: Sequence[str] | None =
     return _over_frequency(result, result.amplitude, panels, "road amplitude")
 
 
-def dynamic_stiffness(result: DynamicStiffness) -> "matplotlib.figure.Figure":
+def dynamic_stiffness(result: DynamicStiffness) -> Figure:
     """Stiffness, loss angle and equivalent damping over frequency, one curve for each amplitude.
 
     Arguments:
@@ -57,7 +77,7 @@ def dynamic_stiffness(result: DynamicStiffness) -> "matplotlib.figure.Figure":
 
 def _over_frequency(
     result: AbstractSteadyCycles, amplitude: Any, panels: Sequence[tuple[str, str, np.ndarray]], legend: str
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """A panel for each title, label and values, with a curve for each amplitude."""
     frequency = np.asarray(result.frequency)
     sizes = 1e3 * np.asarray(amplitude).reshape(-1, frequency.size)

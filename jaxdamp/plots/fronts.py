@@ -1,23 +1,19 @@
 """A front of ride metrics, with the damper laws along it."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
-from jaxdamp._types import VectorLike
+from jaxdamp._types import Axes, Figure, VectorLike
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.plots import _style
+from jaxdamp.plots.changes import own_laws
 from jaxdamp.rig import quasi_static
 from jaxdamp.tune import ParetoFront, limit_spans
 from jaxdamp.vehicles import AbstractVehicle
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
 
 
 MOST_CURVES = 9
@@ -27,7 +23,7 @@ MARKS = ("s", "D", "^", "v", "P", "X")
 
 def pareto(
     front: ParetoFront, baselines: Mapping[str, AbstractVehicle] | None = None, velocities: VectorLike | None = None
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """The front, with its knee, the start and other vehicles; and force over velocity of the dampers along it.
 
     Points and curves have the colour of their first objective. Of three objectives each pair has axes of its own.
@@ -62,9 +58,7 @@ def pareto(
     return figure
 
 
-def _points(
-    axes: "matplotlib.axes.Axes", front: ParetoFront, x: str, y: str, marked: Mapping[str, Mapping[str, float]]
-) -> list[Any]:
+def _points(axes: Axes, front: ParetoFront, x: str, y: str, marked: Mapping[str, Mapping[str, float]]) -> list[Any]:
     """One pair of objectives: the points of the front, its knee, and vehicles to compare with."""
     across, up, shades = front.values[x], front.values[y], front.shares[:, 0]
     if len(front.names) == 2:
@@ -84,7 +78,7 @@ def _points(
     return handles
 
 
-def _limits(axes: "matplotlib.axes.Axes", front: ParetoFront, x: str, y: str) -> list[Any]:
+def _limits(axes: Axes, front: ParetoFront, x: str, y: str) -> list[Any]:
     """Dashed lines at the limits of the two objectives, and marks at points where another metric is at its limit."""
     colour, handles = _style.BAD, []
     for name, (lower, upper) in limit_spans(front.limits, list(front.values)).items():
@@ -110,12 +104,7 @@ def _label(front: ParetoFront, name: str) -> str:
 
 def _laws_along(front: ParetoFront) -> dict[str, list[AbstractDamper]]:
     """The laws that differ along the front, by a title: each at every point."""
-
-    def laws(vehicle: AbstractVehicle) -> list[AbstractDamper]:
-        frame = vehicle.frame()
-        return [element.law for part in (*frame.links, *frame.wheels) for element in part.elements]
-
-    along = list(zip(*(laws(front.point(i)) for i in range(len(front))), strict=True))
+    along = list(zip(*(own_laws(front.point(i)) for i in range(len(front))), strict=True))
     places = [i for i, group in enumerate(along) if not _all_equal(group)]
     return {f"Damper {i + 1}" if len(along) > 1 else "Damper": list(along[i]) for i in places}
 
@@ -127,7 +116,7 @@ def _all_equal(laws: tuple[AbstractDamper, ...]) -> bool:
 
 
 def _curves(
-    axes: "matplotlib.axes.Axes",
+    axes: Axes,
     front: ParetoFront,
     laws: list[AbstractDamper],
     title: str,

@@ -1,24 +1,19 @@
 """Numbers with their spread: one law fitted to many dampers, posteriors, targets, a tuning on other roads."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from jaxdamp import _checks
+from jaxdamp._types import Axes, Figure
 from jaxdamp.identify import ManyFits, Posterior, TargetFit
 from jaxdamp.plots import _style
-from jaxdamp.tune import Rescore
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
+from jaxdamp.tune import DamperComparison, Rescore
 
 
 _COLUMNS = 3  # of panels
 _BINS = 30
 
 
-def many_fits(result: ManyFits) -> "matplotlib.figure.Figure":
+def many_fits(result: ManyFits) -> Figure:
     """The parameters of each damper with their 95 % intervals, and the error of each damper.
 
     Over the setting of the dampers, if it is stated, otherwise in their order. Intervals without an end are left out.
@@ -46,7 +41,7 @@ def many_fits(result: ManyFits) -> "matplotlib.figure.Figure":
     return figure
 
 
-def posterior(result: Posterior) -> "matplotlib.figure.Figure":
+def posterior(result: Posterior) -> Figure:
     """Histograms of the samples of every number, with the mean and the 95 % interval.
 
     Arguments:
@@ -63,7 +58,7 @@ def posterior(result: Posterior) -> "matplotlib.figure.Figure":
     return figure
 
 
-def targets(result: TargetFit) -> "matplotlib.figure.Figure":
+def targets(result: TargetFit) -> Figure:
     """The distance of each value from its target, in tolerances; the shaded values meet it.
 
     Arguments:
@@ -81,7 +76,7 @@ def targets(result: TargetFit) -> "matplotlib.figure.Figure":
     return figure
 
 
-def rescore(result: Rescore) -> "matplotlib.figure.Figure":
+def rescore(result: Rescore) -> Figure:
     """The change of each ride metric by the tuning on each of the other roads, and its mean.
 
     Metrics that are zero or negative on a road are left out, since they have no change in percent.
@@ -104,9 +99,55 @@ def rescore(result: Rescore) -> "matplotlib.figure.Figure":
     return figure
 
 
-def _panels(count: int) -> tuple["matplotlib.figure.Figure", list["matplotlib.axes.Axes"]]:
+def _panels(count: int) -> tuple[Figure, list[Axes]]:
     """So many panels, three in a row."""
     rows = -(-count // _COLUMNS)
     figure = _style.new_figure(12.0, 0.6 + 2.8 * rows)
     grid = figure.add_gridspec(rows, _COLUMNS)
     return figure, [figure.add_subplot(grid[i // _COLUMNS, i % _COLUMNS]) for i in range(count)]
+
+
+def damper_comparison(comparison: DamperComparison) -> Figure:
+    """The change of each metric from the first damper, with its 95 % interval; hollow where it may be none.
+
+    Thick lines are the standard error from the fitted parameters alone.
+
+    Arguments:
+        comparison: result of `tune.compare_dampers`.
+    """
+    remedy = "The call is `damper_comparison(comparison)` with the result of `tune.compare_dampers`."
+    _checks.instance("comparison", comparison, DamperComparison, "be a comparison of dampers", remedy)
+    first, *others = comparison.values
+    metrics = list(comparison.units)
+    figure = _style.new_figure(8.5, 1.6 + 0.3 * len(metrics) * max(len(others), 1))
+    axes = figure.add_subplot()
+    handles = []
+    for number, name in enumerate(others):
+        rows = np.arange(len(metrics)) + 0.7 * ((number + 0.5) / len(others) - 0.5)
+        differences = [comparison.difference(metric, name) for metric in metrics]
+        change, margin, from_parameters = (
+            np.array([getattr(d, key) for d in differences]) for key in ("change", "margin", "from_parameters")
+        )
+        colour = _style.COLOURS[number % len(_style.COLOURS)]
+        faces = [colour if d.significant else "white" for d in differences]
+        thick = {"ecolor": colour, "linewidth": 3.5, "alpha": 0.6}
+        axes.errorbar(change, rows, xerr=_finite(margin), fmt="none", ecolor=colour, capsize=3.0, linewidth=1.0)
+        axes.errorbar(change, rows, xerr=_finite(from_parameters), fmt="none", **thick)
+        axes.scatter(change, rows, 40.0, faces, edgecolors=colour, zorder=3)
+        handles.append(axes.scatter([], [], 40.0, colour, label=f"{name} relative to {first}"))
+    axes.set_yticks(range(len(metrics)), [_style.metric_words(metric) for metric in metrics])
+    axes.invert_yaxis()
+    roads = len(next(iter(comparison.values[first].values())))
+    where = f"on the same {roads} roads" if roads > 1 else "on a white road"
+    _style.dress(axes, "change [%]", "", f"Ride metrics beside those of {first}, {where}")
+    axes.grid(False, axis="y")
+    _style.cross(axes, horizontal=False)
+    _style.legend_above(figure, handles)
+    legend = "With 95 % intervals; hollow where there may be no difference; thick: standard error from the parameters."
+    _style.note_below(figure, [legend, *map(_style.typeset, comparison.warnings)])
+    return figure
+
+
+def _finite(errors: np.ndarray) -> np.ndarray:
+    """Errors to draw: none where they are unknown, which the notes below say."""
+    return np.where(np.isfinite(errors), errors, 0.0)

@@ -1,22 +1,17 @@
 """Findings of a preflight: which is in which record."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._types import Figure
 from jaxdamp.bench import Finding, Preflight
 from jaxdamp.plots import _style
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 _SHADES = {"error": _style.BAD, "warning": _style.COLOURS[1], "note": _style.COLOURS[0]}
 
 
-def preflight(found: Preflight) -> "matplotlib.figure.Figure":
+def preflight(found: Preflight) -> Figure:
     """A row for each record, a column for each kind of finding, coloured by severity, with its size.
 
     Where a record has several findings of a kind, the largest is shown and their number stands in brackets.

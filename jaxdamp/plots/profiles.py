@@ -1,18 +1,64 @@
-"""The cost of other values of one parameter."""
-
-from typing import TYPE_CHECKING
+"""How a fit was reached and what it could be: the course of a training, the cost of other values, a design of tests."""
 
 import numpy as np
 
-from jaxdamp.identify import ProfileCurve
+from jaxdamp._types import Figure
+from jaxdamp.identify import ExperimentDesign, ProfileCurve, Training, extent
 from jaxdamp.plots import _style
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
+def experiment(design: ExperimentDesign) -> Figure:
+    """The runs over stroke and velocity, and the relative standard errors beside those of the programme.
+
+    Arguments:
+        design: of `identify.design_experiment`.
+    """
+    figure = _style.new_figure(11.0, 4.5)
+    left, right = figure.subplots(1, 2)
+    sets = [("design", design.tests, design.covariance)]
+    if design.programme_covariance is not None:
+        sets.append(("programme", design.programme, design.programme_covariance))
+    values, handles = np.abs(np.asarray(design.free.values)), []
+    rows = np.arange(values.size)
+    for number, (name, tests, covariance) in enumerate(sets):
+        style = {"color": _style.COLOURS[number], "alpha": 0.8}
+        reach = np.array([extent(test) for test in tests])
+        label = f"{name}, {len(tests)} runs"
+        handles += left.plot(reach[:, 0], reach[:, 1], "os"[number], markersize=7 - 2 * number, label=label, **style)
+        errors = 100.0 * np.sqrt(np.diag(covariance)) / np.where(values > 0, values, np.nan)
+        right.barh(rows + 0.4 * number, errors, height=0.36, **style)
+    _style.dress(left, "stroke, zero to peak [mm]", "peak velocity [m/s]", "Tests")
+    left.set_xscale("log")
+    left.set_yscale("log")
+    _style.dress(right, "expected standard error [% of the value]", "", "Parameters")
+    right.set_xscale("log")
+    right.set_yticks(rows + 0.2 * (len(sets) - 1), design.free.names)
+    _style.legend_above(figure, handles)
+    return figure
 
 
-def profile(curve: ProfileCurve) -> "matplotlib.figure.Figure":
+def training_history(training: Training) -> Figure:
+    """Errors over the steps of a training, on its records and on those held out, and the step of the result.
+
+    Arguments:
+        training: of `identify.train`.
+    """
+    figure = _style.new_figure(8.0, 4.0)
+    axes = figure.subplots()
+    handles = []
+    lines = (("training records", training.history), ("held-out records", training.held_out_history))
+    for number, (label, values) in enumerate(lines):
+        handles += axes.plot(training.steps, values, label=label, linewidth=1.8, **_style.line_style(number))
+    handles.append(axes.axvline(training.best_step, color=_style.GREY, linestyle=":", label="result"))
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(lambda value, _: _style.short(value))
+    axes.yaxis.set_minor_formatter(lambda value, _: _style.short(value))
+    _style.dress(axes, "step", "root of the mean squared force error [N]", training.stopped)
+    _style.legend_beside(figure, handles)
+    return figure
+
+
+def profile(curve: ProfileCurve) -> Figure:
     """Cost over value, with the 95 % interval and the parabola that the standard error stands for.
 
     Arguments:

@@ -1,19 +1,14 @@
 """The sheet of a ride: one A4 page of a vehicle before and after, its road, its dampers, and what to build."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Figure
 from jaxdamp.plots import _ride_panels, _rides, _sheet, _style
 from jaxdamp.simulation import Response
 from jaxdamp.tune import TuneResult
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
 
 
 @of_known_numbers
@@ -23,7 +18,7 @@ def ride_sheet(
     sentence: str = "",
     name: str = "",
     limits: Mapping[str, object] | None = None,
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """One A4 page of a ride or a tuning, to print or to send: `result.plot("sheet")`.
 
     The vehicle with its numbers; its road among the classes of ISO 8608; comfort over grip with the curve of constant

@@ -1,19 +1,14 @@
 """The roughness of a road: its spectrum between the classes, and segment by segment."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from jaxdamp._types import Figure
 from jaxdamp.metrics import RoughnessBySegment
 from jaxdamp.plots import _style
 from jaxdamp.roads import RoughnessAssessment, class_limits
 
 
-if TYPE_CHECKING:
-    import matplotlib.figure
-
-
-def roughness_by_segment(roughness: RoughnessBySegment) -> "matplotlib.figure.Figure":
+def roughness_by_segment(roughness: RoughnessBySegment) -> Figure:
     """The international roughness index of each segment over the distance, and that of the whole profile.
 
     Arguments:
@@ -32,7 +27,7 @@ def roughness_by_segment(roughness: RoughnessBySegment) -> "matplotlib.figure.Fi
     return figure
 
 
-def roughness_spectrum(assessment: RoughnessAssessment) -> "matplotlib.figure.Figure":
+def roughness_spectrum(assessment: RoughnessAssessment) -> Figure:
     """The displacement spectrum of a road over the spatial frequency, its straight line, and the classes of ISO 8608.
 
     Arguments:

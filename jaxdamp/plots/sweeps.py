@@ -1,21 +1,16 @@
 """A metric over the points of a sweep: curves, or a map."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._tables import typeset_unit
+from jaxdamp._types import Axes, Dataset, Figure
 from jaxdamp.plots import _style
 from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import limit_spans
-
-
-if TYPE_CHECKING:
-    import matplotlib.axes
-    import matplotlib.figure
-    import xarray
 
 
 LEVELS = 14  # of a map
@@ -25,12 +20,12 @@ HATCHES = ("////", "\\\\\\\\", "xxxx", "....")
 
 
 def sweep(
-    data: "xarray.Dataset",
+    data: Dataset,
     metric: str,
     over: Sequence[str] | None = None,
     *,
     limits: Mapping[str, object] | None = None,
-) -> "matplotlib.figure.Figure":
+) -> Figure:
     """A result of a sweep over a grid: a curve for one axis, a map for two; failed points are marked.
 
     Where a limit is violated, a map is hatched, and points of curves are ringed.
@@ -70,7 +65,7 @@ def sweep(
 
 
 def _chosen_axes(
-    data: "xarray.Dataset", metric: str, axes: list[str], over: Sequence[str] | None
+    data: Dataset, metric: str, axes: list[str], over: Sequence[str] | None
 ) -> tuple[list[str], list[str]]:
     """The axes to draw over, and the other ones: of a few values of one of them, each gets a curve."""
     chosen = axes if over is None else [over] if isinstance(over, str) else list(over)
@@ -84,7 +79,7 @@ def _chosen_axes(
     return chosen, others
 
 
-def _grid_axes(data: "xarray.Dataset", metric: str) -> list[str]:
+def _grid_axes(data: Dataset, metric: str) -> list[str]:
     """The axes of a result that is one number for each point of a grid."""
     _checks.one_of("metric", metric, [str(name) for name in data.data_vars])
     axes = [str(name) for name in data[metric].dims]
@@ -95,9 +90,9 @@ def _grid_axes(data: "xarray.Dataset", metric: str) -> list[str]:
 
 
 def _curves(
-    figure: "matplotlib.figure.Figure",
-    plot: "matplotlib.axes.Axes",
-    data: "xarray.Dataset",
+    figure: Figure,
+    plot: Axes,
+    data: Dataset,
     metric: str,
     name: str,
     others: list[str],
@@ -132,9 +127,9 @@ def _curves(
 
 
 def _map(
-    figure: "matplotlib.figure.Figure",
-    plot: "matplotlib.axes.Axes",
-    data: "xarray.Dataset",
+    figure: Figure,
+    plot: Axes,
+    data: Dataset,
     metric: str,
     over: list[str],
     ends: Sequence["_End"],
@@ -202,9 +197,7 @@ def _ends(data: object, spans: Mapping[str, tuple[float, float]]) -> list[_End]:
     return ends
 
 
-def _hatch(
-    plot: "matplotlib.axes.Axes", x: np.ndarray, y: np.ndarray, values: np.ndarray, end: _End, number: int
-) -> Any:
+def _hatch(plot: Axes, x: np.ndarray, y: np.ndarray, values: np.ndarray, end: _End, number: int) -> Any:
     """Hatch a map where a limit is violated, with the boundary drawn; the handle for the legend."""
     from matplotlib.patches import Patch
 

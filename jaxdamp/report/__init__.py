@@ -16,6 +16,7 @@ from jaxdamp.report.benches import (
     baseline_table as baseline_table,
     bench_report,
     law_evaluation as law_evaluation,
+    table_report as table_report,
 )
 from jaxdamp.report.chains import chain_report
 from jaxdamp.report.fits import (
@@ -27,10 +28,13 @@ from jaxdamp.report.fits import (
     fitted_velocities as fitted_velocities,
     parameters_of as parameters_of,
 )
-from jaxdamp.report.force_velocity import table_report as table_report
 from jaxdamp.report.page import Report
-from jaxdamp.report.ranges import fitted_range_table as fitted_range_table, range_use_table as range_use_table
-from jaxdamp.report.records import add_records as add_records, records_table as records_table
+from jaxdamp.report.records import (
+    add_records as add_records,
+    fitted_range_table as fitted_range_table,
+    range_use_table as range_use_table,
+    records_table as records_table,
+)
 from jaxdamp.report.results import result_report
 from jaxdamp.report.rides import (
     add_rides as add_rides,

@@ -1,11 +1,11 @@
-"""A page on bench records without a law: what is odd about them, and their evaluation."""
+"""Pages on bench records without a law, and on a force-velocity table."""
 
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
 from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, percent_change
-from jaxdamp.bench import Evaluation, LimitCheck, Preflight, evaluate
+from jaxdamp.bench import Evaluation, ForceVelocityTable, LimitCheck, Preflight, evaluate
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.identify import predict_runs
 from jaxdamp.report.attempts import Attempts
@@ -48,7 +48,9 @@ def bench_report(
         baseline = law_evaluation(baseline, evaluation)
     sentences = bench_verdict(evaluation, preflight, limits)
     report.verdict(*sentences)
-    add_bench_sheet(report, evaluation, sentences[0] if sentences else "", preflight, limits)
+    doubts = evaluation.notes if preflight is None else [*preflight.sentences(), *evaluation.notes]
+    more = {"sentence": sentences[0] if sentences else "", "warnings": doubts, "limits": limits}
+    report.sheet(lambda: evaluation.plot("sheet", **more), more["sentence"], "damper_sheet")
     add_records(report, evaluation.runs, (), remarks, preflight)
     if preflight is not None and preflight.findings:
         report.table(preflight.table())
@@ -57,23 +59,6 @@ def bench_report(
         report.table(limits.table())
     add_evaluation(report, evaluation, baseline, limits)
     return report
-
-
-def add_bench_sheet(
-    report: Report, evaluation: Evaluation, sentence: str, preflight: Preflight | None, limits: LimitCheck | None = None
-) -> None:
-    """The sheet of records without a law, with what the preflight says.
-
-    Arguments:
-        report: the page.
-        evaluation: of `bench.evaluate`.
-        sentence: at the top.
-        preflight: of `bench.preflight`.
-        limits: of `evaluation.check`.
-    """
-    doubts = evaluation.notes if preflight is None else [*preflight.sentences(), *evaluation.notes]
-    more = {"sentence": sentence, "warnings": doubts, "limits": limits}
-    report.sheet(lambda: evaluation.plot("sheet", **more), sentence, "damper_sheet")
 
 
 def add_evaluation(
@@ -167,3 +152,22 @@ def baseline_table(evaluation: Evaluation, baseline: Evaluation) -> Table:
     title, sides = "Forces beside the baseline", ("baseline", "measured")
     setting = (Column("setting"),) if len(evaluation.settings) > 1 else ()
     return comparison_table(title, "quantity", sides, rows, setting)
+
+
+def table_report(table: ForceVelocityTable, *, folder: Path | None = None, attempts: Attempts | None = None) -> Report:
+    """A page on a force-velocity table.
+
+    Arguments:
+        table: of `bench.read_table`.
+        folder: folder for the pictures as separate files; without it they are only in the page.
+        attempts: collects parts that fail; a new one if left out.
+    """
+    page = Report(f"Force-velocity table {table.name}", folder, attempts)
+    count = len(table.curves)
+    page.verdict(f"{count} setting{'s' * (count > 1)}; the laws go through the points, nothing was fitted.")
+    page.heading("Force over velocity")
+    page.picture(table.plot, "Forces of all settings", "family.png")
+    page.table(table.table())
+    page.heading("What was decided")
+    page.points(table.notes)
+    return page

@@ -1,4 +1,4 @@
-"""A page on laws fitted to records: errors, parameters, loops and curves."""
+"""A page on laws fitted to records: errors, parameters, loops and curves, what the machine adds, doubts."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,12 +10,46 @@ from jaxdamp import plots, rig
 from jaxdamp._tables import Table
 from jaxdamp.bench import BenchRun, Preflight
 from jaxdamp.dampers import AbstractDamper
-from jaxdamp.identify import Band, Comparison, CrossValidation, Rung, without_machine
+from jaxdamp.identify import Band, Comparison, CrossValidation, FitResult, Rung, rounded, without_machine
+from jaxdamp.parameters import parameters
 from jaxdamp.report.attempts import Attempts
-from jaxdamp.report.fit_findings import add_findings, add_validation
 from jaxdamp.report.page import Report
-from jaxdamp.report.ranges import fitted_range_table
-from jaxdamp.report.records import add_records
+from jaxdamp.report.records import add_records, fitted_range_table
+
+
+def machine_sentences(result: FitResult) -> tuple[str, ...]:
+    """What the test machine adds to the force, and what it was taken not to add."""
+    if result.rig is None:
+        return ("No test machine was fitted: all of the measured force counts as the damper's.",)
+    machine = {e.name.removeprefix("rig."): e for e in result.parameters if e.name.startswith("rig.")}
+    texts = [(name, *rounded(e.value, e.standard_error), e.unit) for name, e in machine.items()]
+    fitted = [f"{name.replace('_', ' ')} {value} ± {error} {unit}".rstrip() for name, value, error, unit in texts]
+    absent = [p.path.replace("_", " ") for p in parameters(result.rig) if not np.any(np.asarray(p.value))]
+    return (
+        f"Fitted together with the law, as effects of the test machine: {', '.join(fitted) or 'none that was free'}.",
+        f"Taken as absent: {', '.join(absent)}. An absent effect that the residual shows is named below.",
+    )
+
+
+def add_findings(report: Report, result: FitResult) -> None:
+    """The test machine and the warnings of a fit; without warnings, what that means."""
+    report.text(*machine_sentences(result))
+    report.points(result.warnings)
+    if not result.warnings:
+        report.text(
+            "No warnings: the search converged, the records determine every number, no effect of the machine that was"
+            " left out shows in the residual, and the intervals need no correction for correlated residuals."
+        )
+
+
+def add_validation(report: Report, validation: CrossValidation) -> None:
+    """Each record, predicted by a fit to the others."""
+    report.heading("Records predicted by fits without them")
+    report.text(
+        f"Each record was left out once and predicted by {validation.best} fitted to the others: mean fit"
+        f" {validation.fit_percent(validation.best):.1f} %, RMSE {validation.rmse(validation.best):.1f} N."
+    )
+    report.table(validation.record_table())
 
 
 MOST_CURVES = 5  # laws in one picture of force over velocity

@@ -9,17 +9,13 @@ import platform
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jaxdamp._display import display
 from jaxdamp._tables import Table
+from jaxdamp._types import Figure
 from jaxdamp.report.attempts import Attempts
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 PIXELS = 86  # of a page for an inch of a picture: the widest ones fill the page
@@ -118,7 +114,7 @@ class Report:
         self._headings.append(display().words(text))
         self._sections.append([])
 
-    def sheet(self, figure: "Callable[[], Figure]", finding: str, name: str) -> None:
+    def sheet(self, figure: Callable[[], Figure], finding: str, name: str) -> None:
         """A sheet of one A4 page, which the page begins with; as PNG and PDF too if the report has a folder.
 
         Arguments:
@@ -178,7 +174,7 @@ class Report:
             image = self._image(figure() if callable(figure) else figure, words, name)
             self._add(f"<figure>{image}<figcaption>{html.escape(words)}</figcaption></figure>")
 
-    def _image(self, figure: "Figure", words: str, name: str) -> str:
+    def _image(self, figure: Figure, words: str, name: str) -> str:
         """A figure as an element of the page, and as a file if the report has a folder."""
         data = _png(figure)
         if self._folder is not None:
@@ -221,7 +217,7 @@ class Report:
         return path
 
 
-def _png(figure: "Figure") -> bytes:
+def _png(figure: Figure) -> bytes:
     """A figure as a small PNG file."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
@@ -240,7 +236,7 @@ def _png(figure: "Figure") -> bytes:
     return small.getvalue()
 
 
-def _finding(figure: "Figure") -> str:
+def _finding(figure: Figure) -> str:
     """What the title of a figure says, or the titles of its panels."""
     titles = [figure.get_suptitle(), *(axes.get_title(loc="left") for axes in figure.axes)]
     return ". ".join(" ".join(title.split()) for title in titles if title)

@@ -1,10 +1,12 @@
-"""The section of a page on the records: what they are, what was done to them, what is odd about them."""
+"""Sections of a page on the records and the ranges: what they are, what was done to them, what a ride uses."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from jaxdamp._tables import Cell, Column, Table
 from jaxdamp.bench import BenchRun, Preflight
+from jaxdamp.dampers import FittedRange
 from jaxdamp.report.page import Report
+from jaxdamp.simulation import Response
 
 
 def add_records(
@@ -50,3 +52,35 @@ def records_table(runs: Sequence[BenchRun], held_out: Sequence[BenchRun] = ()) -
         row += (float(run.force.min()), float(run.force.max()), run.work_per_cycle, run.cycles)
         rows.append(row + ("held out" if run.name in names else "fitted",) * bool(held_out))
     return Table("Records (stroke and velocity positive in rebound)", tuple(columns), tuple(rows))
+
+
+def fitted_range_table(covered: FittedRange) -> Table:
+    """The range of the records that laws were fitted to.
+
+    Arguments:
+        covered: `law.fitted_to`.
+    """
+    columns = (Column("quantity"), Column("unit"), Column("lowest", spec=".4g"), Column("highest", spec=".4g"))
+    rows = tuple((q.name, q.unit or "–", *q.limits) for q in covered.known())
+    return Table("Range of the fitted records; beyond it the laws are extrapolated", columns, rows)
+
+
+def range_use_table(responses: Mapping[str, Response]) -> Table | None:
+    """The motion of each damper compared with the fitted range of its law; no table if no law has a range.
+
+    Arguments:
+        responses: by name.
+    """
+    columns = [Column("law"), Column("damper"), Column("quantity"), Column("unit")]
+    columns += [Column(name, spec=".3g") for name in ("lowest", "highest", "fitted from", "fitted to", "times")]
+    columns += [Column("time outside", "%", ".0f")]
+    rows: list[tuple[Cell, ...]] = []
+    for law, response in responses.items():
+        for damper, uses in response.range_use().items():
+            for use in uses:
+                share = None if use.share is None else 100 * use.share
+                ends = (*use.used, *use.fitted, use.times, share)
+                rows.append((law, damper.replace("_", " "), use.quantity, use.unit or "–", *ends))
+    if not rows:
+        return None
+    return Table("Use of the dampers beside the records of their laws", tuple(columns), tuple(rows))

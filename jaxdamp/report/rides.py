@@ -9,7 +9,7 @@ from jaxdamp.dampers import AbstractDamper
 from jaxdamp.metrics import comfort_reaction
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
-from jaxdamp.report.ranges import range_use_table
+from jaxdamp.report.records import range_use_table
 from jaxdamp.simulation import Response, comfort_table, far_outside, metrics_table
 
 

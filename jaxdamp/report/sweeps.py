@@ -2,25 +2,22 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jaxdamp import plots
 from jaxdamp._tables import percent_change, typeset_unit
+from jaxdamp._types import DataArray, Dataset
 from jaxdamp.report.attempts import Attempts
 from jaxdamp.report.page import Report
 from jaxdamp.sweeps import without_effect
 from jaxdamp.tune import limit_spans
 
 
-if TYPE_CHECKING:
-    import xarray
-
-
 MOST_AXES = 2  # of a grid that is drawn
 
 
 def sweep_report(
-    data: "xarray.Dataset",
+    data: Dataset,
     *,
     title: str = "Sweep",
     remarks: Sequence[str] = (),
@@ -61,7 +58,7 @@ def sweep_report(
 
 
 def best_points(
-    data: "xarray.Dataset", limits: Mapping[str, object] | None = None, baseline: Mapping[str, object] | None = None
+    data: Dataset, limits: Mapping[str, object] | None = None, baseline: Mapping[str, object] | None = None
 ) -> list[str]:
     """The smallest value of each result in a sentence, where it is, within the limits, and beside a baseline.
 
@@ -91,10 +88,10 @@ def best_points(
 
 
 def _smallest(
-    data: "xarray.Dataset",
+    data: Dataset,
     name: str,
     axes: Sequence[str],
-    allowed: "xarray.DataArray",
+    allowed: DataArray,
     baseline: Mapping[str, Any] | None,
 ) -> str:
     """The smallest value of a result, where it is, and its change from the baseline."""
@@ -111,5 +108,5 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _in_words(data: "xarray.Dataset", name: str, value: Any) -> str:
+def _in_words(data: Dataset, name: str, value: Any) -> str:
     return f"{float(value):.4g} {typeset_unit(data[name].attrs.get('units', ''))}".rstrip()

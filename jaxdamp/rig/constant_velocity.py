@@ -3,7 +3,7 @@
 import ctypes
 import functools
 import math
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -16,9 +16,48 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_module
 from jaxdamp._traced import of_known_numbers
 from jaxdamp.codegen import C, PrintedFunction, Symbols, library, lower, symbols
-from jaxdamp.dampers import AbstractDamper, coverage
+from jaxdamp.dampers import AbstractDamper, coverage, without_fitted_ranges
 from jaxdamp.parameters import as_float
-from jaxdamp.rig.numbers import is_number, numbers_of
+
+
+class LawNumbers(NamedTuple):
+    """A law, or a law on a machine, as plain numbers.
+
+    Attributes:
+        key: its structure, and what of it is no number of a program.
+        tree: how it is put together.
+        others: its leaves, with None in place of arrays of numbers.
+        arrays: the arrays of numbers, in the order of the leaves.
+    """
+
+    key: Hashable
+    tree: PyTree
+    others: tuple[object, ...]
+    arrays: list[np.ndarray]
+
+    def built(self, arrays: Sequence[object]) -> PyTree:
+        """The same with other numbers."""
+        rest = iter(arrays)
+        return jax.tree.unflatten(self.tree, [next(rest) if leaf is None else leaf for leaf in self.others])
+
+    @property
+    def flat(self) -> np.ndarray:
+        """All numbers, as the C functions take them."""
+        return np.concatenate([np.zeros(0), *map(np.ravel, self.arrays)])
+
+
+def is_number(leaf: object) -> bool:
+    """Whether a leaf of a law is an array of numbers that a program takes."""
+    return isinstance(leaf, jax.Array | np.ndarray) and np.issubdtype(leaf.dtype, np.floating)
+
+
+def numbers_of(law: PyTree) -> LawNumbers:
+    """The numbers of a law whose values are known; the range that it was fitted to is left out."""
+    leaves, tree = jax.tree.flatten(without_fitted_ranges(law))
+    others = tuple(None if is_number(leaf) else leaf for leaf in leaves)
+    arrays = [np.asarray(leaf, np.float64) for leaf in leaves if is_number(leaf)]
+    fixed = tuple(np.asarray(leaf).tobytes() if isinstance(leaf, jax.Array) else repr(leaf) for leaf in others)
+    return LawNumbers((tree, fixed, tuple(array.shape for array in arrays)), tree, others, arrays)
 
 
 class QuasiStatic(NamedTuple):

@@ -1,7 +1,7 @@
 """Dynamic stiffness and damping of a law over frequency and amplitude, as test machines measure them."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import equinox as eqx
 import jax
@@ -16,12 +16,8 @@ from jaxdamp._sharded import varying_as
 from jaxdamp._steady_cycles import AbstractSteadyCycles, checked_points, is_steady, span
 from jaxdamp._tables import Column, Table, plain
 from jaxdamp._traced import behind
-from jaxdamp._types import Scalar, ScalarLike, Signal, State
+from jaxdamp._types import Figure, Scalar, ScalarLike, Signal, State
 from jaxdamp.dampers import AbstractDamper
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 SAMPLES = 256  # of a period
@@ -104,7 +100,7 @@ class DynamicStiffness(AbstractSteadyCycles):
         rows = np.stack([np.asarray(values).ravel() for values in numbers], axis=1)
         return Table("Dynamic stiffness", columns, tuple(tuple(plain(row)) for row in rows))
 
-    def plot(self) -> "Figure":
+    def plot(self) -> Figure:
         """Stiffness, loss angle and damping over frequency, a curve for each amplitude (`plots.dynamic_stiffness`)."""
         from jaxdamp import plots
 

@@ -12,9 +12,9 @@ from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar, Signal, SignalLike, State
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.parameters import Module, as_float, check_parameters, nonnegative, parameter, positive, readable, setting
-from jaxdamp.rig.channel import delayed, lagged
 from jaxdamp.rig.marching import march, slopes
 from jaxdamp.rig.response import respond
+from jaxdamp.rig.sensor import delayed, lagged
 
 
 not_positive = dataclasses.replace(

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
@@ -11,6 +10,7 @@ from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Contents, Table, plain, with_unit
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Figure
 from jaxdamp.roads.iso_classes import (
     HIGHEST_SPATIAL_FREQUENCY,
     LOWEST_SPATIAL_FREQUENCY,
@@ -18,10 +18,6 @@ from jaxdamp.roads.iso_classes import (
     class_limits,
     road_class,
 )
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 # A Hann window correlates neighbouring lines: so many lines count as one independent line (1.94).
@@ -103,7 +99,7 @@ class RoughnessAssessment(AbstractResult):
         """`verdict`."""
         return self.verdict
 
-    def plot(self) -> "matplotlib.figure.Figure":
+    def plot(self) -> Figure:
         """The spectrum with its straight line and the classes (`plots.roughness_spectrum`)."""
         from jaxdamp import plots
 

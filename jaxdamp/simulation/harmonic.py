@@ -1,7 +1,7 @@
 """Frequency response of a vehicle whose laws are not linear: its steady motion on a sine of given amplitude."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import equinox as eqx
 import jax
@@ -15,7 +15,7 @@ from jaxdamp._limits import largest
 from jaxdamp._steady_cycles import AbstractSteadyCycles, checked_points, is_steady, span
 from jaxdamp._tables import Column, Contents, Table, with_unit
 from jaxdamp._traced import behind
-from jaxdamp._types import ScalarLike
+from jaxdamp._types import Figure, ScalarLike
 from jaxdamp.dampers import has_fitted_range, warn_outside
 from jaxdamp.simulation.harmonic_cycle import Cycle, Excitation, sweep
 from jaxdamp.simulation.notes import range_sentences, range_uses
@@ -23,10 +23,6 @@ from jaxdamp.simulation.run import refuse_stacked
 from jaxdamp.simulation.stability import known_cars, known_system, step_need
 from jaxdamp.simulation.step_size import USUAL
 from jaxdamp.vehicles import AbstractVehicle, ChannelKind, Layout, delays_of, refuse_controller, static_equilibrium
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 SAMPLES = 256
@@ -132,7 +128,7 @@ class HarmonicResponse(AbstractSteadyCycles):
             "half_range": {name: with_unit(np.asarray(self.peak(name)), unit) for name, unit in units.items()},
         }
 
-    def plot(self, channels: Sequence[str] | None = None) -> "Figure":
+    def plot(self, channels: Sequence[str] | None = None) -> Figure:
         """First harmonic per metre of road over frequency, one curve for each amplitude (`plots.harmonic_response`).
 
         Arguments:

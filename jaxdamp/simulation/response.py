@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import equinox as eqx
 import jax
@@ -13,7 +13,7 @@ from jaxtyping import Array, Float, Int
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._tables import Contents, Table, with_unit
-from jaxdamp._types import Scalar, Signal
+from jaxdamp._types import Dataset, Figure, Scalar, Signal
 from jaxdamp.dampers import RangeUse
 from jaxdamp.metrics import Metric
 from jaxdamp.simulation.energy import absorbed_by, energy_balance
@@ -21,11 +21,6 @@ from jaxdamp.simulation.notes import range_sentences, range_uses, tyres_in_tensi
 from jaxdamp.simulation.ride_metrics import Comfort, comfort, comfort_table, comfort_units, metrics_table, ride_metrics
 from jaxdamp.simulation.wheels import AxleTiming
 from jaxdamp.vehicles import AbstractVehicle, LinearMap, System
-
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.figure import Figure
 
 
 @jax.tree_util.register_pytree_node_class
@@ -251,7 +246,7 @@ class Response(eqx.Module, AbstractResult):
             "energy_balance": {name: with_unit(value, "J") for name, value in self.energy_balance().items()},
         }
 
-    def plot(self, kind: str = "ride", **options: Any) -> "Figure":
+    def plot(self, kind: str = "ride", **options: Any) -> Figure:
         """Channels over time and the spectrum of the first, or the sheet of the ride.
 
         Arguments:
@@ -262,7 +257,7 @@ class Response(eqx.Module, AbstractResult):
 
         return plotted(kind, {"ride": ride, "sheet": ride_sheet}, self, **options)
 
-    def to_xarray(self) -> "xarray.Dataset":
+    def to_xarray(self) -> Dataset:
         """All channels as an `xarray.Dataset` over time, with units."""
         import xarray
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float, PyTree
 
 from jaxdamp import _checks
-from jaxdamp._dependence import depends
+from jaxdamp._traced import depends
 from jaxdamp._types import Scalar, Signal
 from jaxdamp.roads import AbstractRoad, Columns, delayed
 from jaxdamp.vehicles import AbstractVehicle

@@ -1,22 +1,19 @@
 """What a sweep's `xarray.Dataset` can do: `data.jaxdamp.table()`, `.to_dict()`, `.plot(metric)`."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import numpy as np
 import xarray
 
 from jaxdamp._tables import Column, Contents, Table, plain, typeset_unit
-
-
-if TYPE_CHECKING:
-    import xarray
+from jaxdamp._types import Dataset, Figure
 
 
 _ROUNDING = 1e-12  # of the largest value, by which a result may change along an axis without effect
 
 
-def without_effect(data: "xarray.Dataset") -> dict[str, list[str]]:
+def without_effect(data: Dataset) -> dict[str, list[str]]:
     """The axes of a grid along which a result does not change anywhere, but for rounding, by the name of the result.
 
     No value of such a parameter is better than another. Axes of one value, and points that are no grid, say nothing.
@@ -44,10 +41,6 @@ def without_effect(data: "xarray.Dataset") -> dict[str, list[str]]:
         if flat:
             idle[str(name)] = flat
     return idle
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @final
@@ -90,7 +83,7 @@ class SweepResults:
         """As `Dataset.to_dict`, ready for JSON: numbers that are not finite are None."""
         return plain(self._data.to_dict())
 
-    def plot(self, metric: str, over: Sequence[str] | None = None) -> "Figure":
+    def plot(self, metric: str, over: Sequence[str] | None = None) -> Figure:
         """A result over one axis as a curve, over two as a map (`plots.sweep`)."""
         from jaxdamp.plots import sweep
 

@@ -6,7 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import jax
 import numpy as np
@@ -14,16 +14,13 @@ import numpy as np
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Dataset
 from jaxdamp.blocks import AbstractWork, Blocks, BlockStore, Cluster, Variable, block_size, run_blocks
 from jaxdamp.sweeps.axes import PARAMETER, AbstractPoints, Grid, Points, as_points
 from jaxdamp.sweeps.function import Gradients, PointFunction
 from jaxdamp.sweeps.program import quiet
 from jaxdamp.sweeps.running import Computation, Runner, tell
 from jaxdamp.sweeps.table import Table
-
-
-if TYPE_CHECKING:
-    import xarray
 
 
 PROBES, PROBE = 4, 1024  # pieces of so many computed points, by which two rules are told apart
@@ -46,7 +43,7 @@ class BlockProgram(AbstractWork):
         """What is computed at a point, as it was given."""
         return self._computation.given
 
-    def run(self, number: int) -> "xarray.Dataset":
+    def run(self, number: int) -> Dataset:
         """The results of one block, along the dimension `point`; counted from 0."""
         if not 0 <= number < self.blocks.count:
             _checks.refuse("number", f"be from 0 to {self.blocks.count - 1}", number)
@@ -111,7 +108,7 @@ class BlockProgram(AbstractWork):
         store.create(tuple(points.shape), variables, coordinates)
         return store
 
-    def dataset(self, store: BlockStore) -> "xarray.Dataset":
+    def dataset(self, store: BlockStore) -> Dataset:
         """The labelled results in a store, read when they are asked for."""
         from jaxdamp.sweeps import accessor  # noqa: F401  (gives datasets their `.jaxdamp`)
 
@@ -155,7 +152,7 @@ def block_program(
 
 def sweep_into_store(
     computation: Computation, path: str, cluster: Cluster, progress: Callable[[int, int], None] | None
-) -> "xarray.Dataset":
+) -> Dataset:
     """Compute the blocks that a store lacks, and give all results, read when they are asked for."""
     program = BlockProgram(computation)
     store, total = program.store(path), computation.points.count

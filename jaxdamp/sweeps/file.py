@@ -7,18 +7,15 @@ import warnings
 import zlib
 from collections.abc import Hashable
 from pathlib import Path
-from typing import TYPE_CHECKING, final
+from typing import final
 
 import jax
 import numpy as np
 
 from jaxdamp import _checks
+from jaxdamp._types import DataArray, Dataset
 from jaxdamp._writing import whole
 from jaxdamp.sweeps.table import Table
-
-
-if TYPE_CHECKING:
-    import xarray
 
 
 INTERVAL = 10.0  # s between two writings
@@ -91,7 +88,7 @@ class SweepFile:
             stacklevel=5,
         )
 
-    def _differences(self, stored: "xarray.Dataset") -> list[str]:
+    def _differences(self, stored: Dataset) -> list[str]:
         """What keeps the file from being a part of this sweep, in words."""
         if MARK not in stored.attrs or "done" not in stored:
             return ["it was not written by `jaxdamp.sweep`"]
@@ -154,7 +151,7 @@ def _other_axis(name: str, stored: np.ndarray, new: np.ndarray) -> str:
     return f"the axis {name!r} has other values ({old}; now {now})"
 
 
-def _other_result(name: Hashable, stored: "xarray.DataArray", new: "xarray.DataArray") -> str:
+def _other_result(name: Hashable, stored: DataArray, new: DataArray) -> str:
     """In what the type or shape of a result differ; empty if they do not."""
     if stored.dtype.newbyteorder("=") == new.dtype and stored.shape == new.shape:
         return ""

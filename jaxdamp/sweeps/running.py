@@ -12,7 +12,6 @@ import numpy as np
 
 from jaxdamp._progress import Progress
 from jaxdamp.sweeps.axes import AbstractPoints, Points
-from jaxdamp.sweeps.devices import choose_devices
 from jaxdamp.sweeps.function import (
     Gradients,
     HasDomain,
@@ -24,7 +23,7 @@ from jaxdamp.sweeps.function import (
     Traced,
     trace,
 )
-from jaxdamp.sweeps.program import Program, forget_errors, prepare, with_chunk
+from jaxdamp.sweeps.program import Program, choose_devices, forget_errors, prepare, with_chunk
 from jaxdamp.sweeps.table import Table
 
 

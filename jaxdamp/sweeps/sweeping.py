@@ -2,13 +2,13 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._progress import Progress
 from jaxdamp._traced import of_known_numbers
+from jaxdamp._types import Dataset
 from jaxdamp.blocks import Cluster
 from jaxdamp.sweeps.axes import AbstractPoints, as_points
 from jaxdamp.sweeps.block_program import is_store, sweep_into_store
@@ -17,10 +17,6 @@ from jaxdamp.sweeps.function import Gradients, PointFunction
 from jaxdamp.sweeps.program import quiet
 from jaxdamp.sweeps.running import COMPILED, Computation, tell
 from jaxdamp.sweeps.table import extent
-
-
-if TYPE_CHECKING:
-    import xarray
 
 
 @of_known_numbers
@@ -34,7 +30,7 @@ def sweep(
     file: str | os.PathLike[str] | None = None,
     cluster: Cluster = None,
     progress: Callable[[int, int], None] | None = None,
-) -> "xarray.Dataset":
+) -> Dataset:
     """Compute a function at every point of a grid, a list or a sample: all cores, or all GPUs, many points at a time.
 
     A point at which a result is not finite, or at which the function raises while it runs (`equinox.error_if`), does

@@ -3,16 +3,13 @@
 import dataclasses
 import warnings
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
 
+from jaxdamp._types import Dataset
 from jaxdamp.sweeps.axes import PARAMETER, AbstractPoints, Columns
 from jaxdamp.sweeps.function import Traced
-
-
-if TYPE_CHECKING:
-    import xarray
 
 
 MOST_REASONS = 4  # that a warning names
@@ -71,7 +68,7 @@ class Table:
                 self.reasons.append(reason)
             self.reason[indices] = self.reasons.index(reason)
 
-    def label(self) -> "xarray.Dataset":
+    def label(self) -> Dataset:
         """The results with the names, values and units of the axes."""
         import xarray
 

@@ -13,7 +13,7 @@
 - `compare_dampers`: differences between dampers with error bars; `valving`: a mono-tube damper for a wanted force.
 """
 
-from jaxdamp._deprecated import answer_old_names
+from jaxdamp._guesses import answer_old_names
 from jaxdamp._status import Status
 from jaxdamp.tune.decisions import DamperComparison as DamperComparison, compare_dampers
 from jaxdamp.tune.front import ParetoFront as ParetoFront, hypervolume as hypervolume

@@ -177,8 +177,11 @@ def _judged(states: Sequence[SearchState], problem: FrontProblem) -> tuple[list[
     values = [task.numbers(state.evaluation.values) for state in states]
     short = [missed(problem.limits, of_state, task.tolerance) for of_state in values]
     allowed = [state for state, limits in zip(states, short, strict=True) if not limits]
-    if not allowed:
-        return _nearest(states, values, short, task)
+    if not allowed:  # the point that is nearest to the limits
+        beyond = [max(-limit.margin(v[limit.name]) for limit in s) for s, v in zip(short, values, strict=True)]
+        i, space = int(np.argmin(beyond)), task.space
+        design = np.clip(states[i].y * space.unit, space.lower, space.upper)
+        return [states[i]], Status.LIMIT_NOT_MET, missed_notes(short[i], values[i], space.changes(design))
     notes = []
     if len(allowed) < len(states):
         names = dict.fromkeys(limit.of for limits in short for limit in limits)
@@ -200,19 +203,6 @@ def _ends_of(best: Sequence[SearchState], max_steps: int) -> tuple[Status, list[
         return Status.CONVERGED, []
     status = Status.STEP_LIMIT if any(state.steps >= max_steps for state in failed) else Status.NO_BETTER_STEP
     return status, [f"{len(failed)} of {len(best)} points are not optima: {status.sentence}"]
-
-
-def _nearest(
-    states: Sequence[SearchState],
-    values: Sequence[Mapping[str, float]],
-    short: Sequence[Sequence[Limit]],
-    task: DesignTask[Any],
-) -> tuple[list[SearchState], Status, list[str]]:
-    """Where no search met the limits: the point that is nearest to them."""
-    beyond = [max(-limit.margin(v[limit.name]) for limit in s) for s, v in zip(short, values, strict=True)]
-    i, space = int(np.argmin(beyond)), task.space
-    design = np.clip(states[i].y * space.unit, space.lower, space.upper)
-    return [states[i]], Status.LIMIT_NOT_MET, missed_notes(short[i], values[i], space.changes(design))
 
 
 def _at_bounds(best: Sequence[SearchState], task: DesignTask[Any]) -> list[str]:

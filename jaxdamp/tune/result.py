@@ -4,7 +4,7 @@ import dataclasses
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -13,6 +13,7 @@ from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._status import Status
 from jaxdamp._tables import Column, Compared, Table, comparison_table, percent_change, plain, with_unit
+from jaxdamp._types import Figure
 from jaxdamp.tune.limits import LimitRange, written
 from jaxdamp.tune.objective import Objective, Targets
 from jaxdamp.tune.ranges import Change
@@ -20,10 +21,6 @@ from jaxdamp.tune.rescoring import Rescore, Spectrum, spectra
 from jaxdamp.tune.scenarios import Road
 from jaxdamp.tune.verdict import Verdict, mean_change, verdict_of
 from jaxdamp.vehicles import AbstractVehicle
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 V = TypeVar("V", bound=AbstractVehicle)
@@ -131,7 +128,7 @@ class TuneResult(AbstractResult, Generic[V]):
         """Better or not, by how much and at what price: on fresh roads if there are any."""
         return verdict_of(self)
 
-    def plot(self, kind: str = "changes", **options: Any) -> "Figure":
+    def plot(self, kind: str = "changes", **options: Any) -> Figure:
         """The laws and the metrics before and after, or the sheet of the ride.
 
         Arguments:

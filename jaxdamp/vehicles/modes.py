@@ -1,7 +1,7 @@
 """Natural modes of a vehicle: frequencies, damping, shapes."""
 
 import dataclasses
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,12 +10,9 @@ from jaxtyping import Array, Complex, Float
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Contents, Table, plain, with_unit
+from jaxdamp._types import Figure
 from jaxdamp.vehicles.base import AbstractVehicle
 from jaxdamp.vehicles.linear import LinearVehicle, as_linear, linearise
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,7 +53,7 @@ class Modes(AbstractResult):
         """−Re λ/|λ|."""
         return -np.real(self.poles) / np.abs(self.poles)
 
-    def plot(self) -> "matplotlib.figure.Figure":
+    def plot(self) -> Figure:
         """The shape of each oscillation (`plots.modes`)."""
         from jaxdamp import plots
 

@@ -20,9 +20,9 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float, PyTree
 
-from jaxdamp._dependence import depends
 from jaxdamp._limits import at_least, within
 from jaxdamp._matrices import solve
+from jaxdamp._traced import depends
 from jaxdamp._types import Scalar, State
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.vehicles.equilibrium import rest_position

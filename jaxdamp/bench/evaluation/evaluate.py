@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +16,6 @@ from jaxdamp.bench.evaluation.result import Evaluation
 from jaxdamp.bench.evaluation.separation import GasAndFriction, separate_gas_and_friction
 from jaxdamp.bench.runs import BenchRun
 from jaxdamp.bench.settings import by_number, settings_apart
-
-
-if TYPE_CHECKING:
-    pass
 
 
 WINDOW = 0.05  # share of a stated velocity within which samples, or records, count as taken at it

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
 
@@ -14,11 +14,8 @@ from jaxdamp import _checks
 from jaxdamp._documents import read_text
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table, plain
+from jaxdamp._types import Figure
 from jaxdamp.bench.evaluation.measurements import Measurement, at_velocity
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 COLUMNS = ("quantity", "minimum", "maximum", "velocity", "setting", "record")
@@ -106,7 +103,7 @@ class LimitCheck(AbstractResult):
         """How many limits are kept."""
         return f"{len(self.results) - len(self.warnings)} of {len(self.results)} limits are kept."
 
-    def plot(self) -> "matplotlib.figure.Figure":
+    def plot(self) -> Figure:
         """Each measured value between its limits (`plots.limit_check`)."""
         from jaxdamp import plots
 

@@ -2,23 +2,20 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
 
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult, plotted
 from jaxdamp._tables import Cell, Column, Compared, Table, comparison_table, percent_change, plain
+from jaxdamp._types import Figure
 from jaxdamp.bench.analysis import FoldedCycles
 from jaxdamp.bench.contradictions import repeats
 from jaxdamp.bench.evaluation.limits import Limit, LimitCheck
 from jaxdamp.bench.evaluation.measurements import Measurement, at_velocity, measured
 from jaxdamp.bench.evaluation.separation import GasAndFriction
 from jaxdamp.bench.runs import BenchRun
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 _PEAKS = ("rebound velocity", "rebound force", "compression velocity", "compression force", "rebound/compression ratio")
@@ -171,7 +168,7 @@ class Evaluation(AbstractResult):
         """All measurements as plain data."""
         return {"method": self.method, "notes": list(self.notes), "measurements": plain(self._list().records())}
 
-    def plot(self, kind: "str | Evaluation" = "cycles", **options: object) -> "matplotlib.figure.Figure":
+    def plot(self, kind: "str | Evaluation" = "cycles", **options: object) -> Figure:
         """Mean loops over velocity, stroke, acceleration and time, and forces over velocity; or the damper's sheet.
 
         Arguments:

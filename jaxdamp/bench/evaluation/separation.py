@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from jaxtyping import Float
@@ -10,14 +10,11 @@ from jaxtyping import Float
 from jaxdamp import _checks
 from jaxdamp._results import AbstractResult
 from jaxdamp._tables import Column, Table
+from jaxdamp._types import Figure
 from jaxdamp.bench.analysis import FoldedCycles, fold_cycles
 from jaxdamp.bench.evaluation.measurements import Measurement, measured
 from jaxdamp.bench.motion import Samples
 from jaxdamp.bench.runs import BenchRun
-
-
-if TYPE_CHECKING:
-    import matplotlib.figure
 
 
 LOW_SPEED = 0.05  # m/s, up to which damping is taken as a straight line or a parabola
@@ -110,7 +107,7 @@ class GasAndFriction(AbstractResult):
         """The figures as plain data."""
         return {"record": self.record, "note": self.note, **self.table().to_dict()}
 
-    def plot(self) -> "matplotlib.figure.Figure":
+    def plot(self) -> Figure:
         """Force over stroke in both directions, with the even and the odd part."""
         from jaxdamp import plots
 
