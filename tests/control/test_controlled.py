@@ -1,5 +1,7 @@
 """A controlled vehicle in simulations, rides, sweeps and derivatives, and what is refused."""
 
+from typing import cast
+
 import diffrax
 import equinox as eqx
 import jax
@@ -188,7 +190,10 @@ def test_single_precision_drives_too(car):
         (lambda: Controlled(quarter(Linear(1500.0)), Skyhook()), "`car` must have a damper with one `Scheduled` law"),
         (lambda: Controlled(quarter(Lag(DAMPER, 0.01)), Skyhook()), "`damper` must have a force that changes at once"),
         (lambda: Controlled(quarter(), {"rear_damper": Skyhook()}), "`policy` must be one of 'damper'"),
-        (lambda: Controlled(quarter(), dict.fromkeys(["damper"], 3000.0)), r"`policy\['damper'\]` must be a policy"),
+        (
+            lambda: Controlled(quarter(), {"damper": cast("AbstractPolicy", 3000.0)}),
+            r"`policy\['damper'\]` must be a policy",
+        ),
         (lambda: Controlled(quarter(), Skyhook(), period=0.0), "`period` must"),
         (lambda: Controlled(quarter(), Skyhook(), delay=-1e-3), "`delay` must not be negative"),
         (lambda: Controlled(quarter(), Skyhook(gain=-1.0)), "gain"),
