@@ -133,14 +133,15 @@ def fit(
             either from the records, if its argument is called `runs`, or from all samples `(velocity, force)`, with
             `stroke` and `time` if it has arguments of these names.
         runs: one or more records.
-        rig: the test machine, if it adds to the force of the damper. Its parameters that differ from their defaults are
-            free, with these values as start, beside those of the law: `rig=Rig(gas_force=-100.0, force_delay=1e-3)`
-            estimates a gas force and a delay. `freeze` the known ones (`"rig.moving_mass"`). Names of effects get their
-            starts from the records: `rig=["gas", "friction", "delay"]`, out of offset, gas, gas_stiffness, friction,
-            mass, delay, lag, stroke_offset, heat. An offset or gas force named so is the whole static force: a
-            constant force of the law is held at zero, or zero at rest in a table, unless the call gives it a value; it
-            is left out beside a law with a static force of its own meaning, such as a gas charge. All paths of
-            parameters then begin with `law.` or `rig.`; their last parts stay the same.
+        rig: the test machine, if it adds to the force of the damper; the load cell of measured records nearly always
+            has a zero error, `rig="offset"`, which `compare` fits if nothing is said. Its parameters that differ from
+            their defaults are free, with these values as start, beside those of the law: `rig=Rig(gas_force=-100.0,
+            force_delay=1e-3)` estimates a gas force and a delay. `freeze` the known ones (`"rig.moving_mass"`). Names
+            of effects get their starts from the records: `rig=["gas", "friction", "delay"]`, out of offset, gas,
+            gas_stiffness, friction, mass, delay, lag, stroke_offset, heat. An offset or gas force named so is the whole
+            static force: a constant force of the law is held at zero, or zero at rest in a table, unless the call gives
+            it a value; it is left out beside a law with a static force of its own meaning, such as a gas charge. All
+            paths of parameters then begin with `law.` or `rig.`; their last parts stay the same.
         over: parameters of the law to fit, by path, last part of a path, or pattern; all if left out.
         freeze: parameters to hold at their start, named in the same way.
         bounds: extra limits `{name: (lower, upper)}` in the parameter's unit.
