@@ -96,9 +96,9 @@ class Controlled(AbstractVehicle):
         return {name: self.policy[name] for name in dampers if name in self.policy}
 
     @property
-    def has_controller(self) -> bool:
-        """It has."""
-        return True
+    def passive(self) -> AbstractVehicle:
+        """The vehicle without the controller, its dampers at the commands that their laws have."""
+        return self.car.passive
 
     def frame(self) -> Frame:
         """The parts of the vehicle."""

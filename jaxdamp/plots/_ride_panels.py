@@ -44,7 +44,7 @@ def vehicle(axes: Axes, shown: _rides.Rides) -> None:
         tyre = f"{mass}tyre\n{_style.short(1e-3 * float(wheel.stiffness))} N/mm"
         axes.text(x + 0.075, 0.2, tyre, ha="left", **small)
     axes.axhline(0.03, color=_style.BLACK, linewidth=1.0)
-    frequencies = [_style.short(float(f)) for f in modes(shown.cars[1]).undamped_frequency]
+    frequencies = [_style.short(float(f)) for f in modes(shown.cars[1].passive).undamped_frequency]
     axes.set_title(f"Natural frequencies {', '.join(frequencies[:6])} Hz", loc="left")
 
 

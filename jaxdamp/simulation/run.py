@@ -297,7 +297,7 @@ def check_control(engine: AbstractEngine, system: System, dt: float) -> None:
     if control is None:
         return
     if not engine.runs_controllers:
-        remedy = "Leave it out, or drive the vehicle inside, `vehicle.car`, with its dampers at fixed commands."
+        remedy = "Leave it out, or drive `vehicle.passive`, with its dampers at fixed commands."
         _checks.refuse("engine", "have fixed steps to run a controller", repr(engine), remedy)
     for name in ("period", "delay"):
         value: float = getattr(control, name)

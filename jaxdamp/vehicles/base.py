@@ -43,9 +43,9 @@ class AbstractVehicle(Module):
         return _assembled(self)
 
     @property
-    def has_controller(self) -> bool:
-        """Whether its dampers are commanded while it drives (`control.Controlled`)."""
-        return False
+    def passive(self) -> "AbstractVehicle":
+        """The vehicle without its controller (`control.Controlled`), its dampers at fixed commands; mostly itself."""
+        return self
 
     @property
     def layout(self) -> Layout:
@@ -150,8 +150,8 @@ def refuse_controller(vehicle: AbstractVehicle, asker: str) -> None:
         vehicle: any vehicle.
         asker: what is asked for, in words.
     """
-    if vehicle.has_controller:
-        remedy = "Pass the vehicle inside, `vehicle.car`, whose dampers have fixed commands."
+    if vehicle.passive is not vehicle:
+        remedy = "Pass `vehicle.passive`, whose dampers have fixed commands."
         _checks.refuse("vehicle", f"be without a controller for {asker}", type(vehicle).__name__, remedy)
 
 

@@ -19,6 +19,7 @@ from jaxdamp.vehicles import Corner, HalfCar, QuarterCar
 
 METRICS = ["rms_sprung_acceleration", "rms_dynamic_tyre_load"]
 DAMPER = Scheduled((Linear(300.0), Linear(3900.0)), levels=[0.0, 1.0], command=0.25)
+NO_POLICY = cast("AbstractPolicy", 3000.0)
 ROAD = roads.iso8608("C", speed=20.0, seed=1, duration=4.0)
 
 
