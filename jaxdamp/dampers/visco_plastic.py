@@ -78,8 +78,8 @@ class AbstractViscoPlastic(AbstractDamper):
         del x
         deflections = self._deflections(state)
         width = self.flow_velocity  # over which |v| is rounded: K v (v² + v_f²)^((n−1)/2)
-        viscous = self.viscous_force * v * power(v * v + width * width, 0.5 * (self.exponent - 1.0))
-        flow = self.yield_force * jnp.tanh(v / width) + viscous
+        flow = self.yield_force * jnp.tanh(v / width)
+        flow = flow + self.viscous_force * v * power(v * v + width * width, 0.5 * (self.exponent - 1.0))
         elements = jax.vmap(element_force)(deflections, self.sliding_forces, self.elastic_travels, self.clearances)
         return self._sided(v, flow) + jnp.sum(jax.vmap(self._sided)(deflections, elements))
 
