@@ -141,6 +141,8 @@ def _controlled_system(vehicle: Controlled, layout: Layout) -> System:
     system, frame = vehicle.car.system(), vehicle.car.frame()
     takes = [name for name, law in zip(system.layout.ports, system.laws, strict=True) if len(scheduled_in(law)) == 1]
     policies = vehicle.policies(takes)
+    if not policies:
+        _checks.refuse("car", "have a damper that takes a command, for its controller", ", ".join(system.layout.ports))
     ports = tuple(system.layout.ports.index(name) for name in policies)
     wheels = {name for wheel in frame.wheels for name in wheel.point.terms}
     sprung = jnp.array([0.0 if name in wheels else 1.0 for name in system.layout.coordinates])

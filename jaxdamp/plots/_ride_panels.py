@@ -13,7 +13,6 @@ from jaxdamp.plots import _rides, _sheet, _style, fitted_range
 from jaxdamp.plots.rides import default_channels
 from jaxdamp.rig import quasi_static
 from jaxdamp.roads import assess_roughness, class_limits, road_class
-from jaxdamp.vehicles import modes
 
 
 _MM, _BINS, _MOST_BARS = 1e3, 31, 6
@@ -44,7 +43,7 @@ def vehicle(axes: Axes, shown: _rides.Rides) -> None:
         tyre = f"{mass}tyre\n{_style.short(1e-3 * float(wheel.stiffness))} N/mm"
         axes.text(x + 0.075, 0.2, tyre, ha="left", **small)
     axes.axhline(0.03, color=_style.BLACK, linewidth=1.0)
-    frequencies = [_style.short(float(f)) for f in modes(shown.cars[1].passive).undamped_frequency]
+    frequencies = [_style.short(float(f)) for f in shown.frequencies]
     axes.set_title(f"Natural frequencies {', '.join(frequencies[:6])} Hz", loc="left")
 
 
@@ -218,9 +217,9 @@ def spectrum(axes: Axes, shown: _rides.Rides) -> None:
     for label, style, number in shown.styles():
         axes.loglog(*_rides.smoothed(*pair[number]), label=label, **style)
     low, high = axes.get_ylim()
-    for frequency in modes(shown.cars[1]).undamped_frequency:
+    for frequency in shown.frequencies:
         axes.axvspan(frequency / 1.15, frequency * 1.15, color=_style.SHADE, linewidth=0.0, zorder=0.1)
-    frequencies = np.asarray(modes(shown.cars[1]).undamped_frequency, float)
+    frequencies = shown.frequencies
     for word, group in (("body", frequencies[frequencies < 4.0]), ("wheels", frequencies[frequencies >= 4.0])):
         if group.size:
             middle = float(np.exp(np.mean(np.log(group))))

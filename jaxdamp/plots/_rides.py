@@ -19,7 +19,7 @@ from jaxdamp.rig import quasi_static
 from jaxdamp.roads import WhiteRoad, from_profile
 from jaxdamp.simulation import Response, Ride, simulate
 from jaxdamp.tune import Rescore, TuneResult, damper_paths, limit_spans
-from jaxdamp.vehicles import AbstractVehicle
+from jaxdamp.vehicles import AbstractVehicle, modes
 
 
 GOALS = {"comfort": "body acceleration", "travel": "suspension travel", "grip": "tyre load variation"}
@@ -106,6 +106,11 @@ class Rides:
         rate = np.abs(np.asarray(self.responses[0].road_rate)[:, 0])
         return float(np.mean(rate > 1e-3 * rate.max())) < _EVENT if rate.max() > 0.0 else True
 
+    @functools.cached_property
+    def frequencies(self) -> np.ndarray:
+        """Undamped, of the last vehicle at its equilibrium [Hz]."""
+        return np.asarray(modes(self.cars[1].passive).undamped_frequency, float)
+
     def styles(self) -> list[tuple[str, _style.Look, int]]:
         """Label, look and number of what is drawn: one ride, or before and after."""
         if self.single:
@@ -122,7 +127,7 @@ class Rides:
 
 def constant_damping(shown: Rides, comfort: Sequence[str], grip: Sequence[str]) -> tuple[np.ndarray, np.ndarray] | str:
     """The mean metrics of comfort and grip with linear dampers from soft to firm; or why they cannot be driven."""
-    car = without_fitted_ranges(shown.cars[0])
+    car = without_fitted_ranges(shown.cars[0].passive)
     paths = damper_paths(car)
     rates = {path: _slope(get(car, path)) for path in paths}
     try:
