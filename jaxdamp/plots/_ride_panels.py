@@ -8,7 +8,6 @@ import numpy as np
 from jaxdamp import metrics
 from jaxdamp._tables import typeset_unit
 from jaxdamp._types import Axes
-from jaxdamp.parameters import get
 from jaxdamp.plots import _rides, _sheet, _style, fitted_range
 from jaxdamp.plots.rides import default_channels
 from jaxdamp.rig import quasi_static
@@ -175,22 +174,25 @@ def _bar(axes: Axes, shown: _rides.Rides, row: int, name: str) -> None:
 
 def damper(curves: Axes, shares: Axes, shown: _rides.Rides, path: str) -> None:
     """A damper before and after over mm/s, and the share of time at each velocity with its four quadrants."""
-    laws = [get(car, path) for car in shown.cars]
+    laws = [shown.laws(path, number) for number in (0, 1)]
     velocities = [_rides.damper_velocity(shown, path, number) for number in (0, 1)]
     known = [np.abs(v).max() for v in velocities if v is not None]
     reach = 1.05 * float(max(known)) if known else 1.0
     points = np.linspace(-reach, reach, 401)
     for label, style, number in shown.styles():
-        force = np.asarray(quasi_static(laws[number], points).force)
-        fitted_range.curve(curves, laws[number], points, force, label=label or "law", **style)
+        for law in laws[number]:
+            force = np.asarray(quasi_static(law, points).force)
+            fitted_range.curve(curves, law, points, force, label=label or "law", **style)
+            label = "_"  # the others of a damper at several commands
         velocity = velocities[number]
         if velocity is not None:
             edges = np.linspace(-reach, reach, _BINS + 1)
             share = 100.0 * np.asarray(metrics.velocity_histogram(velocity, edges))
             shares.step(0.5 * (edges[1:] + edges[:-1]), share, where="mid", **style)
-    fitted_range.shade(curves, laws, points)
+    fitted_range.shade(curves, [law for of_one in laws for law in of_one], points)
     _thousandths(curves, shares)
-    _style.dress(curves, "", "force [N]", f"{_style.in_words(path).removesuffix(' law').capitalize()}")
+    title = _style.first_upper(_style.in_words(path.removeprefix("car.")).removesuffix(" law"))
+    _style.dress(curves, "", "force [N]", title + ", at all levels of its command" * (len(laws[1]) > 1))
     _style.cross(curves)
     _style.dress(shares, "velocity [mm/s]   (+ rebound)", "time [%]", _rides.quadrants(velocities[1]))
     curves.tick_params(labelbottom=False)
@@ -256,6 +258,8 @@ def event(axes: Axes, shown: _rides.Rides) -> None:
         )
         words = f"up {_style.short(values.max())} {unit}, down {_style.short(values.min())} {unit}{over}, {settled}"
         axes.plot(time, values, label=f"{label}: {words}" if label else words, **style)
-    _style.dress(axes, "time [s]", f"[{unit}]   (+ up)", f"{_style.metric_words(channel).capitalize()} over the bump")
+    _style.dress(
+        axes, "time [s]", f"[{unit}]   (+ up)", f"{_style.first_upper(_style.metric_words(channel))} over the bump"
+    )
     _style.cross(axes, vertical=False)
     axes.legend(frameon=False, loc="best")

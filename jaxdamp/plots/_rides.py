@@ -12,7 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxdamp import metrics
-from jaxdamp.dampers import Linear, without_fitted_ranges
+from jaxdamp.control import laws_at_levels
+from jaxdamp.dampers import AbstractDamper, Linear, takes_command, without_fitted_ranges
 from jaxdamp.parameters import get
 from jaxdamp.plots import _style
 from jaxdamp.rig import quasi_static
@@ -117,6 +118,11 @@ class Rides:
             return [("", dict(_style.AFTER), 1)]
         words = [_style.in_words(name) for name in self.names]
         return [(words[0], dict(_style.BEFORE), 0), (words[1], dict(_style.AFTER), 1)]
+
+    def laws(self, path: str, number: int) -> list[AbstractDamper]:
+        """The law of a vehicle at a path; where a controller commands it, at all levels of its command."""
+        car, law = self.cars[number], get(self.cars[number], path)
+        return [law] if car.passive is car or not takes_command(law) else laws_at_levels(law)
 
     def dampers(self) -> list[str]:
         """The paths of the first laws that differ, or of the first ones."""

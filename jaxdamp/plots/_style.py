@@ -314,6 +314,11 @@ def law_name(law: AbstractDamper) -> str:
     return f"{law_name(inside[0])} + {words}" if len(inside) == 1 else words
 
 
+def first_upper(words: str) -> str:
+    """Words that begin a sentence; units and names inside stay as they are."""
+    return words[:1].upper() + words[1:]
+
+
 def class_words(part: Any) -> str:
     """The name of a class in words: "digressive progressive" of a DigressiveProgressive, "half car" of a HalfCar."""
     return in_words(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(part).__name__).lower())

@@ -45,7 +45,8 @@ def ride_sheet(
     with _sheet.lettering():
         figure = _sheet.page()
         rows = figure.add_gridspec(5, 1, height_ratios=(1.0, 1.9, 3.2, 3.0, 3.0), hspace=0.02)
-        title = name or _style.class_words(shown.cars[0]).capitalize()
+        car = shown.cars[0]
+        title = name or _style.first_upper("controlled " * (car.passive is not car) + _style.class_words(car.passive))
         top = figure.add_subplot(rows[0].subgridspec(1, 1)[0])
         _sheet.head(top, title, sentence or _changes(shown), _facts(shown), **answer)
         first = [figure.add_subplot(at) for at in rows[1].subgridspec(1, 2, width_ratios=(1.0, 1.15))]
@@ -73,7 +74,7 @@ def _changes(shown: _rides.Rides) -> str:
             change = _style.percent(100.0 * (after / before - 1.0)) if before else "–"
             said.append(f"{words} {_style.quantity(after, shown.units[names[0]]) if shown.single else change}")
     first, last = map(_style.in_words, shown.names)
-    return ", ".join(said).capitalize() if shown.single else f"{last} against {first}: {', '.join(said)}"
+    return _style.first_upper(", ".join(said)) if shown.single else f"{last} against {first}: {', '.join(said)}"
 
 
 def _facts(shown: _rides.Rides) -> str:

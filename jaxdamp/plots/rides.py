@@ -206,7 +206,7 @@ def damper_use(responses: Response | Mapping[str, Response], *, damper: str | No
     reached = np.linspace(-reach, reach, _SHADE_POINTS)
     shaded = [fitted_range.shade(axes, laws.values(), reached) for axes in (trace, time_share, energy_share)]
     handles += shaded[0]
-    words = f"{damper.replace('_', ' ').capitalize()}: law (thick) and its forces in the ride (thin)"
+    words = f"{_style.first_upper(damper.replace('_', ' '))}: law (thick) and its forces in the ride (thin)"
     _style.dress(trace, _style.VELOCITY, _style.FORCE, words)
     _style.cross(trace)
     _style.dress(time_share, "velocity [m/s]", "share of time [%]", f"Time, {reach / _BINS * 2:.2g} m/s a step")

@@ -10,12 +10,15 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from jaxdamp import bench, plots
+from jaxdamp import bench, plots, roads, simulate
 from jaxdamp.bench import BenchSet
+from jaxdamp.control import Controlled, Skyhook
+from jaxdamp.dampers import Linear, Scheduled
 from jaxdamp.identify import Comparison
 from jaxdamp.plots import _style
 from jaxdamp.simulation import Response
 from jaxdamp.tune import TuneResult
+from jaxdamp.vehicles import QuarterCar
 
 
 # Machado, Oliveira and Fernandes (2009), severity 1, for linear RGB.
@@ -85,6 +88,18 @@ def test_colours_differ_for_everybody_and_stand_out_from_paper() -> None:
     ordered = [_style.graded(i, 8) for i in range(8)]
     assert all(contrast(colour) >= 3.0 for colour in [*palette, *meant])
     assert all(contrast(colour) >= 2.5 for colour in ordered)  # labelled at their ends, or in a legend
+
+
+def test_a_sheet_of_a_controlled_car_shows_its_damper_at_all_levels() -> None:
+    damper = Scheduled((Linear(300.0), Linear(900.0), Linear(3900.0)), levels=[0.0, 1.0, 2.0], command=0.0)
+    car = Controlled(QuarterCar(400.0, 50.0, 20e3, 250e3, damper), Skyhook())
+    figure = simulate(car, roads.iso8608("C", speed=20.0, seed=1), duration=1.0).plot("sheet")
+    printed = [text.get_text().replace("\n", " ") for text in texts(figure)]
+    assert any(re.search(r"tyre load variation [\d.]+ N$", text) for text in printed)  # "n" when it was capitalised
+    assert any(text.startswith("Controlled quarter car") for text in printed)
+    (curves,) = (axes for axes in figure.axes if "all levels" in axes.get_title(loc="left"))
+    slopes = {round(float(np.ptp(line.get_ydata()) / np.ptp(line.get_xdata()))) for line in curves.get_lines()[:3]}
+    assert slopes == {300, 900, 3900}
 
 
 def test_lines_that_have_a_name_stand_out(figures: dict[str, Figure]) -> None:
