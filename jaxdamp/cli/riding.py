@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from jaxdamp import _checks, export, roads, simulate
 from jaxdamp.cli.console import Screen
+from jaxdamp.cli.controlling import Controlling
 from jaxdamp.cli.early import refuse_road
 from jaxdamp.cli.jobs import Output, job, with_step_warnings, without_range_warnings, write_tables
 from jaxdamp.cli.options import Call
@@ -103,6 +104,7 @@ def ride(
     road: str = "iso:C",
     driving: Driving,
     how: Annotated[Call, "simulation.simulate"],
+    controlling: Controlling,
     baseline: Path | None = None,
     output: Output,
 ) -> None:
@@ -111,6 +113,8 @@ def ride(
     The law is at every damper of the vehicle.
     """
     make = parse_vehicle(vehicle)
+    if baseline is None and controlling.controller is not None:
+        baseline = law  # at its own command
     files = ({} if baseline is None else {"baseline": baseline}) | {"law": law}
     laws = {name: read_law(name, path) for name, path in files.items()}
     (surface,), run = driving.over(road)
@@ -124,7 +128,7 @@ def ride(
         with screen.stage("Driving", total=len(laws)) as advance:
             for done, (name, damper) in enumerate(laws.items()):
                 advance(name, done)
-                car = make(damper)
+                car = controlling.of(make(damper), damper) if name == "law" else make(damper)
                 with without_range_warnings():
                     responses[name], warned = with_step_warnings(
                         lambda car=car: simulate(car, surface, **how.arguments(**run))

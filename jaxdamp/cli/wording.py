@@ -40,7 +40,7 @@ CALLS = {
     r"`process\(skip_cycles=[^)]*\)`": "--cycles skip:1",
     r"subtract it, `process\(without=[^`]*`": "fit it beside the law, --rig gas",
     r"`bounds=\{[^`]*`": "--bound",
-    r"`dt=([^`]*)`": r"`--dt \1`",
+    r"`(dt|period|delay)=([^`]*)`": r"`--\1 \2`",
     r"Pass `tyre_lifts=True` to the vehicle": "Write tyre_lifts = true into a vehicle file, as for --vehicle car.toml,",
     r"`process\(delay=[^)]*\)`": "fit with --rig delay",
     r'`units=\{"(\w+)": "(\w+)"\}`': r"--units \1=\2",

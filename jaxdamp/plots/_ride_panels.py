@@ -191,7 +191,7 @@ def damper(curves: Axes, shares: Axes, shown: _rides.Rides, path: str) -> None:
             shares.step(0.5 * (edges[1:] + edges[:-1]), share, where="mid", **style)
     fitted_range.shade(curves, [law for of_one in laws for law in of_one], points)
     _thousandths(curves, shares)
-    title = _style.first_upper(_style.in_words(path.removeprefix("car.")).removesuffix(" law"))
+    title = _style.first_upper(_style.in_words(path).removesuffix(" law"))
     _style.dress(curves, "", "force [N]", title + ", at all levels of its command" * (len(laws[1]) > 1))
     _style.cross(curves)
     _style.dress(shares, "velocity [mm/s]   (+ rebound)", "time [%]", _rides.quadrants(velocities[1]))

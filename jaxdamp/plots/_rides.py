@@ -107,10 +107,15 @@ class Rides:
         rate = np.abs(np.asarray(self.responses[0].road_rate)[:, 0])
         return float(np.mean(rate > 1e-3 * rate.max())) < _EVENT if rate.max() > 0.0 else True
 
+    @property
+    def passive(self) -> tuple[AbstractVehicle, AbstractVehicle]:
+        """The vehicles without their controllers."""
+        return self.cars[0].passive, self.cars[1].passive
+
     @functools.cached_property
     def frequencies(self) -> np.ndarray:
         """Undamped, of the last vehicle at its equilibrium [Hz]."""
-        return np.asarray(modes(self.cars[1].passive).undamped_frequency, float)
+        return np.asarray(modes(self.passive[1]).undamped_frequency, float)
 
     def styles(self) -> list[tuple[str, _style.Look, int]]:
         """Label, look and number of what is drawn: one ride, or before and after."""
@@ -121,19 +126,19 @@ class Rides:
 
     def laws(self, path: str, number: int) -> list[AbstractDamper]:
         """The law of a vehicle at a path; where a controller commands it, at all levels of its command."""
-        car, law = self.cars[number], get(self.cars[number], path)
+        car, law = self.cars[number], get(self.passive[number], path)
         return [law] if car.passive is car or not takes_command(law) else laws_at_levels(law)
 
     def dampers(self) -> list[str]:
         """The paths of the first laws that differ, or of the first ones."""
-        paths = damper_paths(self.cars[0])
-        differ = [p for p in paths if repr(get(self.cars[0], p)) != repr(get(self.cars[1], p))]
+        (first, last), paths = self.passive, damper_paths(self.passive[0])
+        differ = [p for p in paths if repr(get(first, p)) != repr(get(last, p))]
         return (differ or paths)[:_MOST_DAMPERS]
 
 
 def constant_damping(shown: Rides, comfort: Sequence[str], grip: Sequence[str]) -> tuple[np.ndarray, np.ndarray] | str:
     """The mean metrics of comfort and grip with linear dampers from soft to firm; or why they cannot be driven."""
-    car = without_fitted_ranges(shown.cars[0].passive)
+    car = without_fitted_ranges(shown.passive[0])
     paths = damper_paths(car)
     rates = {path: _slope(get(car, path)) for path in paths}
     try:

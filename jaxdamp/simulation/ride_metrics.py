@@ -117,7 +117,7 @@ def _weighted(response: "Response", channel: str, weighting: str, dt: ScalarLike
 def _at_rest(response: "Response") -> Float[Array, " channels"]:
     """The channels in the static equilibrium on the first heights of the run, forces left out."""
     road, system = response.run.road[0], response.system
-    return system.outputs(settled(system, road), jnp.zeros(len(system.laws)), road, None)
+    return system.outputs(settled(system, road), jnp.zeros(system.outputs.force.shape[1]), road, None)
 
 
 if TYPE_CHECKING:

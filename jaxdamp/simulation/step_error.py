@@ -1,6 +1,5 @@
 """The error of a step, estimated: a stretch of the run driven with it and with half of it."""
 
-import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -101,7 +100,7 @@ def _driven(
     from jaxdamp.simulation.exponential import ExponentialStepper  # which asks for this estimate itself
 
     (heights, count), parts = road, substeps.astype(dt.dtype)
-    system = dataclasses.replace(system, control=None)  # whose jumps would be compared, not the step
+    system = system.passive()  # the jumps of a controller would be compared, not the step
     outputs, stepper = system.channels(names), ExponentialStepper(Equations(system), dt / parts)
     slopes = road_rate(heights, dt)
 

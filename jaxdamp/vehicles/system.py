@@ -121,6 +121,11 @@ class System(eqx.Module):
         """The outputs of these channels."""
         return self.outputs.of([self.layout.numbers[name] for name in names])
 
+    def passive(self) -> "System":
+        """The same without its controller."""
+        outputs = dataclasses.replace(self.outputs, force=self.outputs.force[:, : len(self.laws)])
+        return dataclasses.replace(self, outputs=outputs, control=None)
+
 
 def assemble(frame: Frame) -> System:
     """The system of a vehicle of these parts."""

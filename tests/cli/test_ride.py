@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from jaxdamp import roads, simulate, vehicles
+from jaxdamp.cli.controlling import parse_policy
 from jaxdamp.cli.jobs import with_step_warnings
 from jaxdamp.cli.riding import Driving, parse_road
 from jaxdamp.cli.vehicle_words import presets
-from jaxdamp.dampers import AbstractDamper, Bilinear, Linear
+from jaxdamp.control import Controlled, Skyhook
+from jaxdamp.dampers import AbstractDamper, Bilinear, Linear, Scheduled
 from jaxdamp.export import to_json
 
 from .invoking import jaxdamp, refused
@@ -73,6 +75,37 @@ def test_ride_compares_a_law_with_a_baseline(law: Path, tmp_path: Path) -> None:
 )
 def test_wrong_words_are_refused(law: Path, tmp_path: Path, words: list[str], message: str) -> None:
     assert message in refused(tmp_path, "ride", law, *words, "--out", tmp_path / "out")
+
+
+def test_a_controller_is_compared_with_the_law_at_its_own_command(tmp_path: Path) -> None:
+    damper = Scheduled((Linear(1000.0), Linear(6000.0)), levels=[0.0, 1.0], command=0.25)
+    words = ["--controller", "skyhook:gain=3000,lead=0.01", "--delay", "0.002", "--actuator-lag", "0.003"]
+    out = tmp_path / "ride"
+    law = _written(damper, tmp_path / "law.json")
+    jaxdamp("ride", law, "--vehicle", "half_car_002", "--duration", "1", *words, "--out", out)
+    rows = {row["metric"]: row for row in csv.DictReader((out / "metrics.csv").read_text().splitlines())}
+    car, road = vehicles.presets.half_car_002(damper), roads.iso8608("C", 20.0, 1.0, seed=0)
+    controlled = Controlled(car, Skyhook(3000.0, 0.01), actuator_lag=0.003, delay=0.002)
+    for column, vehicle in {"baseline": car, "law": controlled}.items():
+        expected = float(simulate(vehicle, road, duration=1.0).metrics(["comfort"])["weighted_rms_sprung_acceleration"])
+        assert float(rows["weighted_rms_sprung_acceleration"][column]) == pytest.approx(expected, rel=1e-9)
+    assert (out / "ride_sheet.png").exists() and "front_damper_command" in (out / "channels_law.csv").read_text()
+    with pytest.raises(AssertionError, match="take a command"):
+        jaxdamp("ride", _written(Linear(1500.0), tmp_path / "linear.json"), *words, "--out", tmp_path / "other")
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("skyhok", "Did you mean 'skyhook'"),
+        ("skyhook:gin=1", "must be one of 'gain', 'lead'"),
+        ("skyhook:3000", "must read like skyhook:gain=3000"),
+        ("power-driven", "must have a stiffness"),
+    ],
+)
+def test_a_wrong_controller_is_refused(word: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        parse_policy(word)
 
 
 def test_a_coarse_step_is_said_in_the_words_of_the_command_line() -> None:

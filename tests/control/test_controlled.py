@@ -132,6 +132,8 @@ def test_dampers_have_policies_and_states_of_their_own():
     np.testing.assert_allclose(rear, 1200.0, rtol=1e-6)  # keeps its command
     both = simulate(Controlled(half, Skyhook(3000.0)), ROAD, duration=1.0)
     assert np.any(both["front_damper_command"] != both["rear_damper_command"])
+    metrics = both.metrics()
+    assert float(metrics["rms_pitch_angle"]) > 0.0  # from the static equilibrium, which has no commands
     part = both.between(0.5, 1.0)
     np.testing.assert_array_equal(part["rear_damper_command"], both["rear_damper_command"][500:])
 
@@ -176,6 +178,12 @@ def test_steps_are_short_enough_for_all_commands():
     ride = Ride(Controlled(steep, Skyhook(1e9)), ROAD, metrics=METRICS, duration=1.0)
     assert ride.substeps > Ride(steep, ROAD, metrics=METRICS, duration=1.0).substeps == 1
     assert float(ride()["rms_sprung_acceleration"]) < 10.0
+
+
+def test_the_error_of_a_coarse_step_is_estimated_without_the_controller():
+    half = HalfCar(700.0, 1200.0, 1.2, 1.5, Corner(40.0, 18e3, 2e6, DAMPER), Corner(45.0, 22e3, 2e6, DAMPER))
+    with pytest.warns(simulation.CoarseStepWarning, match="coarse for this vehicle"):
+        Ride(Controlled(half, Skyhook()), roads.iso8608("C", speed=20.0, seed=1), duration=2.0, dt=5e-3)
 
 
 def test_single_precision_drives_too(car):
