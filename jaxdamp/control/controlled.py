@@ -25,7 +25,9 @@ class Controlled(AbstractVehicle):
     nearest, at the present motion and state of the law, is applied after `delay` and held, and the actuator follows it
     with a first-order lag:
 
-        u' = (u_target − u)/actuator_lag,    filtered signals y' = (signal − y)/sensor_lag
+        u' = (u_target − u)/actuator_lag
+
+    The sensors' filter is one of their own clock, the instants of the run: y += (1 − e^(−dt/sensor_lag)) (signal − y).
 
     Between two levels of a `Scheduled` law its force is taken as straight in the command, which it is where the law is
     linear in its parameters or its forces are blended; else the force misses the demand a little. Demand and command

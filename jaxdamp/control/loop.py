@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
+from jaxdamp._limits import within
 from jaxdamp._types import Scalar, ScalarLike
 from jaxdamp._vectors import MemoryLayout, Vector, laid_out, scalars, times
 from jaxdamp.control.policies import AbstractPolicy, Signals
@@ -138,12 +139,16 @@ class ControlLoop(eqx.Module):
     def resumed(self, state: ControlState, dt: Scalar) -> tuple[Commands, Commands]:
         """Commands at an instant under its target; and how much they were greater a step of dt [s] before.
 
-        As if the actuator had always followed this target; without a lag the command is the target.
+        As if the actuator had always followed this target; without a lag the command is the target. A lag shorter than
+        the step is not resolved: the command then begins where its mean over the step is right if it runs straight.
         """
-        has_lag = self.actuator_lag > 0.0
-        rise = 1.0 / jnp.where(has_lag, _decay(dt, self.actuator_lag), 1.0) - 1.0
-        pairs = list(zip(state.target, state.command, strict=True))
-        return tuple(jnp.where(has_lag, u, t) for t, u in pairs), tuple(rise * (u - t) for t, u in pairs)
+        lag = self.actuator_lag
+        steps = dt / jnp.where(lag > dt, lag, dt)  # at most one, also where the other branch counts
+        decay = _decay(dt, lag)
+        begin = jnp.where(lag > dt, 1.0, 2.0 * lag / dt * (1.0 - decay) - decay)
+        rise = jnp.where(lag > dt, jnp.exp(steps) - 1.0, 0.0)
+        pairs = [(t, u - t) for t, u in zip(state.target, state.command, strict=True)]
+        return tuple(t + begin * left for t, left in pairs), tuple(rise * left for _, left in pairs)
 
 
 @final
@@ -235,10 +240,12 @@ def _difference_at(soft: AbstractDamper, hard: AbstractDamper, velocity: Scalar)
 
 
 ROUNDED = 0.1  # share of the range over which its limits are rounded
+FAR = 100.0  # shares, from where on nothing changes
 
 
 def _rounded_limits(share: Scalar) -> Scalar:
     """A share between zero and one, smooth: (1 + √(s² + w²) − √((s − 1)² + w²))/2."""
+    share = within(share, -FAR, FAR)  # roots of far greater numbers would differ by rounding alone
     above = share - 1.0
     return 0.5 * (1.0 + jnp.sqrt(share * share + ROUNDED**2) - jnp.sqrt(above * above + ROUNDED**2))
 

@@ -145,8 +145,9 @@ class Response(eqx.Module, AbstractResult):
         if channel in self._computed:
             return self._computed[channel]
         number = jnp.asarray(numbers[channel])
-        forces = [self.port_force] if self.commands is None else [self.port_force, self.commands]
-        force = jnp.concatenate(forces, axis=-1) if len(forces) > 1 else self.port_force
+        force = self.port_force
+        if self.commands is not None:
+            force = jnp.concatenate([force, self.commands], axis=-1)
         values = _channel(self.system.outputs, number, self.motion, force, self.road, self.road_rate)
         if _checks.concrete(values) is None:  # traced: it belongs to one program
             return values
@@ -190,15 +191,8 @@ class Response(eqx.Module, AbstractResult):
             _checks.refuse("start, stop", must, f"{start:g} and {stop:g}")
         part, last = slice(inside[0], inside[-1] + 1), inside[-1] + 1 == time.size
         states = [state if last else jnp.full_like(state, jnp.nan) for state in self.final_state]
-        names = [
-            "time",
-            "motion",
-            "port_force",
-            "road",
-            "road_rate",
-            *(["commands"] if self.commands is not None else []),
-        ]
-        arrays = {name: getattr(self, name)[part] for name in names}
+        names = ("time", "motion", "port_force", "road", "road_rate", "commands")
+        arrays = {name: values[part] for name in names if (values := getattr(self, name)) is not None}
         begin = jnp.asarray(inside[0] + (0 if self.begin is None else self.begin))
         return dataclasses.replace(self, **arrays, final_state=states, whole=self.run, begin=begin)
 

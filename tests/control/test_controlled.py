@@ -11,7 +11,15 @@ import pytest
 
 import jaxdamp
 from jaxdamp import Ride, roads, simulate, simulation, vehicles
-from jaxdamp.control import AbstractPolicy, Controlled, Groundhook, PowerDriven, Skyhook, StateFeedback
+from jaxdamp.control import (
+    AbstractPolicy,
+    AccelerationDriven,
+    Controlled,
+    Groundhook,
+    PowerDriven,
+    Skyhook,
+    StateFeedback,
+)
 from jaxdamp.dampers import AbstractDamper, Bilinear, Lag, Linear, MotionRatio, Scheduled
 from jaxdamp.export import to_c
 from jaxdamp.vehicles import Corner, HalfCar, QuarterCar
@@ -173,6 +181,15 @@ def test_a_law_with_states_is_commanded():
     assert np.ptp(run["damper_command"]) > 0.8 and np.all(np.isfinite(run["damper_force"]))
 
 
+def test_lags_shorter_than_a_step_are_driven_too():
+    car = Controlled(quarter(), Skyhook(3000.0))
+    lags = {"actuator_lag": [0.0, 1e-9, 1e-5, 1e-4, 5e-4, 9.99e-4, 1.001e-3]}  # of 1 ms
+    steps = (1e-3, 1.25e-4)
+    coarse, exact = (jaxdamp.sweep(Ride(car, ROAD, metrics=METRICS, duration=2.0, dt=dt), lags) for dt in steps)
+    for name in METRICS:
+        np.testing.assert_allclose(coarse[name], exact[name], rtol=3e-3)
+
+
 def test_steps_are_short_enough_for_all_commands():
     steep = quarter(Scheduled((Linear(300.0), Linear(2e5)), levels=[0.0, 1.0], command=0.0))
     ride = Ride(Controlled(steep, Skyhook(1e9)), ROAD, metrics=METRICS, duration=1.0)
@@ -190,7 +207,10 @@ def test_single_precision_drives_too(car):
     with jax.enable_x64(False):
         single = Controlled(quarter(Scheduled((Linear(300.0), Linear(3900.0)), [0.0, 1.0], 0.25)), Groundhook())
         values = Ride(single, roads.iso8608("C", speed=20.0, seed=1), metrics=METRICS, duration=1.0)()
+        on_off = Controlled(single.car, AccelerationDriven(1e12))
+        command = simulate(on_off, roads.iso8608("C", speed=20.0, seed=1), duration=1.0)["damper_command"]
     assert values[METRICS[0]].dtype == jnp.float32 and 0.5 < float(values[METRICS[0]]) < 5.0
+    assert -1e-4 < float(jnp.min(command)) < 0.01 and 0.99 < float(jnp.max(command)) < 1.0001
 
 
 @pytest.mark.parametrize(
