@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from jaxdamp import _checks
 from jaxdamp._types import Number, Scalar
-from jaxdamp.control.loop import ControlLoop, laws_at_levels, scheduled_in
+from jaxdamp.control.loop import ControlLoop, forces_at, laws_at_levels, scheduled_in
 from jaxdamp.control.policies import AbstractPolicy
 from jaxdamp.parameters import nonnegative, parameter, positive, setting
 from jaxdamp.vehicles import AbstractVehicle, Channel, ChannelKind, Frame, Layout, LinearMap, System
@@ -50,7 +50,8 @@ class Controlled(AbstractVehicle):
 
     Raises:
         ValueError: no damper that takes a command, a name of no damper, a law whose force does not change at once with
-            its command, such as one behind a lag.
+            its command, as it stands behind a lag or a series spring whose state gives it; with `blend="force"`, each
+            level has a state of its own.
 
     >>> from jaxdamp import Ride, roads
     >>> from jaxdamp.control import Skyhook
@@ -88,7 +89,7 @@ class Controlled(AbstractVehicle):
             known = _checks.concrete(forces[name])
             if known is not None and np.ptp(known) == 0.0:
                 must = "have a force that changes at once with its command"
-                remedy = "Put the lag of the damper into `actuator_lag`, and its law without one into the car."
+                remedy = 'Blend the forces of its levels, `blend="force"`, or put its lag into `actuator_lag`.'
                 _checks.refuse(name, must, f"one that is {known[0]:g} N at {float(self.still):g} m/s always", remedy)
 
     def policies(self, dampers: Sequence[str]) -> dict[str, AbstractPolicy]:
@@ -127,14 +128,11 @@ def _channels(dampers: list[str]) -> list[Channel]:
 
 @eqx.filter_jit
 def _forces_at_levels(car: AbstractVehicle, velocity: Scalar) -> dict[str, Float[Array, " levels"]]:
-    """Of each damper that takes a command, its force at a velocity at rest, at all levels."""
+    """Of each damper that takes a command, its force at a velocity at all levels, with the same states."""
     forces = {}
     for name, law in zip(car.layout.ports, car.elements(), strict=True):
         if len(scheduled_in(law)) == 1:
-            laws = laws_at_levels(law)
-            forces[name] = jnp.stack(
-                [law.force(jnp.zeros_like(velocity), velocity, law.initial_state()) for law in laws]
-            )
+            forces[name] = forces_at(laws_at_levels(law), velocity)
     return forces
 
 

@@ -169,7 +169,9 @@ class Sampler:
         self._share = 1.0 - _decay(dt, loop.sensor_lag)
         self._levels = [scalars(scheduled_in(laws[port])[0].levels) for port in loop.ports]
         self._laws = [laws_at_levels(laws[port]) for port in loop.ports]
-        self._small = [[_difference_at(*pair, loop.still) for pair in itertools.pairwise(laws)] for laws in self._laws]
+        self._small = [
+            [jnp.diff(forces_at(pair, loop.still))[0] for pair in itertools.pairwise(laws)] for laws in self._laws
+        ]
 
     def begin(self, signals: tuple[Signals, ...]) -> ControlState:
         """Before the first sample, which the first instant takes."""
@@ -228,17 +230,26 @@ class Sampler:
         levels, command = self._levels[damper], self._levels[damper][0]
         for i, small in enumerate(self._small[damper]):
             rise = forces[i + 1] - forces[i]
-            share = (demand - forces[i]) * rise / (rise * rise + small * small)
+            share = (demand - forces[i]) * rise / (rise * rise + small * small + LEAST)
             command = command + (levels[i + 1] - levels[i]) * _rounded_limits(share)
         return command
 
 
-def _difference_at(soft: AbstractDamper, hard: AbstractDamper, velocity: Scalar) -> Scalar:
-    """By how much the forces of two laws at rest differ at a velocity."""
-    one, other = (law.force(jnp.zeros_like(velocity), velocity, law.initial_state()) for law in (soft, hard))
-    return other - one
+def forces_at(laws: Sequence[AbstractDamper], velocity: Scalar) -> Float[Array, " laws"]:
+    """The forces of laws [N] at a velocity that has been held, with the states that the first of them then has."""
+    zero, first = jnp.zeros_like(velocity), laws[0]
+    state = first.initial_state()
+    if state.size:
+
+        def held(state: Array, _: None) -> tuple[Array, None]:
+            return first.advance(zero, velocity, zero, velocity, state, HELD / STEPS), None
+
+        state, _ = jax.lax.scan(held, state, None, length=STEPS)
+    return jnp.stack([law.force(zero, velocity, state) for law in laws])
 
 
+HELD, STEPS = 0.2, 200  # s, and steps, in which friction and hysteresis at a velocity settle
+LEAST = 1e-12  # N², where two levels have the same force
 ROUNDED = 0.1  # share of the range over which its limits are rounded
 FAR = 100.0  # shares, from where on nothing changes
 

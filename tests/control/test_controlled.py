@@ -20,13 +20,14 @@ from jaxdamp.control import (
     Skyhook,
     StateFeedback,
 )
-from jaxdamp.dampers import AbstractDamper, Bilinear, Lag, Linear, MotionRatio, Scheduled
+from jaxdamp.dampers import AbstractDamper, Bilinear, BoucWen, Lag, Linear, LuGre, MotionRatio, Scheduled, SeriesSpring
 from jaxdamp.export import to_c
 from jaxdamp.vehicles import Corner, HalfCar, QuarterCar
 
 
 METRICS = ["rms_sprung_acceleration", "rms_dynamic_tyre_load"]
 DAMPER = Scheduled((Linear(300.0), Linear(3900.0)), levels=[0.0, 1.0], command=0.25)
+SPRUNG = Scheduled(tuple(SeriesSpring(Linear(c), 2e5) for c in (300.0, 3900.0)), levels=[0.0, 1.0], command=0.0)
 NO_POLICY = cast("AbstractPolicy", 3000.0)
 ROAD = roads.iso8608("C", speed=20.0, seed=1, duration=4.0)
 
@@ -181,6 +182,25 @@ def test_a_law_with_states_is_commanded():
     assert np.ptp(run["damper_command"]) > 0.8 and np.all(np.isfinite(run["damper_force"]))
 
 
+@pytest.mark.parametrize(
+    ("law", "blend"),
+    [
+        (lambda f: BoucWen(600.0, 0.0, 150.0 * f, 1e-3), "parameters"),
+        (lambda f: LuGre(1e5 * f, 300.0, 500.0, 100.0 * f, 120.0 * f, 0.02), "force"),
+        (lambda f: Linear(600.0) + SeriesSpring(Linear(500.0 * f), 2e5), "force"),
+    ],
+    ids=["Bouc-Wen", "LuGre", "series spring"],
+)
+def test_laws_whose_states_give_the_force_are_commanded(law, blend):
+    damper = Scheduled((law(1.0), law(6.0)), levels=[0.0, 1.0], command=0.2, blend=blend)
+    car = Controlled(quarter(damper), Skyhook(2e4), actuator_lag=5e-3)
+    bump = roads.cosine_bump(0.05, start=0.2, length=2.0, speed=10.0)
+    coarse, fine = (simulate(car, bump, duration=1.0, dt=dt) for dt in (1e-3, 2.5e-4))
+    assert np.ptp(fine["damper_command"]) > 0.7
+    error = coarse["z_sprung"] - fine["z_sprung"][::4]
+    assert np.abs(error).max() < 2e-3 * np.abs(fine["z_sprung"]).max()
+
+
 def test_lags_shorter_than_a_step_are_driven_too():
     car = Controlled(quarter(), Skyhook(3000.0))
     lags = {"actuator_lag": [0.0, 1e-9, 1e-5, 1e-4, 5e-4, 9.99e-4, 1.001e-3]}  # of 1 ms
@@ -218,6 +238,7 @@ def test_single_precision_drives_too(car):
     [
         (lambda: Controlled(quarter(Linear(1500.0)), Skyhook()), "`car` must have a damper with one `Scheduled` law"),
         (lambda: Controlled(quarter(Lag(DAMPER, 0.01)), Skyhook()), "`damper` must have a force that changes at once"),
+        (lambda: Controlled(quarter(SPRUNG), Skyhook()), "Blend the forces of its levels"),
         (lambda: Controlled(quarter(), {"rear_damper": Skyhook()}), "`policy` must be one of 'damper'"),
         (
             lambda: Controlled(quarter(), {"damper": cast("AbstractPolicy", 3000.0)}),
