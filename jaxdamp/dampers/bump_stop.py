@@ -4,6 +4,7 @@ from typing import final
 
 import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Array
 
 from jaxdamp import _checks
 from jaxdamp._limits import at_least, within
@@ -12,7 +13,7 @@ from jaxdamp.dampers.base import AbstractStateless
 from jaxdamp.parameters import nonnegative, parameter, positive, setting
 
 
-def penetration(travel: ScalarLike, width: ScalarLike) -> tuple[Scalar, Scalar]:
+def penetration(travel: ScalarLike | Array, width: ScalarLike | Array) -> tuple[Array, Array]:
     """Penetration d [m] and its slope g for a travel u [m] beyond first contact, its onset rounded over `width` w.
 
     d = 0 for u < 0, u²/(2w) up to w, u − w/2 beyond. The slope g rises from 0 to 1 over the width.
