@@ -144,10 +144,13 @@ def _controlled_system(vehicle: Controlled, layout: Layout) -> System:
     if not policies:
         _checks.refuse("car", "have a damper that takes a command, for its controller", ", ".join(system.layout.ports))
     ports = tuple(system.layout.ports.index(name) for name in policies)
-    wheels = {name for wheel in frame.wheels for name in wheel.point.terms}
-    sprung = jnp.array([0.0 if name in wheels else 1.0 for name in system.layout.coordinates])
-    n, motion, outputs = sprung.size, system.motion, system.outputs
-    body = system.form.ports[np.array(ports)] * sprung[None, :]
+    n, motion, outputs = len(system.layout.coordinates), system.motion, system.outputs
+    rows = system.form.ports[np.array(ports)]
+    body = jnp.zeros_like(rows)
+    for part in frame.bodies:  # above a damper is the body that lengthens it when it rises
+        own = np.array([name in part.masses for name in system.layout.coordinates])
+        height = system.layout.coordinates.index(f"z_{part.name}")
+        body = jnp.where(own[None, :] & (rows[:, height] > 0.0)[:, None], rows, body)
     rates = (getattr(motion, name)[n:] for name in ("motion", "force", "road", "road_rate"))
     loop = ControlLoop(
         tuple(policies.values()),

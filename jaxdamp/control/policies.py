@@ -13,7 +13,7 @@ from typing import NamedTuple, final
 from jaxtyping import PyTree
 
 from jaxdamp._types import Number, Scalar
-from jaxdamp.parameters import Module, check_parameters, nonnegative, parameter, readable, real
+from jaxdamp.parameters import Module, check_parameters, interval, nonnegative, parameter, readable, real
 
 
 class Signals(NamedTuple):
@@ -94,7 +94,7 @@ class Hybrid(AbstractPolicy):
     """F = g (σ ż_b − (1 − σ) ż_w): skyhook and groundhook by shares σ and 1 − σ."""
 
     gain: Number = parameter("N s/m", "force per velocity", nonnegative, default=3000.0)
-    share: Number = parameter("", "share of skyhook", nonnegative, default=0.5)
+    share: Number = parameter("", "share of skyhook", interval(0.0, 1.0), default=0.5)
 
     def __call__(self, seen: Signals, state: PyTree) -> tuple[Scalar, PyTree]:
         """The demanded force [N]."""

@@ -12,10 +12,12 @@ from jaxdamp import _checks
 from jaxdamp._jacobian import Mode
 from jaxdamp._types import Scalar, ScalarLike, Signal
 from jaxdamp._vectors import MemoryLayout
+from jaxdamp.control import ControlLoop
 from jaxdamp.dampers import AbstractDamper
 from jaxdamp.rig import AbstractLawEngine
 from jaxdamp.simulation.equations import STRAIGHT, Equations, RoadEdges, RoadInput, StepState
 from jaxdamp.simulation.step_size import RunCheck
+from jaxdamp.vehicles import System
 
 
 class AbstractObserver(ABC):
@@ -193,3 +195,20 @@ def chosen_engine(
     if spacing is not None and spacing != dt:
         _checks.refuse("dt", f"be left out, or be that of the engine, {spacing:g} s", dt)
     return engine, dt
+
+
+def check_control(engine: AbstractEngine, system: System, dt: float) -> None:
+    """Refuse an engine that cannot run a controller, and times of it that are not whole steps."""
+    control: ControlLoop | None = system.control
+    if control is None:
+        return
+    if not engine.runs_controllers:
+        remedy = "Leave it out, or drive `vehicle.passive`, with its dampers at fixed commands."
+        _checks.refuse("engine", "have fixed steps to run a controller", repr(engine), remedy)
+    for name in ("period", "delay"):
+        value: float = getattr(control, name)
+        steps = value / dt
+        if abs(steps - round(steps)) > 1e-6 or (name == "period" and steps < 0.5):
+            must = f"be a whole number of steps of {dt:g} s"
+            near = max(round(steps), 1) * dt
+            _checks.refuse(name, must, f"{value:g} s", f"Pass `{name}={near:g}`, or another `dt`.")

@@ -24,12 +24,12 @@ from jaxdamp.dampers import RangeUse, has_fitted_range
 from jaxdamp.metrics import Metric, MetricValues
 from jaxdamp.parameters import as_float, match_paths, parameters, replace
 from jaxdamp.roads import AbstractRoad, WhiteRoad
-from jaxdamp.simulation.engine import AbstractEngine, chosen_engine
+from jaxdamp.simulation.engine import AbstractEngine, check_control, chosen_engine
 from jaxdamp.simulation.equations import Equations, settled
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.notes import range_uses
 from jaxdamp.simulation.observer import MetricObserver, recorded
-from jaxdamp.simulation.run import check_control, refuse_stacked, run_check, sampled
+from jaxdamp.simulation.run import refuse_stacked, run_check, sampled
 from jaxdamp.simulation.stationary import in_motion, stationary_dampers, stationary_metrics, stationary_range_use
 from jaxdamp.simulation.wheels import delays_by_itself, heights_under_wheels, moves_axles
 from jaxdamp.vehicles import AbstractVehicle, EquivalentDamper, is_stationary, refuse_controller

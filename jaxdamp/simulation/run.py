@@ -14,12 +14,11 @@ from jaxdamp import _checks
 from jaxdamp._field_types import check_field_types, check_module
 from jaxdamp._traced import at_compile_time, behind, is_traced
 from jaxdamp._types import Scalar, Signal
-from jaxdamp.control import ControlLoop
 from jaxdamp.dampers import coverage, warn_outside
 from jaxdamp.parameters import modules_inside
 from jaxdamp.roads import AbstractRoad
 from jaxdamp.simulation.adaptive import Adaptive
-from jaxdamp.simulation.engine import AbstractEngine, RunState, chosen_engine
+from jaxdamp.simulation.engine import AbstractEngine, RunState, check_control, chosen_engine
 from jaxdamp.simulation.equations import Equations, RoadEdges
 from jaxdamp.simulation.exponential import Exponential
 from jaxdamp.simulation.notes import range_sentences
@@ -289,23 +288,6 @@ def _instants(duration: float, dt: float, begins: Scalar | None) -> Signal:
         steps = begins / dt
         time = time + jnp.where(jnp.abs(steps - jnp.round(steps)) < 1e-6, jnp.round(steps), steps)
     return time * dt
-
-
-def check_control(engine: AbstractEngine, system: System, dt: float) -> None:
-    """Refuse an engine that cannot run a controller, and times of it that are not whole steps."""
-    control: ControlLoop | None = system.control
-    if control is None:
-        return
-    if not engine.runs_controllers:
-        remedy = "Leave it out, or drive `vehicle.passive`, with its dampers at fixed commands."
-        _checks.refuse("engine", "have fixed steps to run a controller", repr(engine), remedy)
-    for name in ("period", "delay"):
-        value: float = getattr(control, name)
-        steps = value / dt
-        if abs(steps - round(steps)) > 1e-6 or (name == "period" and steps < 0.5):
-            must = f"be a whole number of steps of {dt:g} s"
-            near = max(round(steps), 1) * dt
-            _checks.refuse(name, must, f"{value:g} s", f"Pass `{name}={near:g}`, or another `dt`.")
 
 
 def refuse_stacked(vehicle: AbstractVehicle) -> None:

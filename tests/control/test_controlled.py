@@ -22,7 +22,7 @@ from jaxdamp.control import (
 )
 from jaxdamp.dampers import AbstractDamper, Bilinear, BoucWen, Lag, Linear, LuGre, MotionRatio, Scheduled, SeriesSpring
 from jaxdamp.export import to_c
-from jaxdamp.vehicles import Corner, HalfCar, QuarterCar
+from jaxdamp.vehicles import Corner, HalfCar, QuarterCar, Seat, SeatMass
 
 
 METRICS = ["rms_sprung_acceleration", "rms_dynamic_tyre_load"]
@@ -145,6 +145,23 @@ def test_dampers_have_policies_and_states_of_their_own():
     assert float(metrics["rms_pitch_angle"]) > 0.0  # from the static equilibrium, which has no commands
     part = both.between(0.5, 1.0)
     np.testing.assert_array_equal(part["rear_damper_command"], both["rear_damper_command"][500:])
+
+
+def test_the_body_is_what_stands_above_a_damper_also_on_seats_and_road_wheels():
+    seat = Seat((SeatMass(80.0, 6e3, Scheduled((Linear(100.0), Linear(2000.0)), [0.0, 1.0], 0.0)),))
+    with_seat = QuarterCar(400.0, 50.0, 20e3, 250e3, Linear(1500.0), seats=(seat,))
+    hull = vehicles.presets.m113_003(damper=Scheduled((Linear(5e3), Linear(5e4)), [0.0, 1.0], 0.0))
+    half = HalfCar(700.0, 1200.0, 1.2, 1.5, Corner(40.0, 18e3, 200e3, DAMPER), Corner(45.0, 22e3, 200e3, DAMPER))
+    names = {"seat": ["z_seat"], "hull": ["z_sprung", "pitch"], "half": ["z_sprung", "pitch"]}
+    for case, car in {"seat": with_seat, "hull": hull, "half": half}.items():
+        run = simulate(Controlled(car, Skyhook(1.0), period=1e-3), ROAD, duration=0.5)  # demands the velocity
+        rates = np.asarray(run.motion)[:, len(car.coordinates) :]
+        for name in (unit.removesuffix("_demand") for unit in run.units if unit.endswith("_demand")):
+            row = np.asarray(run.system.form.ports)[run.system.layout.ports.index(name)]
+            body = [car.coordinates.index(coordinate) for coordinate in names[case]]
+            expected = rates[:-1, body] @ row[body]
+            assert np.ptp(expected) > 0.01
+            np.testing.assert_allclose(run[f"{name}_demand"][1:], expected, rtol=1e-9, atol=1e-12)
 
 
 class Network(AbstractPolicy):
